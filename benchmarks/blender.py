@@ -27,7 +27,7 @@ from vobench.rendering.path import PathRenderer
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, still
 from vobench.scene.material import reflectance
-from vobench.scene.mesh import Mesh, joined
+from vobench.scene.mesh import MeshArrays, arrays, joined_arrays
 from vobench.scene.scene import Scene
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
@@ -46,15 +46,15 @@ def job(scene: Scene, camera: Pinhole, poses: Sequence[Array]) -> dict[str, Any]
     for name in used:
         material = scene.materials[name]
         content[f"tile.{name}"] = reflectance(material)
-        content |= _triangles(name, [t.mesh for t in scene.things if t.material == name], material.tile_m)
+        content |= _triangles(name, [arrays(t.mesh) for t in scene.things if t.material == name], material.tile_m)
     for panel in scene.panels:
         content[f"luminance.{panel.name}"] = panel.luminance_cd_m2
-        content |= _triangles(panel.name, [panel.mesh], 1.0)
+        content |= _triangles(panel.name, [arrays(panel.mesh)], 1.0)
     return content | {"materials": [*used, *(panel.name for panel in scene.panels)]}
 
 
-def _triangles(name: str, meshes: Sequence[Mesh], tile: float) -> dict[str, Any]:
-    whole = joined(meshes)
+def _triangles(name: str, meshes: Sequence[MeshArrays], tile: float) -> dict[str, Any]:
+    whole = joined_arrays(meshes)
     return {f"corners.{name}": whole.corners_m, f"uv.{name}": whole.uv[whole.faces] / tile}
 
 

@@ -73,7 +73,7 @@ def test_a_name_that_is_not_offered_is_an_attribute_error() -> None:
     [
         ("Frame, Result, Rig, se3", "cv2 PIL trimesh vobench.asset vobench.dataset vobench.metric vobench.retired"),
         ("StereoTracker, stereo_pair", "PIL trimesh vobench.asset vobench.dataset vobench.metric vobench.runner"),
-        ("Mesh, block, lathe", "cv2 vobench.dataset vobench.estimator vobench.rendering vobench.runner"),
+        ("make_mesh, block, lathe", "cv2 vobench.dataset vobench.estimator vobench.rendering vobench.runner"),
         ("MetricDefinition, POSES", "cv2 vobench.asset vobench.dataset vobench.estimator vobench.rendering"),
         ("Layout, ReadOptions, assemble", "vobench.asset vobench.metric vobench.rendering vobench.runner"),
     ],

@@ -8,7 +8,8 @@ Estimators   Estimator Frame Result Status Tracks Image EncoderReadings ImuReadi
              PoseFit pose_from_points carried_on: motion
              StereoTracker TrackerSettings Followed: a view whose points are tracked in both cameras
              parameters assert_contract: the manifest's parameters, and the contract in a plugin's own test
-Makers       Mesh Thing joined quad at block card cushion extrusion lathe pierced reveal sheet spline tube: shapes
+Makers       Thing make_mesh joined moved copies flipped two_sided textured: meshes, as trimesh.Trimesh
+             quad at block card cards cushion extrusion lathe pierced reveal sheet spline tube: shapes
              Material Picture Procedural coated matt wood picture STEEL CHROME WHITE DARK BLACK: materials, textures
              BRICK INK INKS NAVY OCHRE PAPER PLUM SAND TEAL: colours
              Part Piece put stood things mm bars bulb: furniture
@@ -56,16 +57,16 @@ if TYPE_CHECKING:
         at,
         block,
         card,
+        cards,
         cushion,
         extrusion,
         lathe,
-        pierced,
-        reveal,
         sheet,
         spline,
         tube,
     )
     from vobench.asset.texture import Procedural
+    from vobench.asset.wall import pierced, reveal
     from vobench.dataset.kalibr import chain_rig
     from vobench.dataset.layout import Layout, Writing
     from vobench.dataset.picture import Picture as RecordedPicture
@@ -134,7 +135,7 @@ if TYPE_CHECKING:
         Switched,
     )
     from vobench.scene.material import Material, Picture
-    from vobench.scene.mesh import Mesh, Thing, joined, quad
+    from vobench.scene.mesh import Thing, copies, flipped, joined, make_mesh, moved, quad, textured, two_sided
     from vobench.sensor.imu import ImuReadings
     from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2
     from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -175,11 +176,12 @@ HOMES = {
     "at": "vobench.asset.shape",
     "block": "vobench.asset.shape",
     "card": "vobench.asset.shape",
+    "cards": "vobench.asset.shape",
     "cushion": "vobench.asset.shape",
     "extrusion": "vobench.asset.shape",
     "lathe": "vobench.asset.shape",
-    "pierced": "vobench.asset.shape",
-    "reveal": "vobench.asset.shape",
+    "pierced": "vobench.asset.wall",
+    "reveal": "vobench.asset.wall",
     "sheet": "vobench.asset.shape",
     "spline": "vobench.asset.shape",
     "tube": "vobench.asset.shape",
@@ -271,10 +273,15 @@ HOMES = {
     "Switched": "vobench.scene.light",
     "Material": "vobench.scene.material",
     "Picture": "vobench.scene.material",
-    "Mesh": "vobench.scene.mesh",
     "Thing": "vobench.scene.mesh",
+    "copies": "vobench.scene.mesh",
+    "flipped": "vobench.scene.mesh",
     "joined": "vobench.scene.mesh",
+    "make_mesh": "vobench.scene.mesh",
+    "moved": "vobench.scene.mesh",
     "quad": "vobench.scene.mesh",
+    "textured": "vobench.scene.mesh",
+    "two_sided": "vobench.scene.mesh",
     "ImuReadings": "vobench.sensor.imu",
     "STANDARD_GRAVITY_MPS2": "vobench.trajectory.kinematics",
     "Stamps": "vobench.trajectory.trajectory",
@@ -324,7 +331,6 @@ __all__ = [
     "Layout",
     "Mask",
     "Material",
-    "Mesh",
     "MetricDefinition",
     "Opening",
     "OverLengths",
@@ -373,15 +379,18 @@ __all__ = [
     "block",
     "bulb",
     "card",
+    "cards",
     "carried_on",
     "chain_rig",
     "coarse_disparity",
     "coated",
     "comparable",
+    "copies",
     "corners_per_cell",
     "cross_matrix",
     "cushion",
     "extrusion",
+    "flipped",
     "follow",
     "follow_predicted",
     "inside",
@@ -390,8 +399,10 @@ __all__ = [
     "local_contrast",
     "looking",
     "lucas_kanade",
+    "make_mesh",
     "matt",
     "mm",
+    "moved",
     "numbered",
     "parameters",
     "picture",
@@ -412,10 +423,12 @@ __all__ = [
     "spline",
     "stereo_pair",
     "stood",
+    "textured",
     "things",
     "truth_file",
     "tube",
     "twist",
+    "two_sided",
     "unit",
     "unread",
     "wood",

@@ -90,9 +90,14 @@ GONE = {
         "rectify": "vobench.plugin.rectification gives the rectified views of a rig, vobench.plugin.stereo_pair a pair "
         "that matches pictures as they are",
     },
+    "vobench.plugin": {
+        "Mesh": "a mesh is a trimesh.Trimesh; vobench.plugin.make_mesh makes one of vertices, faces, texture "
+        "coordinates and normals"
+    },
+    "vobench.scene.mesh": {"Mesh": "a mesh is a trimesh.Trimesh, which vobench.plugin.make_mesh makes of arrays"},
     "vobench.scene.surface": {
         "LAP_M": "faces that touch need no lap",
-        "Surface": "a surface is a vobench.plugin.Mesh with a material's name, a vobench.plugin.Thing",
+        "Surface": "a surface is a vobench.plugin.Thing, a trimesh.Trimesh with a material's name",
         "Window": "vobench.plugin.Opening says where a wall is open",
         "box": "vobench.plugin.block makes a box",
         "rectangle": "vobench.plugin.quad makes a rectangle",

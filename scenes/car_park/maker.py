@@ -23,6 +23,7 @@ from vobench.plugin import (
     coated,
     joined,
     matt,
+    moved,
     picture,
     put,
     quad,
@@ -72,7 +73,7 @@ def _marks():
     for x, y, s in ((-9.0, -1.5, 1), (5.0, -1.5, 1), (-3.0, 1.5, -1), (10.0, 1.5, -1)):
         arrows.append(quad((x - 0.8, y - 0.08, 0.003), (1.6, 0, 0), (0, 0.16, 0)))
         head = [quad((0, 0, 0), (-0.7, 0.4, 0), (0.0, 0.2, 0)), quad((0, 0, 0), (0.0, -0.2, 0), (-0.7, -0.4, 0))]
-        arrows += [mesh.moved(at(x + s * 1.3, y, 0.0035, yaw=0 if s > 0 else 180)) for mesh in head]
+        arrows += [moved(mesh, at(x + s * 1.3, y, 0.0035, yaw=0 if s > 0 else 180)) for mesh in head]
     path = [quad((-15.2, -7.5, 0.003), (0.9, 0, 0), (0, 15, 0))]
     return [
         Part(joined([*lines, *arrows]), line),
@@ -92,7 +93,7 @@ def _structure():
         parts.append(
             Part(joined([stood((0.426, 0.426, 0.2), paint, x, y, 0.2 * k, bevel=0.02).mesh for x, y in places]), paint)
         )
-    beams = [block((0.4, WIDE - 0.01, 0.35), bevel_m=0.02).moved(at(x, 0, HIGH - 0.178)) for x in PILLARS_X]
+    beams = [block((0.4, WIDE - 0.01, 0.35), bevel_m=0.02, transform=at(x, 0, HIGH - 0.178)) for x in PILLARS_X]
     trays = [stood((1.5, 0.16, 0.08), WHITE, x, y, HIGH - 0.1) for x, y in LAMPS]
     red = [tube([[-LONG / 2 + 0.1, y, 2.28], [LONG / 2 - 0.1, y, 2.28]], 0.05, sections=12) for y in (-3.3, 3.3)]
     heads = [tube([[x, y, 2.28], [x, y, 2.15]], 0.02) for x in np.arange(-14, 14.1, 3.5) for y in (-3.3, 3.3)]

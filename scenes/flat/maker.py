@@ -29,10 +29,12 @@ from vobench.plugin import (
     coated,
     cushion,
     extrusion,
+    flipped,
     joined,
     lathe,
     matt,
     mm,
+    moved,
     picture,
     pierced,
     put,
@@ -98,7 +100,7 @@ def _partition(plaster):
     wide = GAP[1] - GAP[0]
     sides = [((GAP[0] - WIDE / 2) / 2, south, 0.0, HIGH), ((GAP[1] + WIDE / 2) / 2, north, 0.0, HIGH)]
     blocks = [
-        block((WALL_M, long, high), bevel_m=0).moved(at(WALL_X, y, z + high / 2))
+        block((WALL_M, long, high), bevel_m=0, transform=at(WALL_X, y, z + high / 2))
         for y, long, z, high in (*sides, (sum(GAP) / 2, wide, GAP_M, HIGH - GAP_M))
     ]
     jambs = [
@@ -159,10 +161,10 @@ def _sink():
     x = wide / 2
     y = long / 2
     walls = [
-        quad((-x, -y, -deep), (0, 0, deep), (0, long, 0)).flipped(),
-        quad((x, -y, -deep), (0, long, 0), (0, 0, deep)).flipped(),
-        quad((-x, -y, -deep), (wide, 0, 0), (0, 0, deep)).flipped(),
-        quad((-x, y, -deep), (0, 0, deep), (wide, 0, 0)).flipped(),
+        flipped(quad((-x, -y, -deep), (0, 0, deep), (0, long, 0))),
+        flipped(quad((x, -y, -deep), (0, long, 0), (0, 0, deep))),
+        flipped(quad((-x, -y, -deep), (wide, 0, 0), (0, 0, deep))),
+        flipped(quad((-x, y, -deep), (0, 0, deep), (wide, 0, 0))),
         quad((-x, -y, -deep), (wide, 0, 0), (0, long, 0)),
     ]
     ring = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
@@ -219,7 +221,7 @@ def _kitchen():
     plinth = [(x0, y0), (x0 + 0.54, y0), (x0 + 0.54, y1 - 0.54), (x1, y1 - 0.54), (x1, y1), (x0, y1)]
     yield "worktop", [top, put(extrusion(plinth, 0.1), DARK), *(p.moved(at(x0 + 0.32, 0.9, TOP_M)) for p in _sink())]
     tiles = coated("#eef0ec", picture.masonry("tile", 3, 1024, 0.8, rows=10, columns=5), roughness=0.1)
-    back = [quad((x1, y1 - 0.008, TOP_M), (x0 - x1, 0, 0), (0, 0, 0.56)).flipped()]
+    back = [flipped(quad((x1, y1 - 0.008, TOP_M), (x0 - x1, 0, 0), (0, 0, 0.56)))]
     back += [quad((x0 + 0.008, y1, TOP_M), (0, y0 - y1, 0), (0, 0, 0.13))]
     yield (
         "splashback",
@@ -229,7 +231,7 @@ def _kitchen():
         "west_tiles",
         [put(block((0.008, y1 - y0, 0.12), bevel_m=0.001), tiles, x0 + 0.004, (y0 + y1) / 2, TOP_M + 0.06)],
     )
-    rings = [lathe([[0, 0], [r, 0], [r, 0.001], [0, 0.001]]).moved(at(x, y, 0.008))
+    rings = [moved(lathe([[0, 0], [r, 0], [r, 0.001], [0, 0.001]]), at(x, y, 0.008))
              for x, y, r in ((-0.14, -0.12, 0.1), (0.14, -0.12, 0.08), (0.14, 0.13, 0.11))]  # fmt: skip
     plate = put(block((0.58, 0.51, 0.008), bevel_m=0.002), coated("#0e0f10", roughness=0.04), z=0.004)
     hob = [plate, put(joined(rings), coated("#3a3c3e", roughness=0.2))]
@@ -243,7 +245,7 @@ def _pot():
     body = lathe(mm("0 0, 105 0, 110 6, 110 130, 113 132, 0 138, 0 140"), sections=32)
     ears = [tube(spline(mm(f"{s * 108} -35 110, {s * 145} -25 115, {s * 145} 25 115, {s * 108} 35 110"), 10), 0.007)
             for s in (-1, 1)]  # fmt: skip
-    knob = lathe(mm("0 0, 10 0, 18 20, 0 24")).moved(at(z_m=0.138))
+    knob = moved(lathe(mm("0 0, 10 0, 18 20, 0 24")), at(z_m=0.138))
     return [put(joined([body, *ears]), coated(BRICK, roughness=0.12), -0.14, 0.13, 0.01),
             put(knob, BLACK, -0.14, 0.13, 0.01)]  # fmt: skip
 

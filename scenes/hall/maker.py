@@ -90,9 +90,9 @@ def _mullions():
     """Posts and rails before the panes, with a double door amid them."""
     y = -WIDE / 2 - 0.04
     edges = [x + s * 1.8 for x in BAYS_X for s in ((-1, 1) if x == BAYS_X[-1] else (-1,))]
-    posts = [block((0.1, 0.14, 4.3), bevel_m=0.004).moved(at(x, y, 2.15)) for x in edges]
-    posts += [block((0.06, 0.1, 4.1), bevel_m=0.004).moved(at(x, y, 2.1)) for x in BAYS_X]
-    rails = [block((LONG - 0.4, 0.12, 0.09), bevel_m=0.004).moved(at(0, y, z)) for z in (0.07, 2.5, 4.17)]
+    posts = [block((0.1, 0.14, 4.3), bevel_m=0.004, transform=at(x, y, 2.15)) for x in edges]
+    posts += [block((0.06, 0.1, 4.1), bevel_m=0.004, transform=at(x, y, 2.1)) for x in BAYS_X]
+    rails = [block((LONG - 0.4, 0.12, 0.09), bevel_m=0.004, transform=at(0, y, z)) for z in (0.07, 2.5, 4.17)]
     yield Part(joined([*posts, *rails]), DARK)
     grip = tube([[0, 0, 0.7], [0, 0, 1.6]], 0.018, sections=12)
     ends = [tube([[0, 0, z], [0, -0.07, z]], 0.012) for z in (0.8, 1.5)]
@@ -122,7 +122,8 @@ def _reception():
     stone = Material(colour=(0.75, 0.74, 0.72), texture=picture.terrazzo(3, 1024, 1.2), eta=1.5, roughness=0.06)
     yield stood((long, 0.05, 1.02), DARK, x, y - 0.34, 0.04)
     slats = [
-        block((0.035, 0.03, 1.0), bevel_m=0.004).moved(at(x + d, y - 0.378, 0.55)) for d in np.arange(-1.97, 2.0, 0.06)
+        block((0.035, 0.03, 1.0), bevel_m=0.004, transform=at(x + d, y - 0.378, 0.55))
+        for d in np.arange(-1.97, 2.0, 0.06)
     ]
     yield Part(joined(slats), wood("walnut"))
     yield stood((long + 0.1, 0.42, 0.05), stone, x, y - 0.25, 1.06, bevel=0.006)
@@ -148,10 +149,10 @@ def _lifts():
     """Two lifts with doors of steel, a plate of buttons between them and their floors above."""
     y = WIDE / 2
     for k, x in enumerate((-4.4, -2.2)):
-        leaf = [block((0.545, 0.03, 2.2), bevel_m=0.003).moved(at(x + s * 0.274, y - 0.02, 1.1)) for s in (-1, 1)]
+        leaf = [block((0.545, 0.03, 2.2), bevel_m=0.003, transform=at(x + s * 0.274, y - 0.02, 1.1)) for s in (-1, 1)]
         yield Part(joined(leaf), replace(STEEL, roughness=0.18))
-        jambs = [block((0.14, 0.12, 2.34), bevel_m=0.006).moved(at(x + s * 0.62, y - 0.055, 1.17)) for s in (-1, 1)]
-        lintel = block((1.1, 0.12, 0.14), bevel_m=0.006).moved(at(x, y - 0.055, 2.27))
+        jambs = [block((0.14, 0.12, 2.34), bevel_m=0.006, transform=at(x + s * 0.62, y - 0.055, 1.17)) for s in (-1, 1)]
+        lintel = block((1.1, 0.12, 0.14), bevel_m=0.006, transform=at(x, y - 0.055, 2.27))
         yield Part(joined([*jambs, lintel]), DARK)
         yield put(
             card((0.28, 0.14)), matt(texture=picture.sign(f"{k} {'vA'[k]}", "#141617")), x, y - 0.02, 2.5, yaw=-90
@@ -259,10 +260,10 @@ def _square():
     front = pierced(corner, (-90, 0, 0), (0, 0, high), holes)
     panes = [quad(corner - [u0, 0.15, -v0], (u0 - u1, 0, 0), (0, 0, v1 - v0)) for u0, u1, v0, v1 in holes]
     sills = [
-        block((u1 - u0 + 0.2, 0.22, 0.1), bevel_m=0).moved(at(45 - (u0 + u1) / 2, -23.95, v0 - 0.1))
+        block((u1 - u0 + 0.2, 0.22, 0.1), bevel_m=0, transform=at(45 - (u0 + u1) / 2, -23.95, v0 - 0.1))
         for u0, u1, v0, _ in holes
     ]
-    eaves = block((90, 0.5, 0.3), bevel_m=0).moved(at(0, -23.9, high))
+    eaves = block((90, 0.5, 0.3), bevel_m=0, transform=at(0, -23.9, high))
     brick = matt("#e8d8c8", picture.masonry("brick", 1))
     glass = coated("#20282e", roughness=0.12)
     yield "house", [Part(front, brick), Part(joined(panes), glass), Part(joined([*sills, eaves]), matt("#d9d5ca"))]

@@ -10,7 +10,6 @@ from scipy.spatial import cKDTree
 from vobench.plugin import (
     NAVY,
     AreaLight,
-    Mesh,
     Part,
     Picture,
     Piece,
@@ -18,14 +17,17 @@ from vobench.plugin import (
     at,
     bulb,
     card,
+    cards,
     coated,
     joined,
+    make_mesh,
     matt,
     picture,
     put,
     quad,
     sheet,
     stood,
+    textured,
     things,
     wood,
 )
@@ -168,8 +170,8 @@ def _paths(ways):
         crown = 0.035 - 0.11 * (2 * np.linspace(-0.5, 0.5, 9)) ** 6
         grid = np.concatenate([p, (height(p[..., 0], p[..., 1]) + crown)[..., None]], axis=-1)
         mesh = sheet(grid[:, ::-1])
-        meshes.append(replace(mesh, uv=mesh.vertices_m[:, :2].copy()))
-    meshes[1] = replace(meshes[1], vertices_m=meshes[1].vertices_m - [0, 0, 0.012])
+        meshes.append(textured(mesh, mesh.vertices[:, :2]))
+    meshes[1].apply_translation([0, 0, -0.012])
     return [Part(joined(meshes), matt("#f2ece0", _gravel()))]
 
 
@@ -179,8 +181,8 @@ def _turf(near):
     y = np.arange(-WIDE / 2, WIDE / 2 + 0.01, CELL_M)
     X, Y = np.meshgrid(x, y)
     mesh = sheet(np.stack([X, Y, height(X, Y)], axis=-1))
-    mesh = replace(mesh, uv=mesh.vertices_m[:, :2].copy())
-    middle = mesh.corners_m.mean(axis=1)
+    mesh = textured(mesh, mesh.vertices[:, :2])
+    middle = mesh.triangles.mean(axis=1)
     tint = (
         np.sin(middle[:, 0] / 5.2 + 1)
         + np.sin(middle[:, 1] / 4.1)
@@ -198,7 +200,7 @@ def _turf(near):
 def _some(mesh, faces):
     """A mesh of some of its faces."""
     used, index = np.unique(mesh.faces[faces], return_inverse=True)
-    return Mesh(mesh.vertices_m[used], index.reshape(-1, 3).astype(np.int32), mesh.uv[used], mesh.normals[used])
+    return make_mesh(mesh.vertices[used], index.reshape(-1, 3), mesh.visual.uv[used], mesh.vertex_normals[used])
 
 
 def _pond():
@@ -254,15 +256,15 @@ def _tufts(rng, near):
     chance = np.where((far > 0.75) & (far < 1.25), 0.8, 0.04) + 0.5 * np.exp(-(((away - 1.35) / 0.3) ** 2))
     chosen = places[(rng.random(len(places)) < chance) & (away > 1.12) & (far > 0.7)]
     blades = _blades()
-    cards = []
+    sizes_m = []
+    poses = []
     for x, y in chosen:
         high = float(rng.uniform(0.1, 0.26))
         for turn in (0, 90):
-            one = card((1.5 * high, high)).moved(
-                at(x, y, float(height(x, y)) + 0.42 * high, yaw=turn + float(rng.uniform(0, 90)))
-            )
-            cards.append(one.two_sided())
-    return [Part(joined(cards), replace(matt("#f4f6e0", blades), cutout=0.5))]
+            yaw = turn + float(rng.uniform(0, 90))
+            sizes_m.append((1.5 * high, high))
+            poses.append(at(x, y, float(height(x, y)) + 0.42 * high, yaw=yaw))
+    return [Part(cards(sizes_m, poses), replace(matt("#f4f6e0", blades), cutout=0.5))]
 
 
 def _blades(px=256):

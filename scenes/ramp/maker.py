@@ -28,6 +28,7 @@ from vobench.plugin import (
     lathe,
     matt,
     mm,
+    moved,
     picture,
     put,
     shell,
@@ -77,7 +78,7 @@ def make(seed):
 
 def _along(profile, y0, y1):
     """A prism over a profile (N, 2) of x and z, from y0 to y1."""
-    return extrusion(np.asarray(profile, float), y1 - y0).moved(at(0, y1, 0, roll=90))
+    return moved(extrusion(np.asarray(profile, float), y1 - y0), at(0, y1, 0, roll=90))
 
 
 def _flight(x0, z0, x1, z1):
@@ -101,13 +102,17 @@ def _ramp(raw):
         kerb = [(FOOT_X, z0), (HEAD_X, HALF_M), (HEAD_X, HALF_M + KERB_M), (FOOT_X, z0 + KERB_M)]
         kerbs += [_along(kerb, y, y + 0.14) for y in (sides[0], sides[1] - 0.14)]
     kerbs.append(
-        block((LONG / 2 - HEAD_X, 0.14, KERB_M), bevel_m=0).moved(
-            at((LONG / 2 + HEAD_X) / 2, UPPER_Y[1] - 0.07, HALF_M + KERB_M / 2)
+        block(
+            (LONG / 2 - HEAD_X, 0.14, KERB_M),
+            bevel_m=0,
+            transform=at((LONG / 2 + HEAD_X) / 2, UPPER_Y[1] - 0.07, HALF_M + KERB_M / 2),
         )
     )
     kerbs.append(
-        block((0.14, UPPER_Y[0] - LOWER_Y[1] + 0.28, KERB_M), bevel_m=0).moved(
-            at(HEAD_X + 0.07, (UPPER_Y[0] + LOWER_Y[1]) / 2, HALF_M + KERB_M / 2)
+        block(
+            (0.14, UPPER_Y[0] - LOWER_Y[1] + 0.28, KERB_M),
+            bevel_m=0,
+            transform=at(HEAD_X + 0.07, (UPPER_Y[0] + LOWER_Y[1]) / 2, HALF_M + KERB_M / 2),
         )
     )
     yield Part(joined(kerbs), matt("#c7c3ba", picture.ground("concrete", 8)))
@@ -120,7 +125,7 @@ def _ramp(raw):
             (UPPER_Y, TOP_M - SLOPE * (x - FOOT_X), tilt),
         ):
             strip = block((0.12 if k else 0.3, y1 - y0 - 0.3, 0.004), bevel_m=0)
-            strips.append(strip.moved(at(x, (y0 + y1) / 2, z + 0.002, pitch=pitch)))
+            strips.append(moved(strip, at(x, (y0 + y1) / 2, z + 0.002, pitch=pitch)))
     yield Part(joined(strips), matt("#5a574f", picture.ground("carpet", 3, 512, 0.8)))
 
 
@@ -134,11 +139,13 @@ def _stair(raw):
         x = FOOT_X + (k + 0.5) * TREAD_M
         z = TOP_M - (k + 1) * rise
         steps.append(
-            block((TREAD_M, STAIR_Y[1] - STAIR_Y[0], z), bevel_m=0, uv_m=(0.3 * k, 0.7 * k)).moved(at(x, y, z / 2))
+            block((TREAD_M, STAIR_Y[1] - STAIR_Y[0], z), bevel_m=0, uv_m=(0.3 * k, 0.7 * k), transform=at(x, y, z / 2))
         )
         edges.append(
-            block((0.05, STAIR_Y[1] - STAIR_Y[0] - 0.02, 0.004), bevel_m=0).moved(
-                at(x + TREAD_M / 2 - 0.03, y, z + 0.002)
+            block(
+                (0.05, STAIR_Y[1] - STAIR_Y[0] - 0.02, 0.004),
+                bevel_m=0,
+                transform=at(x + TREAD_M / 2 - 0.03, y, z + 0.002),
             )
         )
     yield Part(joined(steps), raw)
@@ -197,14 +204,16 @@ def _exhibits():
         axis=1,
     )
     tower = [
-        block((0.34 - 0.04 * k, 0.34 - 0.04 * k, 0.16), bevel_m=0.006).moved(
-            at(0.01 * k, 0, 0.08 + 0.16 * k, yaw=17 * k)
+        block(
+            (0.34 - 0.04 * k, 0.34 - 0.04 * k, 0.16),
+            bevel_m=0.006,
+            transform=at(0.01 * k, 0, 0.08 + 0.16 * k, yaw=17 * k),
         )
         for k in range(6)
     ]
     drop = lathe([[0, 0], [0.05, 0.0], [0.24, 0.3], [0.2, 0.5], [0.05, 0.8], [0, 0.86]], sections=40)
-    egg = cushion((0.5, 0.4, 0.45), power=3).moved(at(z_m=0.225))
-    bowl = vase.moved(np.diag([1.25, 1.25, 0.6, 1]))
+    egg = moved(cushion((0.5, 0.4, 0.45), power=3), at(z_m=0.225))
+    bowl = moved(vase, np.diag([1.25, 1.25, 0.6, 1]))
     knotted = (tube(ring, 0.055, sections=14), replace(STEEL, roughness=0.12))
     timber = (joined(tower), wood("walnut"))
     shapes = [(vase, glaze[0]), knotted, timber, (drop, glaze[1]), (egg, glaze[2]), (bowl, glaze[3])]

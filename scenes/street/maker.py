@@ -29,6 +29,7 @@ from vobench.plugin import (
     joined,
     lathe,
     matt,
+    moved,
     picture,
     pierced,
     put,
@@ -105,8 +106,8 @@ def _lamps():
 def _lit_windows(things):
     """Some windows of homes that shine at night: what lies just before their panes."""
     panes = joined([thing.mesh for thing in things if thing.name.startswith("house") and thing.material == GLASS_NAME])
-    quads = panes.vertices_m.reshape(-1, 4, 3)[::5]
-    before = panes.normals.reshape(-1, 4, 3)[::5] * 0.003
+    quads = panes.vertices.reshape(-1, 4, 3)[::5]
+    before = panes.vertex_normals.reshape(-1, 4, 3)[::5] * 0.003
     faces = [quad(c[0] + n[0], c[1] - c[0], c[3] - c[0]) for c, n in zip(quads, before, strict=True)]
     return AreaLight("windows", joined(faces), 250.0 * len(faces), OFF, colour=(1.25, 0.95, 0.62))
 
@@ -159,15 +160,19 @@ def _ground():
     ]
     slabs_of += [quad((x, -22, KERB_M), (PAVED_M, 0, 0), (0, 44, 0)) for x in (-far - PAVED_M, far)]
     yield "pavement", [Part(joined(slabs_of), slabs)]
-    kerbs = [block((LONG, 0.15, 0.3), bevel_m=0.015).moved(at(0, s * (edge + 0.02), KERB_M - 0.148)) for s in (-1, 1)]
+    kerbs = [
+        block((LONG, 0.15, 0.3), bevel_m=0.015, transform=at(0, s * (edge + 0.02), KERB_M - 0.148)) for s in (-1, 1)
+    ]
     kerbs += [
-        block((0.15, PAVED_M, 0.3), bevel_m=0.015).moved(
-            at(e * (half - 0.02), s * (edge + PAVED_M / 2), KERB_M - 0.148)
+        block(
+            (0.15, PAVED_M, 0.3),
+            bevel_m=0.015,
+            transform=at(e * (half - 0.02), s * (edge + PAVED_M / 2), KERB_M - 0.148),
         )
         for e in (-1, 1)
         for s in (-1, 1)
     ]
-    kerbs += [block((0.15, 44, 0.3), bevel_m=0.015).moved(at(e * (far + 0.02), 0, KERB_M - 0.148)) for e in (-1, 1)]
+    kerbs += [block((0.15, 44, 0.3), bevel_m=0.015, transform=at(e * (far + 0.02), 0, KERB_M - 0.148)) for e in (-1, 1)]
     yield "kerb", [Part(joined(kerbs), stone)]
     dashes = [
         quad((x, -0.06, 0.004), (2.0, 0, 0), (0, 0.12, 0))
@@ -182,9 +187,9 @@ def _ground():
     zebra = [quad((6.2, y, 0.004), (3.6, 0, 0), (0, 0.5, 0)) for y in np.arange(-edge + 0.25, edge - 0.3, 1.0)]
     stops = [quad((e * (half - 0.8) - 0.2, min(0.0, -e * edge), 0.004), (0.4, 0, 0), (0, edge, 0)) for e in (-1, 1)]
     yield "lines", [Part(joined([*dashes, *bays, *zebra, *stops]), line)]
-    lids = [_lid().moved(at(x, y, 0.003)) for x, y in ((-20, 0.9), (-3, -0.7), (15, 1.0), (29, -0.9))]
+    lids = [moved(_lid(), at(x, y, 0.003)) for x, y in ((-20, 0.9), (-3, -0.7), (15, 1.0), (29, -0.9))]
     gullies = [
-        block((0.45, 0.4, 0.01), bevel_m=0.003).moved(at(x, s * (edge - 0.3), 0.003))
+        block((0.45, 0.4, 0.01), bevel_m=0.003, transform=at(x, s * (edge - 0.3), 0.003))
         for x in (-25, -5, 16, 33)
         for s in (-1, 1)
     ]
@@ -267,18 +272,19 @@ def _house(rng, number, wide):
         y = (u0 + u1) / 2 - wide / 2
         z = (v0 + v1) / 2
         bars += [
-            block((0.05, 0.06, v1 - v0), bevel_m=0).moved(at(-0.13, y + s * (w / 2 - 0.03), z)) for s in (-1, 0, 1)
+            block((0.05, 0.06, v1 - v0), bevel_m=0, transform=at(-0.13, y + s * (w / 2 - 0.03), z)) for s in (-1, 0, 1)
         ]
         bars += [
-            block((0.05, w, 0.06), bevel_m=0).moved(at(-0.13, y, zz)) for zz in (v0 + 0.03, v0 + 0.68 * h, v1 - 0.03)
+            block((0.05, w, 0.06), bevel_m=0, transform=at(-0.13, y, zz))
+            for zz in (v0 + 0.03, v0 + 0.68 * h, v1 - 0.03)
         ]
-        sills.append(block((0.2, w + 0.2, 0.09), bevel_m=0).moved(at(0.02, y, v0 - 0.045)))
+        sills.append(block((0.2, w + 0.2, 0.09), bevel_m=0, transform=at(0.02, y, v0 - 0.045)))
         panes.append(quad((-0.15, u0 - wide / 2, v0), (0, w, 0), (0, 0, h)))
     cornice = [
-        block((0.5, wide, 0.14), bevel_m=0).moved(at(0.16, 0, high - 0.07)),
-        block((0.3, wide, 0.2), bevel_m=0).moved(at(0.06, 0, high - 0.25)),
+        block((0.5, wide, 0.14), bevel_m=0, transform=at(0.16, 0, high - 0.07)),
+        block((0.3, wide, 0.2), bevel_m=0, transform=at(0.06, 0, high - 0.25)),
     ]
-    band = block((0.16, wide, 0.16), bevel_m=0).moved(at(0.04, 0, SHOP_M + 0.1))
+    band = block((0.16, wide, 0.16), bevel_m=0, transform=at(0.04, 0, SHOP_M + 0.1))
     parts += [Part(joined([*sills, *cornice, band]), trim), Part(joined(panes), GLASS), Part(joined(bars), WHITE)]
     if number % 3 == 1:  # curtains behind some of the windows
         parts.append(
@@ -309,9 +315,9 @@ def _house(rng, number, wide):
 def _body(wide, high, look):
     """The roof and the two sides behind a front."""
     deep = 15.5
-    roof = [block((deep, wide, 0.1), bevel_m=0).moved(at(-deep / 2, 0, high - 0.06))]
+    roof = [block((deep, wide, 0.1), bevel_m=0, transform=at(-deep / 2, 0, high - 0.06))]
     side = block((deep, 0.1, high - 0.1), bevel_m=0)
-    sides = [side.moved(at(-0.02 - deep / 2, s * (wide / 2 - 0.05), high / 2 - 0.06)) for s in (-1, 1)]
+    sides = [moved(side, at(-0.02 - deep / 2, s * (wide / 2 - 0.05), high / 2 - 0.06)) for s in (-1, 1)]
     return [Part(joined(roof), DARK), Part(joined(sides), look)]
 
 
@@ -325,7 +331,7 @@ def _shop(rng, shop, wide, ink):
         goods = coated("#ffffff", _display(rng), roughness=0.12)
         parts.append(put(card((width, v1 - v0)), goods, -0.25, u0 - wide / 2 + (k + 0.5) * width, (v0 + v1) / 2))
     posts = [
-        block((0.07, 0.07, v1 - v0), bevel_m=0).moved(at(-0.2, u0 - wide / 2 + k * (u1 - u0) / bays, (v0 + v1) / 2))
+        block((0.07, 0.07, v1 - v0), bevel_m=0, transform=at(-0.2, u0 - wide / 2 + k * (u1 - u0) / bays, (v0 + v1) / 2))
         for k in range(bays + 1)
     ]
     parts.append(Part(joined(posts), coated(ink)))
@@ -335,11 +341,11 @@ def _shop(rng, shop, wide, ink):
 def _awning(ink, middle, wide):
     """Striped cloth over a shop window."""
     stripes = [
-        block((1.25, wide / 10, 0.015), bevel_m=0).moved(at(0.66, middle + (k - 4.5) * wide / 10, 2.72, pitch=16))
+        block((1.25, wide / 10, 0.015), bevel_m=0, transform=at(0.66, middle + (k - 4.5) * wide / 10, 2.72, pitch=16))
         for k in range(10)
     ]
     hems = [
-        block((0.012, wide / 10, 0.2), bevel_m=0).moved(at(1.27, middle + (k - 4.5) * wide / 10, 2.46))
+        block((0.012, wide / 10, 0.2), bevel_m=0, transform=at(1.27, middle + (k - 4.5) * wide / 10, 2.46))
         for k in range(10)
     ]
     pale = matt("#e4ded0")

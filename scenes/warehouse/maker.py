@@ -27,6 +27,7 @@ from vobench.plugin import (
     lathe,
     matt,
     mm,
+    moved,
     picture,
     put,
     shell,
@@ -79,7 +80,7 @@ def _bay_x(bay):
 
 def _rack(row, y):
     """Uprights with braces, beams and wire decks of a row of bays."""
-    post = block((0.08, 0.1, 4.6), bevel_m=0.004).moved(at(z_m=2.3))
+    post = block((0.08, 0.1, 4.6), bevel_m=0.004, transform=at(z_m=2.3))
     foot = block((0.14, 0.16, 0.01), bevel_m=0.002)
     uprights = []
     feet = []
@@ -89,16 +90,16 @@ def _rack(row, y):
     for k in range(BAYS + 1):
         x = _bay_x(k) - (BAY_M + 0.1) / 2
         for s in (-1, 1):
-            uprights.append(post.moved(at(x, y + s * DEEP_M / 2)))
-            feet.append(foot.moved(at(x, y + s * DEEP_M / 2, 0.005)))
+            uprights.append(moved(post, at(x, y + s * DEEP_M / 2)))
+            feet.append(moved(foot, at(x, y + s * DEEP_M / 2, 0.005)))
         for j in range(5):
             ends = [[x, y - DEEP_M / 2, 0.3 + 0.85 * j], [x, y + DEEP_M / 2, 0.3 + 0.85 * (j + 1)]]
             braces.append(tube(ends, 0.016, sections=5))
     beam = block((BAY_M, 0.05, 0.12), bevel_m=0)
     slat = block((0.1, DEEP_M - 0.06, 0.02), bevel_m=0)
     for x, z in ((_bay_x(bay), z) for bay in range(BAYS) for z in LEVELS_M[1:]):
-        beams += [beam.moved(at(x, y + s * DEEP_M / 2, z - 0.06)) for s in (-1, 1)]
-        decks += [slat.moved(at(x + along, y, z - 0.011)) for along in _slats()]
+        beams += [moved(beam, at(x, y + s * DEEP_M / 2, z - 0.06)) for s in (-1, 1)]
+        decks += [moved(slat, at(x + along, y, z - 0.011)) for along in _slats()]
     steel = ((uprights, BLUE), (feet, STEEL), (braces, BLUE), (beams, ORANGE), (decks, STEEL))
     yield f"rack_{row}", [Part(joined(meshes), paint) for meshes, paint in steel]
     for bay in range(BAYS):
@@ -158,7 +159,7 @@ def _load(rng, high_m):
         turn = rng.normal(0, 0.8) + 180 * rng.integers(2)
         place = at((i - (nx - 1) / 2) * 1.16 / nx + dx, (j - (ny - 1) / 2) * 0.78 / ny + dy, z0 + r * size[2], yaw=turn)
         tile = max(size)
-        boxes.append(block(size, bevel_m=0, uv_m=(tile / 2, tile / 2)).moved(at(z_m=size[2] / 2)).moved(place))
+        boxes.append(moved(block(size, bevel_m=0, uv_m=(tile / 2, tile / 2), transform=at(z_m=size[2] / 2)), place))
     tint = picture.some(rng, "#ffffff", "#f3ead9", "#e5e9ea", "#fff3dc")
     return [Part(joined(boxes), matt(tint, picture.carton(seed, max(size))))]
 
@@ -193,9 +194,9 @@ def _steelwork():
     beam = extrusion(profile * [0.1, 0.19], WIDE)
     parts = []
     for x in (-12.8, -6.3, 0.2, 6.7, 12.8):
-        parts += [column.moved(at(x, s * (WIDE / 2 - 0.16))) for s in (-1, 1)]
-        parts.append(beam.moved(at(x, WIDE / 2, HIGH - 0.2, roll=90)))
-    purlins = [block((LONG, 0.08, 0.16), bevel_m=0).moved(at(0, y, HIGH - 0.08)) for y in np.arange(-7, 7.1, 2)]
+        parts += [moved(column, at(x, s * (WIDE / 2 - 0.16))) for s in (-1, 1)]
+        parts.append(moved(beam, at(x, WIDE / 2, HIGH - 0.2, roll=90)))
+    purlins = [block((LONG, 0.08, 0.16), bevel_m=0, transform=at(0, y, HIGH - 0.08)) for y in np.arange(-7, 7.1, 2)]
     lamps = [(x, y) for x in (-6.0, 3.0) for y in (-4.75, 0.85, 6.4)]
     trays = [stood((2.5, 0.34, 0.06), WHITE, x, y, 5.905) for x, y in lamps]
     ends = [(x + s * 0.9, y) for x, y in lamps for s in (-1, 1)]
@@ -205,18 +206,20 @@ def _steelwork():
 
 def _markings():
     """Yellow lines along the aisles and around the space before the loading door, zebra and bay numbers."""
-    line = [block((17.2, 0.1, 0.003), bevel_m=0).moved(at(-1.5, y, 0.002)) for y in (-6.15, -3.35, -0.55, 2.25, 5.05)]
-    line += [block((0.1, 11.2, 0.003), bevel_m=0).moved(at(x, -0.55, 0.002)) for x in (7.6, 11.4)]
+    line = [
+        block((17.2, 0.1, 0.003), bevel_m=0, transform=at(-1.5, y, 0.002)) for y in (-6.15, -3.35, -0.55, 2.25, 5.05)
+    ]
+    line += [block((0.1, 11.2, 0.003), bevel_m=0, transform=at(x, -0.55, 0.002)) for x in (7.6, 11.4)]
     zebra = matt("#dcdbd6")
-    stripes = [block((0.4, 0.9, 0.003), bevel_m=0).moved(at(8.0 + 0.8 * k, 5.8, 0.002)) for k in range(5)]
+    stripes = [block((0.4, 0.9, 0.003), bevel_m=0, transform=at(8.0 + 0.8 * k, 5.8, 0.002)) for k in range(5)]
     return [Part(joined(line), YELLOW), Part(joined(stripes), zebra)]
 
 
 def _loading_door():
     """A roller door with guides and bumpers on the east wall, and a plate over it."""
     slat = block((0.04, 4.0, 0.118), bevel_m=0.01)
-    slats = joined([slat.moved(at(0, 0, 0.06 + 0.12 * k)) for k in range(34)])
-    stripe = joined([block((0.05, 0.12, 1.1)).moved(at(0.03, s * 2.2, 0.55)) for s in (-1, 1)])
+    slats = joined([moved(slat, at(0, 0, 0.06 + 0.12 * k)) for k in range(34)])
+    stripe = joined([block((0.05, 0.12, 1.1), transform=at(0.03, s * 2.2, 0.55)) for s in (-1, 1)])
     parts = [put(slats, coated("#b9bfc2", roughness=0.35), 0.03), Part(stripe, YELLOW)]
     parts += [stood((0.16, 0.14, 4.3), DARK, 0.08, s * 2.08) for s in (-1, 1)]
     parts += [stood((0.45, 4.5, 0.45), DARK, 0.22, 0, 4.1), stood((0.25, 0.2, 0.6), BLACK, 0.12, 2.6, 0.4)]

@@ -7,7 +7,7 @@ from vobench.analysis.scene import strength, survey
 from vobench.asset.shape import at, block
 from vobench.scene.light import PointLight, Sky
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, joined, quad
+from vobench.scene.mesh import Thing, flipped, joined, make_mesh, moved, quad
 from vobench.scene.scene import Scene
 
 GREY = {"grey": Material(colour=(0.5, 0.5, 0.5))}
@@ -20,7 +20,7 @@ def scene(*things: Thing) -> Scene:
 
 
 def crate(x_m: float, y_m: float, *, size_m: float = 1.0) -> Thing:
-    mesh = block((size_m, size_m, size_m), bevel_m=0).moved(at(x_m, y_m, size_m / 2))
+    mesh = moved(block((size_m, size_m, size_m), bevel_m=0), at(x_m, y_m, size_m / 2))
     return Thing(f"crate_{x_m:g}", mesh, "grey")
 
 
@@ -37,7 +37,7 @@ def test_the_largest_free_circle_touches_the_floors_edge_or_a_thing() -> None:
 
 
 def test_what_hangs_higher_than_a_body_leaves_the_floor_free() -> None:
-    shelf = Thing("shelf", block((8, 6, 0.05), bevel_m=0).moved(at(z_m=1.2)), "grey")
+    shelf = Thing("shelf", moved(block((8, 6, 0.05), bevel_m=0), at(z_m=1.2)), "grey")
     free = survey(scene(FLOOR, shelf)).free
     assert free is not None
     assert (free.floor_m, free.radius_m) == (0, pytest.approx(3.0, abs=0.1))
@@ -46,7 +46,7 @@ def test_what_hangs_higher_than_a_body_leaves_the_floor_free() -> None:
 def test_a_wall_that_stands_on_the_floor_and_ends_at_the_ceiling_is_no_way() -> None:
     ceiling = Thing("ceiling", quad((-4, 3, 2.5), (8, 0, 0), (0, -6, 0)), "grey")
     for wall in (
-        block((0.14, 6, 2.5), bevel_m=0).moved(at(0.04, 0, 1.25)),  # its ends lie in floor and ceiling
+        moved(block((0.14, 6, 2.5), bevel_m=0), at(0.04, 0, 1.25)),  # its ends lie in floor and ceiling
         quad((0.04, -3, 0), (0, 6, 0), (0, 0, 2.5)),  # a sheet, between two looks down
     ):
         free = survey(scene(FLOOR, ceiling, Thing("wall", wall, "grey"))).free
@@ -71,14 +71,18 @@ def test_open_edges_and_faces_on_a_face_are_found() -> None:
     solid = crate(1.0, 0.0)
     assert survey(scene(FLOOR, solid)).open_edges == 0
     faces = solid.mesh.faces
-    torn = Thing("torn", type(solid.mesh)(solid.mesh.vertices_m, faces[1:], solid.mesh.uv, solid.mesh.normals), "grey")
+    torn = Thing(
+        "torn",
+        make_mesh(solid.mesh.vertices, faces[1:], solid.mesh.visual.uv, solid.mesh.vertex_normals),
+        "grey",
+    )
     assert survey(scene(FLOOR, torn)).open_edges == 3
     assert survey(scene(FLOOR, Thing("twice", joined([solid.mesh, solid.mesh]), "grey"))).twins == 12
 
 
 def test_backs_are_seen_from_inside_a_thing_that_looks_outwards() -> None:
-    hall = block((7.9, 5.9, 3), bevel_m=0).moved(at(z_m=1.4))
-    inwards = survey(scene(FLOOR, Thing("hall", hall.flipped(), "grey")))
+    hall = moved(block((7.9, 5.9, 3), bevel_m=0), at(z_m=1.4))
+    inwards = survey(scene(FLOOR, Thing("hall", flipped(hall), "grey")))
     outwards = survey(scene(FLOOR, Thing("hall", hall, "grey")))
     assert inwards.backs == 0
     assert outwards.backs > 0.5

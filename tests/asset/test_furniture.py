@@ -24,7 +24,7 @@ def made(kind: str, seed: int = 0) -> list[Part]:
 
 
 def digest(parts: Sequence[Part]) -> str:
-    arrays = [a for p in parts for a in (p.mesh.vertices_m, p.mesh.faces, p.mesh.uv, p.mesh.normals)]
+    arrays = [a for p in parts for a in (p.mesh.vertices, p.mesh.faces, p.mesh.visual.uv, p.mesh.vertex_normals)]
     return hashlib.sha256(b"".join(np.ascontiguousarray(a).tobytes() for a in arrays)).hexdigest()
 
 
@@ -37,30 +37,30 @@ def test_the_same_seed_makes_the_same_bytes(kind: str) -> None:
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_face_is_degenerate_and_every_normal_looks_out(kind: str) -> None:
     for part in made(kind):
-        c, mesh = part.mesh.corners_m, part.mesh
+        c, mesh = part.mesh.triangles, part.mesh
         assert np.linalg.norm(np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]), axis=1).min() > 1e-10
-        facing = np.einsum("fck,fk->fc", mesh.normals[mesh.faces], face_normals(c))
+        facing = np.einsum("fck,fk->fc", mesh.vertex_normals[mesh.faces], face_normals(c))
         assert facing.mean(axis=1).min() > 0
-        np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-9)
+        np.testing.assert_allclose(np.linalg.norm(mesh.vertex_normals, axis=1), 1, atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", FLOOR_KINDS)
 def test_what_stands_touches_its_floor_and_does_not_sink_in(kind: str) -> None:
-    lowest = min(part.mesh.vertices_m[:, 2].min() for part in made(kind))
+    lowest = min(part.mesh.vertices[:, 2].min() for part in made(kind))
     assert -0.001 <= lowest <= 0.005
 
 
 @pytest.mark.parametrize("kind", SIZED)
 def test_a_piece_fills_the_size_that_is_asked_for(kind: str) -> None:
     parts = KINDS[kind](np.random.default_rng(0), **SIZED[kind])
-    points = np.concatenate([part.mesh.vertices_m for part in parts])
+    points = np.concatenate([part.mesh.vertices for part in parts])
     wanted = [SIZED[kind][side] for side in ("depth_m", "width_m", "height_m")]
     np.testing.assert_allclose(np.ptp(points, axis=0), wanted, atol=0.05)
 
 
 @pytest.mark.parametrize("kind", ["door", "radiator", "socket", "skirting", "framed", "noticeboard", "pipe", "curtain"])
 def test_what_hangs_stays_before_its_wall(kind: str) -> None:
-    assert min(part.mesh.vertices_m[:, 0].min() for part in made(kind)) >= 0
+    assert min(part.mesh.vertices[:, 0].min() for part in made(kind)) >= 0
 
 
 def test_reflectances_are_those_of_real_things() -> None:

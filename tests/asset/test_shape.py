@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from trimesh import Trimesh
 
 from vobench.asset import shape
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import Mesh, face_normals
+from vobench.scene.mesh import face_normals
 
 SQUARE = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
 HOLES = [SQUARE / 4 + 0.5, SQUARE / 4 + 2.5, SQUARE / 8 + [3, 1]]
@@ -15,7 +16,7 @@ ANGLE = np.linspace(0, 2 * np.pi, 40, endpoint=False)
 STAR = np.stack([np.cos(ANGLE), np.sin(ANGLE)], 1) * np.where(np.arange(40) % 2, 1, 0.5)[:, None]
 BENT = shape.spline([[0, 0, 0], [0, 0, 1], [0, 1, 2], [1, 1, 1]], 30)
 
-SOLIDS: dict[str, Mesh] = {
+SOLIDS: dict[str, Trimesh] = {
     "block": shape.block((0.5, 1.2, 0.03)),
     "sharp block": shape.block((1, 2, 3), bevel_m=0),
     "lathe": shape.lathe([[0, 0], [0.1, 0], [0.2, 0.4], [0.05, 0.5], [0, 0.45]]),
@@ -27,19 +28,19 @@ SOLIDS: dict[str, Mesh] = {
 sides = st.floats(0.02, 3.0)
 
 
-def areas(mesh: Mesh) -> Array:
+def areas(mesh: Trimesh) -> Array:
     """Area vectors (F, 3)."""
-    c = mesh.corners_m
+    c = mesh.triangles
     return np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]) / 2
 
 
-def volume(mesh: Mesh) -> float:
-    return float(np.einsum("fk,fk->", areas(mesh), mesh.corners_m.mean(axis=1)) / 3)
+def volume(mesh: Trimesh) -> float:
+    return float(np.einsum("fk,fk->", areas(mesh), mesh.triangles.mean(axis=1)) / 3)
 
 
-def stretches(mesh: Mesh) -> Array:
+def stretches(mesh: Trimesh) -> Array:
     """Metres of texture per metre (F, 2), the most and the least, of each face."""
-    c, uv = mesh.corners_m, mesh.uv[mesh.faces]
+    c, uv = mesh.triangles, mesh.visual.uv[mesh.faces]
     edges, places = c[:, 1:] - c[:, :1], uv[:, 1:] - uv[:, :1]
     along = np.linalg.norm(edges[:, 0], axis=1)
     x = edges[:, 0] / along[:, None]
@@ -58,7 +59,7 @@ def test_a_solid_is_closed_and_encloses_a_volume(name: str) -> None:
 @pytest.mark.parametrize("name", SOLIDS)
 def test_every_edge_of_a_solid_is_passed_once_in_each_direction(name: str) -> None:
     mesh = SOLIDS[name]
-    _, corner = np.unique(mesh.vertices_m.round(9), axis=0, return_inverse=True)
+    _, corner = np.unique(mesh.vertices.round(9), axis=0, return_inverse=True)
     faces = corner[mesh.faces]
     ways = [tuple(edge) for k in range(3) for edge in faces[:, [k, (k + 1) % 3]].tolist()]
     assert len(set(ways)) == len(ways)
@@ -68,8 +69,8 @@ def test_every_edge_of_a_solid_is_passed_once_in_each_direction(name: str) -> No
 @pytest.mark.parametrize("name", SOLIDS)
 def test_normals_are_unit_and_point_out_of_their_faces(name: str) -> None:
     mesh = SOLIDS[name]
-    np.testing.assert_allclose(np.linalg.norm(mesh.normals, axis=1), 1, atol=1e-9)
-    assert (np.einsum("fck,fk->fc", mesh.normals[mesh.faces], face_normals(mesh.corners_m)) > 0.5).all()
+    np.testing.assert_allclose(np.linalg.norm(mesh.vertex_normals, axis=1), 1, atol=1e-9)
+    assert (np.einsum("fck,fk->fc", mesh.vertex_normals[mesh.faces], face_normals(mesh.triangles)) > 0.5).all()
 
 
 @pytest.mark.parametrize("name", SOLIDS)
@@ -83,7 +84,7 @@ def test_bevels_stay_inside_their_block_and_take_no_more_than_twelve_edges(
     a: float, b: float, c: float, bevel: float
 ) -> None:
     mesh = shape.block((a, b, c), bevel_m=bevel)
-    assert (np.abs(mesh.vertices_m) <= np.array([a, b, c]) / 2 + 1e-12).all()
+    assert (np.abs(mesh.vertices) <= np.array([a, b, c]) / 2 + 1e-12).all()
     assert a * b * c - 2 * bevel**2 * (a + b + c) - 1e-12 <= volume(mesh) <= a * b * c + 1e-12
 
 
@@ -100,7 +101,7 @@ def test_volumes_are_those_of_the_formulas() -> None:
 @pytest.mark.parametrize("name", ["block", "sharp block", "extrusion", "star"])
 def test_textures_of_flat_faces_are_in_metres(name: str) -> None:
     mesh = SOLIDS[name]
-    is_axial = (np.abs(face_normals(mesh.corners_m)).max(axis=1) > 0.999) | (name == "star")
+    is_axial = (np.abs(face_normals(mesh.triangles)).max(axis=1) > 0.999) | (name == "star")
     np.testing.assert_allclose(stretches(mesh)[is_axial], 1, atol=1e-9)
 
 
@@ -110,50 +111,24 @@ def test_textures_of_round_shapes_are_in_metres_around_and_along() -> None:
     rod = shape.tube([[0, 0, 0], [0, 0, 1]], 0.1, sections=64)
     for mesh in (sheet, rod):
         np.testing.assert_allclose(stretches(mesh), 1, rtol=0.06)
-    np.testing.assert_allclose(face_normals(sheet.corners_m), np.tile([0, 0, 1], (len(sheet.faces), 1)), atol=1e-12)
+    np.testing.assert_allclose(face_normals(sheet.triangles), np.tile([0, 0, 1], (len(sheet.faces), 1)), atol=1e-12)
 
 
 def test_the_texture_of_a_block_runs_along_the_longer_side() -> None:
     board = shape.block((0.3, 0.02, 2.0), bevel_m=0)
-    front = board.faces[face_normals(board.corners_m)[:, 1] > 0.5]
-    spread = np.ptp(board.uv[front].reshape(-1, 2), axis=0)
+    front = board.faces[face_normals(board.triangles)[:, 1] > 0.5]
+    spread = np.ptp(board.visual.uv[front].reshape(-1, 2), axis=0)
     np.testing.assert_allclose(spread, [2.0, 0.3])
 
 
 def test_a_lathe_is_smooth_around_and_sharp_at_its_rim() -> None:
-    normals = shape.lathe([[0, 0], [0.3, 0], [0.3, 2], [0, 2]], sections=8).normals
+    normals = shape.lathe([[0, 0], [0.3, 0], [0.3, 2], [0, 2]], sections=8).vertex_normals
     assert len(np.unique(normals.round(9), axis=0)) == 8 + 2
 
 
 def test_a_card_shows_the_top_of_its_picture_at_its_top_and_reads_from_left_to_right() -> None:
     mesh = shape.card((2.0, 1.0), cell=(0.25, 0.5, 0.0, 0.5))
-    assert face_normals(mesh.corners_m) @ [1, 0, 0] == pytest.approx(1)
-    np.testing.assert_allclose(mesh.uv[:, 1], 0.25 - mesh.vertices_m[:, 2] * 0.5)
+    assert face_normals(mesh.triangles) @ [1, 0, 0] == pytest.approx(1)
+    np.testing.assert_allclose(mesh.visual.uv[:, 1], 0.25 - mesh.vertices[:, 2] * 0.5)
     # Who looks against x has y on the right.
-    np.testing.assert_allclose(mesh.uv[:, 0], 0.375 + mesh.vertices_m[:, 1] * 0.125)
-
-
-def test_a_pierced_wall_has_the_area_that_its_holes_leave_and_one_texture_throughout() -> None:
-    holes = [(0.5, 1.5, 0.8, 2.0), (2.0, 3.0, 1.0, 2.2)]
-    wall = shape.pierced((1, 2, 0), (4, 0, 0), (0, 0, 3), holes)
-    on_plane = np.isclose(wall.corners_m[:, :, 1], 2).all(axis=1)
-    assert np.linalg.norm(areas(wall)[on_plane], axis=1).sum() == pytest.approx(12 - 2.4)
-    np.testing.assert_allclose(wall.uv, wall.vertices_m[:, [0, 2]] - [1, 0], atol=1e-12)
-
-
-def test_laps_lie_behind_a_wall_and_cross_its_borders() -> None:
-    wall = shape.pierced((0, 0, 0), (4, 0, 0), (0, 3, 0))
-    laps = wall.vertices_m[wall.vertices_m[:, 2] != 0]
-    assert set(laps[:, 2].round(9)) == {-shape.LAP_BEHIND_M}
-    np.testing.assert_allclose([laps[:, 0].min(), laps[:, 0].max()], [-shape.LAP_M, 4 + shape.LAP_M])
-    np.testing.assert_allclose([laps[:, 1].min(), laps[:, 1].max()], [-shape.LAP_M, 3 + shape.LAP_M])
-
-
-def test_a_reveal_and_its_pane_and_face_enclose_the_hole() -> None:
-    hole = (0.5, 1.5, 0.8, 2.0)
-    sides = shape.reveal((0, 0, 0), (4, 0, 0), (0, 0, 3), hole, 0.15)
-    # Open to the front and back, its area vectors still cancel; its normals look at the middle of the hole.
-    np.testing.assert_allclose(areas(sides).sum(axis=0), 0, atol=1e-12)
-    inward = np.array([1.0, 0.075, 1.4]) - sides.corners_m.mean(axis=1)
-    assert (np.einsum("fk,fk->f", inward, areas(sides)) > 0).all()
-    assert sides.vertices_m[:, 1].max() == pytest.approx(0.15)
+    np.testing.assert_allclose(mesh.visual.uv[:, 0], 0.375 + mesh.vertices[:, 1] * 0.125)

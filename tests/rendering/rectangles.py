@@ -6,7 +6,7 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import Thing, quad, unit
+from vobench.scene.mesh import Thing, moved, quad, unit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -15,15 +15,15 @@ class Rectangle(Thing):
 
     @property
     def corner_m(self) -> Array:
-        return self.mesh.vertices_m[0]
+        return self.mesh.vertices[0]
 
     @property
     def edge_u_m(self) -> Array:
-        return self.mesh.vertices_m[1] - self.corner_m
+        return self.mesh.vertices[1] - self.corner_m
 
     @property
     def edge_v_m(self) -> Array:
-        return self.mesh.vertices_m[3] - self.corner_m
+        return self.mesh.vertices[3] - self.corner_m
 
     @property
     def size_m(self) -> tuple[float, float]:
@@ -38,7 +38,7 @@ class Rectangle(Thing):
         return self.corner_m + u[..., None] * self.edge_u_m + v[..., None] * self.edge_v_m
 
     def moved(self, T_world_mover: Array) -> "Rectangle":
-        return replace(self, mesh=self.mesh.moved(T_world_mover))
+        return replace(self, mesh=moved(self.mesh, T_world_mover))
 
 
 def sheet(corner_m: Array, edge_u_m: Array, edge_v_m: Array, material: str, name: str = "") -> Rectangle:

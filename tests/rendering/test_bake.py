@@ -32,7 +32,7 @@ from vobench.rendering.texel_owner import owners
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Flicker, Light, PointLight, SpotLight, Sun
 from vobench.scene.material import Material, Picture, fresnel
-from vobench.scene.mesh import Mesh, Thing, areas_m2, flat, quad
+from vobench.scene.mesh import Thing, areas_m2, flat, flipped, make_mesh, moved, quad
 from vobench.scene.scene import Scene, ceiling_light, triangles
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
@@ -302,7 +302,7 @@ def by_mirror(light: Light, image: Light, settings: BakeSettings, roughness: flo
 
 def test_a_mirror_wall_doubles_a_lamp() -> None:
     panel = ceiling_light("lamp", np.array([1.0, 0.0, 2.0]), (1.0, 1.0), power_lm=1000)
-    image = replace(panel, mesh=panel.mesh.moved(se3.transform(np.eye(3), np.array([2.0, 0, 0]))))
+    image = replace(panel, mesh=moved(panel.mesh, se3.transform(np.eye(3), np.array([2.0, 0, 0]))))
     bulb = PointLight("bulb", np.array([1.0, 0.5, 1.5]), 1000.0)
     for light, behind in ((panel, image), (bulb, replace(bulb, position_m=np.array([3.0, 0.5, 1.5])))):
         added, reflected = by_mirror(light, behind, DIRECT, 0.0)
@@ -312,7 +312,7 @@ def test_a_mirror_wall_doubles_a_lamp() -> None:
 
 def test_a_lamp_in_a_mirror_counts_once_and_gathered_rays_find_the_lamps_that_a_rough_mirror_blurs() -> None:
     panel = ceiling_light("lamp", np.array([1.0, 0.0, 2.0]), (1.0, 1.0), power_lm=1000)
-    image = replace(panel, mesh=panel.mesh.moved(se3.transform(np.eye(3), np.array([2.0, 0, 0]))))
+    image = replace(panel, mesh=moved(panel.mesh, se3.transform(np.eye(3), np.array([2.0, 0, 0]))))
     settings = replace(DIRECT, indirect_spacing_m=0.2, indirect_rays=1024, bounces=1)
     for roughness in (0.0, 0.05):
         added, reflected = by_mirror(panel, image, settings, roughness)
@@ -354,8 +354,8 @@ def solid(name: str, shape: trimesh.Trimesh, *, smooth: bool = False, inside: bo
     vertices, faces = np.asarray(shape.vertices, float), np.asarray(shape.faces, np.int32)
     mesh = flat(vertices, faces, vertices[:, :2])
     if smooth:
-        mesh = Mesh(vertices, faces, vertices[:, :2].copy(), np.asarray(shape.vertex_normals, float))
-    return Thing(name, mesh.flipped() if inside else mesh, "grey")
+        mesh = make_mesh(vertices, faces, vertices[:, :2].copy(), np.asarray(shape.vertex_normals, float))
+    return Thing(name, flipped(mesh) if inside else mesh, "grey")
 
 
 @pytest.mark.parametrize("smooth", [False, True])

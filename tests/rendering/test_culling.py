@@ -8,6 +8,7 @@ from typing import Any
 import cv2
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
@@ -21,7 +22,7 @@ from vobench.rendering.renderer import still
 from vobench.rendering.view import NEAR_M, PinholeView, Plane, pinhole_view
 from vobench.scene.light import Sky
 from vobench.scene.material import Material
-from vobench.scene.mesh import Mesh, Thing, quad, table
+from vobench.scene.mesh import Thing, make_mesh, quad, table
 from vobench.scene.scene import Scene
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
@@ -101,14 +102,14 @@ def test_the_runs_of_visible_clusters_hold_every_face_once() -> None:
     assert len(drawn.vertices) < len(ball)  # corners are shared
 
 
-def sphere(count: int) -> Mesh:
+def sphere(count: int) -> Trimesh:
     """A ball of radius 1."""
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * count + 1), np.linspace(0, np.pi, count + 1))
     points = np.stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)], -1).reshape(-1, 3)
     a = (np.arange(count)[:, None] * (2 * count + 1) + np.arange(2 * count)).ravel()
     b = a + 2 * count + 1
     faces = np.concatenate([np.stack([a, b, b + 1], -1), np.stack([a, b + 1, a + 1], -1)]).astype(np.int32)
-    return Mesh(points, faces, np.stack([u, v], -1).reshape(-1, 2), points)
+    return make_mesh(points, faces, np.stack([u, v], -1).reshape(-1, 2), points)
 
 
 SCENES = [Path(__file__).parents[2] / "scenes" / name / "scene.yaml" for name in ("office", "room")]
@@ -158,7 +159,7 @@ def scene_in(path: Path, *, closed: bool, mirrors: bool = True) -> Scene:
 
 def drive(renderer: RasterRenderer, scene: Scene, *, frames: int = FRAMES) -> Iterator[Array]:
     """Pictures from 1 m above the floor, once around the room, all around and up and down."""
-    half_m = np.max([np.abs(thing.mesh.vertices_m[:, :2]).max(0) for thing in scene.things], axis=0)
+    half_m = np.max([np.abs(thing.mesh.vertices[:, :2]).max(0) for thing in scene.things], axis=0)
     for index in range(frames):
         turn = 2 * np.pi * (index + 0.3) / frames
         at = (*0.62 * half_m * [np.cos(turn), np.sin(turn)], 0)

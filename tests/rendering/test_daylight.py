@@ -11,7 +11,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene, BakeSettings, bake
 from vobench.scene.light import SUN_RADIUS_RAD, Light, Sky, Sun
 from vobench.scene.material import Material, pane_reflectance
-from vobench.scene.mesh import Thing, quad
+from vobench.scene.mesh import Thing, quad, two_sided
 from vobench.scene.scene import Scene
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=4, bounces=0)
@@ -118,7 +118,7 @@ def test_through_an_opening_a_uniform_sky_gives_its_configuration_factor(glazing
 def test_a_pane_and_its_back_let_in_what_one_pane_does() -> None:
     roof, level = roof_with_opening(0.75, 2.0, None), quad([-0.75, -0.75, 2.0], 1.5 * Y, 1.5 * X)
     lit = []
-    for mesh in (level, level.two_sided()):
+    for mesh in (level, two_sided(level)):
         pane = Thing("pane", mesh, "pane")
         baked = bake(Scene("day", (FLOOR, *roof, pane), PANES, (UNIFORM,)), DIRECT)
         lit.append(baked.direct[0].mean())

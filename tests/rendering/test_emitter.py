@@ -8,7 +8,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.emitter import SolidAngle, rectangle
 
 PANEL = rectangles.rectangle(np.array([0.2, 0.1, 2.0]), np.array([0, 1.2, 0]), np.array([0.8, 0, 0]), "a")
-FACE = rectangle(PANEL.mesh.corners_m)
+FACE = rectangle(PANEL.mesh.triangles)
 assert FACE is not None
 POINTS = np.array([[0.0, 0, 0], [1.5, -0.3, 0.4], [0.2, 0.1, 1.9], [-2, 3, 1.0], [0.2, 0.1, 2.5]])
 

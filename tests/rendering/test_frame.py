@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
 from tests.rendering.rectangles import room
 from vobench.asset.texture import Procedural
@@ -15,7 +16,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.renderer import Radiance, still
 from vobench.scene.light import AreaLight, Sky
 from vobench.scene.material import LUMINANCE, Material, Picture, linear
-from vobench.scene.mesh import Mesh, Thing, flat, quad
+from vobench.scene.mesh import Thing, flat, make_mesh, quad, textured
 from vobench.scene.scene import Scene, ceiling_light
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
@@ -39,21 +40,21 @@ MATERIALS = {
 SKY = Sky("sky", 1000.0, "clear", colour=(0.8, 0.9, 1.2))
 
 
-def ball(radius_m: float, *, at_m: tuple[float, float, float], count: int = 24) -> Mesh:
+def ball(radius_m: float, *, at_m: tuple[float, float, float], count: int = 24) -> Trimesh:
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * count + 1), np.linspace(0, np.pi, count + 1))
     points = np.stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)], -1).reshape(-1, 3)
     a = (np.arange(count)[:, None] * (2 * count + 1) + np.arange(2 * count)).ravel()
     b = a + 2 * count + 1
     faces = np.concatenate([np.stack([a, b, b + 1], -1), np.stack([a, b + 1, a + 1], -1)]).astype(np.int32)
-    return Mesh(radius_m * points + at_m, faces, np.stack([u, v], -1).reshape(-1, 2), points)
+    return make_mesh(radius_m * points + at_m, faces, np.stack([u, v], -1).reshape(-1, 2), points)
 
 
-def board(x_m: float, width_m: float, height_m: float, z_m: float = 1.0) -> Mesh:
+def board(x_m: float, width_m: float, height_m: float, z_m: float = 1.0) -> Trimesh:
     """A rectangle ahead of the camera, which it faces."""
     return quad((x_m, width_m / 2, z_m - height_m / 2), (0, -width_m, 0), (0, 0, height_m))
 
 
-def scene(*things: tuple[Mesh, str], lights: Any = (), sides: str | None = "grey") -> Scene:
+def scene(*things: tuple[Trimesh, str], lights: Any = (), sides: str | None = "grey") -> Scene:
     around = room((8, 8, 3), floor=sides or "grey", wall=sides or "grey", ceiling=sides or "grey")
     around = around if sides else [side.moved(se3.transform(np.eye(3), [-20.0, 0, -10])) for side in around[:1]]
     made = tuple(Thing(str(nth), mesh, material) for nth, (mesh, material) in enumerate(things))
@@ -109,7 +110,7 @@ def test_a_picture_on_a_wall_shows_its_linear_colours_where_they_belong(draw: An
     values[0], values[1] = [[250, 0, 0], [0, 200, 0], [0, 0, 150]], [[90, 90, 0], [0, 60, 60], [30, 30, 30]]
     big = np.kron(values, np.ones((64, 64, 1), np.uint8))
     # Row 0 lies at v = 0, which is the lower edge here.
-    wall = replace(board(2.0, 2.0, 1.2), uv=np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]))
+    wall = textured(board(2.0, 2.0, 1.2), np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]))
     shown = replace(scene((wall, "print")), materials=MATERIALS | {"print": Material(texture=Picture(big, 1.0))})
     picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
     for row in range(2):
@@ -120,7 +121,7 @@ def test_a_picture_on_a_wall_shows_its_linear_colours_where_they_belong(draw: An
 
 def test_a_soup_of_the_same_triangles_cut_otherwise_gives_the_same_picture(snap: Any) -> None:
     whole = ball(0.5, at_m=(2.0, 0.1, 1.0))
-    corners, uv = whole.corners_m, whole.uv[whole.faces]
+    corners, uv = whole.triangles, whole.visual.uv[whole.faces]
     order = RNG.permutation(len(corners))
     middle = [np.concatenate([part[:, [0, 1]], part.mean(1, keepdims=True)], 1) for part in (corners, uv)]
     others = [
@@ -141,7 +142,7 @@ def test_what_is_under_the_cut_out_is_not_there(draw: Any, even_light: Any) -> N
     leaf = np.full((64, 64, 4), 255, np.uint8)
     leaf[:, 32:, 3] = 40
     materials = MATERIALS | {"leaf": Material(texture=Picture(leaf, 1.0), cutout=0.5)}
-    mesh = replace(board(2.0, 1.0, 1.0), uv=np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
+    mesh = textured(board(2.0, 1.0, 1.0), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
     shown = replace(scene((mesh, "leaf")), materials=materials)
     picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
     without = draw(even_light(scene())).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
@@ -154,7 +155,7 @@ def test_what_glows_adds_its_emission_and_its_picture_to_what_it_reflects(draw: 
     half = np.zeros((64, 64, 3), np.uint8)
     half[:, :32] = 255
     screen = Material(colour=(0.2, 0.2, 0.2), emission_cd_m2=(50, 80, 20), emission_texture=Picture(half, 1.0))
-    mesh = replace(board(2.0, 1.0, 1.0), uv=np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
+    mesh = textured(board(2.0, 1.0, 1.0), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
     shown = replace(scene((mesh, "screen")), materials=MATERIALS | {"screen": screen})
     picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
     np.testing.assert_allclose(picture[60, 60], 0.2 * LIGHT + np.array([50, 80, 20]), rtol=1e-5)

@@ -97,7 +97,7 @@ def test_no_ray_slips_between_two_faces_that_share_an_edge() -> None:
     shared = rng.uniform(-3, 3, (200_000, 1)) * [1, 0, 0] + [0, 0, 0]
     corners = quad([-4, -3, 0], [8, 0, 0], [0, 6, 0])
     faces = table([Thing("floor", corners, "a")], [-1], [-1])
-    on_diagonal = corners.vertices_m[0] + (shared[:, :1] / 8 + 0.5) * (corners.vertices_m[2] - corners.vertices_m[0])
+    on_diagonal = corners.vertices[0] + (shared[:, :1] / 8 + 0.5) * (corners.vertices[2] - corners.vertices[0])
     start = on_diagonal + rng.standard_normal((len(shared), 3)) * [1, 1, 0] + [0, 0, 2.0]
     assert RayCaster(faces).stops(start, 2 * (on_diagonal - start)).all()
 

@@ -13,7 +13,7 @@ from vobench.rendering.bake import SUN_STEP_RAD, BakedScene, BakeSettings, bake,
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sky, Sun, Switched
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, quad
+from vobench.scene.mesh import Thing, moved, quad
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 
 COARSE = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=0.3, indirect_rays=64, bounces=3)
@@ -34,7 +34,7 @@ ROOM = tuple(
 PANEL = ceiling_light("panel", np.array([0.5, 0.3, 2.4]), (0.4, 0.4), power_lm=1000)
 BULB = PointLight("bulb", np.array([-1.0, 0.5, 2.0]), 500.0)
 UP = se3.transform(np.eye(3), [0, 0, 0.5])
-CRATE = Thing("crate", block((0.4, 0.6, 1.0), bevel_m=0).moved(UP), "grey")
+CRATE = Thing("crate", moved(block((0.4, 0.6, 1.0), bevel_m=0), UP), "grey")
 PLACES = np.random.default_rng(0).dirichlet((1, 1, 1), 1500)  # on a triangle
 
 
@@ -111,11 +111,11 @@ def window_room() -> tuple[Thing, ...]:
 def test_a_moving_sun_lights_as_one_that_stands_where_it_is(t_s: float) -> None:
     sun = Sun("sun", 1e4, (0.0, 10.0), (80.0, 100.0), (30.0, 40.0))
     baked = bake(scene(sun, things=window_room()), COARSE)
-    moved = Illumination(baked).at(ns(t_s), ns(t_s))
+    later = Illumination(baked).at(ns(t_s), ns(t_s))
     still = Sun("sun", 1e4, (0.0,), (80 + 2 * t_s,), (30 + t_s,))
     rest = bake(scene(still, things=window_room()), COARSE)
     alone = on(rest, layer(rest, 0), "floor")
-    difference = np.abs(on(baked, moved, "floor") - alone)
+    difference = np.abs(on(baked, later, "floor") - alone)
     # The sun's patch may differ by a step of the sun at its rim; indirect light is interpolated.
     assert np.median(difference) < 0.01 * alone.mean()
     assert difference.mean() < 0.01 * alone.mean()
@@ -172,7 +172,7 @@ def test_a_mover_shades_and_is_lit_as_the_same_thing_at_rest(light: Light) -> No
     things = window_room() if light is DAY else ROOM
     moving = bake(scene(light, things=things, movers=(walk(tuple(place)),)), DIRECT)
     lit = Illumination(moving).at(0, 0)
-    crate = replace(CRATE, mesh=CRATE.mesh.moved(se3.transform(np.eye(3), place)))
+    crate = replace(CRATE, mesh=moved(CRATE.mesh, se3.transform(np.eye(3), place)))
     rest = bake(scene(light, things=(*things, crate)), DIRECT)
     straight = layer(rest, 0)
     for name in ("floor", "west", "south"):

@@ -21,10 +21,10 @@ from vobench.rendering.renderer import still
 from vobench.rendering.view import Box, PinholeView, pinhole_view
 from vobench.scene.light import PointLight, Sky
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, quad, table
+from vobench.scene.mesh import Thing, moved, quad, table
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 
-PILLAR = block((0.5, 0.3, 1.8), bevel_m=0).moved(at(0.4, -0.2, 0.9, yaw=25))
+PILLAR = moved(block((0.5, 0.3, 1.8), bevel_m=0), at(0.4, -0.2, 0.9, yaw=25))
 FLOOR = quad((-2, -2, 0), (4, 0, 0), (0, 4, 0))
 LAMP = ceiling_light("panel", np.array([1.0, 0.3, 2.4]), (0.8, 0.4), power_lm=1000)
 PANEL = panel_emitter(LAMP)
@@ -38,19 +38,19 @@ def each(balls: BoundingSphere) -> list[BoundingSphere]:
 
 def test_parts_enclose_all_of_a_thing_and_are_smaller_than_one_ball() -> None:
     weights = np.random.default_rng(0).dirichlet((1, 1, 1), 200)
-    points = np.einsum("nk,fkj->fnj", weights, PILLAR.corners_m).reshape(-1, 3)
-    balls = parts(PILLAR.corners_m)
+    points = np.einsum("nk,fkj->fnj", weights, PILLAR.triangles).reshape(-1, 3)
+    balls = parts(PILLAR.triangles)
     apart = np.linalg.norm(points[:, None] - balls.centre_m, axis=-1)
     assert (apart <= balls.radius_m + 1e-9).any(1).all()
     assert balls.radius_m.max() < 0.6
-    assert len(parts(FLOOR.corners_m).radius_m) == 1
+    assert len(parts(FLOOR.triangles).radius_m) == 1
 
 
 @pytest.mark.parametrize("emitter", [PANEL, BULB], ids=["panel", "bulb"])
 def test_a_place_from_which_a_ray_meets_the_thing_is_never_left_out(emitter: Emitter) -> None:
     numbers = np.random.default_rng(1)
     points = np.append(numbers.uniform(-4, 4, (4000, 2)), np.full((4000, 1), 1e-4), axis=1)
-    spots = np.einsum("nk,kj->nj", numbers.dirichlet((1, 1, 1), 4000), LAMP.mesh.corners_m[0])
+    spots = np.einsum("nk,kj->nj", numbers.dirichlet((1, 1, 1), 4000), LAMP.mesh.triangles[0])
     lamp = spots if emitter is PANEL else np.broadcast_to(emitter.ball.centre_m, points.shape)
     hidden = CASTER.occluded(points, lamp)
     kept = np.any(
@@ -129,10 +129,10 @@ def test_shade_found_bit_by_bit_is_that_found_at_once(cell: BakedScene) -> None:
 
 
 def test_several_casters_stop_what_any_of_them_stops() -> None:
-    moved = RayCaster(table([Thing("pillar", PILLAR.moved(at(0.7, -0.4, 0.1, yaw=70)), "grey")], [-1], [-1]))
+    elsewhere = RayCaster(table([Thing("pillar", moved(PILLAR, at(0.7, -0.4, 0.1, yaw=70)), "grey")], [-1], [-1]))
     numbers = np.random.default_rng(2)
     origins, ways = numbers.uniform(-2, 2, (3000, 3)), numbers.uniform(-3, 3, (3000, 3))
-    there, here = moved.stops(origins, ways), CASTER.stops(origins, ways)
+    there, here = elsewhere.stops(origins, ways), CASTER.stops(origins, ways)
     assert (there & ~here).any()
     assert (here & ~there).any()
-    np.testing.assert_array_equal(Casters(moved, CASTER).stops(origins, ways), there | here)
+    np.testing.assert_array_equal(Casters(elsewhere, CASTER).stops(origins, ways), there | here)

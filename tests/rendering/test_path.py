@@ -18,7 +18,7 @@ from vobench.rendering.path import PathRenderer
 from vobench.rendering.renderer import View, still
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import LUMINANCE, Material, Picture, fresnel, linear, pane_reflectance, under_coat
-from vobench.scene.mesh import Thing, quad, unit
+from vobench.scene.mesh import Thing, quad, two_sided, unit
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 
 X, Y, Z = np.eye(3)
@@ -414,7 +414,7 @@ def test_holes_are_seen_through_and_let_light_through(trace):
     pixels[:, 2:, 3] = 0
     lace = Material(colour=(0.0,) * 3, texture=Picture(pixels, 0.004), cutout=0.5)
     sun = Sun("sun", 1000.0, (0.0,), (0.0,), (60.0,))
-    sheet = Thing("lace", quad([-4, -4, 0.5], 8 * X, 8 * Y).two_sided(), "lace")
+    sheet = Thing("lace", two_sided(quad([-4, -4, 0.5], 8 * X, 8 * Y)), "lace")
     plain = floor_under(sun)
     covered = replace(plain, things=(*plain.things, sheet), materials={**plain.materials, "lace": lace})
     shown = trace(covered, samples=2000).mean()

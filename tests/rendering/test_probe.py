@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
 from tests.rendering.rectangles import room
 from vobench.asset.texture import Procedural
@@ -15,7 +16,7 @@ from vobench.rendering.probe import FACES, LEVELS, glints, level_of, roughness_o
 from vobench.rendering.renderer import Radiance, still
 from vobench.scene.light import Flicker, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Material, inner_reflectance
-from vobench.scene.mesh import Mesh, Thing, quad
+from vobench.scene.mesh import Thing, make_mesh, quad
 from vobench.scene.scene import Scene
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
@@ -26,13 +27,13 @@ ALL_AROUND = Sky("sky", np.pi * BRIGHT, "uniform", ground_albedo=1.0)
 GREY = Material(texture=Procedural("plain", 0.5, 0, 1, 8, 0))
 
 
-def ball(centre_m: tuple[float, float, float] = (0.0, 0.0, 1.5), count: int = 60) -> Mesh:
+def ball(centre_m: tuple[float, float, float] = (0.0, 0.0, 1.5), count: int = 60) -> Trimesh:
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * count + 1), np.linspace(0, np.pi, count + 1))
     points = np.stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)], -1).reshape(-1, 3)
     a = (np.arange(count)[:, None] * (2 * count + 1) + np.arange(2 * count)).ravel()
     b = a + 2 * count + 1
     faces = np.concatenate([np.stack([a, b, b + 1], -1), np.stack([a, b + 1, a + 1], -1)]).astype(np.int32)
-    return Mesh(RADIUS_M * points + centre_m, faces, np.stack([u, v], -1).reshape(-1, 2), points)
+    return make_mesh(RADIUS_M * points + centre_m, faces, np.stack([u, v], -1).reshape(-1, 2), points)
 
 
 def shown(material: Material, *, sides: dict[str, Material] | None = None, lights: Any = (ALL_AROUND,)) -> Scene:
@@ -97,7 +98,7 @@ def test_metal_whose_normals_lie_square_to_the_view_has_a_luminance(draw: Any, e
     # A bevel seen along its face: at some dozens of these samples the cosine is 0 to the last bit.
     askew = np.tile(np.array([0.0, 1, 1]) / np.sqrt(2), (4, 1))
     points = np.array([[2.0, -1, -1], [2, 1, -1], [2, 1, 1], [2, -1, 1]])
-    bevel = Mesh(points, np.array([[0, 2, 1], [0, 3, 2]], np.int32), np.zeros((4, 2)), askew)
+    bevel = make_mesh(points, np.array([[0, 2, 1], [0, 3, 2]], np.int32), np.zeros((4, 2)), askew)
     metal = {"metal": Material(colour=(0.5, 0.5, 0.5), metal=1.0, roughness=0.25)}
     camera = Pinhole(320, 240, 160.0, 160.0, 159.25, 119.25)
     renderer = draw(even_light(Scene("bevel", (Thing("bevel", bevel, "metal"),), metal, ())))

@@ -18,7 +18,7 @@ from vobench.rendering.pyrender_engine import PyrenderRenderer
 from vobench.rendering.renderer import Radiance, View, still
 from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Thing, quad
+from vobench.scene.mesh import Thing, quad, two_sided
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light
 
 X, Y, Z = np.eye(3)
@@ -128,7 +128,7 @@ LIGHTS = {
 @pytest.mark.parametrize("kind", LIGHTS)
 def test_a_shadow_falls_where_rays_from_the_light_are_blocked(kind: str) -> None:
     light = LIGHTS[kind]
-    plate = Thing("plate", quad((-0.15, -0.15, 1.0), 0.3 * X, 0.3 * Y).two_sided(), "floor")
+    plate = Thing("plate", two_sided(quad((-0.15, -0.15, 1.0), 0.3 * X, 0.3 * Y)), "floor")
     below = looking(pitch_deg=90, position_m=(0, 0, 0.9))
     lit, shaded = (drawn(scene(*things, lights=(light,)), below)[..., 0] for things in ([floor()], [floor(), plate]))
     # Where the shadow of the plate's middle is, and the same place on the other side.

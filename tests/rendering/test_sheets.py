@@ -12,18 +12,18 @@ from vobench.rendering.geometry import RayCaster, reversed_faces
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import PointLight
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, joined, quad, table
+from vobench.scene.mesh import Thing, flipped, joined, moved, quad, table
 from vobench.scene.scene import Scene, triangles
 
 GREY = {"grey": Material(texture=Procedural("plain", 0.5, 0.0, 1.0, 8, 0))}
 SETTINGS = BakeSettings(spacing_m=0.1, light_rays=4, indirect_spacing_m=0.2, indirect_rays=144, bounces=12)
-ROOM = block((3.0, 2.6, 2.4), bevel_m=0).flipped()
+ROOM = flipped(block((3.0, 2.6, 2.4), bevel_m=0))
 SHEET = quad((0, -0.5, -0.6), (0, 1.0, 0), (0, 0, 1.2))  # seen from +x
 
 
 @pytest.mark.parametrize("back_first", [False, True])
 def test_a_ray_meets_the_side_of_a_sheet_that_it_comes_from(back_first: bool) -> None:
-    both = joined([SHEET, SHEET.flipped()][:: -1 if back_first else 1])
+    both = joined([SHEET, flipped(SHEET)][:: -1 if back_first else 1])
     faces = table([Thing("sheet", both, "grey")], [-1], [-1])
     rng = np.random.default_rng(0)
     ends = np.column_stack([np.zeros(200), rng.uniform(-0.4, 0.4, 200), rng.uniform(-0.5, 0.5, 200)])
@@ -59,7 +59,7 @@ def mean_lx(scene: Scene) -> float:
 @pytest.mark.parametrize("back_first", [False, True])
 def test_a_room_of_two_sided_walls_is_as_bright_as_one_that_is_seen_from_inside_alone(back_first: bool) -> None:
     lamp = PointLight("bulb", np.array([0.2, 0.1, 0.4]), 1000.0)
-    walls = joined([ROOM.flipped(), ROOM][:: 1 if back_first else -1])
+    walls = joined([flipped(ROOM), ROOM][:: 1 if back_first else -1])
     alone, doubled = (Scene("s", (Thing("room", mesh, "grey"),), GREY, (lamp,)) for mesh in (ROOM, walls))
     assert mean_lx(doubled) == pytest.approx(mean_lx(alone), rel=0.01)
 
@@ -70,7 +70,7 @@ def test_a_two_sided_sheet_returns_light_from_both_sides(back_first: bool) -> No
     lamps = tuple(PointLight(f"bulb_{x}", np.array([x, 0.3, 0.4]), 1000.0) for x in (-0.5, 0.5))
     seen = []
     for apart_m in (0.001, 0.0):
-        pair = [SHEET.moved(at(apart_m / 2)), SHEET.flipped().moved(at(-apart_m / 2))][:: -1 if back_first else 1]
+        pair = [moved(SHEET, at(apart_m / 2)), moved(flipped(SHEET), at(-apart_m / 2))][:: -1 if back_first else 1]
         things = (Thing("room", ROOM, "grey"), Thing("sheet", joined(pair), "grey"))
         seen.append(mean_lx(Scene("s", things, GREY, lamps)))
     assert seen[1] == pytest.approx(seen[0], rel=0.01)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
 from vobench.asset.texture import Procedural
 from vobench.errors import UnknownNameError
@@ -23,7 +24,7 @@ from vobench.rendering.lamp import lamp_of
 from vobench.rendering.truth import Shot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Mesh, Thing, Triangles, flat, joined, quad, unit
+from vobench.scene.mesh import Thing, Triangles, flat, flipped, joined, quad, two_sided, unit
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 
@@ -43,7 +44,7 @@ def sheet(name: str, center_m, edge_u_m, edge_v_m, material: str = "diffuse") ->
     return Thing(name, quad(np.asarray(center_m) - (u + v) / 2, u, v), material)
 
 
-def sides(center_m, size_m, *, yaw_deg: float = 0.0) -> list[Mesh]:
+def sides(center_m, size_m, *, yaw_deg: float = 0.0) -> list[Trimesh]:
     """The sides of a block, seen from outside: east, west, north, south, top, bottom."""
     x, y, z = np.diag(np.asarray(size_m, float)) @ se3.rotation_z(np.deg2rad(yaw_deg)).T
     ways = ((x, y, z), (-x, z, y), (y, z, x), (-y, x, z), (z, x, y), (-z, y, x))
@@ -206,7 +207,7 @@ def test_mirrors_coats_and_what_stands_behind_panes_are_in_the_mask(truth, expec
     surface, distance_m, rays = expected
     faces = triangles(HALL, t_ns=0)
     shiny = np.array([*(faces.things[n].material in {"wax", "steel"} for n in faces.thing), False])[surface]
-    both = replace(PANE, mesh=PANE.mesh.two_sided())
+    both = replace(PANE, mesh=two_sided(PANE.mesh))
     pane = triangles(Scene("pane", (both,), MATERIALS, ()))
     behind = met(pane, HERE[:3, 3], rays @ HERE[:3, :3].T).min(1) < distance_m
     assert behind.any()
@@ -426,12 +427,12 @@ def test_backs_are_not_seen_but_hide_lights():
     ceiling = sheet("ceiling", [0, 0, 1.5], [0, 1.0, 0], [1.0, 0, 0])
     caster = stage(PointLight("bulb", np.array([0, 0, 3.0]), 100.0), things=(ceiling,))
     truth = caster.frame(TOP, Shot(ABOVE, 0), ["depth", "shadow"])
-    assert (ceiling.mesh.normals[:, 2] < 0).all()
+    assert (ceiling.mesh.vertex_normals[:, 2] < 0).all()
     np.testing.assert_allclose(truth.depth, 2.0, rtol=1e-6)
     assert truth.shadow[100, 100] == 1
 
 
-def icosphere(center_m, radius_m: float, *, splits: int) -> Mesh:
+def icosphere(center_m, radius_m: float, *, splits: int) -> Trimesh:
     """A ball of 20 * 4^splits faces whose corners are on it."""
     gold = (1 + 5**0.5) / 2
     pairs = np.array([[-1, gold], [1, gold], [-1, -gold], [1, -gold]])
@@ -526,7 +527,7 @@ def test_ids_and_depth_of_many_meshes_are_those_of_every_triangle_tried_in_float
     np.testing.assert_allclose(flattened(truth.normals)[seen], normals, atol=1e-6)
 
 
-def tessellated(corner_m, edge_u_m, edge_v_m, count: int) -> Mesh:
+def tessellated(corner_m, edge_u_m, edge_v_m, count: int) -> Trimesh:
     """A rectangle of count * count squares, each of two faces with corners of its own."""
     u, v = np.asarray(edge_u_m, float) / count, np.asarray(edge_v_m, float) / count
     places = np.ndindex(count, count)
@@ -535,7 +536,7 @@ def tessellated(corner_m, edge_u_m, edge_v_m, count: int) -> Mesh:
 
 def test_rays_through_corners_and_edges_of_faces_meet_one_of_them():
     # Every pixel's ray goes through a corner of the wall's squares, 5 m away: 1/20 m a pixel.
-    wall = tessellated([5.0, -1.5, -1.0], [0, 3.0, 0], [0, 0, 2.0], 20).flipped()
+    wall = flipped(tessellated([5.0, -1.5, -1.0], [0, 3.0, 0], [0, 0, 2.0], 20))
     camera, pose = Pinhole(21, 21, 100.0 / 3, 50.0, 10.0, 10.0), looking(pitch_deg=0, position_m=(0, 0, 0))
     caster = TruthCaster(Scene("wall", (Thing("wall", wall, "diffuse"),), MATERIALS, ()))
     truth = caster.frame(camera, Shot(pose, 0), ["depth", "instance"])
@@ -582,7 +583,7 @@ def holed(opacity) -> dict[str, Material]:
 def test_what_is_seen_through_holes_is_what_is_behind_and_light_falls_through():
     # Left half solid: opacity rises from a hole to solid over a pixel, half way at its edge.
     opacity = np.where(np.arange(4) < 2, 255, 0)[None]
-    sheet_m = quad([-0.4, -0.4, 0.5], [0.8, 0, 0], [0, 0.8, 0]).two_sided()
+    sheet_m = two_sided(quad([-0.4, -0.4, 0.5], [0.8, 0, 0], [0, 0.8, 0]))
     floor = sheet("floor", np.zeros(3), [4.0, 0, 0], [0, 4.0, 0])
     bulb = PointLight("bulb", np.array([0.0, 0, 1.0]), 100.0)
     still = Scene("holes", (floor, Thing("paper", sheet_m, "paper")), holed(opacity), (bulb,))
@@ -611,7 +612,7 @@ def test_a_lamp_with_faces_to_all_sides_shines_to_all_sides_and_is_not_in_its_ow
     center_m, rng = np.array([1.0, 2.0, 3.0]), np.random.default_rng(0)
     points_m = (center_m + 2 * unit(rng.normal(size=(50, 3)))).astype(np.float32)
     ball, panel = (
-        lamp_of(mesh.corners_m) for mesh in (icosphere(center_m, 0.5, splits=1), sides(center_m, (1, 1, 0))[4])
+        lamp_of(mesh.triangles) for mesh in (icosphere(center_m, 0.5, splits=1), sides(center_m, (1, 1, 0))[4])
     )
     for lamp, stops_m, half in ((ball, 1.5, False), (panel, 2.0, True)):
         vectors_m = lamp.vectors_m(points_m)

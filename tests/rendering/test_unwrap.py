@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 import trimesh
+from trimesh import Trimesh
 
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
@@ -15,21 +16,21 @@ from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.scene.material import Material
-from vobench.scene.mesh import Mesh, Thing, Triangles, areas_m2, flat, joined, quad, table
+from vobench.scene.mesh import Thing, Triangles, areas_m2, flat, joined, make_mesh, quad, table, two_sided
 
 MATERIALS = {"grey": Material()}
 
 
-def shape(made: trimesh.Trimesh, *, smooth: bool) -> Mesh:
+def shape(made: trimesh.Trimesh, *, smooth: bool) -> Trimesh:
     vertices, faces = np.asarray(made.vertices, float), np.asarray(made.faces, np.int32)
     if not smooth:
         return flat(vertices, faces, vertices[:, :2])
-    return Mesh(vertices, faces, vertices[:, :2].copy(), np.asarray(made.vertex_normals, float))
+    return make_mesh(vertices, faces, vertices[:, :2].copy(), np.asarray(made.vertex_normals, float))
 
 
 def zoo() -> Triangles:
     """Floors and boxes, round things, a sheet with a back, faces too thin for a texel, and some without area."""
-    sheet = quad([3, 0, 0.5], [0.5, 0, 0.2], [0, 0.7, 0]).two_sided()
+    sheet = two_sided(quad([3, 0, 0.5], [0.5, 0, 0.2], [0, 0.7, 0]))
     needle = flat([[0, 3, 0], [1, 3, 0], [0.5, 3.0001, 0]], [[0, 1, 2]], np.zeros((3, 2)))
     nothing = flat([[0, 0, 0], [2, 0, 0], [1, 0, 0], [2, 1.5, 0]], [[0, 1, 2], [1, 1, 3]], np.zeros((4, 2)))
     meshes = [

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
 from vobench.asset.shape import at, block, cushion
 from vobench.geometry.se3 import Array
@@ -21,7 +22,7 @@ from vobench.scene.light import (
     Switched,
     scaled,
 )
-from vobench.scene.mesh import Mesh, areas_m2, face_normals, quad
+from vobench.scene.mesh import areas_m2, face_normals, moved, quad
 from vobench.scene.scene import ceiling_light
 
 LEVELS: dict[str, Level] = {
@@ -104,28 +105,28 @@ def test_a_spots_light_falls_in_a_straight_line_between_its_two_angles() -> None
 
 SHAPES = {
     "panel": quad((0, 0, 0), (2.0, 0, 0), (0, 0.5, 0)),
-    "bevelled block": block((0.3, 0.2, 0.1), bevel_m=0.02).moved(at(1, 2, 3, yaw=20)),
+    "bevelled block": moved(block((0.3, 0.2, 0.1), bevel_m=0.02), at(1, 2, 3, yaw=20)),
     "ball": cushion((0.3, 0.3, 0.3), power=2, cells=4),
 }
 
 
 @pytest.mark.parametrize("shape", SHAPES.values(), ids=list(SHAPES))
-def test_a_lamps_luminance_over_its_area_and_half_space_is_its_power(shape: Mesh) -> None:
+def test_a_lamps_luminance_over_its_area_and_half_space_is_its_power(shape: Trimesh) -> None:
     lamp, directions = AreaLight("lamp", shape, 900.0), sphere(20_000)
-    a, b, c = np.moveaxis(shape.corners_m, 1, 0)
+    a, b, c = np.moveaxis(shape.triangles, 1, 0)
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
-    cosines = np.maximum(directions @ face_normals(shape.corners_m).T, 0)
+    cosines = np.maximum(directions @ face_normals(shape.triangles).T, 0)
     assert lamp.luminance_cd_m2 * (cosines @ area).mean() * 4 * np.pi == pytest.approx(900, rel=1e-3)
 
 
 @pytest.mark.parametrize("size_m", [(0.6, 0.6), (1.2, 0.1)])
 def test_a_ceiling_light_shines_down_from_where_it_hangs(size_m: tuple[float, float]) -> None:
     lamp = ceiling_light("lamp", np.array([0.3, -0.2, 2.9]), size_m, power_lm=4000)
-    np.testing.assert_allclose(lamp.mesh.vertices_m.mean(0), [0.3, -0.2, 2.9])
-    np.testing.assert_allclose(np.ptp(lamp.mesh.vertices_m, axis=0), [*size_m, 0])
-    np.testing.assert_allclose(face_normals(lamp.mesh.corners_m), [[0, 0, -1]] * 2)
+    np.testing.assert_allclose(lamp.mesh.vertices.mean(0), [0.3, -0.2, 2.9])
+    np.testing.assert_allclose(np.ptp(lamp.mesh.vertices, axis=0), [*size_m, 0])
+    np.testing.assert_allclose(face_normals(lamp.mesh.triangles), [[0, 0, -1]] * 2)
     assert lamp.luminance_cd_m2 == pytest.approx(4000 / (np.pi * np.prod(size_m)))
-    assert areas_m2(lamp.mesh.corners_m).sum() == pytest.approx(np.prod(size_m))
+    assert areas_m2(lamp.mesh.triangles).sum() == pytest.approx(np.prod(size_m))
 
 
 def test_a_bulb_sends_out_its_power() -> None:

@@ -2,65 +2,69 @@
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
 from vobench.asset.shape import block
 from vobench.geometry import se3
 from vobench.scene.light import PointLight
-from vobench.scene.mesh import Mesh, Thing, face_normals, flat, joined, quad, table, unit
+from vobench.scene.mesh import Thing, face_normals, flat, flipped, joined, moved, quad, table, two_sided, unit
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
 
 CORNER_M, U_M, V_M = np.array([1.0, 2.0, 0.5]), np.array([2.0, 0, 0]), np.array([0, 0, 3.0])
 T = se3.transform(se3.rotation_z(0.4), [0.3, -2.0, 1.0])
 
 
-def tetrahedron() -> Mesh:
+def tetrahedron() -> Trimesh:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
     return flat(vertices, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], vertices[:, :2])
 
 
-def volume(mesh: Mesh) -> float:
+def volume(mesh: Trimesh) -> float:
     """What a mesh encloses, positive where its faces look outwards (Gauss's theorem)."""
-    a, b, c = np.moveaxis(mesh.corners_m, 1, 0)
+    a, b, c = np.moveaxis(mesh.triangles, 1, 0)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
 def test_a_quad_faces_where_its_edges_turn_and_its_texture_lies_on_it_in_metres() -> None:
     mesh = quad(CORNER_M, U_M, V_M, uv_m=(0.25, 0.5))
-    np.testing.assert_allclose(face_normals(mesh.corners_m), [unit(np.cross(U_M, V_M))] * 2)
-    np.testing.assert_allclose(mesh.normals, [unit(np.cross(U_M, V_M))] * 4)
-    along, up = (mesh.vertices_m - CORNER_M) @ unit(U_M), (mesh.vertices_m - CORNER_M) @ unit(V_M)
-    np.testing.assert_allclose(mesh.uv, np.stack([along + 0.25, up + 0.5], -1))
-    assert {tuple(p) for p in mesh.vertices_m[mesh.faces].reshape(-1, 3)} == {tuple(p) for p in mesh.vertices_m}
+    np.testing.assert_allclose(face_normals(mesh.triangles), [unit(np.cross(U_M, V_M))] * 2)
+    np.testing.assert_allclose(mesh.vertex_normals, [unit(np.cross(U_M, V_M))] * 4)
+    along, up = (mesh.vertices - CORNER_M) @ unit(U_M), (mesh.vertices - CORNER_M) @ unit(V_M)
+    np.testing.assert_allclose(mesh.visual.uv, np.stack([along + 0.25, up + 0.5], -1))
+    assert {tuple(p) for p in mesh.vertices[mesh.faces].reshape(-1, 3)} == {tuple(p) for p in mesh.vertices}
 
 
 def test_a_flat_mesh_has_the_normals_of_its_faces_and_encloses_what_it_should() -> None:
     mesh = tetrahedron()
     assert volume(mesh) == pytest.approx(1 / 6)
-    np.testing.assert_allclose(mesh.normals[mesh.faces], face_normals(mesh.corners_m)[:, None].repeat(3, 1))
+    np.testing.assert_allclose(mesh.vertex_normals[mesh.faces], face_normals(mesh.triangles)[:, None].repeat(3, 1))
 
 
 def test_a_moved_mesh_is_its_points_moved() -> None:
-    mesh, moved = tetrahedron(), tetrahedron().moved(T)
-    np.testing.assert_allclose(moved.vertices_m, se3.apply(T, mesh.vertices_m))
-    np.testing.assert_allclose(moved.normals, mesh.normals @ T[:3, :3].T, atol=1e-12)
+    mesh = tetrahedron()
+    displaced = moved(mesh, T)
+    np.testing.assert_allclose(displaced.vertices, se3.apply(T, mesh.vertices))
+    np.testing.assert_allclose(displaced.vertex_normals, mesh.vertex_normals @ T[:3, :3].T, atol=1e-12)
 
 
 @pytest.mark.parametrize("scale", [(2.0, 1.0, 0.5), (-1.0, 1.0, 1.0), (-1.0, -2.0, -3.0)])
 def test_what_is_scaled_or_mirrored_still_looks_outwards(scale: tuple[float, float, float]) -> None:
-    moved = tetrahedron().moved(T @ np.diag([*scale, 1.0]))
-    assert volume(moved) == pytest.approx(abs(np.prod(scale)) / 6)
-    np.testing.assert_allclose(moved.normals[moved.faces], face_normals(moved.corners_m)[:, None].repeat(3, 1))
+    scaled = moved(tetrahedron(), T @ np.diag([*scale, 1.0]))
+    assert volume(scaled) == pytest.approx(abs(np.prod(scale)) / 6)
+    np.testing.assert_allclose(
+        scaled.vertex_normals[scaled.faces], face_normals(scaled.triangles)[:, None].repeat(3, 1)
+    )
 
 
 def test_a_flipped_mesh_looks_inwards_and_two_sides_enclose_nothing() -> None:
-    assert volume(tetrahedron().flipped()) == pytest.approx(-1 / 6)
-    assert volume(tetrahedron().two_sided()) == pytest.approx(0)
-    assert len(tetrahedron().two_sided().faces) == 8
+    assert volume(flipped(tetrahedron())) == pytest.approx(-1 / 6)
+    assert volume(two_sided(tetrahedron())) == pytest.approx(0)
+    assert len(two_sided(tetrahedron()).faces) == 8
 
 
 def test_joined_meshes_have_all_faces_of_all_and_nothing_else() -> None:
-    parts = [tetrahedron(), quad(CORNER_M, U_M, V_M), tetrahedron().moved(T)]
-    np.testing.assert_array_equal(joined(parts).corners_m, np.concatenate([part.corners_m for part in parts]))
+    parts = [tetrahedron(), quad(CORNER_M, U_M, V_M), moved(tetrahedron(), T)]
+    np.testing.assert_array_equal(joined(parts).triangles, np.concatenate([part.triangles for part in parts]))
     assert len(joined([]).faces) == 0
 
 
@@ -90,10 +94,10 @@ def test_what_a_face_has_is_that_of_its_things_mesh() -> None:
     faces = triangles(hall())
     for nth, thing in enumerate(faces.things):
         own, mesh = faces.thing == nth, thing.mesh
-        np.testing.assert_array_equal(faces.corners_m[own], mesh.corners_m)
-        np.testing.assert_array_equal(faces.normals[own], mesh.normals[mesh.faces])
-        np.testing.assert_array_equal(faces.uv[own], mesh.uv[mesh.faces])
-        np.testing.assert_allclose(faces.plane[own], face_normals(mesh.corners_m), atol=1e-12)
+        np.testing.assert_array_equal(faces.corners_m[own], mesh.triangles)
+        np.testing.assert_array_equal(faces.normals[own], mesh.vertex_normals[mesh.faces])
+        np.testing.assert_array_equal(faces.uv[own], mesh.visual.uv[mesh.faces])
+        np.testing.assert_allclose(faces.plane[own], face_normals(mesh.triangles), atol=1e-12)
 
 
 def test_movers_faces_are_where_their_path_says_and_others_stay() -> None:

@@ -48,7 +48,7 @@ def gaits(path: Path, by: float = 1.0) -> list[tuple[Gait, np.ndarray]]:
     """The limbs of a walker, and the points of each."""
     who = walker(np.random.default_rng(0))
     ways = [Gait(path, who.cycle_m, limb.joints_m, limb.pitch_rad, who.rise_m).sized(by) for limb in who.limbs]
-    points = [np.concatenate([part.mesh.vertices_m for part in limb.parts]) * by for limb in who.limbs]
+    points = [np.concatenate([part.mesh.vertices for part in limb.parts]) * by for limb in who.limbs]
     return list(zip(ways, points, strict=True))
 
 

@@ -10,7 +10,7 @@ from vobench.asset.texture import Procedural
 from vobench.errors import SuiteError
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Scaled, Sky, SpotLight, Steady, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Thing, quad
+from vobench.scene.mesh import Thing, make_mesh, quad
 from vobench.suite.maker_message import LENGTH, MakerScene, checked, decode, encode
 
 WALL = quad((0, 0, 0), (1, 0, 0), (0, 1, 0))
@@ -49,8 +49,8 @@ def test_all_that_a_maker_may_return_arrives_with_the_same_bytes() -> None:
     assert encode(arrived) == encode(sent)
     assert [type(light) for light in arrived.lights] == [type(light) for light in sent.lights]
     assert [light.level for light in arrived.lights] == list(LEVELS)
-    np.testing.assert_array_equal(arrived.things[0].mesh.vertices_m, WALL.vertices_m)
-    assert arrived.things[0].mesh.faces.dtype == WALL.faces.dtype
+    np.testing.assert_array_equal(arrived.things[0].mesh.vertices, WALL.vertices)
+    np.testing.assert_array_equal(arrived.things[0].mesh.faces, WALL.faces)
     assert arrived.materials["oak"] == sent.materials["oak"]
 
 
@@ -85,6 +85,7 @@ def test_a_texture_of_the_makers_own_class_arrives_as_its_picture() -> None:
         (([], {"chalk": "white"}), "a material that is no Material: str"),
         (([], {}, ["lamp"]), "a light that is no AreaLight or PointLight"),
         (([Thing("wall", WALL, "chalk")], {}), "things without materials: chalk"),
+        (([Thing("wall", 3, "chalk")], {"chalk": Material()}), "'wall' with a mesh of type int"),
     ],
 )
 def test_what_make_should_not_return_is_named(returned, sentence) -> None:
@@ -143,21 +144,28 @@ class TestHostile:
     )
     def test_an_array_that_is_not_there_is_refused(self, array) -> None:
         def change(header):
-            self._first(header, "Mesh")["vertices_m"] = {"array": array}
+            self._first(header, "MeshArrays")["vertices_m"] = {"array": array}
 
         with pytest.raises(SuiteError):
             decode(self._changed(change))
 
     def test_faces_of_vertices_that_are_not_there_are_refused(self) -> None:
-        mesh = quad((0, 0, 0), (1, 0, 0), (0, 1, 0))
-        mesh.faces[0, 0] = 99
-        with pytest.raises(SuiteError, match=r"thing 'wall': mesh.faces names a vertex that is not there"):
-            decode(encode(MakerScene((Thing("wall", mesh, "chalk"),), {"chalk": Material()})))
+        mesh = make_mesh(WALL.vertices, [[0, 1, 99]], np.zeros((4, 2)), WALL.vertex_normals)
+        with pytest.raises(SuiteError, match="'wall' with a mesh whose faces name a vertex that is not there"):
+            checked(([Thing("wall", mesh, "chalk")], {"chalk": Material()}))
 
     def test_numbers_that_are_not_finite_are_refused(self) -> None:
         mesh = quad((0, 0, np.nan), (1, 0, 0), (0, 1, 0))
-        with pytest.raises(SuiteError, match=r"thing 'wall': mesh.vertices_m has a number that is not finite"):
-            decode(encode(MakerScene((Thing("wall", mesh, "chalk"),), {"chalk": Material()})))
+        with pytest.raises(SuiteError, match="'wall' with a mesh whose vertices have a number that is not finite"):
+            checked(([Thing("wall", mesh, "chalk")], {"chalk": Material()}))
+
+    def test_the_same_is_refused_in_a_message(self) -> None:
+        def change(header):
+            fields = self._first(header, "MeshArrays")
+            fields["faces"] = {"array": {"dtype": "int64", "shape": [1, 3], "offset": 0}}
+
+        with pytest.raises(SuiteError, match="faces name a vertex that is not there"):
+            decode(self._changed(change))
 
     @pytest.mark.parametrize(
         ("fields", "place"), [({"colour": "red"}, "colour"), ({"kind": "portal"}, "kind"), ({"eta": None}, "eta")]

@@ -28,8 +28,8 @@ def test_a_place_is_the_same_for_one_seed_and_stands_above_its_ground(
     assert {thing.material for thing in things} <= materials.keys()
     for thing, other in zip(things, again, strict=True):
         assert thing.name == other.name
-        np.testing.assert_array_equal(thing.mesh.vertices_m, other.mesh.vertices_m)
-        assert np.isfinite(thing.mesh.vertices_m).all()
-    over_ground = [thing.mesh.vertices_m[:, 2] - ground(*thing.mesh.vertices_m[:, :2].T) for thing in things]
+        np.testing.assert_array_equal(thing.mesh.vertices, other.mesh.vertices)
+        assert np.isfinite(thing.mesh.vertices).all()
+    over_ground = [thing.mesh.vertices[:, 2] - ground(*thing.mesh.vertices[:, :2].T) for thing in things]
     deepest = 1.1 if "height" in maker else 0.2  # a bush on a slope, and the pond under its water
     assert -deepest < min(float(heights.min()) for heights in over_ground) <= 0.0

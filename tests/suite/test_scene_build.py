@@ -27,11 +27,11 @@ sky: {illuminance_lx: 8000}
 MAKER = """import numpy as np
 from vobench.asset.shape import at, lathe
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing
+from vobench.scene.mesh import Thing, moved
 
 def make(seed):
     column = lathe([[0, 0], [0.3, 0], [0.3, 2.0], [0, 2.0]])
-    return (Thing("column", column.moved(at(seed, 0, 0)), "chalk"),), {"chalk": Material(colour=(0.8, 0.8, 0.7))}
+    return (Thing("column", moved(column, at(seed, 0, 0)), "chalk"),), {"chalk": Material(colour=(0.8, 0.8, 0.7))}
 """
 
 
@@ -72,7 +72,7 @@ def yard(tmp_path: Path):
 
 
 def vertices(scene: Scene, name: str) -> np.ndarray:
-    return np.concatenate([thing.mesh.vertices_m for thing in scene.things if thing.name == name])
+    return np.concatenate([thing.mesh.vertices for thing in scene.things if thing.name == name])
 
 
 def test_the_names_that_a_yaml_may_say_are_those_that_there_are() -> None:

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from trimesh import Trimesh
 
 from vobench.errors import SuiteError
 from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE
-from vobench.scene.mesh import Mesh, joined
+from vobench.scene.mesh import joined
 from vobench.scene.scene import Scene
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
@@ -16,7 +17,7 @@ from vobench.suite.scene_file import read_scene
 # ruff: noqa: E501 - tables of sentences are easier to read a line each
 
 
-def of_material(scene: Scene, material: str) -> Mesh:
+def of_material(scene: Scene, material: str) -> Trimesh:
     """All that has a material."""
     return joined([thing.mesh for thing in scene.things if thing.material == material])
 
@@ -57,7 +58,7 @@ def test_a_spot_points_at_its_target_and_the_sun_where_its_angles_say(hall):
 )
 def test_a_window_is_in_its_wall_at_its_place_along_the_world_axis(hall, wall, middle):
     scene = hall("wall: north", f"wall: {wall}")
-    pane = of_material(scene, "pane").vertices_m
+    pane = of_material(scene, "pane").vertices
     np.testing.assert_allclose(pane.mean(0), middle, atol=1e-9)
     assert np.ptp(pane, axis=0)[2] == pytest.approx(0.8)
     assert np.ptp(pane, axis=0)[:2].max() == pytest.approx(1.0)
@@ -67,8 +68,8 @@ def test_boards_stand_upright_and_look_where_they_face(hall):
     for yaw_deg, normal in ((0, [1, 0, 0]), (90, [0, 1, 0]), (-90, [0, -1, 0])):
         scene = hall("size_m: [1, 2], material: steel", f"size_m: [1, 2], yaw_deg: {yaw_deg}, material: steel")
         (board,) = (thing.mesh for thing in scene.things if thing.name == "looking_glass")
-        np.testing.assert_allclose(board.normals, [normal] * len(board.normals), atol=1e-9)
-        np.testing.assert_allclose(sorted(np.ptp(board.vertices_m, axis=0)), [0, 1, 2], atol=1e-9)
+        np.testing.assert_allclose(board.vertex_normals, [normal] * len(board.vertex_normals), atol=1e-9)
+        np.testing.assert_allclose(sorted(np.ptp(board.vertices, axis=0)), [0, 1, 2], atol=1e-9)
 
 
 def test_movers_go_with_their_path(hall):

@@ -8,13 +8,12 @@ from numpy.typing import ArrayLike, NDArray
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture
-from vobench.scene.mesh import Triangles, distinct, unit
+from vobench.scene.mesh import Triangles, distinct, open_edges, unit, welded
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_way import Free, free_circle
 
 EYE_HEIGHT_M = 1.2
 DIRECTIONS = 4096  # in which a survey looks for the backs of faces
-WELD_M = 1e-5  # corners that are closer are one point
 MAX_FACES_OF_RECTANGLE = 2  # objects with more faces are expected to be closed
 
 
@@ -81,20 +80,16 @@ def _rounded(point_m: ArrayLike) -> tuple[float, float, float]:
 
 def _point_ids(faces: Triangles) -> NDArray[np.intp]:
     """The number (F, 3) of the point at each corner."""
-    cells = np.rint(faces.corners_m.reshape(-1, 3) / WELD_M).astype(np.int64)
-    return distinct(cells)[1].reshape(-1, 3)
+    _, point_ids = welded(faces.corners_m.reshape(-1, 3))
+    return point_ids.reshape(-1, 3)
 
 
 def _open_edges(faces: Triangles, point_ids: NDArray[np.intp]) -> int:
     """The number of edges of objects that belong to a single face; those of rectangles do not count."""
     faces_of_thing = np.bincount(faces.thing, minlength=len(faces.things))
     is_solid = np.isin(faces.thing, np.flatnonzero(faces_of_thing > MAX_FACES_OF_RECTANGLE))
-    starts = point_ids[is_solid]
-    ends = np.roll(starts, -1, axis=1)
-    edges = np.sort(np.stack([starts, ends], -1), axis=-1)
-    thing_of_edge = np.repeat(faces.thing[is_solid], 3)
-    edge_ids = distinct(np.column_stack([thing_of_edge, edges.reshape(-1, 2)]))[1]
-    return int((np.bincount(edge_ids) == 1).sum())
+    thing_offset = faces.thing[is_solid, None] * (point_ids.max(initial=0) + 1)  # edges of two things are not shared
+    return len(open_edges(point_ids[is_solid] + thing_offset))
 
 
 def _share_of_backs(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:

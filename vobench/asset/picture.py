@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, wraps
 from inspect import signature
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
-from vobench.asset.shape import Hole
+from vobench.asset.wall import Hole
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Map, Picture, Texture
 
@@ -37,15 +38,65 @@ TONES = {
     "leaf": ("#1d3018", "#33522a", "#4b7038", "#7a9a58"),
     "clay": ("#6d3d2a", "#99593f", "#b06c4f", "#c58a6b"),
 }
-# Noise from octaves (lowest and highest frequency per tile, slope, amount); pits (frequencies, threshold, depth).
-GROUNDS: dict[str, tuple[tuple[Box, ...], Box]] = {
-    "plaster": (((1, 8, 1.0, 0.07), (8, 80, 0.7, 0.06), (80, 480, 0.1, 0.11)), (20, 90, 3.1, -0.25)),
-    "concrete": (((1, 10, 1.1, 0.17), (10, 90, 0.8, 0.1), (90, 500, 0.2, 0.09)), (30, 160, 2.5, -0.5)),
-    "carpet": (((1, 6, 1.0, 0.04), (100, 500, 0.0, 0.22)), (60, 300, 2.2, 0.45)),
-    "kraft": (((1, 20, 1.0, 0.06), (60, 500, 0.2, 0.06)), (80, 300, 2.8, -0.25)),
-    "cork": (((2, 30, 0.6, 0.07), (30, 200, 0.1, 0.2)), (20, 90, 1.8, -0.3)),
-    "leaf": (((1, 20, 1.0, 0.08), (20, 120, 0.4, 0.05)), (30, 90, 2.6, 0.2)),
-    "clay": (((1, 20, 1.0, 0.15), (20, 250, 0.4, 0.08)), (20, 90, 2.4, 0.2)),
+
+
+@dataclass(frozen=True, slots=True)
+class Octave:
+    """A band of noise: lowest and highest frequency per tile, slope of the spectrum, amount in shares of the tones."""
+
+    low: float
+    high: float
+    slope: float
+    amount: float
+
+
+@dataclass(frozen=True, slots=True)
+class Pits:
+    """Spots where noise between two frequencies per tile exceeds a threshold; a negative depth is darker."""
+
+    low: float
+    high: float
+    threshold: float
+    depth: float
+
+
+@dataclass(frozen=True, slots=True)
+class Ground:
+    """An even surface: noise in several bands, and pits."""
+
+    octaves: tuple[Octave, ...]
+    pits: Pits
+
+
+GROUNDS: dict[str, Ground] = {
+    "plaster": Ground(
+        (Octave(1, 8, 1.0, 0.07), Octave(8, 80, 0.7, 0.06), Octave(80, 480, 0.1, 0.11)),
+        Pits(20, 90, 3.1, -0.25),
+    ),
+    "concrete": Ground(
+        (Octave(1, 10, 1.1, 0.17), Octave(10, 90, 0.8, 0.1), Octave(90, 500, 0.2, 0.09)),
+        Pits(30, 160, 2.5, -0.5),
+    ),
+    "carpet": Ground(
+        (Octave(1, 6, 1.0, 0.04), Octave(100, 500, 0.0, 0.22)),
+        Pits(60, 300, 2.2, 0.45),
+    ),
+    "kraft": Ground(
+        (Octave(1, 20, 1.0, 0.06), Octave(60, 500, 0.2, 0.06)),
+        Pits(80, 300, 2.8, -0.25),
+    ),
+    "cork": Ground(
+        (Octave(2, 30, 0.6, 0.07), Octave(30, 200, 0.1, 0.2)),
+        Pits(20, 90, 1.8, -0.3),
+    ),
+    "leaf": Ground(
+        (Octave(1, 20, 1.0, 0.08), Octave(20, 120, 0.4, 0.05)),
+        Pits(30, 90, 2.6, 0.2),
+    ),
+    "clay": Ground(
+        (Octave(1, 20, 1.0, 0.15), Octave(20, 250, 0.4, 0.08)),
+        Pits(20, 90, 2.4, 0.2),
+    ),
 }
 STONES = ("#d9d3c7", "#b9b1a4", "#6e6a66", "#45474a", "#9a7a62", "#7d8a84")
 CEMENT = "#aaa49a"
@@ -73,45 +124,64 @@ WORDS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Unpainted:
-    """A texture whose pixels are painted where they are first asked for."""
+    """A texture whose pixels are painted when they are first asked for."""
 
     pixels: Callable[[], NDArray[Any]]
     tile_m: float
 
 
 def painted(paint: Callable[..., Picture]) -> Callable[..., Texture]:
-    """What paints pictures that cover `tile_m`, 1 without, made one for each of its arguments, and late.
+    """A function that paints pictures, made lazy: one texture for equal arguments, painted when first looked at.
 
-    Most that a scene is built for, such as ways through it, looks at none.
+    Most that a scene is built for, such as paths through it, looks at none. A parameter `tile_m` is the texture's.
     """
-    form = signature(paint)
+    parameters = signature(paint)
 
     @cache
     def texture(*args: Any, **kwargs: Any) -> Texture:
-        (said := form.bind(*args, **kwargs)).apply_defaults()
-        return Unpainted(cache(lambda: paint(*args, **kwargs).values), said.arguments.get("tile_m", 1.0))
+        call = parameters.bind(*args, **kwargs)
+        call.apply_defaults()
+        tile_m = call.arguments.get("tile_m", 1.0)
+        return Unpainted(cache(lambda: paint(*args, **kwargs).values), tile_m)
 
     return wraps(paint)(texture)
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
     """The three bytes of #rrggbb."""
-    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+    red = int(colour[1:3], 16)
+    green = int(colour[3:5], 16)
+    blue = int(colour[5:7], 16)
+    return red, green, blue
 
 
 def _ramp(values: ArrayLike, tones: str) -> Bytes:
     """Colours (..., 3) of values from 0, the first tone, to 1, the last."""
-    stops = np.array([rgb(tone) for tone in TONES[tones]])
-    at = np.linspace(0, 1, 256)
-    table = np.stack([np.interp(at, np.linspace(0, 1, len(stops)), stops[:, k]) for k in range(3)], axis=-1)
-    return np.asarray((table + 0.5).astype(np.uint8)[(np.clip(values, 0, 1) * 255).astype(np.uint8)])
+    colours = np.array([rgb(tone) for tone in TONES[tones]])
+    stops = np.linspace(0, 1, len(colours))
+    levels = np.linspace(0, 1, 256)
+    channels = [np.interp(levels, stops, colours[:, channel]) for channel in range(3)]
+    table = (np.stack(channels, axis=-1) + 0.5).astype(np.uint8)
+
+    level = (np.clip(values, 0, 1) * 255).astype(np.uint8)
+    return np.asarray(table[level])
 
 
 def _scaled(picture: ArrayLike | Image.Image, factor: ArrayLike) -> Bytes:
-    return np.asarray(np.clip(np.asarray(picture) * np.asarray(factor, np.float32), 0, 255).astype(np.uint8))
+    """A picture times a factor, as bytes."""
+    scaled = np.asarray(picture) * np.asarray(factor, np.float32)
+    return np.asarray(np.clip(scaled, 0, 255).astype(np.uint8))
 
 
-def noise(rng: Rng, px: int, low: float, high: float, *, slope: float = 1.0, stretch: float = 1.0) -> Map:
+def noise(
+    rng: Rng,
+    px: int,
+    low: float,
+    high: float,
+    *,
+    slope: float = 1.0,
+    stretch: float = 1.0,
+) -> Map:
     """Periodic noise (px, px) of unit variance between two frequencies per tile, `stretch` times as long along u.
 
     Above 1024 pixels it repeats within the tile where its lowest frequency allows that.
@@ -120,33 +190,59 @@ def noise(rng: Rng, px: int, low: float, high: float, *, slope: float = 1.0, str
     n = px // repeats
     low = low / repeats
     high = high / repeats
-    f = np.hypot(scipy.fft.rfftfreq(n) * n * stretch, scipy.fft.fftfreq(n)[:, None] * n).astype(np.float32)
-    shape = np.where((f >= low) & (f <= high), np.maximum(f, 1) ** -slope, 0).astype(np.float32)
-    values = scipy.fft.irfft2(scipy.fft.rfft2(rng.standard_normal((n, n), dtype=np.float32)) * shape, s=(n, n))
-    return np.tile(values / (values.std() or 1), (repeats, repeats)).astype(np.float32)
+
+    f_u = scipy.fft.rfftfreq(n) * n * stretch
+    f_v = scipy.fft.fftfreq(n)[:, None] * n
+    f = np.hypot(f_u, f_v).astype(np.float32)
+    is_in_band = (f >= low) & (f <= high)
+    shape = np.where(is_in_band, np.maximum(f, 1) ** -slope, 0).astype(np.float32)
+
+    white = rng.standard_normal((n, n), dtype=np.float32)
+    values = scipy.fft.irfft2(scipy.fft.rfft2(white) * shape, s=(n, n))
+    unit_variance = values / (values.std() or 1)
+    return np.tile(unit_variance, (repeats, repeats)).astype(np.float32)
 
 
-def _polygons(image: Image.Image, shapes: Array, tones: NDArray[np.int64], *, is_open: bool = False) -> Map:
+def _polygons(
+    image: Image.Image,
+    shapes: Array,
+    tones: NDArray[np.int64],
+    *,
+    is_open: bool = False,
+) -> Map:
     """The image with polygons (N, K, 2) in pixels that run on across its borders, drawn in order, as an array."""
     draw = ImageDraw.Draw(image)
+    draw_shape = draw.line if is_open else draw.polygon
     px = image.width
-    low = shapes.min(axis=1)
-    high = shapes.max(axis=1)
-    for corners, near, far, tone in zip(shapes, low, high, tones.tolist(), strict=True):
-        for dx in (0, *([px] if near[0] < 0 else []), *([-px] if far[0] > px else [])):
-            for dy in (0, *([px] if near[1] < 0 else []), *([-px] if far[1] > px else [])):
-                place = (corners + np.array([dx, dy])).ravel().tolist()
-                (draw.line if is_open else draw.polygon)(place, fill=tone)
+    lowest = shapes.min(axis=1)
+    highest = shapes.max(axis=1)
+    for corners, low, high, tone in zip(shapes, lowest, highest, tones.tolist(), strict=True):
+        for dx in _repeats(low[0], high[0], px):
+            for dy in _repeats(low[1], high[1], px):
+                shifted = corners + np.array([dx, dy])
+                draw_shape(shifted.ravel().tolist(), fill=tone)
     return np.asarray(image, np.float32)
+
+
+def _repeats(low: float, high: float, px: int) -> list[int]:
+    """The shifts at which what covers [low, high] is seen in a tile of [0, px]."""
+    shifts = [0]
+    if low < 0:
+        shifts.append(px)
+    if high > px:
+        shifts.append(-px)
+    return shifts
 
 
 def _scratches(rng: Rng, px: int, count: int) -> Map:
     """Thin bent lines (px, px) in [0, 1]."""
     start = rng.uniform(0, px, (count, 1, 2))
-    way = rng.normal(0, 0.03 * px, (count, 1, 2))
+    step = rng.normal(0, 0.03 * px, (count, 1, 2))
     bend = rng.normal(0, 0.004 * px, (count, 1, 2))
-    lines = np.concatenate([start, start + way / 2 + bend, start + way], axis=1)
-    return _polygons(Image.new("L", (px, px)), lines, rng.integers(30, 255, count), is_open=True) / np.float32(255)
+    lines = np.concatenate([start, start + step / 2 + bend, start + step], axis=1)
+    tones = rng.integers(30, 255, count)
+    blank = Image.new("L", (px, px))
+    return _polygons(blank, lines, tones, is_open=True) / np.float32(255)
 
 
 def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
@@ -154,37 +250,62 @@ def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
     rows, count = cuts.shape
     x = np.arange(px)
     row = x * rows // px
-    high = px / rows
-    place = np.stack([np.searchsorted(np.sort(c * px), x) % count for c in cuts]) + np.arange(rows)[:, None] * count
-    apart = np.abs((x - cuts[..., None] * px + px / 2) % px - px / 2).min(axis=1)
-    return place[row], np.minimum(apart[row], np.minimum(x % high, high - x % high)[:, None]).astype(np.float32)
+    row_px = px / rows
+
+    columns = [np.searchsorted(np.sort(cut * px), x) % count for cut in cuts]
+    cell = np.stack(columns) + np.arange(rows)[:, None] * count
+
+    to_cut = (x - cuts[..., None] * px + px / 2) % px - px / 2
+    along = np.abs(to_cut).min(axis=1)
+    across = np.minimum(x % row_px, row_px - x % row_px)
+    to_joint = np.minimum(along[row], across[:, None])
+    return cell[row], to_joint.astype(np.float32)
 
 
 @painted
 def boards(
-    tones: str, seed: int = 0, px: int = 1024, tile_m: float = 1.2, *, rows: int = 8, joint_m: float = 0
+    tones: str,
+    seed: int = 0,
+    px: int = 1024,
+    tile_m: float = 1.2,
+    *,
+    rows: int = 8,
+    joint_m: float = 0,
 ) -> Picture:
     """Planks along u: rings cut lengthwise, pores, fibres, each plank in a tone of its own, and scratches."""
     rng = np.random.default_rng(seed)
     cuts = 2 if joint_m else 1
     variety = 0.08 if joint_m else 0.05
-    cell, apart = _cells(px, rng.uniform(0, 1, (rows, cuts)))
     planks = rows * cuts
-    v = ((np.arange(px) / px * rows) % 1)[:, None] * tile_m / rows
+    cell, to_joint = _cells(px, rng.uniform(0, 1, (rows, cuts)))
+
+    # Each plank is cut at some depth beside the heart of its trunk; late wood is the dark end of each ring.
+    row_share = (np.arange(px) / px * rows) % 1
+    v = row_share[:, None] * tile_m / rows
     heart = rng.uniform(-0.05, 0.15, planks)
     depth = rng.uniform(0.01, 0.07, planks)
     phase = rng.uniform(0, 7, planks)
     wave = np.sin(2 * np.pi * np.arange(px) / px + phase[cell]) * 0.02
     bend = noise(rng, px, 1, 12, slope=1.6, stretch=3) * 0.004
     radius = np.hypot(v - heart[cell] + bend, depth[cell] + wave)
-    late = ((radius / rng.uniform(0.005, 0.009, planks)[cell] % 1) ** 3).astype(np.float32)
+    ring_m = rng.uniform(0.005, 0.009, planks)
+    late_wood = ((radius / ring_m[cell] % 1) ** 3).astype(np.float32)
+
     fibre = noise(rng, px, 30, 500, slope=0.4, stretch=30)
     pores = noise(rng, px, 60, 500, slope=0.0, stretch=12) > 1.9
-    tone = 0.62 - 0.3 * late + 0.09 * fibre - 0.22 * pores + rng.normal(0, variety, planks)[cell]
-    wear = 1 + 0.03 * noise(rng, px, 1, 20) + 0.12 * _scratches(rng, px, px // 4)
+    plank_tone = rng.normal(0, variety, planks)
+    tone = 0.62 - 0.3 * late_wood + 0.09 * fibre - 0.22 * pores + plank_tone[cell]
+
+    stains = noise(rng, px, 1, 20)
+    scratches = _scratches(rng, px, px // 4)
+    wear = 1 + 0.03 * stains + 0.12 * scratches
     hue = 1 + rng.normal(0, 0.15 * variety, (planks, 3)).astype(np.float32)
-    joint = np.minimum(0.3 + 0.7 * apart / (joint_m / tile_m * px), 1) if joint_m else np.float32(1)
-    return Picture(_scaled(_ramp(tone, tones), hue[cell] * (wear * joint)[..., None]), tile_m)
+    joint = np.float32(1)
+    if joint_m:
+        joint_px = joint_m / tile_m * px
+        joint = np.minimum(0.3 + 0.7 * to_joint / joint_px, 1)
+    light = hue[cell] * (wear * joint)[..., None]
+    return Picture(_scaled(_ramp(tone, tones), light), tile_m)
 
 
 @painted
@@ -201,23 +322,37 @@ def masonry(
     """Bricks, slabs or tiles in courses, each shifted by `bond` of a length against the one before."""
     rng = np.random.default_rng(seed)
     variety = 0.14 if columns > 3 else 0.05
-    cell, apart = _cells(px, (np.arange(columns) + bond * (np.arange(rows) % 2)[:, None] + 1e-3) / columns)
+    shift = bond * (np.arange(rows) % 2)[:, None]
+    cuts = (np.arange(columns) + shift + 1e-3) / columns
+    cell, to_joint = _cells(px, cuts)
+
     rough = noise(rng, px, 4, 60, slope=0.6) * 0.6 + noise(rng, px, 60, 400, slope=0.2)
     pits = noise(rng, px, 40, 200, slope=0.2) > 2.3
-    tone = 0.5 + rng.normal(0, variety, rows * columns)[cell] + variety * 0.5 * rough - 0.2 * pits
-    is_joint = (apart + 0.6 * rough < 0.006 / tile_m * px)[..., None]
-    light = 1 + 0.3 * variety * noise(rng, px, 1, 8) - 0.1 * np.exp(-apart / 3) + 0.04 * rough
-    return Picture(_scaled(np.where(is_joint, rgb(MORTAR), _ramp(tone, tones)), light[..., None]), tile_m)
+    brick_tone = rng.normal(0, variety, rows * columns)
+    tone = 0.5 + brick_tone[cell] + variety * 0.5 * rough - 0.2 * pits
+
+    joint_px = 0.006 / tile_m * px
+    is_joint = (to_joint + 0.6 * rough < joint_px)[..., None]
+    stains = 0.3 * variety * noise(rng, px, 1, 8)
+    edge = 0.1 * np.exp(-to_joint / 3)
+    light = 1 + stains - edge + 0.04 * rough
+    colours = np.where(is_joint, rgb(MORTAR), _ramp(tone, tones))
+    return Picture(_scaled(colours, light[..., None]), tile_m)
 
 
 @painted
 def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Picture:
     """An even surface of GROUNDS: blotches, grain, pits and scratches."""
     rng = np.random.default_rng(seed)
-    octaves, (low, high, threshold, depth) = GROUNDS[kind]
-    tone = 0.6 + sum(amount * noise(rng, px, a, b, slope=slope) for a, b, slope, amount in octaves)
-    tone = tone + depth * np.clip((noise(rng, px, low, high, slope=0.3) - threshold) / 0.3, 0, 1)
-    return Picture(_ramp(tone - 0.2 * _scratches(rng, px, px // 20), kind), tile_m)
+    surface = GROUNDS[kind]
+    bands = (band.amount * noise(rng, px, band.low, band.high, slope=band.slope) for band in surface.octaves)
+    tone = 0.6 + sum(bands)
+
+    pits = surface.pits
+    excess = (noise(rng, px, pits.low, pits.high, slope=0.3) - pits.threshold) / 0.3
+    tone = tone + pits.depth * np.clip(excess, 0, 1)
+    scratched = tone - 0.2 * _scratches(rng, px, px // 20)
+    return Picture(_ramp(scratched, kind), tile_m)
 
 
 @painted
@@ -226,9 +361,13 @@ def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
     rng = np.random.default_rng(seed)
     thread = np.arange(px) // 4
     bulge = np.abs(np.sin(np.arange(px) * np.pi / 4 + 0.4))
-    warp, weft = (0.5 + 0.14 * rng.standard_normal(px // 4)[thread] + 0.3 * bulge for _ in range(2))
-    is_over = (thread[:, None] + thread) % 2 == 0
-    tone = np.where(is_over, warp * (0.7 + 0.3 * bulge[:, None]), weft[:, None] * (0.7 + 0.3 * bulge))
+    warp = 0.5 + 0.14 * rng.standard_normal(px // 4)[thread] + 0.3 * bulge
+    weft = 0.5 + 0.14 * rng.standard_normal(px // 4)[thread] + 0.3 * bulge
+
+    is_warp_above = (thread[:, None] + thread) % 2 == 0
+    warp_tone = warp * (0.7 + 0.3 * bulge[:, None])
+    weft_tone = weft[:, None] * (0.7 + 0.3 * bulge)
+    tone = np.where(is_warp_above, warp_tone, weft_tone)
     tone = tone + 0.06 * noise(rng, px, 1, 12) + 0.1 * noise(rng, px, 40, 250, slope=0.0)
     return Picture(_ramp(tone, "cloth"), tile_m)
 
@@ -237,20 +376,33 @@ def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
 def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
     """Broken stones of all sizes ground flush with their cement, between strips of brass, with stains and scratches."""
     rng = np.random.default_rng(seed)
-    count = round(11700 * tile_m**2)
-    radius = np.sort(0.0016 * rng.uniform(0, 1, count) ** -0.55)[::-1].clip(max=0.014) / tile_m * px
-    angle = np.sort(rng.uniform(0, 2 * np.pi, (count, 6)), axis=1)
-    shapes = np.stack([np.cos(angle), np.sin(angle)], -1) * radius[:, None, None] + rng.uniform(0, px, (count, 1, 2))
-    chips = _polygons(Image.new("L", (px, px)), shapes, rng.integers(1, 6 * len(STONES) + 1, count)).astype(np.uint8)
-    tones = np.array([rgb(CEMENT), *(rgb(stone) for stone in STONES for _ in range(6))])
-    table = (tones * rng.uniform(0.86, 1.12, (len(tones), 1))).clip(0, 255).astype(np.uint8)
+    chips, stone_colours = _stone_chips(rng, px, tile_m)
     grain = 0.045 * noise(rng, px, 20, 1500, slope=0.6) + 0.02 * noise(rng, px, 3, 12)
     grain -= 0.1 * _scratches(rng, px, px // 6)
-    picture = _scaled(table[chips], (1 + grain)[..., None])
+    pixels = _scaled(stone_colours[chips], (1 + grain)[..., None])
+
     strip = slice(round(0.004 / tile_m * px))
-    picture[strip] = BRASS
-    picture[:, strip] = BRASS
-    return Picture(picture, tile_m)
+    pixels[strip] = BRASS
+    pixels[:, strip] = BRASS
+    return Picture(pixels, tile_m)
+
+
+def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
+    """The stone (px, px) that is seen at each pixel, 0 for cement, and the colours (stones + 1, 3) of all."""
+    count = round(11700 * tile_m**2)
+    size_m = np.sort(0.0016 * rng.uniform(0, 1, count) ** -0.55)[::-1].clip(max=0.014)
+    radius_px = size_m / tile_m * px
+    angle = np.sort(rng.uniform(0, 2 * np.pi, (count, 6)), axis=1)
+    circle = np.stack([np.cos(angle), np.sin(angle)], -1)
+    shapes = circle * radius_px[:, None, None] + rng.uniform(0, px, (count, 1, 2))
+
+    shades = 6  # of each stone
+    stones = rng.integers(1, shades * len(STONES) + 1, count)
+    chips = _polygons(Image.new("L", (px, px)), shapes, stones)
+    tones = [rgb(stone) for stone in STONES for _ in range(shades)]
+    colours = np.array([rgb(CEMENT), *tones])
+    shaded = colours * rng.uniform(0.86, 1.12, (len(colours), 1))
+    return chips.astype(np.uint8), shaded.clip(0, 255).astype(np.uint8)
 
 
 # Printed matter: a picture fills [0, 1]², to be cut into cells.
@@ -264,8 +416,18 @@ def _font(size: int) -> Any:
     return ImageFont.load_default(size)
 
 
-def _text(draw: Draw, place: tuple[float, float], text: str, size: float, colour: str, *, anchor: str = "lt") -> None:
-    draw.text(place, text, font=_font(max(6, round(size))), fill=colour, anchor=anchor)
+def _text(
+    draw: Draw,
+    place: tuple[float, float],
+    text: str,
+    size: float,
+    colour: str,
+    *,
+    anchor: str = "lt",
+) -> None:
+    """Draw a line of text whose anchor is at a place; sizes below 6 pixels cannot be read."""
+    font = _font(max(6, round(size)))
+    draw.text(place, text, font=font, fill=colour, anchor=anchor)
 
 
 def _words(rng: Rng, count: int) -> str:
@@ -274,11 +436,12 @@ def _words(rng: Rng, count: int) -> str:
 
 def _on(colour: str) -> str:
     """The ink that can be read on a colour."""
-    return PAPER if sum(rgb(colour)) < 380 else INK
+    is_dark = sum(rgb(colour)) < 380
+    return PAPER if is_dark else INK
 
 
 def some(rng: Rng, *colours: str) -> str:
-    """One of some colours."""
+    """One of the colours."""
     return str(rng.choice(colours))
 
 
@@ -287,28 +450,46 @@ def _chart(draw: Draw, rng: Rng, box: Box) -> None:
     x0, y0, x1, y1 = box
     draw.line([x0, y0, x0, y1, x1, y1], fill="#777777")
     xs = np.linspace(x0, x1, int(rng.integers(8, 16)))[1:-1]
-    half = 0.3 * (xs[1] - xs[0])
     has_bars = rng.random() < 0.4
     for _ in range(1 if has_bars else 3):
-        ys = y1 - (y1 - y0) * np.clip(0.5 + np.cumsum(rng.normal(0, 0.16, len(xs))), 0.06, 0.96)
+        walk = np.cumsum(rng.normal(0, 0.16, len(xs)))
+        shares = np.clip(0.5 + walk, 0.06, 0.96)
+        ys = y1 - (y1 - y0) * shares
         ink = some(rng, *INKS)
-        for x, y in zip(xs, ys, strict=True):
-            draw.rectangle([x - half, y, x + half, y1] if has_bars else [x - 2, y - 2, x + 2, y + 2], fill=ink)
-        if not has_bars:
-            draw.line(np.stack([xs, ys], axis=1).ravel().tolist(), fill=ink, width=2)
+        if has_bars:
+            _bars(draw, xs, ys, y1, ink)
+        else:
+            _curve(draw, xs, ys, ink)
+
+
+def _bars(draw: Draw, xs: Array, ys: Array, bottom: float, ink: str) -> None:
+    half = 0.3 * (xs[1] - xs[0])
+    for x, y in zip(xs, ys, strict=True):
+        draw.rectangle([x - half, y, x + half, bottom], fill=ink)
+
+
+def _curve(draw: Draw, xs: Array, ys: Array, ink: str) -> None:
+    for x, y in zip(xs, ys, strict=True):
+        draw.rectangle([x - 2, y - 2, x + 2, y + 2], fill=ink)
+    points = np.stack([xs, ys], axis=1)
+    draw.line(points.ravel().tolist(), fill=ink, width=2)
 
 
 def _column(draw: Draw, rng: Rng, box: Box, size: float) -> None:
     """Paragraphs of text, with a chart now and then, that fill a box."""
     x0, y, x1, y1 = box
+    characters = (x1 - x0) / (0.52 * size)
     while y < y1 - size:
-        if rng.random() < 0.07 and y1 - y > 12 * size:
+        has_chart = rng.random() < 0.07
+        if has_chart and y1 - y > 12 * size:
             _chart(draw, rng, (x0 + size, y + size, x1, y + 9 * size))
             y += 10.5 * size
-        is_last = rng.random() < 0.14
-        length = (x1 - x0) / (0.52 * size) * (rng.uniform(0.2, 0.8) if is_last else 1)
-        _text(draw, (x0, y), _words(rng, 16)[: int(length)], size, "#3a3d42")
-        y += (2.4 if is_last else 1.35) * size
+
+        ends_paragraph = rng.random() < 0.14
+        length = characters * (rng.uniform(0.2, 0.8) if ends_paragraph else 1)
+        line = _words(rng, 16)[: int(length)]
+        _text(draw, (x0, y), line, size, "#3a3d42")
+        y += (2.4 if ends_paragraph else 1.35) * size
 
 
 @painted
@@ -316,15 +497,22 @@ def pages(seed: int = 0) -> Picture:
     """Six sheets of A4 (480 × 680 px each), in three columns and two rows, with titles, text and charts."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(1440, 1360, PAPER)
-    for x, y in ((x, y) for y in (0, 680) for x in (0, 480, 960)):
-        band = some(rng, PAPER, PAPER, *INKS)
-        split = rng.choice([220, 440])
-        draw.rectangle([x, y, x + 479, y + 679], fill=some(rng, "#f4f2ec", PAPER, "#ebe8df"))
-        draw.rectangle([x, y, x + 479, y + 90], fill=band)
-        _text(draw, (x + 24, y + 36), _words(rng, 3).title(), 29, _on(band))
-        for x0 in range(24, 456, split):
-            _column(draw, rng, (x + x0, y + 112, x + x0 + split - 20, y + 650), 10)
+    for y, x in product((0, 680), (0, 480, 960)):
+        _page(draw, rng, x, y)
     return Picture(np.asarray(image))
+
+
+def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
+    """A sheet with its upper left corner at x, y: a title over one or two columns."""
+    band = some(rng, PAPER, PAPER, *INKS)
+    split = rng.choice([220, 440])
+    paper = some(rng, "#f4f2ec", PAPER, "#ebe8df")
+    draw.rectangle([x, y, x + 479, y + 679], fill=paper)
+    draw.rectangle([x, y, x + 479, y + 90], fill=band)
+    title = _words(rng, 3).title()
+    _text(draw, (x + 24, y + 36), title, 29, _on(band))
+    for left in range(24, 456, split):
+        _column(draw, rng, (x + left, y + 112, x + left + split - 20, y + 650), 10)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -340,80 +528,107 @@ class Spines:
 def spines(seed: int = 0, count: int = 52) -> Spines:
     """Books of several publishers, volumes of series among them, and ring binders."""
     rng = np.random.default_rng(seed)
-    high = round(0.325 * SPINE_PX_PER_M)
     drawn: list[Image.Image] = []
     while len(drawn) < count:
-        drawn += _binders(rng) if rng.random() < 0.14 else _series(rng)
+        has_binders = rng.random() < 0.14
+        drawn += _binders(rng) if has_binders else _series(rng)
+
+    # Spines are drawn lying, and stand beside one another in the picture.
     ends = np.cumsum([0, *(spine.height for spine in drawn)])
-    image = Image.new("RGB", (int(ends[-1]), high), PAPER)
+    height = round(0.325 * SPINE_PX_PER_M)
+    image = Image.new("RGB", (int(ends[-1]), height), PAPER)
     for x, spine in zip(ends.tolist(), drawn, strict=False):
         image.paste(spine.transpose(Image.Transpose.ROTATE_270), (x, 0))
+
     worn = 1 + 0.05 * noise(rng, 1024, 20, 500, slope=0.5)
-    pixels = _scaled(image, np.tile(worn, (1, image.width // 1024 + 1))[:high, : image.width, None])
+    repeated = np.tile(worn, (1, image.width // 1024 + 1))
+    pixels = _scaled(image, repeated[:height, : image.width, None])
+
     u = (ends / image.width).tolist()
-    cells = tuple((u[k], u[k + 1], 0.0, spine.width / high) for k, spine in enumerate(drawn))
-    return Spines(Picture(pixels), cells, tuple((s.height / SPINE_PX_PER_M, s.width / SPINE_PX_PER_M) for s in drawn))
+    cells = [(u[k], u[k + 1], 0.0, spine.width / height) for k, spine in enumerate(drawn)]
+    sizes_m = [(spine.height / SPINE_PX_PER_M, spine.width / SPINE_PX_PER_M) for spine in drawn]
+    return Spines(Picture(pixels), tuple(cells), tuple(sizes_m))
 
 
 def _binders(rng: Rng) -> list[Image.Image]:
     """Ring binders of one owner, lying on their side as books are."""
     colour = some(rng, NAVY, INK, BRICK, "#8a8d8f")
     owner = _words(rng, 1).upper()
-    result = []
     w = round(0.07 * SPINE_PX_PER_M)
     h = round(0.318 * SPINE_PX_PER_M)
+    binders = []
     for volume in range(int(rng.integers(2, 5))):
         image, draw = _canvas(h, w, colour)
-        draw.rectangle([0.12 * h, 0.14 * w, 0.55 * h, 0.86 * w], fill=PAPER)
+        label = [0.12 * h, 0.14 * w, 0.55 * h, 0.86 * w]
+        hole = [0.79 * h, 0.28 * w, 0.79 * h + 0.44 * w, 0.72 * w]
+        draw.rectangle(label, fill=PAPER)
         _text(draw, (0.15 * h, 0.5 * w), f"{owner} {2019 + volume}", 0.34 * w, INK, anchor="lm")
-        draw.ellipse([0.79 * h, 0.28 * w, 0.79 * h + 0.44 * w, 0.72 * w], fill="#0c0d0e", outline="#b9bcbe", width=5)
-        result.append(image)
-    return result
+        draw.ellipse(hole, fill="#0c0d0e", outline="#b9bcbe", width=5)
+        binders.append(image)
+    return binders
 
 
 def _series(rng: Rng) -> list[Image.Image]:
     """A book, or the volumes of one, each lying on its side: as wide as the book is high."""
     volumes = int(rng.choice([1, 1, 1, 1, 2, 5]))
     w = round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
-    h = round(float(rng.choice([0.178, 0.2, 0.216, 0.235, 0.24, 0.28])) * SPINE_PX_PER_M)
+    height_m = float(rng.choice([0.178, 0.2, 0.216, 0.235, 0.24, 0.28]))
+    h = round(height_m * SPINE_PX_PER_M)
     colour = some(rng, *INKS, INK, PAPER, "#e2d9c6", "#4a5a4d")
     accent = some(rng, *INKS, PAPER)
     title = _words(rng, int(rng.integers(2, 5))).title()
     author = _words(rng, 1).upper()
-    block = rng.uniform(-0.6, 0.6)
+
     image, draw = _canvas(h, w, colour)
-    for start, length in ((0.13, max(block, 0)), *((band, 0.012) for band in rng.choice([0.05, 0.09, 0.84], 2))):
+    title_band = rng.uniform(-0.6, 0.6)  # its length, where it is positive
+    thin_bands = [(start, 0.012) for start in rng.choice([0.05, 0.09, 0.84], 2)]
+    for start, length in ((0.13, max(title_band, 0)), *thin_bands):
         draw.rectangle([start * h, 0, (start + length) * h, w], fill=accent)
-    on_title = _on(accent if block > 0 else colour)
-    _text(draw, (0.15 * h, 0.5 * w), title, min(0.6 * w, 0.075 * h, 1.25 * h / len(title)), on_title, anchor="lm")
-    result = [image.copy() for _ in range(volumes)]
-    for k, spine in enumerate(result):
-        last = author if volumes == 1 else str(k + 1)
-        size = min(0.45 * w, 0.06 * h)
-        _text(ImageDraw.Draw(spine), (0.97 * h, 0.5 * w), last, size, _on(colour), anchor="rm")
-    return result
+    title_ink = _on(accent if title_band > 0 else colour)
+    title_size = min(0.6 * w, 0.075 * h, 1.25 * h / len(title))
+    _text(draw, (0.15 * h, 0.5 * w), title, title_size, title_ink, anchor="lm")
+
+    spines_of_series = []
+    size = min(0.45 * w, 0.06 * h)
+    for volume in range(1, volumes + 1):
+        spine = image.copy()
+        foot = author if volumes == 1 else str(volume)
+        _text(ImageDraw.Draw(spine), (0.97 * h, 0.5 * w), foot, size, _on(colour), anchor="rm")
+        spines_of_series.append(spine)
+    return spines_of_series
 
 
 @painted
 def screen(seed: int = 0) -> Picture:
     """A display (1280 × 720) with files, an editor, a chart, a log and a bar of icons."""
     rng = np.random.default_rng(seed)
-    back, bar = ("#1f252b", "#12161a") if rng.random() < 0.7 else ("#f2f1ec", "#d9dcdc")
-    ink = _on(back)
-    (image, draw) = _canvas(1280, 720, back)
-    for box, fill in (((0, 0, 1280, 26), bar), ((0, 26, 190, 690), bar), ((0, 690, 1280, 720), "#34556b")):
-        draw.rectangle(box, fill=fill)
-    for y0, y1 in ((60, 360), (380, 670)):
-        draw.rectangle([800, y0, 1250, y1], fill=bar, outline="#59636a")
-    for k in range(38):
-        _text(draw, (14 + 14 * (k % 3), 40 + 17 * k), _words(rng, 2)[:18], 13, "#8d979d")
-        x = 240.0 + 26 * abs((3 * k) % 8 - 4) * (k % 5 > 0)
+    is_dark = rng.random() < 0.7
+    background = "#1f252b" if is_dark else "#f2f1ec"
+    panel = "#12161a" if is_dark else "#d9dcdc"
+    ink = _on(background)
+
+    image, draw = _canvas(1280, 720, background)
+    draw.rectangle([0, 0, 1280, 26], fill=panel)
+    draw.rectangle([0, 26, 190, 690], fill=panel)
+    draw.rectangle([0, 690, 1280, 720], fill="#34556b")
+    draw.rectangle([800, 60, 1250, 360], fill=panel, outline="#59636a")
+    draw.rectangle([800, 380, 1250, 670], fill=panel, outline="#59636a")
+
+    for row in range(38):
+        file_name = _words(rng, 2)[:18]
+        _text(draw, (14 + 14 * (row % 3), 40 + 17 * row), file_name, 13, "#8d979d")
+        indent = 26 * abs((3 * row) % 8 - 4) * (row % 5 > 0)
+        x = 240.0 + indent
         for word in _words(rng, int(rng.integers(1, 7))).split():
-            _text(draw, (x, 36 + 17 * k), word, 13, some(rng, ink, ink, TEAL, OCHRE, SKY, SAGE))
+            colour = some(rng, ink, ink, TEAL, OCHRE, SKY, SAGE)
+            _text(draw, (x, 36 + 17 * row), word, 13, colour)
             x += 8.5 * len(word)
-    for k in range(16):
-        _text(draw, (812, 392 + 17 * k), _words(rng, 6)[:50], 12, "#8fae92")
-        draw.rectangle([20 + 40 * k, 696, 42 + 40 * k, 714], fill=INKS[k % 8])
+
+    for row in range(16):
+        message = _words(rng, 6)[:50]
+        _text(draw, (812, 392 + 17 * row), message, 12, "#8fae92")
+        icon_x = 20 + 40 * row
+        draw.rectangle([icon_x, 696, icon_x + 22, 714], fill=INKS[row % 8])
     _chart(draw, rng, (830, 90, 1230, 330))
     return Picture(np.asarray(image))
 
@@ -430,46 +645,70 @@ def poster(style: str, seed: int = 0, width: int = 700, height: int = 1000) -> P
 
 def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
     """Ridges in the haze below a sun."""
-    for k, tone in enumerate(np.linspace(rgb(SKY), rgb(PAPER), 40).astype(int).tolist()):
+    sky_tones = np.linspace(rgb(SKY), rgb(PAPER), 40).astype(int)
+    for k, tone in enumerate(sky_tones.tolist()):
         draw.rectangle([0, k * h / 40, w, h], fill=tuple(tone))
-    draw.ellipse([0.62 * w, 0.12 * h, 0.62 * w + 0.16 * h, 0.28 * h], fill=OCHRE)
+
+    sun = [0.62 * w, 0.12 * h, 0.62 * w + 0.16 * h, 0.28 * h]
+    draw.ellipse(sun, fill=OCHRE)
+
     x = np.linspace(0, w, 160)
-    for k, tone in enumerate(np.linspace(rgb(SAND), rgb(NAVY), 8).astype(int).tolist()):
-        walk = np.cumsum(rng.normal(0, 1, 160)) - np.linspace(0, 1, 160) * rng.normal(0, 6)
-        ridge = h * (0.3 + 0.08 * k + 0.012 * walk + 0.0009 * k * rng.normal(0, 1, 160))
+    ridge_tones = np.linspace(rgb(SAND), rgb(NAVY), 8).astype(int)
+    for k, tone in enumerate(ridge_tones.tolist()):
+        steps = rng.normal(0, 1, 160)
+        slope = np.linspace(0, 1, 160) * rng.normal(0, 6)
+        walk = np.cumsum(steps) - slope
+        trees = rng.normal(0, 1, 160)
+        ridge = h * (0.3 + 0.08 * k + 0.012 * walk + 0.0009 * k * trees)
         draw.polygon([(0, h), *zip(x, ridge, strict=True), (w, h)], fill=tuple(tone))
 
 
 def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
     """Quarters and halves of circles in squares."""
     side = w // 5
-    for x, y in ((x, y) for y in range(0, h, side) for x in range(0, w, side)):
-        back, front, dot = (some(rng, *INKS[:6], PAPER) for _ in range(3))
+    for y, x in product(range(0, h, side), range(0, w, side)):
+        background = some(rng, *INKS[:6], PAPER)
+        foreground = some(rng, *INKS[:6], PAPER)
+        dot_colour = some(rng, *INKS[:6], PAPER)
         quarter = int(rng.integers(4))
-        half = rng.random() < 0.4
-        draw.rectangle([x, y, x + side, y + side], fill=back)
-        left, up = (x, y) if half else (x - side * (quarter in (0, 3)), y - side * (quarter in (0, 1)))
-        across = side if half else 2 * side
-        draw.pieslice([left, up, left + across, up + across], 90 * quarter, 90 * quarter + 90 + 90 * half, fill=front)
-        draw.ellipse([x + 0.38 * side, y + 0.38 * side, x + 0.62 * side, y + 0.62 * side], fill=dot)
+        is_half = rng.random() < 0.4
+        draw.rectangle([x, y, x + side, y + side], fill=background)
+
+        # A quarter is part of a circle twice as wide, about a corner of the square.
+        diameter = side if is_half else 2 * side
+        left = x if is_half else x - side * (quarter in (0, 3))
+        top = y if is_half else y - side * (quarter in (0, 1))
+        start_deg = 90 * quarter
+        end_deg = start_deg + 90 + 90 * is_half
+        draw.pieslice([left, top, left + diameter, top + diameter], start_deg, end_deg, fill=foreground)
+
+        near = 0.38 * side
+        far = 0.62 * side
+        draw.ellipse([x + near, y + near, x + far, y + far], fill=dot_colour)
 
 
 def _talk(draw: Draw, rng: Rng, w: int, h: int) -> None:
     """A title over three columns of text and charts."""
-    draw.rectangle([0, 0, w, 0.12 * h], fill=some(rng, NAVY, TEAL, PLUM))
+    banner = some(rng, NAVY, TEAL, PLUM)
+    draw.rectangle([0, 0, w, 0.12 * h], fill=banner)
     _text(draw, (0.04 * w, 0.03 * h), _words(rng, 4).title(), 0.04 * h, PAPER)
     _text(draw, (0.04 * w, 0.08 * h), _words(rng, 6).title(), 0.02 * h, SAND)
     for k in range(3):
         x0 = w * (0.04 + 0.32 * k)
         x1 = w * (0.32 + 0.32 * k)
         y = h * (0.2 + 0.3 * (k % 2))
-        draw.rectangle([x0, 0.15 * h, x1, 0.18 * h], fill=some(rng, *INKS))
+        heading = some(rng, *INKS)
+        draw.rectangle([x0, 0.15 * h, x1, 0.18 * h], fill=heading)
         _column(draw, rng, (x0, 0.2 * h, x1, 0.96 * h), 0.011 * h)
         draw.rectangle([x0, y, x1, y + 0.2 * h], fill=PAPER)
         _chart(draw, rng, (x0, y, x1, y + 0.18 * h))
 
 
-POSTERS: dict[str, Callable[[Draw, Rng, int, int], None]] = {"hills": _hills, "circles": _circles, "talk": _talk}
+POSTERS: dict[str, Callable[[Draw, Rng, int, int], None]] = {
+    "hills": _hills,
+    "circles": _circles,
+    "talk": _talk,
+}
 
 
 @painted
@@ -477,16 +716,22 @@ def whiteboard(seed: int = 0) -> Picture:
     """A board (1440 × 900) with diagrams in four inks, and what is left of wiped ones."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(1440, 900, "#e9e9e5")
+    wiped_diagrams = 8
     for k in range(24):
         x, y = rng.uniform(40, [1100, 760])
-        ink = some(rng, NAVY, BRICK, "#2f6b4a", INK) if k >= 8 else "#dcdcda"
+        is_wiped = k < wiped_diagrams
+        ink = "#dcdcda" if is_wiped else some(rng, NAVY, BRICK, "#2f6b4a", INK)
+        arrow_end = (x + 290, y + rng.uniform(-40, 120))
         draw.rounded_rectangle([x, y, x + 200, y + 74], 12, outline=ink, width=4)
-        draw.line([x + 200, y + 37, x + 290, y + rng.uniform(-40, 120)], fill=ink, width=4)
-        _text(draw, (x + 14, y + 20), _words(rng, int(rng.integers(1, 3))), rng.uniform(24, 36), ink)
+        draw.line([x + 200, y + 37, *arrow_end], fill=ink, width=4)
+        label = _words(rng, int(rng.integers(1, 3)))
+        _text(draw, (x + 14, y + 20), label, rng.uniform(24, 36), ink)
         if k % 6 == 5:
             _chart(draw, rng, (x, y + 90, x + 240, y + 220))
-    wiped = 1 - 0.015 * noise(rng, 1440, 2, 60, stretch=2)[:900]
-    return Picture(_scaled(image.filter(ImageFilter.GaussianBlur(0.8)), wiped[..., None]))
+
+    soft = image.filter(ImageFilter.GaussianBlur(0.8))
+    smears = 1 - 0.015 * noise(rng, 1440, 2, 60, stretch=2)[:900]
+    return Picture(_scaled(soft, smears[..., None]))
 
 
 @painted
@@ -497,18 +742,20 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
     draw = ImageDraw.Draw(image)
     x = rng.uniform(300, 480)
     y = rng.choice([150, 440])
-    for box, fill in (
-        ((0, 352, 768, 416), "#c4a882"),
-        ((0, 383, 768, 385), "#7d5d3c"),
-        ((x, y, x + 230, y + 150), PAPER),
-    ):
-        draw.rectangle(box, fill=fill)
+    draw.rectangle([0, 352, 768, 416], fill="#c4a882")
+    draw.rectangle([0, 383, 768, 385], fill="#7d5d3c")
+    draw.rectangle([x, y, x + 230, y + 150], fill=PAPER)
+
     for bar in np.cumsum(rng.integers(3, 8, 34)):
-        draw.rectangle([x + 12 + bar, y + 84, x + 12 + bar + rng.integers(1, 4), y + 136], fill=INK)
+        left = x + 12 + bar
+        draw.rectangle([left, y + 84, left + rng.integers(1, 4), y + 136], fill=INK)
     for k in range(3):
-        _text(draw, (x + 12, y + 10 + 22 * k), _words(rng, 3).title(), 19 - 2 * k, INK)
-        up = 110 + 60 * k
-        draw.line([up, 640, up, 580, up - 16, 600, up, 580, up + 16, 600], fill="#5b3f26", width=5)
+        line = _words(rng, 3).title()
+        _text(draw, (x + 12, y + 10 + 22 * k), line, 19 - 2 * k, INK)
+        arrow_x = 110 + 60 * k
+        shaft = [arrow_x, 640, arrow_x, 580]
+        head = [arrow_x - 16, 600, arrow_x, 580, arrow_x + 16, 600]
+        draw.line([*shaft, *head], fill="#5b3f26", width=5)
     _text(draw, (90, 480), _words(rng, 1).upper(), 54, "#5b3f26")
     return Picture(np.asarray(image), tile_m)
 
@@ -516,7 +763,8 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
 @painted
 def sign(text: str, colour: str = PAPER) -> Picture:
     """A plate (480 × 240) with a word in a border."""
+    ink = _on(colour)
     image, draw = _canvas(480, 240, colour)
-    draw.rectangle([8, 8, 471, 231], outline=_on(colour), width=5)
-    _text(draw, (240, 120), text, 90, _on(colour), anchor="mm")
+    draw.rectangle([8, 8, 471, 231], outline=ink, width=5)
+    _text(draw, (240, 120), text, 90, ink, anchor="mm")
     return Picture(np.asarray(image))

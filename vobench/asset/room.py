@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import ModuleType
 from typing import Any, Literal
 from zlib import crc32
 
@@ -9,26 +10,31 @@ import numpy as np
 
 from vobench.asset import fitting, furniture, household, outdoors, picture
 from vobench.asset.furniture import Part, matt
-from vobench.asset.shape import Hole, at, pierced, reveal
+from vobench.asset.shape import at
+from vobench.asset.wall import Hole, pierced, reveal
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material
-from vobench.scene.mesh import Mesh, Thing, joined, quad
+from vobench.scene.mesh import MeshArrays, Thing, joined_arrays, quad_arrays
 
 Instance = tuple[str, Sequence[Part]]
 Wall = Literal["east", "north", "west", "south"]
 OUTWARD: dict[Wall, tuple[float, float]] = {"east": (1, 0), "north": (0, 1), "west": (-1, 0), "south": (0, -1)}
 
+# Modules with the functions that make furniture, and the names of these.
+_MODULES: dict[ModuleType, str] = {
+    furniture: """
+        desk chair shelf book_stack papers monitor keyboard mouse mug pens desk_lamp cables plant carton
+        crate sofa waste_bin cabinet bench pillar
+    """,
+    fitting: """
+        door window_frame blind curtain radiator socket skirting framed noticeboard glass_wall pipe
+        lamp_housing spot_housing
+    """,
+    household: "dining_chair floor_lamp fruit_bowl low_board pendant rug table television",
+    outdoors: "bollard bush car park_bench park_lamp person rock street_lamp tree",
+}
 KINDS: dict[str, Callable[..., list[Part]]] = {
-    name: getattr(room, name)
-    for room, names in (
-        (furniture, "desk chair shelf book_stack papers monitor keyboard mouse mug pens desk_lamp cables plant carton"),
-        (furniture, "crate sofa waste_bin cabinet bench pillar"),
-        (fitting, "door window_frame blind curtain radiator socket skirting framed noticeboard glass_wall pipe"),
-        (fitting, "lamp_housing spot_housing"),
-        (household, "dining_chair floor_lamp fruit_bowl low_board pendant rug table television"),
-        (outdoors, "bollard bush car park_bench park_lamp person rock street_lamp tree"),
-    )
-    for name in names.split()
+    name: getattr(module, name) for module, names in _MODULES.items() for name in names.split()
 }
 # Materials that scenes may name.
 FINISHES: dict[str, Callable[[], Material]] = {
@@ -49,7 +55,7 @@ FINISHES: dict[str, Callable[[], Material]] = {
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One of KINDS at a place; what is left to chance hangs on the scene's seed and this name alone."""
+    """One of KINDS at a position; its random choices depend on the scene's seed and this name alone."""
 
     kind: str
     name: str
@@ -59,36 +65,44 @@ class Piece:
     size: Mapping[str, Any] = field(default_factory=dict)
 
     def rng(self, seed: int = 0) -> np.random.Generator:
-        """Its chances."""
-        return np.random.default_rng(np.random.SeedSequence([seed, crc32(self.name.encode())]))
+        """The generator of its random choices."""
+        name_hash = crc32(self.name.encode())
+        return np.random.default_rng(np.random.SeedSequence([seed, name_hash]))
 
     def build(self, seed: int = 0) -> Instance:
         """Its name and its parts in the scene's frame."""
+        make = KINDS[self.kind]
         T_world_piece = at(*self.at_m, yaw=self.yaw_deg, pitch=self.pitch_deg)
-        return self.name, [part.moved(T_world_piece) for part in KINDS[self.kind](self.rng(seed), **self.size)]
+        parts = [part.moved(T_world_piece) for part in make(self.rng(seed), **self.size)]
+        return self.name, parts
 
 
 def things(
     instances: Iterable[Instance], known: Mapping[str, Material] = {}
 ) -> tuple[tuple[Thing, ...], dict[str, Material]]:
-    """The parts of instances as things, one of each material an instance, and the materials by name.
+    """The parts of instances as things, one per material of an instance, and the materials by name.
 
     A material that is not known by a name already is named after the instance that has it first.
     """
     names = {material: name for name, material in known.items()}
     result = []
     for name, parts in instances:
-        meshes: dict[Material, list[Mesh]] = {}
-        for part in parts:
-            meshes.setdefault(part.material, []).append(part.mesh)
-        for k, (material, of_it) in enumerate(meshes.items()):
-            result.append(Thing(name, joined(of_it), names.setdefault(material, f"{name}.{k}")))
+        for k, (material, meshes) in enumerate(_by_material(parts).items()):
+            material_name = names.setdefault(material, f"{name}.{k}")
+            result.append(Thing(name, joined_arrays(meshes).mesh(), material_name))
     return tuple(result), {name: material for material, name in names.items()}
+
+
+def _by_material(parts: Sequence[Part]) -> dict[Material, list[MeshArrays]]:
+    meshes: dict[Material, list[MeshArrays]] = {}
+    for part in parts:
+        meshes.setdefault(part.material, []).append(part.arrays)
+    return meshes
 
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """A window: its middle along the wall (world x or y) and above the floor, and how far behind it the pane is."""
+    """A window: its center along the wall (world x or y) and above the floor, and how far behind it the pane is."""
 
     wall: Wall
     center_m: tuple[float, float]
@@ -108,23 +122,33 @@ def shell(
 ) -> Iterator[Instance]:
     """`floor`, `ceiling`, `wall_east` ... around the origin, and `window_0` ..., each of its reveals and its pane."""
     x, y, z = size_m
-    yield "floor", [Part(pierced((-x / 2, -y / 2, 0), (x, 0, 0), (0, y, 0)), floor)]
-    yield "ceiling", [Part(pierced((-x / 2, -y / 2, z), (0, y, 0), (x, 0, 0)), ceiling)]
-    for name, outward in OUTWARD.items():
-        right = np.array([outward[1], -outward[0], 0.0])
-        corner = (np.array([*outward, 0.0]) - right) * [x / 2, y / 2, 0]
-        sheet = corner, right * [x, y, 0], (0.0, 0.0, z)
-        holes = {k: _hole(opening, sheet[1]) for k, opening in enumerate(openings) if opening.wall == name}
-        yield f"wall_{name}", [Part(pierced(*sheet, list(holes.values())), walls[name])]
-        for k, (u0, u1, v0, v1) in holes.items():
+    floor_mesh = pierced((-x / 2, -y / 2, 0), (x, 0, 0), (0, y, 0))
+    ceiling_mesh = pierced((-x / 2, -y / 2, z), (0, y, 0), (x, 0, 0))
+    yield "floor", [Part(floor_mesh, floor)]
+    yield "ceiling", [Part(ceiling_mesh, ceiling)]
+
+    for name, (outward_x, outward_y) in OUTWARD.items():
+        outward = np.array([outward_x, outward_y, 0.0])
+        right = np.array([outward_y, -outward_x, 0.0])
+        corner = (outward - right) * [x / 2, y / 2, 0]
+        edge = right * [x, y, 0]
+        up = (0.0, 0.0, z)
+        holes = {k: _hole(opening, edge) for k, opening in enumerate(openings) if opening.wall == name}
+        yield f"wall_{name}", [Part(pierced(corner, edge, up, list(holes.values())), walls[name])]
+
+        for k, hole in holes.items():
+            u0, u1, v0, v1 = hole
             depth = openings[k].depth_m
-            near = corner + right * u0 + [0, 0, v0] + np.array([*outward, 0.0]) * depth
-            glass = quad(near, right * (u1 - u0), (0, 0, v1 - v0))
-            yield f"window_{k}", [Part(reveal(*sheet, (u0, u1, v0, v1), depth), frame), Part(glass, pane)]
+            pane_corner = corner + right * u0 + [0, 0, v0] + outward * depth
+            glass = quad_arrays(pane_corner, right * (u1 - u0), (0, 0, v1 - v0))
+            sides = reveal(corner, edge, up, hole, depth)
+            yield f"window_{k}", [Part(sides, frame), Part(glass, pane)]
 
 
 def _hole(opening: Opening, edge_m: Array) -> Hole:
-    (along, up) = opening.center_m
-    (width, height) = opening.size_m
-    u = float(np.abs(edge_m).sum() / 2 + along * np.sign(edge_m.sum()))
+    """The hole of an opening in a wall whose lower edge is edge_m, around the origin."""
+    along, up = opening.center_m
+    width, height = opening.size_m
+    half_length = np.abs(edge_m).sum() / 2
+    u = float(half_length + along * np.sign(edge_m.sum()))
     return u - width / 2, u + width / 2, up - height / 2, up + height / 2

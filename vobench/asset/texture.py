@@ -11,21 +11,33 @@ from vobench.scene.material import Map
 from vobench.setting import OneOf, Positive, Share, settings
 
 
-def _noise(texture: "Procedural", rng: np.random.Generator, *, coarse_m: float, fine_m: float, slope: float) -> Map:
+def _noise(
+    texture: "Procedural",
+    rng: np.random.Generator,
+    *,
+    coarse_m: float,
+    fine_m: float,
+    slope: float,
+) -> Map:
     """Periodic noise of unit variance whose features are between `fine_m` and `coarse_m` wide; 0 where none fits.
 
     White noise shaped in the frequency domain by f^-slope: isotropic, and a tile without seams.
     """
     n = texture.resolution_px
-    per_m = n / texture.tile_m
-    f_u = scipy.fft.rfftfreq(n) * per_m
+    px_per_m = n / texture.tile_m
+    lowest = 0.5 / coarse_m  # cycles per metre
+    highest = 0.5 / fine_m
+    f_u = scipy.fft.rfftfreq(n) * px_per_m
+    f_v = scipy.fft.fftfreq(n)[:, None] * px_per_m
     # Columns above the band are zero, and the inverse transform adds them back as such.
-    f_u = f_u[f_u < 0.5 / fine_m]
-    spectrum = scipy.fft.rfft2(rng.standard_normal((n, n), dtype=np.float32), workers=-1)[:, : len(f_u)]
-    f = np.hypot(scipy.fft.fftfreq(n)[:, None] * per_m, f_u).astype(np.float32)
-    band = (f > 0.5 / coarse_m) & (f < 0.5 / fine_m)
-    spectrum = spectrum * np.where(band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
-    noise = scipy.fft.irfft2(spectrum, s=(n, n), workers=-1)
+    f_u = f_u[f_u < highest]
+    f = np.hypot(f_v, f_u).astype(np.float32)
+    is_in_band = (f > lowest) & (f < highest)
+    shape = np.where(is_in_band, np.maximum(f, 1e-6) ** -slope, 0).astype(np.float32)
+
+    white = rng.standard_normal((n, n), dtype=np.float32)
+    spectrum = scipy.fft.rfft2(white, workers=-1)[:, : len(f_u)]
+    noise = scipy.fft.irfft2(spectrum * shape, s=(n, n), workers=-1)
     return np.asarray(noise / (noise.std() or 1))
 
 
@@ -41,7 +53,9 @@ def terrazzo(texture: "Procedural", rng: np.random.Generator) -> Map:
     small = _noise(texture, rng, coarse_m=0.015, fine_m=0.004, slope=0.5)
     grain = _noise(texture, rng, coarse_m=0.5, fine_m=0.002, slope=1.2)
     step = 0.08
-    return np.asarray(0.9 * np.tanh((chips - 0.6) / step) - 0.6 * np.tanh((small - 0.8) / step) + 0.5 * grain)
+    bright_chips = 0.9 * np.tanh((chips - 0.6) / step)
+    dark_chips = 0.6 * np.tanh((small - 0.8) / step)
+    return np.asarray(bright_chips - dark_chips + 0.5 * grain)
 
 
 def plaster(texture: "Procedural", rng: np.random.Generator) -> Map:
@@ -56,7 +70,8 @@ def wood(texture: "Procedural", rng: np.random.Generator) -> Map:
     bend = _noise(texture, rng, coarse_m=0.6, fine_m=0.08, slope=1.5)
     fibre = _noise(texture, rng, coarse_m=0.05, fine_m=0.004, slope=0.6)
     n = texture.resolution_px
-    rings = np.arange(n, dtype=np.float32)[:, None] / n * 2 * np.pi * round(texture.tile_m / 0.05)
+    count = round(texture.tile_m / 0.05)
+    rings = np.arange(n, dtype=np.float32)[:, None] / n * 2 * np.pi * count
     return np.asarray(np.sin(rings + 2.5 * bend) + 0.7 * fibre)
 
 
@@ -77,7 +92,8 @@ def checker(texture: "Procedural", rng: np.random.Generator) -> Map:
     """Eight by eight squares: the one with corners whose place is known."""
     del rng
     square = np.arange(texture.resolution_px) * 8 // texture.resolution_px
-    return np.where((square[:, None] + square[None, :]) % 2, 1.0, -1.0).astype(np.float32)
+    is_bright = (square[:, None] + square[None, :]) % 2
+    return np.where(is_bright, 1.0, -1.0).astype(np.float32)
 
 
 PATTERNS: dict[str, Callable[["Procedural", np.random.Generator], Map]] = {
@@ -113,7 +129,11 @@ class Procedural:
 
     def pixels(self) -> Map:
         """Reflectance (resolution_px, resolution_px) float32 in [0.02, 0.98], row 0 at v = 0."""
-        pattern = PATTERNS[self.pattern](self, np.random.default_rng([self.seed, self.resolution_px]))
-        low, high = np.percentile(pattern[::4, ::4] if len(pattern) > 64 else pattern, [1, 99])
-        unit = (pattern - pattern.mean()) / ((high - low) / 2 if high > low else 1.0)
-        return np.asarray(np.clip(self.albedo * (1 + self.contrast * unit), 0.02, 0.98).astype(np.float32))
+        rng = np.random.default_rng([self.seed, self.resolution_px])
+        pattern = PATTERNS[self.pattern](self, rng)
+        sample = pattern[::4, ::4] if len(pattern) > 64 else pattern
+        darkest, brightest = np.percentile(sample, [1, 99])
+        spread = (brightest - darkest) / 2 if brightest > darkest else 1.0
+        deviation = (pattern - pattern.mean()) / spread
+        reflectance = self.albedo * (1 + self.contrast * deviation)
+        return np.asarray(np.clip(reflectance, 0.02, 0.98).astype(np.float32))

@@ -22,6 +22,7 @@ from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.mesh import areas_m2, face_normals, unit
+from vobench.scene.mesh import corners as mesh_corners
 
 FAR_OFF = 2.9  # radii of a rectangle, beyond which rays spread over its area tell as well what hides it
 MESH_SAMPLES = 8  # along a side, of a mesh's light without rays
@@ -168,7 +169,7 @@ class Emitter:
 
 def panel_emitter(light: AreaLight) -> Emitter:
     """A lamp's faces, which shine only to their front: rectangles by solid angle, all else by area."""
-    corners_m = light.mesh.corners_m
+    corners_m = mesh_corners(light.mesh)
     face = rectangle(corners_m)
     around = bounding_sphere(corners_m)
     if face is None:

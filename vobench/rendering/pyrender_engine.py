@@ -30,7 +30,18 @@ from vobench.rendering.view import NEAR_M, T_CV_GL, Box
 from vobench.rendering.warp import warp
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Rgb
-from vobench.scene.mesh import Mesh, Thing, areas_m2, cross, distinct, face_normals, joined, unit
+from vobench.scene.mesh import (
+    MeshArrays,
+    Thing,
+    areas_m2,
+    arrays,
+    corners,
+    cross,
+    distinct,
+    face_normals,
+    joined_arrays,
+    unit,
+)
 from vobench.scene.scene import Scene
 
 GAMMA = 2.2  # pyrender stores linear ** (1 / 2.2)
@@ -239,13 +250,13 @@ class PyrenderScene:
         sun: Array | None = None,
     ) -> list[Any]:
         """One node for each material of things, in their common frame; panes let the sun (3,) through."""
-        by_material = dict[str, list[Mesh]]()
+        by_material = dict[str, list[MeshArrays]]()
         for thing in things:
-            by_material.setdefault(thing.material, []).append(thing.mesh)
+            by_material.setdefault(thing.material, []).append(arrays(thing.mesh))
         nodes = []
         for name, meshes in by_material.items():
             tile_m = texture_tile_m(self._scene.materials[name])
-            mesh = joined(meshes)
+            mesh = joined_arrays(meshes)
             if sun is not None and self._scene.materials[name].kind == "pane":
                 mesh = _turned_away(mesh, sun)
             nodes += self._add_mesh(mesh, self._materials(name), tile_m)
@@ -256,15 +267,15 @@ class PyrenderScene:
         import pyrender
 
         solid = [thing for thing in things if self._scene.materials[thing.material].kind != "pane"]
-        sheets = [thing.mesh.flipped() for thing in solid if _is_open(thing.mesh)]
+        sheets = [arrays(thing.mesh).flipped() for thing in solid if _is_open(arrays(thing.mesh))]
         material = pyrender.MetallicRoughnessMaterial(
             baseColorFactor=[0.2, 0.2, 0.2, 1.0], metallicFactor=0.0, roughnessFactor=1.0
         )
-        self._add_mesh(joined(sheets), material, TILE_EDGES_M)
+        self._add_mesh(joined_arrays(sheets), material, TILE_EDGES_M)
 
     def _add_mesh(
         self,
-        mesh: Mesh,
+        mesh: MeshArrays,
         material: Any,
         tile_m: float,
     ) -> list[Any]:
@@ -288,7 +299,7 @@ class PyrenderScene:
         """The faces of a lamp, their material, and what they emit (3,) at level 1, white at 1."""
         look = self._scene.materials.get(light.material)
         material, emitted, tile_m = lamp_material(light, look)
-        self._add_mesh(light.mesh, material, tile_m)
+        self._add_mesh(arrays(light.mesh), material, tile_m)
         return material, emitted / self._white_cd_m2
 
     def _add_light(self, light: Light) -> Any:
@@ -334,7 +345,7 @@ def _spot(
     return pyrender.SpotLight(color=colour, intensity=intensity, innerConeAngle=narrow_rad, outerConeAngle=widest_rad)
 
 
-def _turned_away(mesh: Mesh, sun: Array) -> Mesh:
+def _turned_away(mesh: MeshArrays, sun: Array) -> MeshArrays:
     """A mesh whose faces all show the sun (3,) their backs, which its shadow map leaves out; normals stay."""
     faces = mesh.faces.copy()
     towards = face_normals(mesh.corners_m) @ sun > 0
@@ -342,7 +353,7 @@ def _turned_away(mesh: Mesh, sun: Array) -> Mesh:
     return replace(mesh, faces=faces)
 
 
-def _is_open(mesh: Mesh) -> bool:
+def _is_open(mesh: MeshArrays) -> bool:
     """Whether a mesh has an edge with a face on one side only, as a sheet has and a box has not."""
     corners = np.round(mesh.corners_m, WELD_DIGITS).reshape(-1, 3)
     _, kind = distinct(corners)
@@ -393,14 +404,14 @@ def _mean_normal(light: AreaLight) -> Array:
 
 def _summed_normal(light: AreaLight) -> Array:
     """The mean (3,) of a panel's normals by area, shorter than 1 where they differ."""
-    corners_m = light.mesh.corners_m
+    corners_m = corners(light.mesh)
     areas = areas_m2(corners_m)
     return np.asarray(areas @ face_normals(corners_m) / areas.sum())
 
 
 def _middle_m(light: AreaLight) -> Array:
     """The centroid (3,) of a panel's faces."""
-    corners_m = light.mesh.corners_m
+    corners_m = corners(light.mesh)
     areas = areas_m2(corners_m)
     return np.asarray(areas @ corners_m.mean(1) / areas.sum())
 

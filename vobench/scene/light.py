@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, ClassVar, Protocol
+from typing import TYPE_CHECKING, Annotated, ClassVar, Protocol
 
 import numpy as np
 from annotated_types import MinLen
@@ -12,8 +12,11 @@ from annotated_types import MinLen
 from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
 from vobench.scene.material import WHITE, Rgb
-from vobench.scene.mesh import Mesh, areas_m2
+from vobench.scene.mesh import areas_m2, corners
 from vobench.setting import Positive, Share, settings
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 NS_PER_S = 1e9
 SUN_RADIUS_RAD = np.deg2rad(0.533 / 2)  # seen from the Earth
@@ -54,11 +57,13 @@ class Flicker:
     phase_deg: float = 0.0
 
     def mean(self, start_ns: int, end_ns: int) -> float:
-        """The integral of the cosine is its value amid the interval times a sinc."""
+        """The mean: the integral of the cosine is its value at the middle of the interval times a sinc."""
         middle_s = (start_ns + end_ns) / 2 / NS_PER_S
         length_s = (end_ns - start_ns) / NS_PER_S
-        swing = np.cos(4 * np.pi * self.mains_hz * middle_s + float(np.deg2rad(self.phase_deg)))
-        return float(1 + self.depth * swing * np.sinc(2 * self.mains_hz * length_s))
+        phase_rad = float(np.deg2rad(self.phase_deg))
+        swing = np.cos(4 * np.pi * self.mains_hz * middle_s + phase_rad)
+        smoothing = np.sinc(2 * self.mains_hz * length_s)
+        return float(1 + self.depth * swing * smoothing)
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,18 +74,20 @@ class Dimmer:
     levels: tuple[float, ...]
 
     def mean(self, start_ns: int, end_ns: int) -> float:
-        """The trapezia's area over the interval's length."""
+        """The mean: the area of trapezoids over the interval's length."""
         start_s = start_ns / NS_PER_S
         end_s = end_ns / NS_PER_S
         inside = [t for t in self.times_s if start_s < t < end_s]
         times = np.array([start_s, *inside, end_s])
         levels = np.interp(times, self.times_s, self.levels)
-        return float(np.trapezoid(levels, times) / (end_s - start_s)) if end_ns > start_ns else float(levels[0])
+        if end_ns <= start_ns:
+            return float(levels[0])
+        return float(np.trapezoid(levels, times) / (end_s - start_s))
 
 
 @settings(kw_only=False)
 class Switched:
-    """On or off at first, and the other way round from each of the increasing instants times_s on."""
+    """A light that is on or off at first and changes at each of the increasing instants times_s."""
 
     times_s: Annotated[tuple[float, ...], MinLen(1)]
     on_first: bool = True
@@ -96,9 +103,10 @@ class Switched:
         is_on = self.on_first ^ bool(passed % 2)
         if end_ns <= start_ns:
             return float(is_on)
-        edges = np.array([start_s, *(t for t in self.times_s if start_s < t < end_s), end_s])
-        lengths = np.diff(edges)
-        return float(lengths[0 if is_on else 1 :: 2].sum() / (end_s - start_s))
+        changes = [t for t in self.times_s if start_s < t < end_s]
+        lengths = np.diff(np.array([start_s, *changes, end_s]))
+        first_on = 0 if is_on else 1
+        return float(lengths[first_on::2].sum() / (end_s - start_s))
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,19 +125,19 @@ STEADY = Steady()
 
 
 def scaled(level: Level, factor: float) -> Level:
-    """The function of time `factor` times as bright; what is steady stays so, as engines spare themselves work."""
+    """The function of time `factor` times as bright; a steady one stays so, as engines compute it once."""
     return Steady(factor * level.level) if isinstance(level, Steady) else Scaled(level, factor)
 
 
 @dataclass(frozen=True, slots=True)
 class AreaLight:
-    """Faces that emit `power_lm` evenly and to all sides of their front (Lambert).
+    """Faces that emit `power_lm` evenly from their front (Lambert).
 
     `material` names what they look like, where that has an emission texture.
     """
 
     name: str
-    mesh: Mesh
+    mesh: "Trimesh"
     power_lm: float
     level: Level = STEADY
     colour: Rgb = WHITE
@@ -139,7 +147,8 @@ class AreaLight:
     @property
     def luminance_cd_m2(self) -> float:
         """Luminance of the faces: power / (π area)."""
-        return self.power_lm / (np.pi * float(areas_m2(self.mesh.corners_m).sum()))
+        area_m2 = float(areas_m2(corners(self.mesh)).sum())
+        return self.power_lm / (np.pi * area_m2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,17 +186,21 @@ class SpotLight:
 
     @property
     def peak_cd(self) -> float:
-        """Intensity amid the beam: the power over the integral of the fall-off."""
+        """Intensity at the middle of the beam: the power over the integral of the fall-off."""
         theta = np.linspace(0, np.deg2rad(self.outer_deg), 4001)
-        return float(self.power_lm / np.trapezoid(2 * np.pi * np.sin(theta) * self._falloff(theta), theta))
+        ring_sr = 2 * np.pi * np.sin(theta)
+        solid_angle_sr = np.trapezoid(ring_sr * self._falloff(theta), theta)
+        return float(self.power_lm / solid_angle_sr)
 
     def intensity_cd(self, directions: Array) -> Array:
         """Luminous intensity (...) towards unit directions (..., 3)."""
-        return self.peak_cd * self._falloff(np.arccos(np.clip(directions @ self.direction, -1, 1)))
+        theta = np.arccos(np.clip(directions @ self.direction, -1, 1))
+        return self.peak_cd * self._falloff(theta)
 
     def _falloff(self, theta_rad: Array) -> Array:
         inner, outer = np.deg2rad([self.inner_deg, self.outer_deg])
-        return np.asarray(np.clip((outer - theta_rad) / max(outer - inner, 1e-9), 0.0, 1.0))
+        width = max(outer - inner, 1e-9)
+        return np.asarray(np.clip((outer - theta_rad) / width, 0.0, 1.0))
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,7 +221,7 @@ class Sun:
 
     @property
     def moves(self) -> bool:
-        """Whether its shadows wander."""
+        """Whether its shadows move."""
         return len(self.times_s) > 1
 
     def direction(self, t_ns: float) -> Array:
@@ -216,7 +229,8 @@ class Sun:
         t_s = t_ns / NS_PER_S
         azimuth = np.deg2rad(np.interp(t_s, self.times_s, self.azimuth_deg))
         elevation = np.deg2rad(np.interp(t_s, self.times_s, self.elevation_deg))
-        return np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+        level = np.cos(elevation)
+        return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
 
 
 # Coefficients a to e of ISO 15469:2004 (CIE S 011), types 5, 1 and 12.
@@ -245,7 +259,8 @@ class Sky:
 
     def luminance_cd_m2(self, directions: Array) -> Array:
         """Luminance (...) seen along unit directions (..., 3). Source: ISO 15469:2004, eqs 1 to 7."""
-        scale = self.illuminance_lx / _level_illuminance(self.kind, *map(float, self.sun_direction))
+        sun_direction = map(float, self.sun_direction)
+        scale = self.illuminance_lx / _level_illuminance(self.kind, *sun_direction)
         sky = _relative_luminance(self.kind, self.sun_direction, directions) * scale
         ground = self.ground_albedo * self.illuminance_lx / np.pi
         return np.where(directions[..., 2] >= 0, sky, ground)
@@ -258,20 +273,22 @@ def _relative_luminance(kind: str, sun_direction: Array, directions: Array) -> A
     if c == e == 0:
         return gradation
     chi = np.arccos(np.clip(directions @ sun_direction, -1, 1))
-    scatter: Array = 1 + c * (np.exp(d * chi) - np.exp(d * np.pi / 2)) + e * np.cos(chi) ** 2
-    return gradation * scatter
+    towards_sun = c * (np.exp(d * chi) - np.exp(d * np.pi / 2))
+    indicatrix: Array = 1 + towards_sun + e * np.cos(chi) ** 2
+    return gradation * indicatrix
 
 
 @lru_cache(maxsize=64)
 def _level_illuminance(kind: str, *sun_direction: float) -> float:
-    """Level illuminance by a sky of relative luminance, by the midpoint rule over the upper half sphere."""
+    """Illuminance of level ground by a sky of relative luminance, by the midpoint rule over the upper hemisphere."""
     sine_squared = (np.arange(256) + 0.5) / 256
     azimuth = 2 * np.pi * (np.arange(512) + 0.5) / 512
     cosine = np.sqrt(1 - sine_squared)[:, None]
     angle = azimuth[None, :]
     up = np.broadcast_to(np.sqrt(sine_squared)[:, None], (256, 512))
     directions = np.stack([cosine * np.cos(angle), cosine * np.sin(angle), up], -1)
-    return float(np.pi * _relative_luminance(kind, np.array(sun_direction), directions).mean())
+    luminance = _relative_luminance(kind, np.array(sun_direction), directions)
+    return float(np.pi * luminance.mean())
 
 
 Light = AreaLight | PointLight | SpotLight | Sun | Sky

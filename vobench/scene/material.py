@@ -44,7 +44,7 @@ class Material:
 
     colour (3,) linear RGB reflectance, times the texture. eta: of the coat or the pane's glass, 1 for none;
     tint: scales what a coat or mirror mirrors, or what a pane lets pass. roughness: GGX alpha of coat or mirror.
-    metal: the share of the body that is bare metal, which mirrors in its colour and scatters nothing.
+    metal: the share of the body that is bare metal, which reflects specularly in its colour and scatters nothing.
     emission_cd_m2 (3,): luminance of each channel as white of that strength, times emission_texture.
     cutout: the opacity of the texture below which there is a hole, None where it is solid.
     """
@@ -97,18 +97,22 @@ def emitted_cd_m2(material: Material) -> Array:
     """Luminance (3,) of each channel of what a material emits, the mean over its texture."""
     if material.emission_texture is None:
         return np.array(material.emission_cd_m2)
-    return np.asarray(material.emission_cd_m2 * linear_texture(material.emission_texture).mean((0, 1), dtype=float))
+    mean = linear_texture(material.emission_texture).mean((0, 1), dtype=float)
+    return np.asarray(material.emission_cd_m2 * mean)
 
 
 def reflectance(material: Material) -> Map:
     """Luminous reflectance (H, W) float32 of a body's tile, row 0 at v = 0; one pixel where it has no texture."""
     colour = np.array(material.colour, np.float32)
+    weights = np.array(LUMINANCE)
+    luminous = colour @ weights
     if material.texture is None:
-        return np.full((1, 1), colour @ np.array(LUMINANCE), np.float32)
+        return np.full((1, 1), luminous, np.float32)
     pixels = material.texture.pixels()
-    if pixels.ndim == 2:
-        return np.asarray(pixels * np.float32(colour @ np.array(LUMINANCE)), np.float32)
-    return np.asarray(linear(pixels[..., :3]) @ (colour * np.array(LUMINANCE)).astype(np.float32))
+    is_grey = pixels.ndim == 2
+    if is_grey:
+        return np.asarray(pixels * np.float32(luminous), np.float32)
+    return np.asarray(linear(pixels[..., :3]) @ (colour * weights).astype(np.float32))
 
 
 def fresnel(cosine: Array, eta: float | Array) -> Array:

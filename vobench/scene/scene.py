@@ -7,13 +7,13 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.light import AreaLight, Light, PointLight, SpotLight
+from vobench.scene.light import NS_PER_S, AreaLight, Light, PointLight, SpotLight
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, Triangles, quad, table
+from vobench.scene.mesh import Thing, Triangles, moved, quad, table
 
 
 class Way(Protocol):
-    """Where a rigid thing is at any time."""
+    """The trajectory of a rigid thing."""
 
     def pose(self, t_ns: float) -> Array:
         """T_world_mover (4, 4) at an instant."""
@@ -24,7 +24,7 @@ class Way(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Path:
-    """Straight ways between positions_m (K, 3) and yaw_deg (K,) at increasing times_s (K,), even in time.
+    """A trajectory linear between positions_m (K, 3) and yaw_deg (K,) at increasing times_s (K,).
 
     Before the first and after the last time the mover rests, or starts again where `repeats`.
     """
@@ -36,21 +36,25 @@ class Path:
 
     def pose(self, t_ns: float) -> Array:
         """T_world_mover (4, 4) at an instant."""
-        t_s = t_ns / 1e9
+        t_s = t_ns / NS_PER_S
+        start_s = self.times_s[0]
         if self.repeats:
-            t_s = self.times_s[0] + (t_s - self.times_s[0]) % (self.times_s[-1] - self.times_s[0])
+            t_s = start_s + (t_s - start_s) % (self.times_s[-1] - start_s)
         position = [np.interp(t_s, self.times_s, axis) for axis in self.positions_m.T]
         yaw = np.deg2rad(np.interp(t_s, self.times_s, self.yaw_deg))
         return se3.transform(se3.rotation_z(yaw), np.array(position))
 
     def distance_m(self, t_ns: float) -> float:
-        """The length of the way from the first time to an instant."""
-        gone_m = np.append(0, np.cumsum(np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1)))
+        """The distance travelled from the first time to an instant."""
+        t_s = t_ns / NS_PER_S
+        steps_m = np.linalg.norm(np.diff(self.positions_m, axis=0), axis=1)
+        distance_m = np.append(0, np.cumsum(steps_m))
+        duration_s = self.times_s[-1] - self.times_s[0]
         rounds = 0.0
-        lasts_s = self.times_s[-1] - self.times_s[0]
         if self.repeats:
-            rounds = np.floor((t_ns / 1e9 - self.times_s[0]) / lasts_s)
-        return float(rounds * gone_m[-1] + np.interp(t_ns / 1e9 - rounds * lasts_s, self.times_s, gone_m))
+            rounds = np.floor((t_s - self.times_s[0]) / duration_s)
+        within_round = np.interp(t_s - rounds * duration_s, self.times_s, distance_m)
+        return float(rounds * distance_m[-1] + within_round)
 
     def sized(self, by: float) -> "Path":
         """The same with all lengths times `by`."""
@@ -58,19 +62,24 @@ class Path:
 
 
 def jointed(joints_m: Array, pitch_rad: Array) -> Array:
-    """T_body_limb (4, 4) of a limb turned about y at joints (J, 3), given as they are unturned, from the body on."""
+    """T_body_limb (4, 4) of a limb rotated about y at joints (J, 3), which are given unrotated, from the body on."""
     T = np.eye(4)
-    for joint_m, turn in zip(joints_m, pitch_rad, strict=True):
-        c = np.cos(turn)
-        s = np.sin(turn)
+    for joint_m, pitch in zip(joints_m, pitch_rad, strict=True):
+        c = np.cos(pitch)
+        s = np.sin(pitch)
         R = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
         T = T @ se3.transform(R, joint_m - R @ joint_m)
     return T
 
 
+def _periodic(phase: float, steps: Array, values: Array) -> float:
+    """A value at a phase in [0, 1) of a cycle, linear between values (K,) at its K even steps."""
+    return float(np.interp(phase, steps, [*values, values[0]]))
+
+
 @dataclass(frozen=True, slots=True)
 class Gait:
-    """The way of a limb of somebody who walks a path: it swings with the distance, and stands still when they do.
+    """The trajectory of a limb of somebody who walks a path: it swings with the distance travelled.
 
     joints_m (J, 3) as in `jointed`; pitch_rad (K, J) and rise_m (K,), how high the body is, at K even steps of a
     cycle of cycle_m.
@@ -86,9 +95,10 @@ class Gait:
         """T_world_limb (4, 4) at an instant."""
         phase = self.path.distance_m(t_ns) / self.cycle_m % 1
         steps = np.linspace(0, 1, len(self.rise_m) + 1)
-        rise, *pitch = (np.interp(phase, steps, [*x, x[0]]) for x in (self.rise_m, *self.pitch_rad.T))
-        up = se3.transform(np.eye(3), [0, 0, rise])
-        return self.path.pose(t_ns) @ up @ jointed(self.joints_m, np.array(pitch))
+        rise = _periodic(phase, steps, self.rise_m)
+        pitch = [_periodic(phase, steps, joint) for joint in self.pitch_rad.T]
+        T_ground_body = se3.transform(np.eye(3), [0, 0, rise])
+        return self.path.pose(t_ns) @ T_ground_body @ jointed(self.joints_m, np.array(pitch))
 
     def sized(self, by: float) -> "Gait":
         """The same with all lengths times `by`."""
@@ -97,7 +107,7 @@ class Gait:
 
 @dataclass(frozen=True, slots=True)
 class Mover:
-    """A rigid thing on its way; its things are in its own frame. What has limbs is several movers of one name."""
+    """A rigid body that moves; its things are in its own frame. A body with limbs is several movers of one name."""
 
     name: str
     things: tuple[Thing, ...]
@@ -106,7 +116,7 @@ class Mover:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Things that stand still, their materials by name, the lights that shine on them, and movers."""
+    """Stationary things, their materials by name, the lights that shine on them, and movers."""
 
     name: str
     things: tuple[Thing, ...]
@@ -122,40 +132,58 @@ class Scene:
 
 def triangles(scene: Scene, *, t_ns: float | None = None) -> Triangles:
     """Every face of a scene: things, panels, movers; these in their own frames where t_ns is None."""
-    lamps = {nth: light for nth, light in enumerate(scene.lights) if isinstance(light, AreaLight)}
-    panels = {nth: Thing(light.name, light.mesh, light.material or light.name) for nth, light in lamps.items()}
-    moving = [(nth, thing) for nth, m in enumerate(scene.movers) for thing in m.things]
-    things = [*scene.things, *panels.values(), *(thing for _, thing in moving)]
-    mover = [-1] * (len(scene.things) + len(panels)) + [nth for nth, _ in moving]
-    lamp = [-1] * len(scene.things) + list(panels) + [-1] * len(moving)
+    things = list(scene.things)
+    mover = [-1] * len(things)
+    lamp = [-1] * len(things)
+    for nth, light in enumerate(scene.lights):
+        if isinstance(light, AreaLight):
+            things.append(Thing(light.name, light.mesh, light.material or light.name))
+            mover.append(-1)
+            lamp.append(nth)
+    for nth, body in enumerate(scene.movers):
+        things += body.things
+        mover += [nth] * len(body.things)
+        lamp += [-1] * len(body.things)
+
     faces = table(things, mover, lamp)
-    return faces if t_ns is None else faces.moved([m.path.pose(t_ns) for m in scene.movers])
+    return faces if t_ns is None else faces.moved([body.path.pose(t_ns) for body in scene.movers])
 
 
 def ceiling_light(name: str, center_m: Array, size_m: tuple[float, float], *, power_lm: float) -> AreaLight:
     """A panel that hangs level and shines down."""
     x = np.array([size_m[0], 0, 0])
     y = np.array([0, size_m[1], 0])
-    return AreaLight(name, quad(np.asarray(center_m, float) - (x + y) / 2, y, x), power_lm)
+    corner = np.asarray(center_m, float) - (x + y) / 2
+    return AreaLight(name, quad(corner, y, x), power_lm)
 
 
 def sized(scene: Scene, by: float) -> Scene:
     """The scene with all lengths times `by`, textures too; lamps are so much stronger that it is lit as before."""
-    T = np.diag([by, by, by, 1.0])
+    movers = []
+    for mover in scene.movers:
+        things = tuple(_sized_thing(thing, by) for thing in mover.things)
+        movers.append(replace(mover, things=things, path=mover.path.sized(by)))
+    return replace(
+        scene,
+        things=tuple(_sized_thing(thing, by) for thing in scene.things),
+        lights=tuple(_sized_light(light, by) for light in scene.lights),
+        movers=tuple(movers),
+    )
 
-    def grown(things: tuple[Thing, ...]) -> tuple[Thing, ...]:
-        return tuple(
-            replace(thing, mesh=thing.mesh.moved(T), spacing_m=thing.spacing_m and thing.spacing_m * by)
-            for thing in things
-        )
 
-    def brighter(light: Light) -> Light:
-        if isinstance(light, AreaLight):
-            return replace(light, mesh=light.mesh.moved(T), power_lm=light.power_lm * by**2)
-        if isinstance(light, PointLight | SpotLight):
-            return replace(light, position_m=light.position_m * by, power_lm=light.power_lm * by**2)
-        return light
+def _sized_thing(thing: Thing, by: float) -> Thing:
+    spacing_m = thing.spacing_m and thing.spacing_m * by
+    return replace(thing, mesh=moved(thing.mesh, _scaling(by)), spacing_m=spacing_m)
 
-    movers = [replace(m, things=grown(m.things), path=m.path.sized(by)) for m in scene.movers]
-    lights = tuple(map(brighter, scene.lights))
-    return replace(scene, things=grown(scene.things), lights=lights, movers=tuple(movers))
+
+def _sized_light(light: Light, by: float) -> Light:
+    """A light whose power grows with the areas that it shines on."""
+    if isinstance(light, AreaLight):
+        return replace(light, mesh=moved(light.mesh, _scaling(by)), power_lm=light.power_lm * by**2)
+    if isinstance(light, PointLight | SpotLight):
+        return replace(light, position_m=light.position_m * by, power_lm=light.power_lm * by**2)
+    return light
+
+
+def _scaling(by: float) -> Array:
+    return np.diag([by, by, by, 1.0])

@@ -9,7 +9,7 @@ import numpy as np
 
 from vobench.scene.light import Light, Sky, Sun
 from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2, reflectance
-from vobench.scene.mesh import areas_m2
+from vobench.scene.mesh import areas_m2, corners
 from vobench.scene.scene import Scene
 from vobench.suite.scene_spec import ModelSpec, PointLamp, SceneFile, SkySpec, SunSpec
 
@@ -37,7 +37,7 @@ def bare_model_scene(path: Path) -> SceneFile:
     from vobench.asset.model import read_model
 
     model = read_model(path)
-    corners_m = np.concatenate([thing.mesh.vertices_m for thing in model.everything])
+    corners_m = np.concatenate([thing.mesh.vertices for thing in model.everything])
     extent_m = float(np.ptp(corners_m, axis=0).max())
     scale = CENTIMETRE if extent_m > LARGEST_M else 1.0
     if scale != 1:
@@ -47,7 +47,7 @@ def bare_model_scene(path: Path) -> SceneFile:
     properties_by_thing = np.array([properties[thing.material] for thing in model.everything])  # (T, 2)
     emission_cd_m2 = properties_by_thing[:, 0]
     reflectances = properties_by_thing[:, 1]
-    area_m2 = np.array([areas_m2(thing.mesh.corners_m).sum() for thing in model.everything])  # (T,)
+    area_m2 = np.array([areas_m2(corners(thing.mesh)).sum() for thing in model.everything])  # (T,)
 
     absorption_m2 = float(area_m2 @ (1 - reflectances))
     emitted_lm = _lamp_power_lm(model.lights) + np.pi * area_m2 @ emission_cd_m2

@@ -35,12 +35,12 @@ from vobench.scene.light import (
     Switched,
 )
 from vobench.scene.material import Material, Picture, Texture
-from vobench.scene.mesh import Mesh, Thing
+from vobench.scene.mesh import MeshArrays, Thing, arrays, has_texture_coordinates, is_mesh
 
 LIGHTS = (AreaLight, PointLight, SpotLight, Sun, Sky)
 LEVELS = (Steady, Flicker, Dimmer, Switched, Scaled)
 TEXTURES = (Picture, Procedural)
-CLASSES: dict[str, type] = {each.__name__: each for each in (Mesh, Thing, Material, *LIGHTS, *LEVELS, *TEXTURES)}
+CLASSES: dict[str, type] = {each.__name__: each for each in (MeshArrays, Thing, Material, *LIGHTS, *LEVELS, *TEXTURES)}
 DTYPES = ("float64", "float32", "int64", "int32", "uint8", "bool")
 OBJECT = "object"
 ARRAY = "array"
@@ -73,7 +73,7 @@ def checked(returned: Any) -> MakerScene:
     if missing:
         raise SuiteError(f"make() returns things without materials: {', '.join(sorted(map(str, missing)))}")
     for thing in things:
-        _require_sound(thing)
+        _require_drawable(thing, materials[thing.material])
     return MakerScene(tuple(things), dict(materials), tuple(lights))
 
 
@@ -88,23 +88,36 @@ def _require_all(noun: str, objects: Any, classes: tuple[type, ...]) -> None:
         raise SuiteError(f"make() returns a {noun} that is no {names}: {type(strange[0]).__name__}")
 
 
-def _require_sound(thing: Thing) -> None:
+def _require_drawable(thing: Thing, material: Material) -> None:
+    """Raise SuiteError where a thing's mesh cannot be drawn."""
+    if not is_mesh(thing.mesh):
+        kind = type(thing.mesh).__name__
+        raise SuiteError(f"make() returns '{thing.name}' with a mesh of type {kind}; it should be a trimesh.Trimesh")
+    if material.texture is not None and not has_texture_coordinates(thing.mesh):
+        advice = "set mesh.visual = trimesh.visual.TextureVisuals(uv=...)"
+        raise SuiteError(f"make() returns '{thing.name}' with a texture but without texture coordinates; {advice}")
+    try:
+        _require_sound(arrays(thing.mesh))
+    except SuiteError as error:
+        raise SuiteError(f"make() returns '{thing.name}' with a mesh whose {error}") from None
+
+
+def _require_sound(mesh: MeshArrays) -> None:
     """Raise SuiteError where a mesh's arrays do not fit together, or where a number is not finite."""
-    mesh = thing.mesh
     vertices = len(mesh.vertices_m)
     shapes: dict[str, tuple[NDArray[Any], tuple[int, int]]] = {
-        "vertices_m": (mesh.vertices_m, (vertices, 3)),
-        "uv": (mesh.uv, (vertices, 2)),
+        "vertices": (mesh.vertices_m, (vertices, 3)),
+        "texture coordinates": (mesh.uv, (vertices, 2)),
         "normals": (mesh.normals, (vertices, 3)),
         "faces": (mesh.faces, (len(mesh.faces), 3)),
     }
     for name, (array, shape) in shapes.items():
         if array.shape != shape:
-            raise SuiteError(f"thing '{thing.name}': mesh.{name} has shape {array.shape}, where {shape} is right")
+            raise SuiteError(f"{name} have shape {array.shape}, where {shape} is right")
         if not np.isfinite(array).all():
-            raise SuiteError(f"thing '{thing.name}': mesh.{name} has a number that is not finite")
+            raise SuiteError(f"{name} have a number that is not finite")
     if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < vertices:
-        raise SuiteError(f"thing '{thing.name}': mesh.faces names a vertex that is not there")
+        raise SuiteError("faces name a vertex that is not there")
 
 
 # Writing
@@ -136,9 +149,12 @@ class _Writer:
         """The place of an object in the list; it is added if it is new."""
         if id(thing) in self._places:
             return self._places[id(thing)]
-        kind = type(thing)
-        if CLASSES.get(kind.__name__) is kind and is_dataclass(thing):
-            entry = {field.name: self.value(getattr(thing, field.name)) for field in fields(thing)}
+        kind: type = type(thing)
+        if is_mesh(thing):
+            kind = MeshArrays
+            entry = self._fields(arrays(thing))
+        elif CLASSES.get(kind.__name__) is kind and is_dataclass(thing):
+            entry = self._fields(thing)
         elif callable(getattr(thing, "pixels", None)):  # a texture of the maker's own: its picture is what counts
             kind = Picture
             entry = {"values": self.value(np.asarray(thing.pixels())), "tile_m": self.value(thing.tile_m)}
@@ -149,6 +165,9 @@ class _Writer:
         self._alive.append(thing)
         self._places[id(thing)] = len(self.objects) - 1
         return self._places[id(thing)]
+
+    def _fields(self, thing: Any) -> dict[str, Any]:
+        return {field.name: self.value(getattr(thing, field.name)) for field in fields(thing)}
 
     def _array(self, array: Any) -> dict[str, Any]:
         """Dtype, shape and offset of an array, which is added to the arrays."""
@@ -212,6 +231,9 @@ def _object(entry: Any, earlier: Sequence[Any], arrays: memoryview) -> Any:
     made = CLASSES[name](**{key: getattr(fields_read, key) for key in values})
     if isinstance(made, Picture):
         _require_picture(made)
+    if isinstance(made, MeshArrays):
+        _require_sound(made)
+        return made.mesh()
     return made
 
 
@@ -228,8 +250,19 @@ def _instance_of(*classes: type) -> Any:
     return Annotated[Any, AfterValidator(partial(_require_class, classes=classes))]
 
 
+def _require_mesh(value: Any) -> Any:
+    """The value, if it is a mesh. Raises ValueError."""
+    if not is_mesh(value):
+        raise ValueError(f"it should be a mesh, not {type(value).__name__}")
+    return value
+
+
+class _Mesh:
+    """Stands for trimesh.Trimesh, which this module does not import, in annotations."""
+
+
 _OF_FIELDS: dict[Any, Any] = {
-    Mesh: _instance_of(Mesh),
+    _Mesh: Annotated[Any, AfterValidator(_require_mesh)],
     Level: _instance_of(*LEVELS),
     Texture | None: _instance_of(*TEXTURES, type(None)),
 }
@@ -239,7 +272,7 @@ _OF_FIELDS: dict[Any, Any] = {
 def _reader(name: str) -> type[BaseModel]:
     """Checks the fields of a class of `CLASSES`; an array by its class alone."""
     known = CLASSES[name]
-    hints = get_type_hints(known, include_extras=True)
+    hints = get_type_hints(known, localns={"Trimesh": _Mesh}, include_extras=True)
     types = {field.name: _OF_FIELDS.get(hints[field.name], hints[field.name]) for field in fields(known)}
     config = ConfigDict(arbitrary_types_allowed=True, extra="forbid")
     required: dict[str, Any] = {key: (kind, ...) for key, kind in types.items()}

@@ -22,7 +22,7 @@ from vobench.geometry.se3 import Array
 from vobench.scene import scene as scripted
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2
-from vobench.scene.mesh import Thing, areas_m2
+from vobench.scene.mesh import Thing, areas_m2, corners, moved
 from vobench.scene.scene import Scene
 from vobench.suite.maker_message import MakerScene
 from vobench.suite.scene_file import SKY, SUN, Lighting, content, lit, materials_used
@@ -124,10 +124,10 @@ def _room(spec: SceneFile, of: Callable[[str], Material]) -> Iterator[Instance]:
 
 def _boxes(spec: SceneFile, of: Callable[[str], Material]) -> Iterator[Instance]:
     for index, box in enumerate(spec.boxes):
-        mesh = block(box.size_m, bevel_m=0).moved(at(*box.center_m, yaw=box.yaw_deg))
+        mesh = block(box.size_m, bevel_m=0, transform=at(*box.center_m, yaw=box.yaw_deg))
         yield box.name or f"box_{index}", [Part(mesh, of(box.material))]
     for index, board in enumerate(spec.boards):
-        mesh = card(board.size_m).moved(at(*board.center_m, yaw=board.yaw_deg))
+        mesh = moved(card(board.size_m), at(*board.center_m, yaw=board.yaw_deg))
         yield board.name or f"board_{index}", [Part(mesh, of(board.material))]
 
 
@@ -159,7 +159,7 @@ def _model(spec: ModelSpec) -> Contents:
     T = at(*spec.at_m, yaw=spec.yaw_deg)
     before = f"{spec.name}." if spec.name else ""
     placed = tuple(
-        replace(thing, name=before + thing.name, mesh=thing.mesh.moved(T), material=before + thing.material)
+        replace(thing, name=before + thing.name, mesh=moved(thing.mesh, T), material=before + thing.material)
         for thing in model.everything
     )
     lights = tuple(_moved(replace(light, name=before + light.name), T) for light in model.lights)
@@ -209,7 +209,7 @@ def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterato
         count[thing.name] = count[thing.name] + 1
         red, green, blue = (emission / luminance).tolist()
         name = f"{thing.name}.{nth}" if nth else thing.name
-        power_lm = luminance * np.pi * areas_m2(thing.mesh.corners_m).sum()
+        power_lm = luminance * np.pi * areas_m2(corners(thing.mesh)).sum()
         colour = (red, green, blue)
         yield AreaLight(name, thing.mesh, power_lm, colour=colour, material=thing.material)
 
