@@ -21,7 +21,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking, stereo_rig
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flat
+from vobench.scene.mesh import Thing, flat, flipped
 from vobench.scene.scene import Scene, triangles
 
 LENS = Pinhole(160, 120, 150.0, 150.0, 79.5, 59.5)
@@ -61,8 +61,8 @@ def hall(*, pillar: bool = False) -> Scene:
         corners_m = corners[faces]
         vertices = corners_m.reshape(-1, 3)
         mesh = flat(vertices, np.arange(len(vertices)).reshape(-1, 3), np.zeros((len(vertices), 2)))
-        outward = np.einsum("ij,ij->i", mesh.normals[::3], corners_m.mean(1) - corners.mean(0)) > 0
-        turned = mesh.flipped() if outward.all() == inward else mesh
+        outward = np.einsum("ij,ij->i", mesh.vertex_normals[::3], corners_m.mean(1) - corners.mean(0)) > 0
+        turned = flipped(mesh) if outward.all() == inward else mesh
         things.append(Thing(f"box_{number}", turned, "paint"))
     return Scene("hall", tuple(things), {"paint": Material()}, ())
 

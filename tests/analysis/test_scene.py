@@ -117,23 +117,23 @@ def test_the_strength_of_a_light_has_its_unit() -> None:
 def test_corners_nearer_than_a_hundredth_of_a_millimetre_are_one_point() -> None:
     solid = crate(1.0, 0.0)
     for gap_m, open_edges in ((1e-7, 0), (1e-3, 3)):
-        vertices = solid.mesh.vertices_m[solid.mesh.faces].reshape(-1, 3).copy()  # each face has corners of its own
+        vertices = solid.mesh.vertices[solid.mesh.faces].reshape(-1, 3).copy()  # each face has corners of its own
         vertices[:3] += gap_m
         faces = np.arange(len(vertices)).reshape(-1, 3)
         uv = np.zeros((len(vertices), 2))
         normals = np.repeat(np.array([[0.0, 0.0, 1.0]]), len(vertices), axis=0)
-        apart = Thing("apart", type(solid.mesh)(vertices, faces, uv, normals), "grey")
+        apart = Thing("apart", make_mesh(vertices, faces, uv, normals), "grey")
         found = survey(scene(FLOOR, apart)).open_edges
         assert found == 0 if open_edges == 0 else found >= open_edges
 
 
 def test_a_face_that_stands_twice_in_another_order_of_corners_is_a_twin() -> None:
     solid = crate(1.0, 0.0)
-    turned = type(solid.mesh)(
-        solid.mesh.vertices_m,
+    turned = make_mesh(
+        solid.mesh.vertices,
         np.vstack([solid.mesh.faces, np.roll(solid.mesh.faces[:2], 1, axis=1)]),
-        solid.mesh.uv,
-        solid.mesh.normals,
+        np.zeros((len(solid.mesh.vertices), 2)),
+        solid.mesh.vertex_normals,
     )
     assert survey(scene(FLOOR, solid)).twins == 0
     assert survey(scene(FLOOR, Thing("turned", turned, "grey"))).twins == 2

@@ -16,7 +16,7 @@ from vobench.analysis.scene_sheet import (
 )
 from vobench.asset.shape import at, block
 from vobench.scene.material import Material, srgb
-from vobench.scene.mesh import Thing
+from vobench.scene.mesh import Thing, make_mesh, moved, texture_coordinates
 from vobench.scene.scene import Scene
 
 
@@ -47,7 +47,7 @@ def test_positions_and_pixels_are_each_others_inverse() -> None:
 
 def test_the_plan_shows_the_floor_things_on_it_and_white_around() -> None:
     materials = {"grey": Material(colour=(0.5, 0.5, 0.5)), "dark": Material(colour=(0.1, 0.1, 0.1))}
-    box = Thing("box", block((1, 1, 1), bevel_m=0).moved(at(2.0, 1.0, 0.5)), "dark")
+    box = Thing("box", moved(block((1, 1, 1), bevel_m=0), at(2.0, 1.0, 0.5)), "dark")
     room = Scene("s", (FLOOR, box), materials, (LIGHT,))
     found = survey(room)
     drawn = plan(room, found)
@@ -57,7 +57,7 @@ def test_the_plan_shows_the_floor_things_on_it_and_white_around() -> None:
 
 
 def test_what_is_higher_than_2_m_above_the_floor_is_cut_off() -> None:
-    low, high = (Thing("shelf", block((8, 6, 0.1), bevel_m=0).moved(at(z_m=z)), "grey") for z in (1.9, 2.2))
+    low, high = (Thing("shelf", moved(block((8, 6, 0.1), bevel_m=0), at(z_m=z)), "grey") for z in (1.9, 2.2))
     floor = Thing("floor", FLOOR.mesh, "white")
     materials = {"grey": Material(colour=(0.2, 0.2, 0.2)), "white": Material(colour=(0.7, 0.7, 0.7))}
     for shelf, linear in ((low, 0.2), (high, 0.7)):
@@ -69,10 +69,12 @@ def test_what_is_higher_than_2_m_above_the_floor_is_cut_off() -> None:
 
 
 def test_a_steep_face_is_darker_than_a_level_one() -> None:
-    ramp = Thing("ramp", block((1, 1, 1), bevel_m=0).moved(at(2, 1, 0.5)), "grey")
-    corners = ramp.mesh.vertices_m.copy()
+    ramp = Thing("ramp", moved(block((1, 1, 1), bevel_m=0), at(2, 1, 0.5)), "grey")
+    corners = ramp.mesh.vertices.copy()
     corners[(corners[:, 2] > 0.5) & (corners[:, 0] > 2)] -= [0, 0, 0.999]  # its top falls by 45 degrees
-    slope = Thing("ramp", type(ramp.mesh)(corners, ramp.mesh.faces, ramp.mesh.uv, ramp.mesh.normals), "grey")
+    slope = Thing(
+        "ramp", make_mesh(corners, ramp.mesh.faces, texture_coordinates(ramp.mesh), ramp.mesh.vertex_normals), "grey"
+    )
     room = scene(FLOOR, slope)
     found = survey(room)
     expected = 0.5 * (0.35 + 0.65 * np.sqrt(0.5))

@@ -12,7 +12,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.occlusion import Bodies, back_faces, dot
 from vobench.rendering.shot import Shot, shot_transforms
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, quad, table
+from vobench.scene.mesh import Thing, flipped, make_mesh, moved, quad, table, texture_coordinates, two_sided
 from vobench.scene.scene import Mover, Path, Scene
 
 MATERIALS = {"a": Material(), "glass": Material("pane", eta=1.5)}
@@ -103,7 +103,7 @@ def test_rays_without_reach_are_not_blocked_and_a_shorter_reach_never_blocks_mor
 def test_no_ray_slips_through_a_floor_of_many_triangles(shift: list[float]) -> None:
     side = np.linspace(-1, 1, 41)
     quads = [quad([x, y, 0], [0.05, 0, 0], [0, 0.05, 0]) for x in side[:-1] for y in side[:-1]]
-    things = tuple(Thing("tile", mesh.moved(se3.transform(np.eye(3), shift)), "a") for mesh in quads)
+    things = tuple(Thing("tile", moved(mesh, se3.transform(np.eye(3), shift)), "a") for mesh in quads)
     bodies = Bodies(Scene("floor", things, MATERIALS, ()))
     eye_m = np.array([0.01, 0.02, 1.0])
     above = se3.transform(np.eye(3), shift + eye_m)
@@ -117,15 +117,15 @@ def test_no_ray_slips_through_a_floor_of_many_triangles(shift: list[float]) -> N
 
 def test_the_back_of_a_face_has_its_corners_in_any_order_and_belongs_to_the_same_thing() -> None:
     front = quad([0, 0, 0], [1, 0, 0], [0, 1, 0])
-    back = front.flipped()
-    rolled = replace(back, faces=np.roll(back.faces, 1, axis=1))
+    back = flipped(front)
+    rolled = make_mesh(back.vertices, np.roll(back.faces, 1, axis=1), texture_coordinates(back), back.vertex_normals)
     sheet = Thing("sheet", front, "a")
     for mesh in (back, rolled):
         both = table([replace(sheet, mesh=front), replace(sheet, mesh=mesh)], [-1, -1], [-1, -1])
         assert (back_faces(both) == -1).all()
-    two_sided = table([replace(sheet, mesh=front.two_sided())], [-1], [-1])
-    back_of = back_faces(two_sided)
+    both_sides = table([replace(sheet, mesh=two_sided(front))], [-1], [-1])
+    back_of = back_faces(both_sides)
     assert back_of[-1] == -1
-    np.testing.assert_array_equal(back_of[back_of[:-1]], np.arange(len(two_sided)))
-    cosine = dot(two_sided.plane, two_sided.plane[back_of[:-1]])
+    np.testing.assert_array_equal(back_of[back_of[:-1]], np.arange(len(both_sides)))
+    cosine = dot(both_sides.plane, both_sides.plane[back_of[:-1]])
     np.testing.assert_allclose(cosine, -1)

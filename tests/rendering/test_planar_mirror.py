@@ -6,12 +6,13 @@ import pytest
 from vobench.geometry import se3
 from vobench.rendering.planar_mirror import LEAST_M2, MirrorFaces, planar_mirrors, sharpness
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Mesh, areas_m2, face_normals, quad
+from vobench.scene.mesh import MeshArrays, areas_m2, face_normals
+from vobench.scene.mesh import quad_arrays as quad
 
 RNG = np.random.default_rng(0)
 
 
-def faces_of(*meshes: tuple[Mesh, int, bool]) -> MirrorFaces:
+def faces_of(*meshes: tuple[MeshArrays, int, bool]) -> MirrorFaces:
     """Perfect mirrors, each with its mover and whether it is a pane."""
     corners_m = np.concatenate([mesh.corners_m for mesh, _, _ in meshes])
     counts = [len(mesh.faces) for mesh, _, _ in meshes]

@@ -10,7 +10,7 @@ from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Mesh, Thing, Triangles, flat, quad, table
+from vobench.scene.mesh import Thing, Triangles, flat, make_mesh, quad, table, two_sided
 
 MATERIALS = {"grey": Material(), "wax": Material(eta=1.5)}
 BOARD = table([Thing("board", quad([1, 2, 3], [0.7, 0, 0], [0, 0.5, 0]), "wax")], [-1], [-1])
@@ -22,11 +22,11 @@ def points_of(faces: Triangles, spacing_m: float, *, seed: int = 0) -> tuple[Tex
     return texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=seed)
 
 
-def shape(made: trimesh.Trimesh, *, smooth: bool) -> Mesh:
+def shape(made: trimesh.Trimesh, *, smooth: bool) -> trimesh.Trimesh:
     vertices, faces = np.asarray(made.vertices, float), np.asarray(made.faces, np.int32)
     if not smooth:
         return flat(vertices, faces, vertices[:, :2])
-    return Mesh(vertices, faces, vertices[:, :2].copy(), np.asarray(made.vertex_normals, float))
+    return make_mesh(vertices, faces, vertices[:, :2].copy(), np.asarray(made.vertex_normals, float))
 
 
 def test_a_step_leads_from_each_inner_point_to_the_next() -> None:
@@ -82,7 +82,7 @@ def test_where_things_touch_neither_side_has_light_of_its_own():
             trimesh.creation.box((0.2, 0.2, 0.2), trimesh.transformations.translation_matrix([0.5, 0, 0.12])),
             smooth=False,
         ),
-        "sheet": quad([-0.6, 0, 0.3], [0.2, 0, 0], [0, 0.2, 0]).two_sided(),
+        "sheet": two_sided(quad([-0.6, 0, 0.3], [0.2, 0, 0], [0, 0.2, 0])),
     }
     things = [Thing(name, mesh, "grey") for name, mesh in meshes.items()]
     faces = table(things, [-1] * len(things), [-1] * len(things))

@@ -7,17 +7,18 @@ import pytest
 
 from vobench.geometry.se3 import Array
 from vobench.rendering.watertight import watertight
-from vobench.scene.mesh import Mesh, quad
+from vobench.scene.mesh import MeshArrays
+from vobench.scene.mesh import quad_arrays as quad
 
 
-def sphere(count: int) -> Mesh:
+def sphere(count: int) -> MeshArrays:
     """A ball of radius 1."""
     u, v = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * count + 1), np.linspace(0, np.pi, count + 1))
     points = np.stack([np.sin(v) * np.cos(u), np.sin(v) * np.sin(u), np.cos(v)], -1).reshape(-1, 3)
     a = (np.arange(count)[:, None] * (2 * count + 1) + np.arange(2 * count)).ravel()
     b = a + 2 * count + 1
     faces = np.concatenate([np.stack([a, b, b + 1], -1), np.stack([a, b + 1, a + 1], -1)]).astype(np.int32)
-    return Mesh(points, faces, np.stack([u, v], -1).reshape(-1, 2), points)
+    return MeshArrays(points, faces, np.stack([u, v], -1).reshape(-1, 2), points)
 
 
 def edges(triangles: Array) -> list[tuple[bytes, bytes]]:

@@ -7,7 +7,7 @@ from vobench.asset.shape import at, block
 from vobench.errors import SuiteError
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
-from vobench.scene.mesh import Mesh, Thing, quad
+from vobench.scene.mesh import Thing, flipped, moved, quad
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_way import (
     BODY_M,
@@ -40,7 +40,7 @@ def ceiling(length_m: float, width_m: float, *, z_m: float = 2.5) -> Thing:
 
 def box(x_m: float, y_m: float, size_m: tuple[float, float, float], *, z_m: float = 0.0) -> Thing:
     """A box that stands at a place."""
-    return Thing("box", block(size_m, bevel_m=0).moved(at(x_m, y_m, z_m + size_m[2] / 2)), "grey")
+    return Thing("box", moved(block(size_m, bevel_m=0), at(x_m, y_m, z_m + size_m[2] / 2)), "grey")
 
 
 def scene(*things: Thing) -> Scene:
@@ -75,15 +75,15 @@ def test_a_circle_never_reaches_beyond_its_floor(side_m: float) -> None:
 
 def test_the_circle_moves_with_its_floor_and_turns_with_it() -> None:
     free = circle(floor(5, 3))
-    moved = circle(floor(5, 3, x_m=7.0, y_m=-2.0, z_m=0.5))
+    shifted = circle(floor(5, 3, x_m=7.0, y_m=-2.0, z_m=0.5))
     turned = circle(floor(3, 5))
     assert free is not None
-    assert moved is not None
+    assert shifted is not None
     assert turned is not None
-    assert moved.radius_m == pytest.approx(free.radius_m)
+    assert shifted.radius_m == pytest.approx(free.radius_m)
     assert turned.radius_m == pytest.approx(free.radius_m)
-    assert (moved.x_m, moved.y_m) == (pytest.approx(free.x_m + 7), pytest.approx(free.y_m - 2))
-    assert moved.floor_m == pytest.approx(0.5, abs=FLOOR_STEP_M / 2)
+    assert (shifted.x_m, shifted.y_m) == (pytest.approx(free.x_m + 7), pytest.approx(free.y_m - 2))
+    assert shifted.floor_m == pytest.approx(0.5, abs=FLOOR_STEP_M / 2)
     assert turned.x_m == pytest.approx(free.y_m)
 
 
@@ -209,7 +209,7 @@ def test_a_scene_without_a_floor_is_refused_with_a_guess_at_the_reason() -> None
 
 def hall(length_m: float, width_m: float, *, height_m: float = 2.5) -> Scene:
     """A closed hall, seen from inside."""
-    walls = block((length_m, width_m, height_m), bevel_m=0).flipped().moved(at(z_m=height_m / 2))
+    walls = moved(flipped(block((length_m, width_m, height_m), bevel_m=0)), at(z_m=height_m / 2))
     return scene(Thing("hall", walls, "grey"))
 
 
@@ -219,7 +219,7 @@ def test_all_of_the_sky_is_seen_without_a_roof_and_none_in_a_hall() -> None:
 
 
 def test_half_a_roof_hides_part_of_the_sky() -> None:
-    roof: Mesh = quad((0, 3, 2.5), (60, 0, 0), (0, -6, 0))
+    roof = quad((0, 3, 2.5), (60, 0, 0), (0, -6, 0))
     wide = quad((0, 60, 2.5), (60, 0, 0), (0, -120, 0))
     narrow_share, _ = ceiling_above(scene(floor(8, 6), Thing("roof", roof, "grey")))
     wide_share, _ = ceiling_above(scene(floor(8, 6), Thing("roof", wide, "grey")))

@@ -162,7 +162,8 @@ class TestHostile:
     def test_the_same_is_refused_in_a_message(self) -> None:
         def change(header):
             fields = self._first(header, "MeshArrays")
-            fields["faces"] = {"array": {"dtype": "int64", "shape": [1, 3], "offset": 0}}
+            bits_of_floats = {"dtype": "int64", "shape": [1, 3], "offset": fields["vertices_m"]["array"]["offset"]}
+            fields["faces"] = {"array": bits_of_floats}
 
         with pytest.raises(SuiteError, match="faces name a vertex that is not there"):
             decode(self._changed(change))

@@ -153,6 +153,6 @@ def test_a_scale_multiplies_every_length(hall, scale):
     whole = hall()
     sized = hall("white_cd_m2: 50", f"white_cd_m2: 50\nscale: {scale}")
     for before, after in zip(whole.things, sized.things, strict=True):
-        np.testing.assert_allclose(after.mesh.vertices_m, scale * before.mesh.vertices_m, atol=1e-9)
+        np.testing.assert_allclose(after.mesh.vertices, scale * before.mesh.vertices, atol=1e-9)
     for before, after in zip(whole.movers, sized.movers, strict=True):
         np.testing.assert_allclose(after.path.pose(1e9)[:3, 3], scale * before.path.pose(1e9)[:3, 3])
