@@ -13,7 +13,7 @@ from vobench.geometry.se3 import Array
 from vobench.motion.controller import CONTROLLERS, references
 from vobench.motion.drive import Drive, drive
 from vobench.motion.pioneer import THETAS, AccelerationLimits, Theta, accelerations, over_period, velocities
-from vobench.motion.slip import DELTAS, DISTURBANCE_STREAMS, SLIP_STREAMS, SLIPS, FloorPatch, SlipSettings
+from vobench.motion.slip import DELTAS, DISTURBANCE_STREAMS, SLIP_STREAMS, SLIPS, FloorPatch, SlipSettings, drawn
 from vobench.trajectory.kinematics import level
 
 PATHS = {"figure_10": ((1, 1), (0, 1), (1, 0), (2, 2)), "figure_12": ((0, 1), (1, 1), (2, 2))}
@@ -378,3 +378,16 @@ def test_integrated_acceleration_closes_although_it_jumps_at_every_control_insta
     gained = (world.reshape(-1, 8, 3).transpose(0, 2, 1) @ weights * half / 1e9).sum(0)
     end = run.motion.at(knots[-1:])
     np.testing.assert_allclose(gained, end.T_world_body[0, :3, :3] @ end.velocity_mps[0], atol=1e-8)
+
+
+def test_the_disturbance_of_each_frame_is_the_one_drawn_for_it() -> None:
+    def generators() -> dict[str, np.random.Generator]:
+        return {stream: np.random.default_rng(k) for k, stream in enumerate(DISTURBANCE_STREAMS)}
+
+    slip = SLIPS["slippery"]
+    delta = DELTAS["bumpy"]
+    run = drive([(0.5, 0.0)], slip=slip, delta=delta, rngs=generators())
+    rows = drawn(len(run.slip), slip, delta, (), step_s=1 / 30, rngs=generators()).rows
+
+    np.testing.assert_array_equal(run.slip, rows[:, :3])
+    np.testing.assert_array_equal(run.delta, rows[:, 3:])
