@@ -166,3 +166,15 @@ def test_a_name_far_from_all_gets_no_guess(here):
 def test_a_path_to_nothing_says_which_file_was_wanted(here):
     with pytest.raises(UnknownNameError, match=r"^no estimator file at plug/estimator\.yaml\. Known by name: "):
         catalog.find("estimator", "./plug")
+
+
+def test_a_folder_is_offered_as_a_path_only_for_the_kind_that_it_holds(here):
+    for name, file in (("vo", "estimator.yaml"), ("barn", "scene.yaml"), ("empty", "notes.txt")):
+        (here / name).mkdir()
+        (here / name / file).touch()
+    offered = {
+        (kind, name): "write ./" in str(pytest.raises(UnknownNameError, catalog.find, kind, name).value)
+        for kind in ("scene", "estimator", "suite")
+        for name in ("vo", "barn", "empty")
+    }
+    assert {pair for pair, is_offered in offered.items() if is_offered} == {("estimator", "vo"), ("scene", "barn")}
