@@ -166,3 +166,16 @@ def test_a_name_far_from_all_gets_no_guess(here):
 def test_a_path_to_nothing_says_which_file_was_wanted(here):
     with pytest.raises(UnknownNameError, match=r"^no estimator file at plug/estimator\.yaml\. Known by name: "):
         catalog.find("estimator", "./plug")
+
+
+@pytest.mark.parametrize("kind", ["scene", "estimator", "suite"])
+@pytest.mark.parametrize(
+    ("name", "file", "kind_inside"),
+    [("vo", "estimator.yaml", "estimator"), ("barn", "scene.yaml", "scene"), ("empty", "notes.txt", None)],
+)
+def test_a_folder_is_offered_as_a_path_only_for_the_kind_that_it_holds(here, kind, name, file, kind_inside):
+    (here / name).mkdir()
+    (here / name / file).touch()
+    with pytest.raises(UnknownNameError) as refused:
+        catalog.find(kind, name)
+    assert ("write ./" in str(refused.value)) is (kind == kind_inside)
