@@ -33,7 +33,7 @@ def test_a_trajectory_is_exported_as_text(vobench, here, ran, form, files):
     errors = vobench("score", truth, "path.txt", *times, "--json").json
     assert next(m for m in errors["metrics"] if m["name"] == "ate_trans")["max"] < 1e-9
     again = vobench("export", truth, "path.txt", "--form", form)
-    assert again.err.endswith("choose another name or take it away: path.txt\n")
+    assert again.err.endswith("choose another name or remove it: path.txt\n")
 
 
 def test_a_trajectory_without_stamps_is_not_exported(vobench, here):
