@@ -100,7 +100,7 @@ def test_a_run_verifies_and_a_changed_one_does_not(vobench, ran):
 WRONG = [
     (("import", "nowhere", "out"), "no file or folder at nowhere"),
     (("import", "suites", "out"), "suites"),
-    (("import", "suites", "scenes"), "should be a new or empty folder, but there is something: scenes"),
+    (("import", "suites", "scenes"), "should be a new or empty folder, but exists and is not empty: scenes"),
     (("import", "suites", "out", "--form", "eurok"), "no form named 'eurok'. Did you mean 'euroc'?"),
     (("import", "suites", "out", "--topic", "lft=/a"), "no topic named 'lft'. Did you mean 'left'?"),
     (
