@@ -33,7 +33,7 @@ def test_a_trajectory_is_exported_as_text(vobench, here, ran, form, files):
     errors = vobench("score", truth, "path.txt", *times, "--json").json
     assert next(m for m in errors["metrics"] if m["name"] == "ate_trans")["max"] < 1e-9
     again = vobench("export", truth, "path.txt", "--form", form)
-    assert again.err.endswith("choose another name or take it away: path.txt\n")
+    assert again.err.endswith("choose another name or remove it: path.txt\n")
 
 
 def test_a_trajectory_without_stamps_is_not_exported(vobench, here):
@@ -100,7 +100,7 @@ def test_a_run_verifies_and_a_changed_one_does_not(vobench, ran):
 WRONG = [
     (("import", "nowhere", "out"), "no file or folder at nowhere"),
     (("import", "suites", "out"), "suites"),
-    (("import", "suites", "scenes"), "should be a new or empty folder, but there is something: scenes"),
+    (("import", "suites", "scenes"), "should be a new or empty folder, but exists and is not empty: scenes"),
     (("import", "suites", "out", "--form", "eurok"), "no form named 'eurok'. Did you mean 'euroc'?"),
     (("import", "suites", "out", "--topic", "lft=/a"), "no topic named 'lft'. Did you mean 'left'?"),
     (
