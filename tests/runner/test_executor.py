@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from queue import SimpleQueue
+from types import SimpleNamespace
 
 import pytest
 
@@ -193,10 +194,11 @@ def test_a_sequence_whose_process_dies_counts_for_no_estimator(bench, tmp_path, 
     submit = executor.submit
 
     def deadly(one: Task, store: Path, slot: int, threads: int, tell):
-        if one.stage == "sequence" and "dim" in one.subject.name:
-            one = replace(one, subject=None)  # whatever it then trips over
+        is_doomed = one.stage == "sequence" and "dim" in one.subject.name
+        if is_doomed:
+            one = replace(one, subject=SimpleNamespace(name=one.subject.name))  # whatever it then trips over
         future = submit(one, store, slot, threads, tell)
-        if one.stage == "sequence" and one.subject is None:
+        if is_doomed:
             kill_all(executor, signal.SIGSEGV)
         return future
 
@@ -210,6 +212,15 @@ def test_a_sequence_whose_process_dies_counts_for_no_estimator(bench, tmp_path, 
     assert "1 of 2 cases could not be simulated or imported" in (folder.path / "leaderboard.html").read_text()
     (unmade,) = folder.unmade()
     assert unmade.cases == ("dim",)
+
+
+def test_an_error_while_a_process_is_waited_for_ends_the_run_instead_of_hanging_it(tmp_path, monkeypatch):
+    def fails(self, *_):
+        raise ZeroDivisionError("in the thread")
+
+    monkeypatch.setattr(executor._Worker, "ask", fails)
+    with pytest.raises(ZeroDivisionError, match="in the thread"):
+        perform_all([LIGHT], tmp_path, LocalProcesses(1))
 
 
 def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monkeypatch):

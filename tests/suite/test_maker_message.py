@@ -162,7 +162,7 @@ class TestHostile:
     def test_the_same_is_refused_in_a_message(self) -> None:
         def change(header):
             fields = self._first(header, "MeshArrays")
-            bits_of_floats = {"dtype": "int64", "shape": [1, 3], "offset": fields["vertices_m"]["array"]["offset"]}
+            bits_of_floats = {"dtype": "int64", "shape": [1, 3], "offset": fields["vertices_m"]["array"]["offset"] + 24}
             fields["faces"] = {"array": bits_of_floats}
 
         with pytest.raises(SuiteError, match="faces name a vertex that is not there"):

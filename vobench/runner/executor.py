@@ -186,7 +186,7 @@ class LocalProcesses:
         limit = len(cores) if self._pins_cores else threads
         first = self._worker(slot, task, cores)
 
-        def await_end() -> None:
+        def outcome() -> Done:
             worker = first
             done = worker.ask(task, store, limit, tell)
             if worker.had_fault and task.stage in REPEATABLE:
@@ -200,7 +200,14 @@ class LocalProcesses:
             else:
                 worker.leave()
             self._running.discard(worker.process)
-            future.set_result(done)
+            return done
+
+        def await_end() -> None:
+            try:
+                future.set_result(outcome())
+            except BaseException as error:  # else whoever waits for the future would wait for ever
+                first.leave()
+                future.set_exception(error)
 
         threading.Thread(target=await_end, name=f"task {task.key}", daemon=True).start()
         return future
