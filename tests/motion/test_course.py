@@ -390,3 +390,9 @@ def test_how_far_wheels_have_rolled_does_not_hang_on_how_often_it_is_asked() -> 
     np.testing.assert_allclose(rims[0], rims[1], rtol=1e-11)
     distance_m = 0.5 * (3.7 / 2 - np.sin(4 * np.pi * 3.7) / (8 * np.pi))
     assert RADIUS * rims[0].mean() == pytest.approx(distance_m, rel=1e-11)
+
+
+@pytest.mark.parametrize("ratio", [(1, 4), (4, 1), (2, 3)])
+def test_the_arc_length_of_a_curve_has_knots_for_the_wave_that_is_fastest(ratio) -> None:
+    curve = lissajous_curve((3.0, 2.0), ratio, phase_rad=0.1)
+    assert len(curve.arc.parameter.c) == 4096 * max(ratio) + 1
