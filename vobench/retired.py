@@ -94,7 +94,6 @@ GONE = {
         "Mesh": "a mesh is a trimesh.Trimesh; vobench.plugin.make_mesh makes one of vertices, faces, texture "
         "coordinates and normals"
     },
-    "vobench.scene.mesh": {"Mesh": "a mesh is a trimesh.Trimesh, which vobench.plugin.make_mesh makes of arrays"},
     "vobench.scene.surface": {
         "LAP_M": "faces that touch need no lap",
         "Surface": "a surface is a vobench.plugin.Thing, a trimesh.Trimesh with a material's name",

@@ -8,7 +8,7 @@ from trimesh import Trimesh
 
 from vobench.asset import shape
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import face_normals
+from vobench.scene.mesh import face_normals, joined, moved, two_sided
 
 SQUARE = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
 HOLES = [SQUARE / 4 + 0.5, SQUARE / 4 + 2.5, SQUARE / 8 + [3, 1]]
@@ -132,3 +132,28 @@ def test_a_card_shows_the_top_of_its_picture_at_its_top_and_reads_from_left_to_r
     np.testing.assert_allclose(mesh.visual.uv[:, 1], 0.25 - mesh.vertices[:, 2] * 0.5)
     # Who looks against x has y on the right.
     np.testing.assert_allclose(mesh.visual.uv[:, 0], 0.375 + mesh.vertices[:, 1] * 0.125)
+
+
+def test_cards_are_cards_at_their_poses_seen_from_both_sides() -> None:
+    sizes = [(1.0, 2.0), (0.3, 0.7)]
+    poses = [shape.at(1, 2, 3, yaw=20, pitch=30, roll=40), shape.at(z_m=-1, roll=200)]
+    expected = [two_sided(moved(shape.card(size), pose)) for size, pose in zip(sizes, poses, strict=True)]
+    cards = shape.cards(sizes, poses)
+    np.testing.assert_array_equal(cards.triangles, joined(expected).triangles)
+    np.testing.assert_array_equal(cards.vertex_normals, joined(expected).vertex_normals)
+    np.testing.assert_array_equal(cards.visual.uv, joined(expected).visual.uv)
+
+
+def test_a_block_with_a_transform_is_the_block_moved() -> None:
+    T = shape.at(1, 2, 3, yaw=20, pitch=30, roll=40)
+    there = shape.block((1, 2, 3), transform=T)
+    np.testing.assert_array_equal(there.triangles, moved(shape.block((1, 2, 3)), T).triangles)
+
+
+def test_a_plate_without_thickness_has_no_normals_on_its_rim() -> None:
+    plate = shape.block((1, 2, 0))
+    is_rim = np.abs(plate.triangles[:, :, 2]).max(axis=1) == 0
+    assert is_rim.all()
+    lengths = np.linalg.norm(plate.vertex_normals, axis=1)
+    assert sorted(set(lengths.round(9))) == [0, 1]
+    assert (lengths > 0.5).sum() == 12

@@ -1,13 +1,37 @@
 """Meshes keep their shape and winding as they are moved, mirrored and joined; a scene's table has every face once."""
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 import pytest
+import trimesh
 from trimesh import Trimesh
 
 from vobench.asset.shape import block
 from vobench.geometry import se3
 from vobench.scene.light import PointLight
-from vobench.scene.mesh import Thing, face_normals, flat, flipped, joined, moved, quad, table, two_sided, unit
+from vobench.scene.mesh import (
+    WELD_M,
+    Thing,
+    arrays,
+    copies,
+    face_normals,
+    flat,
+    flipped,
+    has_texture_coordinates,
+    is_closed_body,
+    joined,
+    make_mesh,
+    moved,
+    open_edges,
+    quad,
+    table,
+    textured,
+    two_sided,
+    unit,
+    welded,
+)
 from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
 
 CORNER_M, U_M, V_M = np.array([1.0, 2.0, 0.5]), np.array([2.0, 0, 0]), np.array([0, 0, 3.0])
@@ -111,3 +135,67 @@ def test_movers_faces_are_where_their_path_says_and_others_stay() -> None:
 
 def test_a_table_of_nothing_is_empty() -> None:
     assert len(table((), (), ())) == 0
+
+
+def test_a_made_mesh_keeps_its_vertices_in_order_and_all_that_it_was_given() -> None:
+    vertices = np.array([[0.1, 0.2, 0.3], [0.1, 0.2, 0.3], [1, 0, 0], [0, 1, 0]])
+    uv = np.arange(8.0).reshape(4, 2)
+    normals = unit(np.arange(12.0).reshape(4, 3) + 1)
+    mesh = make_mesh(vertices, [[0, 2, 3], [1, 3, 2]], uv, normals)
+    np.testing.assert_array_equal(mesh.vertices, vertices)
+    np.testing.assert_array_equal(mesh.faces, [[0, 2, 3], [1, 3, 2]])
+    np.testing.assert_array_equal(mesh.visual.uv, uv)
+    np.testing.assert_array_equal(mesh.vertex_normals, normals)
+
+
+def test_nothing_changes_the_mesh_that_it_is_given() -> None:
+    mesh = block((1.0, 2.0, 3.0))
+    before = [array.copy() for array in (mesh.vertices, mesh.faces, mesh.visual.uv, mesh.vertex_normals)]
+    for change in (flipped, two_sided, lambda m: moved(m, T), lambda m: textured(m, m.visual.uv + 1)):
+        other = change(mesh)
+        other.apply_translation([1, 2, 3])
+    after = (mesh.vertices, mesh.faces, mesh.visual.uv, mesh.vertex_normals)
+    for array, original in zip(after, before, strict=True):
+        np.testing.assert_array_equal(array, original)
+
+
+def test_copies_are_the_mesh_at_each_pose() -> None:
+    poses = [T, np.eye(4), T @ T]
+    expected = joined([moved(tetrahedron(), pose) for pose in poses])
+    np.testing.assert_array_equal(copies(tetrahedron(), poses).triangles, expected.triangles)
+
+
+def test_points_within_the_weld_tolerance_are_one_and_others_are_not() -> None:
+    points = np.array([[0, 0, 0], [1, 0, 0], [WELD_M / 10, 0, 0], [1 + 3 * WELD_M, 0, 0]])
+    first, index = welded(points)
+    assert len(first) == 3
+    assert index[0] == index[2]
+    assert index[1] != index[3]
+    np.testing.assert_allclose(points[first][index], points, atol=WELD_M)
+
+
+def test_a_closed_body_has_no_open_edges_and_one_that_lacks_a_face_has_three() -> None:
+    mesh = block((1.0, 2.0, 3.0))
+    point = welded(arrays(mesh).vertices_m)[1]
+    faces = point[mesh.faces]
+    assert len(open_edges(faces)) == 0
+    assert len(open_edges(faces[1:])) == 3
+    assert set(open_edges(faces[1:]).ravel()) == set(faces[0])
+
+
+@pytest.mark.parametrize(("change", "is_closed"), [(lambda m: m, True), (flipped, False), (two_sided, False)])
+def test_a_body_is_closed_where_it_is_seen_from_outside(change: Callable[[Trimesh], Trimesh], is_closed: bool) -> None:
+    assert is_closed_body(arrays(change(block((1.0, 2.0, 3.0))))) is is_closed
+
+
+def test_a_body_that_lacks_a_face_is_open() -> None:
+    whole = arrays(block((1.0, 2.0, 3.0)))
+    assert not is_closed_body(replace(whole, faces=whole.faces[1:]))
+
+
+def test_a_mesh_of_trimesh_has_its_own_normals_and_no_texture_coordinates() -> None:
+    box = trimesh.creation.box((1, 1, 1))
+    assert not has_texture_coordinates(box)
+    np.testing.assert_array_equal(arrays(box).uv, np.zeros((8, 2)))
+    np.testing.assert_array_equal(arrays(box).normals, box.vertex_normals)
+    assert has_texture_coordinates(textured(box, np.zeros((8, 2))))

@@ -186,6 +186,30 @@ def test_a_maker_gets_the_scenes_seed_and_what_it_raises_is_named(yard, tmp_path
         yard("maker: maker.py\n")
 
 
+TRIMESH_MAKER = """import trimesh
+from vobench.scene.material import Material
+from vobench.scene.mesh import Thing
+
+def make(seed):
+    column = trimesh.creation.cylinder(0.3, 2.0)
+    return [Thing("column", column, "chalk")], {"chalk": Material(colour=(0.8, 0.8, 0.7))}
+"""
+
+
+def test_a_maker_may_return_meshes_of_trimesh_and_nothing_else(yard, tmp_path: Path) -> None:
+    maker = tmp_path / "maker.py"
+    maker.write_text(TRIMESH_MAKER)
+    column = vertices(yard("maker: maker.py\n"), "column")
+    np.testing.assert_allclose([column[:, 2].min(), column[:, 2].max()], [-1, 1])
+    maker.write_text(TRIMESH_MAKER.replace("trimesh.creation.cylinder(0.3, 2.0)", "[[0, 0, 0]]"))
+    with pytest.raises(SuiteError, match=r"make\(\) returns 'column' with a mesh of type list; it should be a trimesh"):
+        yard("maker: maker.py\n")
+    grain = "Material(texture=__import__('vobench.asset.texture').asset.texture.Procedural('plaster', 0.5))"
+    maker.write_text(TRIMESH_MAKER.replace("Material(colour=(0.8, 0.8, 0.7))", grain))
+    with pytest.raises(SuiteError, match=r"'column' with a texture but without texture coordinates; set mesh.visual"):
+        yard("maker: maker.py\n")
+
+
 def test_files_count_by_what_is_in_them_wherever_they_lie(yard, tmp_path: Path) -> None:
     said = []
     for folder in ("a", "b"):

@@ -9,7 +9,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from vobench.asset.gltf import ModelLight, Node, Primitive, read_gltf
+from vobench.asset.gltf import Gltf, ModelLight, Node, Primitive, read_gltf
 from vobench.asset.gltf_file import MOST_BYTES, located
 from vobench.asset.gltf_material import Look
 from vobench.asset.mesh_file import read_as_glb
@@ -108,16 +108,24 @@ def read_model(
                 primitives += [_sound(primitive) for primitive in file.primitives(node, poses)]
                 lights += file.lights(node)
 
-        if file.materials.reduced:
-            notes.append(f"{len(file.materials.reduced)} of its pictures are reduced to fit into memory")
         model = _model(primitives, lights, roles)
-        notes += file.file.notes
-        for primitive in primitives:
-            notes += [*primitive.look.notes, *primitive.notes]
+        notes += _notes_of_file(file, primitives)
         if not up:  # else the user has decided
             notes += _doubt_of_axis(model, path, axis)
         notes += _doubt_of_unit(model)
         return replace(model, notes=tuple(dict.fromkeys(notes)))
+
+
+def _notes_of_file(file: Gltf, primitives: Sequence[Primitive]) -> list[str]:
+    """What of a file is read otherwise than it has it."""
+    notes = []
+    reduced = len(file.materials.reduced)
+    if reduced:
+        notes.append(f"{reduced} of its pictures are reduced to fit into memory")
+    notes += file.file.notes
+    for primitive in primitives:
+        notes += [*primitive.look.notes, *primitive.notes]
+    return notes
 
 
 def _require_file(path: Path) -> None:
@@ -159,18 +167,28 @@ def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles:
         if max(named[1].emission_cd_m2) > 0:
             bright[node] = names[node]
 
-    lamps = [node for node in names if role[node].name == "lamp"]
-    if lamps and not bright.keys() & lamps:
-        raise ModelError(f"{lamps[0]}: is a lamp without light; set its emissiveFactor and emissiveStrength (cd/m²)")
-    light_names = _unique_names({nth: light.name for nth, light in enumerate(lights)})
     return Model(
         things=tuple(stationary),
         materials={name: material for (_, material), name in material_names.items()},
-        lights=tuple(replace(light, name=light_names[nth]) for nth, light in enumerate(lights)),
+        lights=_renamed(lights),
         movers=_movers(moving),
-        lamps=tuple(bright[node] for node in lamps if node in bright),
+        lamps=_lamps([node for node in names if role[node].name == "lamp"], bright),
         dropped=sum(primitive.dropped for primitive in primitives),
     )
+
+
+def _renamed(lights: Sequence[ModelLight]) -> tuple[ModelLight, ...]:
+    """Lights with names that differ."""
+    names = _unique_names({nth: light.name for nth, light in enumerate(lights)})
+    return tuple(replace(light, name=names[nth]) for nth, light in enumerate(lights))
+
+
+def _lamps(lamps: Sequence[Node], bright: Mapping[Node, str]) -> tuple[str, ...]:
+    """The names of the things of lamps that emit light. Raises ModelError where there are lamps but none of these."""
+    shining = tuple(bright[node] for node in lamps if node in bright)
+    if lamps and not shining:
+        raise ModelError(f"{lamps[0]}: is a lamp without light; set its emissiveFactor and emissiveStrength (cd/m²)")
+    return shining
 
 
 def _movers(moving: Sequence[tuple[Node, int, Thing]]) -> tuple[Moving, ...]:

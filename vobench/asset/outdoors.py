@@ -276,13 +276,17 @@ def walker(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.
         limbs.append(_arm(side, clothes, hip))
 
     scale = height_m / NOMINAL_HEIGHT_M
-    lowest_m = [min(limb.lowest_m(step) for limb in limbs) for step in range(STEPS)]
     reach = np.sin(np.deg2rad(stride_deg))
     return Walker(
         limbs=[limb.scaled(scale) for limb in limbs],
         cycle_m=4 * scale * LEG_M * reach,
-        rise_m=-scale * np.array(lowest_m),
+        rise_m=-scale * np.array([_lowest_m(limbs, step) for step in range(STEPS)]),
     )
+
+
+def _lowest_m(limbs: list[Limb], step: int) -> float:
+    """The lowest z of all limbs at a step of a cycle."""
+    return min(limb.lowest_m(step) for limb in limbs)
 
 
 def _leg_angles(stride_deg: float) -> tuple[Array, Array]:

@@ -95,8 +95,13 @@ def _uv_axes(corners_m: Array, order: Sequence[int]) -> NDArray[np.int64]:
     """
     prefers_x = np.array([2e-6, 1e-6, 0])  # so that faces at 45° have one axis on every machine
     facing = np.argmax(np.abs(face_normals(corners_m)) + prefers_x, axis=1)
-    axes_across = np.array([[axis for axis in order if axis != normal] for normal in range(3)])
+    axes_across = np.array([_others(order, normal) for normal in range(3)])
     return np.asarray(axes_across[facing])
+
+
+def _others(order: Sequence[int], normal: int) -> list[int]:
+    """The axes in `order` but one."""
+    return [axis for axis in order if axis != normal]
 
 
 class _Cube:
