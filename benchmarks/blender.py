@@ -25,7 +25,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
 from vobench.rendering.path import PathRenderer
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.material import reflectance
 from vobench.scene.mesh import MeshArrays, arrays, joined_arrays
 from vobench.scene.scene import Scene
@@ -78,12 +78,12 @@ def in_blender(python: str, content: dict[str, Any]) -> tuple[Any, Any]:
 
 def timed(renderer: Any, camera: Pinhole, poses: Sequence[Array]) -> tuple[list[Radiance], float]:
     """Pictures at all poses, and the median seconds of one; a first one warms up."""
-    renderer.radiance(camera, still(camera, poses[0], t_ns=1))
+    renderer.radiance(camera, single_instant(camera, poses[0], t_ns=1))
     pictures = []
     spent = []
     for pose in poses:
         started = time.perf_counter()
-        pictures.append(renderer.radiance(camera, still(camera, pose)))
+        pictures.append(renderer.radiance(camera, single_instant(camera, pose)))
         spent.append(time.perf_counter() - started)
     return pictures, float(np.median(spent))
 
@@ -114,7 +114,7 @@ def main() -> None:
     raster.close()
     pictures, seconds = in_blender(arguments.python, job(scene, camera, poses))
     tracers = [PathRenderer(scene, samples=arguments.samples // 2, seed=seed, max_depth=None) for seed in (1, 2)]
-    halves = [[tracer.radiance(camera, still(camera, pose)) for pose in poses] for tracer in tracers]
+    halves = [[tracer.radiance(camera, single_instant(camera, pose)) for pose in poses] for tracer in tracers]
     print(f"room, {camera.width_px} x {camera.height_px}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     print(f"{'':28}{'s a picture':>12}{'PSNR dB':>9}{'mean / path':>13}{'times raster':>14}")
     traced = np.mean(halves)

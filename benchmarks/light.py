@@ -28,7 +28,7 @@ from vobench.rendering.bake import BakedScene, BakeSettings, bake, load_baked, s
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.path import PathRenderer
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene, triangles
 from vobench.suite import catalog
@@ -167,7 +167,7 @@ def pairs(scene: Scene, white_cd_m2: float, camera: Pinhole, samples: int, bakes
     tracers = [PathRenderer(scene, samples=samples // 2, seed=seed, max_depth=None) for seed in (1, 2)]
     for place in PLACES[scene.name]:
         T_world_camera = stand(*place)
-        views = still(camera, T_world_camera)
+        views = single_instant(camera, T_world_camera)
         a, b = (tracer.radiance(camera, views) / white_cd_m2 for tracer in tracers)
         yield Pair(raster.radiance(camera, views) / white_cd_m2, (a, b), kinds(scene, camera, T_world_camera))
     raster.close()

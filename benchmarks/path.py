@@ -19,7 +19,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering import mitsuba as llvm
 from vobench.rendering.mitsuba import load
 from vobench.rendering.path import PathRenderer
-from vobench.rendering.renderer import still
+from vobench.rendering.renderer import single_instant
 from vobench.scene.scene import Scene
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
@@ -75,7 +75,7 @@ def compare(scene: Scene, samples: int, pictures: int) -> None:
     direct = mitsuba_itself(scene, T_world_camera, samples)
 
     def ours(index: int) -> Any:
-        return renderer.radiance(LENS, still(LENS, T_world_camera, t_ns=index))
+        return renderer.radiance(LENS, single_instant(LENS, T_world_camera, t_ns=index))
 
     rows = [("Mitsuba itself", *seconds(direct, pictures)), ("vobench", *seconds(ours, pictures))]
     print(f"{platform.machine()}, {scene.name}, {samples} paths a pixel, depth {MAX_DEPTH}, {llvm.VARIANT}")

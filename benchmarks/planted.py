@@ -20,7 +20,7 @@ import yaml
 from vobench.analysis.causes import attribute
 from vobench.analysis.explain_trial import explain_trial
 from vobench.analysis.shrink_trial import shrink_trial
-from vobench.analysis.trial_data import read_conditions, read_course, read_outcome
+from vobench.analysis.trial_data import read_conditions, read_error_series, read_outcome
 from vobench.geometry import rig
 from vobench.geometry.camera import Pinhole
 from vobench.rendering import bake
@@ -30,7 +30,8 @@ from vobench.runner.folder import RunFolder
 from vobench.runner.key import cache_folder
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.run import run_suite
-from vobench.suite.suite import Plan, read_plan
+from vobench.suite.plan import Plan
+from vobench.suite.suite import read_plan
 
 LENS = Pinhole(240, 160, 200.0, 200.0, 119.5, 79.5)
 
@@ -179,7 +180,9 @@ def rank_causes(world: World, out: Path) -> int:
     seen = {name: read_conditions(folder, read_simulated_case(folder, "way")) for name, folder in folders.items()}
     for estimator in estimators:
         scores = {name: next(s for s in f.scores() if s.estimator == estimator) for name, f in folders.items()}
-        found = attribute([replace(read_course(folders[name], scores[name], seen[name]), case=name) for name in names])
+        found = attribute(
+            [replace(read_error_series(folders[name], scores[name], seen[name]), case=name) for name in names]
+        )
         assert found is not None
         for name, change in world.planted.items():
             if change["estimator"] == estimator:

@@ -25,7 +25,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakeSettings, bake
 from vobench.rendering.pyrender_engine import PyrenderRenderer
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import Renderer, View, still
+from vobench.rendering.renderer import Renderer, View, single_instant
 from vobench.scene.material import Map
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose
@@ -98,7 +98,7 @@ class Recorder:
 def pair(renderer: Renderer, rig: Rig, T_world_body: Array) -> list[Map]:
     """Both eyes' pictures, each at one instant."""
     eyes = ((rig.left, T_world_body @ rig.T_body_left), (rig.right, T_world_body @ rig.T_body_right))
-    return [renderer.radiance(camera, still(camera, T)) for camera, T in eyes]
+    return [renderer.radiance(camera, single_instant(camera, T)) for camera, T in eyes]
 
 
 def blurred(renderer: Renderer, rig: Rig, T_world_body: Array) -> None:

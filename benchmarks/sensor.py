@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from vobench.geometry.rig import LENSES
-from vobench.sensor.exposure import AutoExposure, Exposure, start, step, strips
+from vobench.sensor.exposure import AutoExposure, Exposure, initial_exposures, next_exposures, strips
 from vobench.sensor.image_sensor import (
     CAMERAS,
     CameraSensor,
@@ -25,7 +25,7 @@ from vobench.sensor.image_sensor import (
     expose,
     fixed_pattern,
 )
-from vobench.sensor.lens import lens_maps, through_lens
+from vobench.sensor.lens import apply_lens, lens_maps
 
 LENS = LENSES["paper_literal"]
 SHAPE = (LENS.height_px, LENS.width_px)
@@ -84,7 +84,7 @@ def lenses() -> Iterator[tuple[str, Callable[[], object]]]:
     light = picture()
     for name, effects in LENS_EFFECTS.items():
         maps = lens_maps(effects, LENS, np.random.default_rng(3))
-        yield name, lambda maps=maps: through_lens(light, maps)
+        yield name, lambda maps=maps: apply_lens(light, maps)
 
 
 def the_rest() -> Iterator[tuple[str, Callable[[], object]]]:
@@ -93,8 +93,8 @@ def the_rest() -> Iterator[tuple[str, Callable[[], object]]]:
     chip = CAMERAS["mt9v034"]
     grey = expose(picture(), CameraSettings(), noise())
     signal = chip.signal_of_grey
-    state = start(loop, Exposure(0.005))
-    yield "auto-exposure, a step", lambda: step(loop, state, grey, signal)
+    state = initial_exposures(loop, Exposure(0.005))
+    yield "auto-exposure, a step", lambda: next_exposures(loop, state, grey, signal)
     yield "32 strips of 8 sub-frames", lambda: strips(SHAPE[0], 0.02, 0, 0.01, row_strips=32, sub_frames=8)
     yield "once: a fixed pattern", lambda: fixed_pattern(SHAPE, chip, np.random.default_rng(2))
     yield (

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from vobench.report.drive_plot import log_of, save_sheet
+from vobench.report.drive_plot import drive_log, save_sheet
 from vobench.runner.drive import drive_plan
 from vobench.suite.suite import read_plan
 
@@ -19,7 +19,7 @@ def main() -> None:
         suite.write_text(page.split("```yaml\n")[1].split("```")[0], encoding="utf-8")
         plan = read_plan(str(suite))
     out = Path(sys.argv[1]) if len(sys.argv) > 1 else DOCS / "images" / "trajectories.svg"
-    save_sheet(out, [log_of(drive) for drive in drive_plan(plan).drives])
+    save_sheet(out, [drive_log(drive) for drive in drive_plan(plan).drives])
     print(out)
 
 

@@ -19,7 +19,7 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
-from vobench.rendering.truth import Shot, TruthCaster
+from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.scene import triangles
 from vobench.sensor.pixel_truth import CHANNELS
 from vobench.sequence import SequenceWriter
@@ -34,7 +34,7 @@ STEP_RAD = 0.05
 RING_M = 1.5
 
 
-def poses(count: int) -> list[tuple[Shot, Shot]]:
+def poses(count: int) -> list[tuple[CameraShot, CameraShot]]:
     """Pairs of successive pictures on a circle around the room's middle."""
     mount = looking(pitch_deg=PITCH_DEG, position_m=(0.25, 0.06, 0.4))
 
@@ -43,10 +43,12 @@ def poses(count: int) -> list[tuple[Shot, Shot]]:
         return se3.transform(se3.rotation_z(angle + np.pi / 2), place) @ mount
 
     angles = np.linspace(0, 2 * np.pi, count, endpoint=False).tolist()
-    return [(Shot(at(a), 0), Shot(at(a + STEP_RAD), STEP_NS)) for a in angles]
+    return [(CameraShot(at(a), 0), CameraShot(at(a + STEP_RAD), STEP_NS)) for a in angles]
 
 
-def median_ms(work: Callable[[Shot, Shot], object], pairs: list[tuple[Shot, Shot]]) -> tuple[float, float]:
+def median_ms(
+    work: Callable[[CameraShot, CameraShot], object], pairs: list[tuple[CameraShot, CameraShot]]
+) -> tuple[float, float]:
     """Wall and CPU time; the first pose is done once before it counts."""
     work(*pairs[0])
     spent = []
@@ -59,18 +61,18 @@ def median_ms(work: Callable[[Shot, Shot], object], pairs: list[tuple[Shot, Shot
     return 1e3 * wall_s, 1e3 * cpu_s
 
 
-def cast(caster: TruthCaster, pairs: list[tuple[Shot, Shot]]) -> None:
+def cast(caster: TruthCaster, pairs: list[tuple[CameraShot, CameraShot]]) -> None:
     """A line for each channel, and one for all."""
     for name, channels in (*((name, (name,)) for name in CHANNELS), ("all", tuple(CHANNELS))):
 
-        def work(now: Shot, later: Shot, channels: tuple[str, ...] = channels) -> None:
+        def work(now: CameraShot, later: CameraShot, channels: tuple[str, ...] = channels) -> None:
             caster.frame(LENS, now, channels, later=later)
 
         wall_ms, cpu_ms = median_ms(work, pairs)
         print(f"  {name:12}{wall_ms:9.1f}{cpu_ms:9.1f}")
 
 
-def record(caster: TruthCaster, pairs: list[tuple[Shot, Shot]]) -> None:
+def record(caster: TruthCaster, pairs: list[tuple[CameraShot, CameraShot]]) -> None:
     """A line for each channel: what writing it takes, and its size in the file."""
     rig = stereo_rig(LENS, pitch_deg=PITCH_DEG)
     frames = [caster.frame(LENS, now, later=later) for now, later in pairs]

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 from typing_extensions import TypeAliasType
 
 from vobench.errors import InputError, SettingError
-from vobench.setting import ByKind, Like, Matching, Name, OneOf, hints, settings, unit_of
+from vobench.setting import ByKind, FromPreset, Matching, Name, OneOf, hints, settings, unit_of
 from vobench.suite.yaml_file import checked, json_schema, plain
 
 
@@ -57,7 +57,7 @@ class Toy:
     size_m: tuple[Annotated[float, Gt(0)], Annotated[float, Gt(0)]] | None = None
     times_s: Annotated[tuple[float, ...], MinLen(1), MaxLen(3)] = (0.0,)
     curve: Annotated[float, Ge(0.5)] | str | tuple[float, ...] = "straight"
-    spring: Annotated[Spring, Like("spring", SPRINGS)] = Spring()
+    spring: Annotated[Spring, FromPreset("spring", SPRINGS)] = Spring()
     motion: Annotated[Slide | Swing, ByKind("motion", default="swing")] = Slide(length_m=1.0)
     springs: dict[Name, Spring] | None = None
     first_s: float = 0.0

@@ -24,7 +24,7 @@ MOST_SAID = 10  # mistakes in one message; the others are counted
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class FilePlace:
     """A place in a file: line and column, counted from 1, and the key and value there, as far as they are known."""
 
     file: str
@@ -43,7 +43,7 @@ class Mistake:
     """One mistake in a sentence; its places lead from the requested file to the wrong one."""
 
     sentence: str
-    places: tuple[Place, ...] = ()
+    places: tuple[FilePlace, ...] = ()
 
     def __str__(self) -> str:
         return ": ".join([*map(str, self.places), self.sentence])
@@ -138,7 +138,7 @@ def _is_safe(character: str) -> bool:
     return character.isprintable() or character == "\n"
 
 
-def unknown(kind: str, name: str, known: list[str]) -> str:
+def unknown_name_sentence(kind: str, name: str, known: list[str]) -> str:
     """The sentence about an unknown name, with the nearest known name and all known ones."""
     nearest = get_close_matches(name, known, n=1)
     guess = f" Did you mean '{nearest[0]}'?" if nearest else ""
@@ -150,4 +150,4 @@ def require_known(kind: str, name: str, known: Iterable[str]) -> None:
     """Raise UnknownNameError, with the nearest known name, unless `name` is one of `known`."""
     names = list(known)
     if name not in names:
-        raise UnknownNameError(unknown(kind, name, names))
+        raise UnknownNameError(unknown_name_sentence(kind, name, names))

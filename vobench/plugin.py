@@ -69,7 +69,7 @@ if TYPE_CHECKING:
     from vobench.asset.wall import pierced, reveal
     from vobench.dataset.kalibr import chain_rig
     from vobench.dataset.layout import Layout, Writing
-    from vobench.dataset.picture import Picture as RecordedPicture
+    from vobench.dataset.picture import EncodedPicture as RecordedPicture
     from vobench.dataset.picture import unread
     from vobench.dataset.picture_list import numbered, picture_files
     from vobench.dataset.recording import PictureStream, ReadOptions, RecordedFrame, Recording, Topics, assemble
@@ -190,7 +190,7 @@ HOMES = {
     "Layout": "vobench.dataset.layout",
     "Writing": "vobench.dataset.layout",
     "unread": "vobench.dataset.picture",
-    "RecordedPicture": "vobench.dataset.picture:Picture",
+    "RecordedPicture": "vobench.dataset.picture:EncodedPicture",
     "PictureStream": "vobench.dataset.recording",
     "ReadOptions": "vobench.dataset.recording",
     "RecordedFrame": "vobench.dataset.recording",

@@ -20,7 +20,7 @@ from typing import Annotated, Any, Literal, TypeVar, Union, dataclass_transform,
 
 from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 
-from vobench.errors import SettingError, unknown
+from vobench.errors import SettingError, unknown_name_sentence
 
 # Sentences about wrong values for those who write YAML, by pydantic's type of the error; {} are filled in.
 COMPLAINTS = {
@@ -117,7 +117,7 @@ def settings(*, kw_only: bool = True) -> Callable[[type[T]], type[T]]:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Check:
+class ValueCheck:
     """A value that `check` accepts, which raises SettingError otherwise; `schema` describes it in a JSON Schema.
 
     With `first`, the value is checked before its type is, as it was written, with lists as tuples.
@@ -142,28 +142,28 @@ class Check:
         return value
 
 
-def OneOf(what: str, known: Collection[str]) -> Check:
+def OneOf(what: str, known: Collection[str]) -> ValueCheck:
     """Text that is one of the known names, which are names of a `what`; for other text the nearest is suggested."""
 
     def check(name: str) -> None:
         if name not in known:
-            raise SettingError(unknown(what, name, list(known)))
+            raise SettingError(unknown_name_sentence(what, name, list(known)))
 
-    return Check(check, {"enum": sorted(known)})
+    return ValueCheck(check, {"enum": sorted(known)})
 
 
-def Matching(pattern: str, words: str) -> Check:
+def Matching(pattern: str, words: str) -> ValueCheck:
     """Text that matches a pattern as a whole; `words` describe the pattern."""
 
     def check(text: str) -> None:
         if not re.fullmatch(pattern, text):
             raise SettingError(f"should be {words} (got {text!r})")
 
-    return Check(check, {"pattern": f"^{pattern}$"})
+    return ValueCheck(check, {"pattern": f"^{pattern}$"})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Short:
+class ShortForm:
     """A value with a short form, which `expand` turns into the full form; `schema` describes the short form."""
 
     expand: Callable[[Any], Any]
@@ -177,7 +177,7 @@ class Short:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Like:
+class FromPreset:
     """A section that may start from a preset: `like: name` and the keys that differ; a bare name is the preset itself.
 
     `key` replaces `like`. `section` is the key of the part that the presets describe, if they do not describe all.
@@ -197,9 +197,9 @@ class Like:
         if name not in self.presets:
             is_bare_name = value == name
             keys = [] if is_bare_name else [self.key]
-            raise SettingError(unknown(self.what, str(name), list(self.presets)), *keys)
+            raise SettingError(unknown_name_sentence(self.what, str(name), list(self.presets)), *keys)
         preset = asdict(self.presets[name])
-        return over({self.section: preset} if self.section else preset, written)
+        return merged_over({self.section: preset} if self.section else preset, written)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: Callable[[Any], Any]) -> Any:
         return _before(self.merged, handler(source))
@@ -236,7 +236,7 @@ class ByKind:
             if kind is None:
                 raise SettingError(f"this key is missing; it is one of {', '.join(sorted(members))}", "kind")
             if not isinstance(kind, str) or kind not in members:
-                raise SettingError(unknown(f"kind of {self.what}", str(kind), list(members)), "kind")
+                raise SettingError(unknown_name_sentence(f"kind of {self.what}", str(kind), list(members)), "kind")
             return {**tupled(value), "kind": kind}
 
         union = core_schema.tagged_union_schema(members, discriminator="kind")
@@ -249,12 +249,12 @@ def _before(change: Callable[[Any], Any], schema: Any) -> Any:
     return core_schema.no_info_before_validator_function(change, schema)
 
 
-def over(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
+def merged_over(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     """The preset with the given values in place of its own: sections are merged key by key, other values replaced."""
     merged = {**preset, **given}
     for key, value in given.items():
         if isinstance(value, dict) and isinstance(preset.get(key), dict):
-            merged[key] = over(preset[key], value)
+            merged[key] = merged_over(preset[key], value)
     return merged
 
 
@@ -324,7 +324,7 @@ def _checked(value: Any, hint: Any) -> Any:
 def _checked_by_marks(value: Any, hint: Any, marks: tuple[Any, ...]) -> Any:
     """The value of an annotated type."""
     for mark in marks:
-        if isinstance(mark, Check) and mark.first:
+        if isinstance(mark, ValueCheck) and mark.first:
             mark.check(value)
     checked = _checked(value, hint)
     for mark in marks:
@@ -415,7 +415,7 @@ def _require_mark(mark: Any, value: Any) -> None:
             raise _error(error_type, value, min_length=bound, actual_length=len(value))
         case MaxLen(bound) if len(value) > bound:
             raise _error("too_long", value, max_length=bound, actual_length=len(value))
-        case Check(first=False):
+        case ValueCheck(first=False):
             mark.check(value)
 
 

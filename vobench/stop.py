@@ -52,12 +52,12 @@ def check() -> None:
         raise Stopped
 
 
-def forget() -> None:
+def withdraw_requests() -> None:
     """Withdraw all requests."""
     _requests.clear()
 
 
-def undo_all() -> None:
+def clean_up_all() -> None:
     """Clean up from any thread for a process that ends now: first end what is running, then remove what is left."""
     latest_first = _cleanups[::-1]
     _call([cleanup for cleanup in latest_first if cleanup.is_awaited])
@@ -71,7 +71,7 @@ def _call(cleanups: Iterable[_Cleanup]) -> None:
 
 
 @contextmanager
-def undone(call: Callable[[], object], *, is_awaited: bool = False) -> Iterator[None]:
+def cleanup_after(call: Callable[[], object], *, is_awaited: bool = False) -> Iterator[None]:
     """Call a function after the block, however it ends, even if the process ends. Raises Stopped as `check` does.
 
     If it ends something `is_awaited`, such as another process, it is also called as soon as a stop is requested.
@@ -142,7 +142,7 @@ def run(
             start_new_session=True,
             preexec_fn=_die_with_parent(),  # noqa: PLW1509 - one system call, whose library is loaded before the fork
         ) as process,
-        undone(lambda: kill_session(process), is_awaited=True),
+        cleanup_after(lambda: kill_session(process), is_awaited=True),
     ):
         out, err = process.communicate(timeout=timeout_s)
     check()

@@ -38,7 +38,7 @@ def temporary_folder() -> Iterator[Path]:
         with suppress(OSError):  # others are in use
             folder.parent.rmdir()
 
-    with stop.undone(close):
+    with stop.cleanup_after(close):
         yield folder
 
 

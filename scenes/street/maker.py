@@ -206,7 +206,7 @@ def _display(rng):
     """What is to be seen in a shop window: goods on shelves before a wall, with cards and lamps."""
     w = 640
     h = 420
-    back = picture.rgb(picture.some(rng, "#a08c70", "#8d999a", "#b3a894", "#8f7c80"))
+    back = picture.rgb(picture.one_of(rng, "#a08c70", "#8d999a", "#b3a894", "#8f7c80"))
     image = Image.new("RGB", (w, h), back)
     draw = ImageDraw.Draw(image)
     for k in range(8):
@@ -218,7 +218,7 @@ def _display(rng):
         while x < w - 60:
             bw = rng.uniform(16, 58)
             bh = rng.uniform(28, 96)
-            ink = picture.rgb(picture.some(rng, *INKS, PAPER, SAND))
+            ink = picture.rgb(picture.one_of(rng, *INKS, PAPER, SAND))
             if rng.random() < 0.4:
                 draw.ellipse([x, z - bh, x + bw, z], fill=ink)
             else:
@@ -242,7 +242,7 @@ def _house(rng, number, wide):
     """A front on x = 0 that faces x: a shop below, storeys of windows above, a cornice, a door and a downpipe."""
     kind, colour = FACES[(number * 3 + number // 8) % len(FACES)]
     storeys = int(rng.integers(2, 5))
-    ink = picture.some(rng, NAVY, TEAL, BRICK, PLUM, INK, "#2f4a36")
+    ink = picture.one_of(rng, NAVY, TEAL, BRICK, PLUM, INK, "#2f4a36")
     look = (
         matt(colour, picture.masonry("brick", number % 3))
         if kind == "brick"

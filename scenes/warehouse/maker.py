@@ -135,7 +135,7 @@ def _load(rng, high_m):
         drum = lathe(
             [[0, 0], [0.28, 0], [0.29, 0.02], [0.28, 0.28], [0.29, 0.3], [0.28, 0.58], [0.29, 0.86], [0, 0.86]]
         )
-        colour = coated(picture.some(rng, "#27445c", "#b4533a", "#3d7a7c"), roughness=0.25)
+        colour = coated(picture.one_of(rng, "#27445c", "#b4533a", "#3d7a7c"), roughness=0.25)
         return [put(drum, colour, x, y, z0, yaw=rng.uniform(0, 90)) for x in (-0.3, 0.3) for y in (-0.05,)]
     if kind < 0.2:
         return [
@@ -160,7 +160,7 @@ def _load(rng, high_m):
         place = at((i - (nx - 1) / 2) * 1.16 / nx + dx, (j - (ny - 1) / 2) * 0.78 / ny + dy, z0 + r * size[2], yaw=turn)
         tile = max(size)
         boxes.append(moved(block(size, bevel_m=0, uv_m=(tile / 2, tile / 2), transform=at(z_m=size[2] / 2)), place))
-    tint = picture.some(rng, "#ffffff", "#f3ead9", "#e5e9ea", "#fff3dc")
+    tint = picture.one_of(rng, "#ffffff", "#f3ead9", "#e5e9ea", "#fff3dc")
     return [Part(joined(boxes), matt(tint, picture.carton(seed, max(size))))]
 
 

@@ -10,12 +10,14 @@ import pytest
 from tests.cli.conftest import CLOSET, make_cheap
 from tests.runner.conftest import CLOSET as TEXTURED_CLOSET
 from vobench.geometry.camera import Pinhole
-from vobench.geometry.rig import own_pair, stereo_rig
+from vobench.geometry.rig import custom_stereo_pair, stereo_rig
 from vobench.runner.executor import Serial
 from vobench.runner.folder import RunFolder, TrialScore
 from vobench.runner.run import run_suite
 from vobench.suite.axis import RigSettings
-from vobench.suite.suite import Case, Plan, read_plan
+from vobench.suite.case import Case
+from vobench.suite.plan import Plan
+from vobench.suite.suite import read_plan
 from vobench.suite.yaml_file import plain
 
 SCENE = """
@@ -137,7 +139,9 @@ def recorded_case(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The folder of a case of some twenty small pictures from a textured closet, with a right eye that is rolled."""
     root = tmp_path_factory.mktemp("recorded")
     (root / "closet.yaml").write_text(TEXTURED_CLOSET)
-    rig: Any = plain(RigSettings(own=own_pair(stereo_rig(LENS, pitch_deg=0)), pitch_deg=30, forward_m=0, height_m=0.3))
+    rig: Any = plain(
+        RigSettings(own=custom_stereo_pair(stereo_rig(LENS, pitch_deg=0)), pitch_deg=30, forward_m=0, height_m=0.3)
+    )
     stated = {key: rig[key] for key in ("own", "pitch_deg", "forward_m", "height_m")}
     suite = {
         "name": "recorded",

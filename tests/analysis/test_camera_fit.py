@@ -5,7 +5,7 @@ import pytest
 
 from vobench.analysis.camera_fit import (
     WELL_E,
-    Look,
+    CameraLook,
     _fit_blur_px,
     _fit_gain,
     _fit_gamma,
@@ -20,7 +20,7 @@ from vobench.analysis.conditions import chip_noise_dn
 from vobench.analysis.image_statistics import edge_px, gradients
 from vobench.geometry.camera import Pinhole
 from vobench.sensor.image_sensor import NoiseStreams, expose
-from vobench.sensor.lens import lens_maps, through_lens
+from vobench.sensor.lens import apply_lens, lens_maps
 
 LENS = Pinhole(160, 120, 150.0, 150.0, 79.5, 59.5)
 
@@ -36,7 +36,7 @@ def light() -> np.ndarray:
 def develop(settings):
     maps = lens_maps(settings, LENS, np.random.default_rng(0))
     noise = NoiseStreams(np.random.default_rng(1), np.random.default_rng(2))
-    return [expose(through_lens(light(), maps), settings, noise)]
+    return [expose(apply_lens(light(), maps), settings, noise)]
 
 
 def test_a_cameras_exposure_contrast_blur_and_noise_are_found():
@@ -90,11 +90,11 @@ def test_the_noise_is_solved_from_that_of_flat_parts_less_that_of_rounding() -> 
     for noise in (0.5, 3.0):
         chip = camera_of(1.0, 0.6, 0.0, noise).chip
         variance = np.mean([chip_noise_dn(chip, grey_dn) ** 2 for grey_dn in flat_dn])
-        wanted = Look(100.0, 30.0, float(np.sqrt(variance + 1 / 12)), 3.0, flat_dn)
+        wanted = CameraLook(100.0, 30.0, float(np.sqrt(variance + 1 / 12)), 3.0, flat_dn)
         assert _fit_noise(parameters, wanted) == pytest.approx(noise, rel=1e-6)
-    assert _fit_noise(parameters, Look(100.0, 30.0, 0.1, 3.0, flat_dn)) == 0.03  # less than rounding makes
-    assert _fit_noise(parameters, Look(100.0, 30.0, 1e4, 3.0, flat_dn)) == 30
-    assert _fit_noise(parameters, Look(100.0, 30.0, 2.0, 3.0, np.zeros(0))) == 0.03
+    assert _fit_noise(parameters, CameraLook(100.0, 30.0, 0.1, 3.0, flat_dn)) == 0.03  # less than rounding makes
+    assert _fit_noise(parameters, CameraLook(100.0, 30.0, 1e4, 3.0, flat_dn)) == 30
+    assert _fit_noise(parameters, CameraLook(100.0, 30.0, 2.0, 3.0, np.zeros(0))) == 0.03
 
 
 @pytest.mark.parametrize("wanted", [0.2, 1.7, 3.9])
@@ -111,7 +111,7 @@ def test_exposure_is_solved_over_orders_of_magnitude() -> None:
 
     parameters = _Parameters(gain=1.0, gamma=0.6, blur_px=0.0, noise=1.0)
     for gain in (0.05, 1.0, 20.0):
-        wanted = Look(10 * gain, 0.0, 0.0, 0.0, np.zeros(0))
+        wanted = CameraLook(10 * gain, 0.0, 0.0, 0.0, np.zeros(0))
         assert _fit_gain(parameters, wanted, linear) == pytest.approx(gain, rel=0.04)
 
 
@@ -122,9 +122,9 @@ def test_contrast_is_solved_at_the_exposure_that_gives_the_mean() -> None:
         response = float(settings.chip.response)
         return [255 * np.clip(settings.exposure_gain * light, 0, 1) ** (1 / response)] * 2
 
-    def look(gain: float, gamma: float) -> Look:
+    def look(gain: float, gamma: float) -> CameraLook:
         image = perfect(camera_of(gain, gamma, 0.0, 1.0))[0]
-        return Look(float(image.mean()), float(image.std()), 0.0, 0.0, np.zeros(0))
+        return CameraLook(float(image.mean()), float(image.std()), 0.0, 0.0, np.zeros(0))
 
     start = _Parameters(gain=1.0, gamma=0.45, blur_px=0.0, noise=1.0)
     for gain, gamma in ((0.5, 0.8), (0.9, 0.4)):

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vobench.analysis.causes import Attribution, Cause, Course, attribute
+from vobench.analysis.causes import Attribution, Cause, ErrorSeries, attribute
 from vobench.geometry.se3 import Array
 
 
-def courses(slope: dict[str, float], *, trials: int = 4, frames: int = 121, twin: bool = False) -> list[Course]:
+def courses(slope: dict[str, float], *, trials: int = 4, frames: int = 121, twin: bool = False) -> list[ErrorSeries]:
     """Trials whose error's logarithm is these slopes times the square roots of conditions, and noise."""
     rng = np.random.default_rng(3)
     made = []
@@ -21,7 +21,7 @@ def courses(slope: dict[str, float], *, trials: int = 4, frames: int = 121, twin
         log = sum(k * np.sqrt(held[name]) for name, k in slope.items()) + rng.normal(0, 0.3, frames) - 6
         loss = np.minimum(np.exp(log), 1.0)
         loss[0] = 0.0
-        made.append(Course(f"case_{nth}", 0, held, loss))
+        made.append(ErrorSeries(f"case_{nth}", 0, held, loss))
     return made
 
 
@@ -58,13 +58,13 @@ def test_a_trial_goes_wrong_where_its_error_leaps() -> None:
     assert course.first_divergence is None
     loss = course.loss.copy()
     loss[40:] = 1.0
-    assert Course("c", 0, course.conditions, loss).first_divergence == 40
+    assert ErrorSeries("c", 0, course.conditions, loss).first_divergence == 40
 
 
 def test_nothing_is_learned_from_a_few_segments_or_frames_that_are_all_alike() -> None:
     assert attribute(courses({}, trials=1, frames=20)) is None
     (course,) = courses({}, trials=1)
-    assert attribute([Course("c", 0, {"flat": course.conditions["flat"]}, course.loss)]) is None
+    assert attribute([ErrorSeries("c", 0, {"flat": course.conditions["flat"]}, course.loss)]) is None
 
 
 # --- Exact laws, on errors without noise ---
@@ -83,7 +83,7 @@ def fitted(levels: dict[str, np.ndarray], log_loss: np.ndarray) -> Attribution:
     loss = constant_in_segments(np.exp(log_loss))
     loss[0] = 0.0
     conditions = {name: constant_in_segments(level**2) for name, level in levels.items()}
-    found = attribute([Course("case", 0, conditions, loss)])
+    found = attribute([ErrorSeries("case", 0, conditions, loss)])
     assert found is not None
     return found
 
@@ -165,7 +165,9 @@ def test_the_factors_of_a_segment_say_how_it_differs_from_the_median_one() -> No
 
 
 def test_segments_cover_every_frame_but_the_first_once_and_belong_to_their_trial() -> None:
-    trials = [Course(f"case_{nth}", nth, each.conditions, each.loss) for nth, each in enumerate(courses({"a": 1.0}))]
+    trials = [
+        ErrorSeries(f"case_{nth}", nth, each.conditions, each.loss) for nth, each in enumerate(courses({"a": 1.0}))
+    ]
     shorter = replace(trials[0], case="short", loss=trials[0].loss[:38])
     found = attribute([*trials, shorter])
     assert found is not None
@@ -194,7 +196,7 @@ def test_eight_segments_are_enough_and_seven_are_not() -> None:
     rng = np.random.default_rng(1)
     for segments, is_enough in ((8, True), (7, False)):
         frames = 1 + 5 * segments
-        course = Course("c", 0, {"a": rng.uniform(0, 4, frames)}, rng.uniform(0, 1, frames))
+        course = ErrorSeries("c", 0, {"a": rng.uniform(0, 4, frames)}, rng.uniform(0, 1, frames))
         assert (attribute([course]) is not None) == is_enough
 
 
@@ -221,7 +223,7 @@ def diverging(threshold_loss: float, *, others: float) -> int | None:
     loss = np.full(50, others)
     loss[0] = 0.0
     loss[30] = threshold_loss
-    return Course("c", 0, {}, loss).first_divergence
+    return ErrorSeries("c", 0, {}, loss).first_divergence
 
 
 @pytest.mark.parametrize(
@@ -262,7 +264,7 @@ def test_each_trial_keeps_its_number_of_segments_when_they_are_resampled() -> No
     for nth in range(10):
         level = constant_in_segments(np.full(4, rng.uniform(1, 3)))
         loss = np.exp(0.8 * level - 6 + rng.normal(0, 0.3))
-        trials.append(Course(f"case_{nth}", 0, {"a": level**2}, loss))
+        trials.append(ErrorSeries(f"case_{nth}", 0, {"a": level**2}, loss))
     found = attribute(trials)
     assert found is not None
     (cause,) = found.causes

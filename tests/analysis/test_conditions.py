@@ -10,13 +10,23 @@ import pytest
 from vobench.analysis.conditions import CONDITIONS, SubsampledCamera, _contrast, chip_noise_dn, conditions
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
-from vobench.geometry.rig import CalibrationError, EyeError, looking, own_pair, stereo_rig
+from vobench.geometry.rig import CalibrationError, CameraError, custom_stereo_pair, looking, stereo_rig
 from vobench.scene.material import Material, srgb
 from vobench.sensor.image_sensor import CameraSensor
 from vobench.sequence.reader import StereoFrame
 from vobench.suite.axis import RigSettings
-from vobench.suite.scene_spec import BoardSpec, BoxSpec, Glass, Matt, Mirror, MoverSpec, PathKey, Polished
-from vobench.suite.suite import Case, read_plan
+from vobench.suite.case import Case
+from vobench.suite.scene_spec import (
+    BoardSpec,
+    BoxSpec,
+    DiffuseSpec,
+    GlassSpec,
+    MirrorSpec,
+    MoverSpec,
+    PathKey,
+    PolishedSpec,
+)
+from vobench.suite.suite import read_plan
 from vobench.suite.yaml_file import plain
 from vobench.trajectory.trajectory import Trajectory
 
@@ -38,7 +48,9 @@ lamps: [{name: lamp, kind: point, center_m: [-2, 0, 0], power_lm: 100}]
 def wall(tmp_path_factory: pytest.TempPathFactory) -> Case:
     """A case of a plain wall that fills the view, 4 m ahead of the origin, and a camera without any effect."""
     root = tmp_path_factory.mktemp("wall")
-    rig: Any = plain(RigSettings(own=own_pair(stereo_rig(LENS, pitch_deg=0, baseline_m=BASELINE_M)), pitch_deg=0))
+    rig: Any = plain(
+        RigSettings(own=custom_stereo_pair(stereo_rig(LENS, pitch_deg=0, baseline_m=BASELINE_M)), pitch_deg=0)
+    )
     suite = {
         "name": "wall",
         "scenes": ["wall"],
@@ -122,7 +134,11 @@ def test_every_condition_is_computed_of_every_frame(wall: Case) -> None:
 
 @pytest.mark.parametrize(
     ("name", "other", "material"),
-    [("mirror", "gloss", Mirror()), ("mirror", "gloss", Glass()), ("gloss", "mirror", Polished("plain", 0.5))],
+    [
+        ("mirror", "gloss", MirrorSpec()),
+        ("mirror", "gloss", GlassSpec()),
+        ("gloss", "mirror", PolishedSpec("plain", 0.5)),
+    ],
 )
 def test_a_board_of_twice_the_area_is_twice_the_share_of_mirrors_or_of_gloss(wall, name, other, material) -> None:
     side_m = 0.6
@@ -223,7 +239,7 @@ def test_a_calibration_error_twice_as_large_moves_points_twice_as_far(wall: Case
 
 def test_a_wrong_principal_point_moves_the_points_of_both_cameras_by_as_much(wall: Case) -> None:
     both = CalibrationError(center_px=(0.3, -0.4))
-    left, right = (CalibrationError(**{side: EyeError(center_px=(0.3, -0.4))}) for side in ("left", "right"))
+    left, right = (CalibrationError(**{side: CameraError(center_px=(0.3, -0.4))}) for side in ("left", "right"))
     for error, expected_px in ((both, 0.5), (left, 0.25), (right, 0.25)):
         case = replace(wall, rig=replace(wall.rig, calibration_error=error))
         assert one(case, "calibration") == pytest.approx(expected_px)
@@ -251,23 +267,25 @@ def contrast_of(case: Case, material: Any) -> float:
 
 def test_faintness_is_the_inverse_of_the_contrast_and_50_for_a_plain_wall(wall: Case) -> None:
     assert one(wall, "faintness") == pytest.approx(50)
-    weak, strong = (contrast_of(wall, Matt("terrazzo", 0.4, contrast=share, resolution_px=64)) for share in (0.2, 0.4))
+    weak, strong = (
+        contrast_of(wall, DiffuseSpec("terrazzo", 0.4, contrast=share, resolution_px=64)) for share in (0.2, 0.4)
+    )
     assert weak > 0.01
     assert strong == pytest.approx(2 * weak, rel=0.1)
 
 
 def test_contrast_is_the_deviation_of_the_texture_over_its_mean(wall: Case) -> None:
-    material = Matt("terrazzo", 0.4, contrast=0.5, resolution_px=64)
+    material = DiffuseSpec("terrazzo", 0.4, contrast=0.5, resolution_px=64)
     pixels = np.asarray(material.build().texture.pixels(), float)
     assert contrast_of(wall, material) == pytest.approx(pixels.std() / pixels.mean(), rel=0.05)
 
 
 def test_a_mirror_has_no_texture_of_its_own_and_what_is_behind_the_camera_does_not_count(wall: Case) -> None:
-    textured = Matt("terrazzo", 0.4, contrast=0.5, resolution_px=64)
+    textured = DiffuseSpec("terrazzo", 0.4, contrast=0.5, resolution_px=64)
     case = scene(wall, materials={"plaster": textured})
-    assert one(with_board(case, 1.0, Mirror()), "faintness") == pytest.approx(one(case, "faintness"))
+    assert one(with_board(case, 1.0, MirrorSpec()), "faintness") == pytest.approx(one(case, "faintness"))
     behind = BoardSpec(name="behind", center_m=(-3, 0, 0), size_m=(5, 5), yaw_deg=0, material="of_board")
-    materials = {"plaster": textured, "of_board": Matt("plain", 0.5, resolution_px=8)}
+    materials = {"plaster": textured, "of_board": DiffuseSpec("plain", 0.5, resolution_px=8)}
     other = scene(wall, boards=(*wall.scene.boards, behind), materials=materials)
     assert one(other, "faintness") == pytest.approx(one(case, "faintness"))
 
@@ -437,7 +455,7 @@ def test_frames_are_read_in_order(wall: Case) -> None:
 
 
 def test_of_mirrors_alone_nothing_has_a_texture(wall: Case) -> None:
-    assert one(scene(wall, materials={"plaster": Mirror()}), "faintness") == pytest.approx(50)
+    assert one(scene(wall, materials={"plaster": MirrorSpec()}), "faintness") == pytest.approx(50)
 
 
 @dataclass(frozen=True, slots=True)
@@ -464,4 +482,4 @@ def test_stripes_of_two_pixels_are_seen_in_both_directions(axis: int, colours: b
 def test_bodies_without_a_texture_have_no_contrast_and_mirrors_none_that_is_known() -> None:
     assert _contrast(Material()) == 0
     assert np.isnan(_contrast(None))
-    assert np.isnan(_contrast(Mirror().build()))
+    assert np.isnan(_contrast(MirrorSpec().build()))

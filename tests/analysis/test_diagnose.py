@@ -9,8 +9,8 @@ import pytest
 from vobench.analysis.diagnose import diagnose
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.trajectory.formats import Reading, parse_any, parse_times
-from vobench.trajectory.trajectory import Trajectory, parse_move
+from vobench.trajectory.formats import TrajectoryReading, parse_any, parse_times
+from vobench.trajectory.trajectory import Trajectory, parse_pose_convention
 
 DATA = Path(__file__).parents[2] / ".." / "shared" / "data" / "trajectories"
 WITH_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="no folder ../shared/data with real trajectories")
@@ -35,7 +35,7 @@ def scaled(trajectory, factor):
 
 
 def moved(word):
-    return lambda est: changed(est, parse_move(word).apply(est.T_world_frame))
+    return lambda est: changed(est, parse_pose_convention(word).apply(est.T_world_frame))
 
 
 FRAMES = {
@@ -65,7 +65,7 @@ def read(name):
         t_ns = parse_times((DATA / "KITTI_00_gt_times.txt").read_text(), name="times")
     unit = None if t_ns is None else "s"
     t_ns = np.arange(len(parsed.T)) * 10**9 if t_ns is None else t_ns
-    return Reading(Trajectory(t_ns, parsed.T), unit, unit)
+    return TrajectoryReading(Trajectory(t_ns, parsed.T), unit, unit)
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +87,7 @@ def loop(n=400, seed=1):
     R = se3.rotation_z(s + np.pi / 2) @ axes @ se3.rotation_z(0.4 * np.sin(3 * s)) @ axes.T  # heading, roll
     gt = Trajectory(np.arange(n, dtype=np.int64) * 50_000_000, se3.transform(R, p))
     noisy = se3.transform(gt.T_world_frame[:, :3, :3], p + np.cumsum(rng.normal(scale=2e-3, size=p.shape), axis=0))
-    return Reading(gt), Reading(Trajectory(gt.t_ns, noisy))
+    return TrajectoryReading(gt), TrajectoryReading(Trajectory(gt.t_ns, noisy))
 
 
 def assert_named(fault, gt, est):
@@ -125,7 +125,9 @@ def test_another_world_is_no_fault():
 def test_several_faults_are_named_one_after_the_other():
     gt, est = loop()
     broken = scaled(est.trajectory, 3.0)
-    broken = changed(broken, parse_move("axes:z,-x,-y").apply(broken.T_world_frame), broken.t_ns + 700_000_000)
+    broken = changed(
+        broken, parse_pose_convention("axes:z,-x,-y").apply(broken.T_world_frame), broken.t_ns + 700_000_000
+    )
     findings = diagnose(gt, replace(est, trajectory=broken))
     assert [finding.fault for finding in findings] == ["time_offset", "axis_swap", "scale"]
     assert [finding.options for finding in findings] == [
@@ -140,14 +142,14 @@ def test_the_move_that_mends_is_the_inverse_of_the_one_that_broke():
     for word in ("axes:z,-x,-y", "positions:y,z,x"):  # neither is its own inverse
         broken = moved(word)(est.trajectory)
         finding = diagnose(gt, replace(est, trajectory=broken))[0]
-        mended = parse_move(finding.options[1]).apply(broken.T_world_frame)
+        mended = parse_pose_convention(finding.options[1]).apply(broken.T_world_frame)
         np.testing.assert_allclose(mended, est.trajectory.T_world_frame, atol=1e-12)
 
 
 def test_a_mount_that_mends_is_the_inverse_of_the_one_that_broke():
     gt, est = loop()
     finding = assert_named("body_frame_offset", gt, replace(est, trajectory=est.trajectory.of_mounted(TILT)))
-    left = TILT @ parse_move(finding.options[1]).matrix
+    left = TILT @ parse_pose_convention(finding.options[1]).matrix
     assert np.rad2deg(se3.rotation_angle(left[:3, :3])) < 2
     assert np.linalg.norm(left[:3, 3]) < 0.05
 
@@ -196,7 +198,7 @@ def test_poor_motion_is_no_fault(shape):
     R = se3.rotation_z(6 * s) if shape == "plane" else np.broadcast_to(np.eye(3), (n, 3, 3))
     gt = Trajectory(np.arange(n) * 10**8, se3.transform(R, p))
     noise = np.random.default_rng(2).normal(scale=1e-3, size=(n, 3))
-    assert diagnose(Reading(gt), Reading(changed(gt, se3.transform(R, p + noise)))) == ()
+    assert diagnose(TrajectoryReading(gt), TrajectoryReading(changed(gt, se3.transform(R, p + noise)))) == ()
 
 
 @pytest.mark.parametrize("word", ["inverse", "rotations:inverse"])
@@ -233,7 +235,7 @@ def test_trajectories_with_nothing_in_common_are_called_so_and_nothing_else(seed
     s = np.linspace(0, 6, 400)
     waves = np.sin(rng.uniform(0.5, 4, (3, 5, 1)) * s + rng.uniform(0, 6, (3, 5, 1))).sum(axis=1).T
     other = Trajectory(gt.trajectory.t_ns, se3.transform(se3.rotation_z(waves[:, 0]), factor * waves))
-    finding = assert_named("unrelated", gt, Reading(other))
+    finding = assert_named("unrelated", gt, TrajectoryReading(other))
     assert finding.options == ()
     assert finding.evidence[0].after >= 50
 
@@ -321,7 +323,7 @@ def test_real_trajectories_of_other_places_are_not_of_one_motion(real, one, othe
     gt, est = real[one][0].trajectory, real[other][1].trajectory
     n = min(len(gt), len(est))
     t_ns = np.arange(n) * 10**8
-    pair = (Reading(Trajectory(t_ns, t.T_world_frame[:n])) for t in (gt, est))
+    pair = (TrajectoryReading(Trajectory(t_ns, t.T_world_frame[:n])) for t in (gt, est))
     assert_named("unrelated", *pair)
 
 

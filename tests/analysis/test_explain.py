@@ -25,7 +25,7 @@ from vobench.analysis.explain import (
 )
 from vobench.analysis.nuisance import nuisances_of
 from vobench.geometry import se3
-from vobench.suite.suite import Case
+from vobench.suite.case import Case
 from vobench.trajectory.trajectory import Trajectory
 
 Error = Callable[[set[str]], float]

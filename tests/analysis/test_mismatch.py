@@ -15,7 +15,7 @@ from vobench.analysis.mismatch import (
 )
 from vobench.geometry import se3
 from vobench.trajectory.align import align
-from vobench.trajectory.trajectory import Move
+from vobench.trajectory.trajectory import PoseConvention
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_there_are_47_other_axes_all_signed_permutations() -> None:
 def test_wrong_axes_are_corrected_to_the_misfit_of_right_ones(drive, kind, index) -> None:
     T_gt, T_est = drive
     axes = SIGNED_AXES[index]
-    mismatch = found(T_gt, Move(kind, axes.T).apply(T_est))
+    mismatch = found(T_gt, PoseConvention(kind, axes.T).apply(T_est))
     assert mismatch is not None
     right = misfit(T_gt, T_est)
     assert mismatch.correction.misfit.total == pytest.approx(right.total, rel=0.05)
@@ -85,7 +85,7 @@ def test_wrong_axes_are_corrected_to_the_misfit_of_right_ones(drive, kind, index
 def test_inverses_are_found_on_either_side_in_different_worlds(drive, side, word, kind) -> None:
     T_gt, T_est = drive
     T_est = TILT @ T_est
-    given = (Move(word).apply(T_gt), T_est) if side == "gt" else (T_gt, Move(word).apply(T_est))
+    given = (PoseConvention(word).apply(T_gt), T_est) if side == "gt" else (T_gt, PoseConvention(word).apply(T_est))
     mismatch = found(*given)
     assert (mismatch.kind, mismatch.correction.side, mismatch.lever) == (kind, side, None)
     np.testing.assert_allclose(mismatch.correction.T_gt, T_gt, atol=1e-9)
@@ -96,8 +96,8 @@ def test_inverses_are_found_on_either_side_in_different_worlds(drive, side, word
 def test_in_one_world_it_is_the_estimate_that_counts_as_inverse(seed: int) -> None:
     gt, est = (reading.trajectory.T_world_frame for reading in loop(n=200, seed=seed))
     for word in ("inverse", "rotations"):
-        assert found(gt, Move(word).apply(est)).correction.side == "est"
-        assert found(Move(word).apply(gt), est).correction.side == "est"
+        assert found(gt, PoseConvention(word).apply(est)).correction.side == "est"
+        assert found(PoseConvention(word).apply(gt), est).correction.side == "est"
 
 
 @pytest.mark.parametrize("side", ["gt", "est"])

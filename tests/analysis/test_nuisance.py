@@ -12,21 +12,21 @@ from vobench.analysis.nuisance import COATED_FINISHES, FAINT_FINISHES, NUISANCES
 from vobench.geometry import se3
 from vobench.geometry.rig import looking
 from vobench.scene.material import reflectance
-from vobench.sensor.image_sensor import Eye, Eyes, NoiseStreams, expose
+from vobench.sensor.image_sensor import CameraDifference, CameraDifferences, NoiseStreams, expose
 from vobench.sequence.reader import StereoFrame
+from vobench.suite.case import Case
 from vobench.suite.scene_build import build
 from vobench.suite.scene_spec import (
     STEADY,
     BoxSpec,
-    Glass,
+    DiffuseSpec,
+    GlassSpec,
     LevelSpec,
     LightOverride,
-    Matt,
     SkySpec,
     SunKey,
     SunSpec,
 )
-from vobench.suite.suite import Case
 from vobench.trajectory.trajectory import Trajectory
 
 BURNT = "burnt pixels"
@@ -61,7 +61,7 @@ def worst(hard: Case) -> Case:
         defocus_px=1.0,
         vignetting_cutoff_deg=50.0,
         ghost=0.1,
-        unlike=Eyes(left=Eye(gain=0.9), right=Eye(gain=0.5)),
+        unlike=CameraDifferences(left=CameraDifference(gain=0.9), right=CameraDifference(gain=0.5)),
         timing=timing,
     )
 
@@ -148,12 +148,12 @@ def test_without_shadows_there_are_few_edges_and_without_low_texture_nothing_is_
 
 
 def test_mirrors_become_stone_that_is_neither_faint_nor_glossy_and_panes_stop_mirroring(hard: Case) -> None:
-    materials = {**hard.scene.materials, "door": Glass(eta=1.5)}
+    materials = {**hard.scene.materials, "door": GlassSpec(eta=1.5)}
     case = replace(hard, scene=replace(hard.scene, materials=materials))
     changed = without(case, ["mirrors"]).scene.materials
-    assert changed["door"] == Glass(eta=1.0)
+    assert changed["door"] == GlassSpec(eta=1.0)
     stone = changed["glass"]
-    assert isinstance(stone, Matt)
+    assert isinstance(stone, DiffuseSpec)
     assert 0.2 < float(reflectance(stone.build()).mean()) < 0.7
     assert without(case, ["mirrors", "low texture"]).scene.materials["glass"] == stone
     assert changed["floor"] == hard.scene.materials["floor"]
@@ -168,7 +168,7 @@ def finished(case: Case, finish: str) -> Case:
 def test_built_in_mirrors_and_panes_are_replaced_as_those_of_the_scene(hard: Case) -> None:
     stone = without(hard, ["mirrors"]).scene.materials["glass"]
     assert without(finished(hard, "mirror"), ["mirrors"]).scene.materials["mirror"] == stone
-    assert without(finished(hard, "pane"), ["mirrors"]).scene.materials["pane"] == Glass(eta=1.0)
+    assert without(finished(hard, "pane"), ["mirrors"]).scene.materials["pane"] == GlassSpec(eta=1.0)
     assert "brick" not in without(finished(hard, "brick"), NAMES).scene.materials
 
 
@@ -196,9 +196,9 @@ def test_faint_finishes_get_a_pattern_of_strong_contrast(hard: Case, finish: str
 
 
 def test_only_faint_and_plain_materials_get_a_pattern_and_they_are_at_most_as_bright_as_it_can_be(hard: Case) -> None:
-    bright = Matt("terrazzo", 0.9, contrast=0.29, resolution_px=8)
-    dark = Matt("plain", 0.2, contrast=0.5, resolution_px=8)
-    clear = Matt("terrazzo", 0.9, contrast=0.3, resolution_px=8)
+    bright = DiffuseSpec("terrazzo", 0.9, contrast=0.29, resolution_px=8)
+    dark = DiffuseSpec("plain", 0.2, contrast=0.5, resolution_px=8)
+    clear = DiffuseSpec("terrazzo", 0.9, contrast=0.3, resolution_px=8)
     materials = {**hard.scene.materials, "bright": bright, "dark": dark, "clear": clear}
     changed = without(replace(hard, scene=replace(hard.scene, materials=materials)), ["low texture"]).scene.materials
     assert changed["clear"] == clear

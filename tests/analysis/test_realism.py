@@ -11,11 +11,11 @@ from vobench.analysis.image_statistics import gradients, picture_statistics
 from vobench.analysis.realism import (
     STATISTICS,
     WINDOW,
+    FrameSample,
     Realism,
-    Shot,
     measure,
+    pair_sentences,
     residual,
-    says,
     shots_of,
     window_starts,
 )
@@ -41,10 +41,10 @@ def test_runs_of_pictures_lie_apart_and_within_the_recording():
 
 def test_one_eye_has_eight_statistics_and_a_sentence():
     picture = as_grey(boards())
-    found = measure([[Shot(picture, None)] * 3], RIG)
+    found = measure([[FrameSample(picture, None)] * 3], RIG)
     assert list(found.values) == [s.name for s in STATISTICS][1:]
     assert found.values["tracks_home"] == 100
-    assert says(found)[0].startswith("There is no stereo pair to judge")
+    assert pair_sentences(found)[0].startswith("There is no stereo pair to judge")
 
 
 def test_a_statistic_says_what_brings_it_into_its_band():
@@ -57,8 +57,8 @@ def test_a_statistic_says_what_brings_it_into_its_band():
 # --- The nine statistics ---
 
 
-def run(*images: np.ndarray) -> list[Shot]:
-    return [Shot(image, None) for image in images]
+def run(*images: np.ndarray) -> list[FrameSample]:
+    return [FrameSample(image, None) for image in images]
 
 
 def flat(grey: int) -> np.ndarray:
@@ -182,7 +182,7 @@ def fit(**changes) -> StereoFit:
 
 
 def sentences(pair: StereoFit | None) -> list[str]:
-    return says(Realism({}, {}, {}, pair, 1))
+    return pair_sentences(Realism({}, {}, {}, pair, 1))
 
 
 def test_of_a_pair_that_is_right_nothing_significant_is_said() -> None:

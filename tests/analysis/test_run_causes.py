@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.analysis.conftest import NoisyRun
-from vobench.analysis.causes import Course, attribute
+from vobench.analysis.causes import ErrorSeries, attribute
 from vobench.analysis.run_causes import EstimatorCauses, RunCauses, find_causes
 from vobench.errors import UnknownNameError
 
@@ -16,7 +16,7 @@ def planted() -> RunCauses:
     rng = np.random.default_rng(0)
     blur, depth = rng.uniform(0.1, 4, 200), rng.uniform(1, 2, 200)
     loss = np.append(0.0, 0.01 * np.exp(np.sqrt(blur[1:])))
-    course = Course("walk", 0, {"blur": blur, "depth": depth}, loss)
+    course = ErrorSeries("walk", 0, {"blur": blur, "depth": depth}, loss)
     found = EstimatorCauses("mine", ("ok",), (course,), attribute([course]))
     return RunCauses(Path("runs"), (found,))
 
@@ -69,7 +69,7 @@ def test_each_trial_is_listed_with_the_frame_at_which_it_diverges() -> None:
     (found,) = planted().estimators
     loss = found.courses[0].loss.copy()
     loss[50] = 1.0
-    diverged = EstimatorCauses("mine", ("lost",), (Course("walk", 1, found.courses[0].conditions, loss),), None)
+    diverged = EstimatorCauses("mine", ("lost",), (ErrorSeries("walk", 1, found.courses[0].conditions, loss),), None)
     assert diverged.trials() == [{"case": "walk", "repeat": 1, "status": "lost", "first_divergence_frame": 50}]
 
 

@@ -94,9 +94,9 @@ def test_a_scene_without_a_floor_has_no_free_circle() -> None:
 
 
 def test_textures_are_counted_once_each_in_megabytes() -> None:
-    from vobench.suite.scene_spec import Matt
+    from vobench.suite.scene_spec import DiffuseSpec
 
-    texture = Matt("terrazzo", 0.4, contrast=0.5, resolution_px=64)
+    texture = DiffuseSpec("terrazzo", 0.4, contrast=0.5, resolution_px=64)
     materials = {
         "grey": Material(colour=(0.5, 0.5, 0.5), texture=texture),
         "again": Material(colour=(0.2, 0.5, 0.5), texture=texture),

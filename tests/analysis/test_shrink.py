@@ -4,7 +4,7 @@ import pytest
 
 from vobench.analysis.nuisance import nuisances_of
 from vobench.analysis.shrink import Failure, middle_of_first_run, shrink
-from vobench.suite.suite import Case
+from vobench.suite.case import Case
 
 
 @pytest.mark.parametrize("wrong_at", [0, 3, 150, 299])

@@ -4,7 +4,7 @@ import numpy as np
 
 from tests.analysis.conftest import NoisyRun
 from vobench.analysis.conditions import CONDITIONS
-from vobench.analysis.trial_data import read_conditions, read_course, read_outcome, read_paths
+from vobench.analysis.trial_data import read_conditions, read_error_series, read_outcome, read_paths
 from vobench.runner.finished_trial import read_simulated_case
 
 
@@ -27,7 +27,7 @@ def test_a_course_has_one_error_per_frame_and_none_at_the_first(noisy_run: Noisy
     case = read_simulated_case(noisy_run.folder, "short")
     of_frames = read_conditions(noisy_run.folder, case)
     score = noisy_run.score("wheel_odometry")
-    course = read_course(noisy_run.folder, score, of_frames)
+    course = read_error_series(noisy_run.folder, score, of_frames)
     assert len(course.loss) == score.frames
     assert course.loss[0] == 0
     assert course.conditions is of_frames

@@ -92,7 +92,7 @@ def call(words: tuple[object, ...], patch: pytest.MonkeyPatch) -> int:
             main()
     finally:
         atexit.unregister(os._exit)  # a command that was stopped ends its process so
-        stop.forget()
+        stop.withdraw_requests()
         for number, listener in listens.items():
             signal.signal(number, listener)
     return int(ended.value.code or 0)

@@ -9,7 +9,7 @@ from rich.measure import Measurement
 from vobench.cli import board as cli_board
 from vobench.cli import terminal
 from vobench.report.board_table import COST, HEADINGS, MEMORY
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 from vobench.runner.folder import TrialScore
 
 
@@ -23,7 +23,7 @@ def printed(trials, width, monkeypatch):
     file = io.StringIO()
     console = Console(file=file, width=width, markup=False, highlight=False)
     monkeypatch.setattr(terminal, "console", lambda: console)
-    cli_board.print_board(board(trials, {}))
+    cli_board.print_board(make_board(trials, {}))
     return file.getvalue()
 
 
@@ -98,7 +98,7 @@ def drawn(width, monkeypatch):
     file = io.StringIO()
     out = Console(file=file, width=width, markup=False, highlight=False)
     monkeypatch.setattr(terminal, "console", lambda: out)
-    cli_board.print_board(board([repeated(name, k) for name in NAMES for k in range(3)], {}))
+    cli_board.print_board(make_board([repeated(name, k) for name in NAMES for k in range(3)], {}))
     return file.getvalue()
 
 

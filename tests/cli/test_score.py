@@ -12,7 +12,7 @@ import pytest
 from vobench.geometry import se3
 from vobench.runner.consistency import format_covariances
 from vobench.trajectory.formats import format_tum
-from vobench.trajectory.trajectory import Trajectory, parse_move
+from vobench.trajectory.trajectory import Trajectory, parse_pose_convention
 
 TRAJECTORIES = Path(__file__).parents[2] / ".." / "shared" / "data" / "trajectories"
 TUM = ("freiburg1_xyz-groundtruth.txt", "freiburg1_xyz-rgbdslam.txt")
@@ -144,7 +144,7 @@ def test_a_mend_of_the_estimate_is_one_of_the_truth_once_they_have_changed_place
 
 @pytest.mark.parametrize(("fault", "word"), [("inverse_poses", "inverse"), ("inverse_rotations", "rotations:inverse")])
 def test_inverse_poses_and_inverse_rotations_are_mended_by_one_word(vobench, files, fault, word):
-    T = parse_move(word).apply(drive(noise_m=0.02).T_world_frame)
+    T = parse_pose_convention(word).apply(drive(noise_m=0.02).T_world_frame)
     (files / "broken").write_text(format_tum(Trajectory(drive().t_ns, T)))
     said = vobench("diagnose", "true", "broken", "--json").json
     assert [finding["fault"] for finding in said["findings"]] == [fault]

@@ -329,8 +329,8 @@ def test_what_is_left_of_a_folder_that_was_being_filled_is_never_published(tmp_p
     folder = tmp_path / "folder"
     folder.mkdir()
     (folder / "half").write_text("")
-    with stop.undone(lambda: stop.remove(folder)):
-        stop.undo_all()  # by the thread that watches
+    with stop.cleanup_after(lambda: stop.remove(folder)):
+        stop.clean_up_all()  # by the thread that watches
         assert list(tmp_path.iterdir()) == []
         with pytest.raises(FileNotFoundError):
             folder.rename(tmp_path / "final")
@@ -339,9 +339,9 @@ def test_what_is_left_of_a_folder_that_was_being_filled_is_never_published(tmp_p
 def test_the_latest_is_undone_first_but_processes_before_all():
     order = []
     with (
-        stop.undone(lambda: order.append("folder")),
-        stop.undone(lambda: order.append("process"), is_awaited=True),
-        stop.undone(lambda: order.append("file")),
+        stop.cleanup_after(lambda: order.append("folder")),
+        stop.cleanup_after(lambda: order.append("process"), is_awaited=True),
+        stop.cleanup_after(lambda: order.append("file")),
     ):
-        stop.undo_all()
+        stop.clean_up_all()
         assert order == ["process", "file", "process", "folder"]

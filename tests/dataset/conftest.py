@@ -16,7 +16,7 @@ from vobench.dataset.recording import ReadOptions
 from vobench.dataset.sequence import convert
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
-from vobench.geometry.rig import ImuCalibration, Rig, WheelGeometry, mounted, side_by_side
+from vobench.geometry.rig import ImuCalibration, Rig, WheelGeometry, mounted_rig, side_by_side
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sensor.pixel_truth import TruthFrame
@@ -56,7 +56,7 @@ class Made:
 
 def make_rig(lens: Camera = PLAIN, *, T_left_right: Array | None = None, stereo: bool = True, imu: bool = False) -> Rig:
     T_left_right = side_by_side(0.117) if T_left_right is None else T_left_right
-    rig = mounted(lens, lens, T_left_right, pitch_deg=21.0, wheels=WheelGeometry(0.1, 0.3, 4096))
+    rig = mounted_rig(lens, lens, T_left_right, pitch_deg=21.0, wheels=WheelGeometry(0.1, 0.3, 4096))
     rig = rig if stereo else replace(rig, right=None, T_body_right=None)
     return replace(rig, imu=IMU) if imu else rig
 

@@ -19,7 +19,7 @@ from vobench.dataset.source import rectified
 from vobench.errors import InputError, SequenceError, VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import Equirectangular
-from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted, side_by_side, true_rig
+from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted_rig, side_by_side, true_rig
 from vobench.sequence import Sequence, SequenceWriter
 from vobench.trajectory.formats import parse_any, parse_times
 from vobench.trajectory.trajectory import Trajectory
@@ -39,7 +39,7 @@ NAMES = re.compile(
 def real() -> Rig:
     """EuRoC's pair: bent lenses, not parallel."""
     pair = PRESETS["euroc"]
-    return mounted(pair.left, pair.right, pair.T_left_right, pitch_deg=10.0)
+    return mounted_rig(pair.left, pair.right, pair.T_left_right, pitch_deg=10.0)
 
 
 def listing(folder: Path) -> set[str]:

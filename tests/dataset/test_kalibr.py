@@ -15,7 +15,7 @@ from vobench.dataset.read_back import check_rig, pixel_difference
 from vobench.errors import InputError, SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import DoubleSphere, Equirectangular
-from vobench.geometry.rig import PRESETS, ImuCalibration, Rig, mounted
+from vobench.geometry.rig import PRESETS, ImuCalibration, Rig, mounted_rig
 from vobench.sensor.imu import IMUS
 
 # What YAML 1.1 resolves to a float (PyYAML, which Kalibr reads with): a point, and a sign in the exponent.
@@ -26,7 +26,7 @@ SPHERES = DoubleSphere(512, 512, 156.8, 156.9, 254.9, 256.9, -0.18, 0.59)
 
 def preset_rig(name: str) -> Rig:
     pair = PRESETS[name]
-    return mounted(pair.left, pair.right, pair.T_left_right, pitch_deg=20.0)
+    return mounted_rig(pair.left, pair.right, pair.T_left_right, pitch_deg=20.0)
 
 
 def written(folder: Path, text: str) -> Path:

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from vobench.dataset.picture import Picture, as_file, conversions, enumerated, grey, kind_of, unread
+from vobench.dataset.picture import EncodedPicture, as_file, conversions, enumerated, grey, kind_of, unread
 from vobench.errors import VobenchError
 
 RNG = np.random.default_rng(4)
@@ -17,8 +17,8 @@ GREY = RNG.integers(0, 256, (24, 36), np.uint8)
 COLOUR = RNG.integers(0, 256, (24, 36, 3), np.uint8)
 
 
-def encoded(pixels, ending=".png") -> Picture:
-    return Picture(f"a{ending}", cv2.imencode(ending, pixels)[1].tobytes())
+def encoded(pixels, ending=".png") -> EncodedPicture:
+    return EncodedPicture(f"a{ending}", cv2.imencode(ending, pixels)[1].tobytes())
 
 
 def as_grey(picture):
@@ -38,7 +38,7 @@ def test_grey_is_the_weighted_sum_of_colours():
     blue, green, red = np.moveaxis(COLOUR.astype(float), -1, 0)
     expected = 0.299 * red + 0.587 * green + 0.114 * blue
     assert np.abs(as_grey(encoded(COLOUR)) - expected).max() <= 0.51
-    assert np.array_equal(as_grey(Picture("pixels", COLOUR)), as_grey(encoded(COLOUR)))
+    assert np.array_equal(as_grey(EncodedPicture("pixels", COLOUR)), as_grey(encoded(COLOUR)))
 
 
 @pytest.mark.parametrize("factor", [256, 257])
@@ -47,7 +47,7 @@ def test_16_bits_give_back_8_however_they_were_widened(factor):
     assert np.array_equal(as_grey(encoded(wide)), GREY)
     data, form = as_file(encoded(wide), kind_of(encoded(wide)))
     assert form == "png"
-    assert np.array_equal(as_grey(Picture("again", data)), GREY)
+    assert np.array_equal(as_grey(EncodedPicture("again", data)), GREY)
 
 
 def test_an_alpha_channel_makes_no_difference_but_for_a_note():
@@ -60,10 +60,10 @@ def chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 
 
-def by_hand(width, height, bits, colour, rows: bytes, *more: bytes) -> Picture:
+def by_hand(width, height, bits, colour, rows: bytes, *more: bytes) -> EncodedPicture:
     header = struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, 0)
     chunks = chunk(b"IHDR", header) + b"".join(more) + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b"")
-    return Picture("by hand", b"\x89PNG\r\n\x1a\n" + chunks)
+    return EncodedPicture("by hand", b"\x89PNG\r\n\x1a\n" + chunks)
 
 
 def test_kinds_of_png_that_opencv_does_not_write():
@@ -89,7 +89,7 @@ def test_a_header_that_asks_for_the_moon_costs_nothing():
 )
 def test_what_is_no_picture_is_said(data):
     with pytest.raises(VobenchError, match=r": here\.png$"):
-        kind_of(Picture("here.png", data))
+        kind_of(EncodedPicture("here.png", data))
 
 
 @given(st.sampled_from([".png", ".jpg"]), st.booleans(), st.data())
@@ -103,7 +103,7 @@ def test_spoilt_bytes_are_a_picture_or_a_sentence(ending, colour, data):
             spoilt[data.draw(st.integers(0, len(spoilt) - 1))] ^= data.draw(st.integers(1, 255))
         spoilt = spoilt[: data.draw(st.integers(0, len(spoilt)))]
     try:
-        result = as_grey(Picture("spoilt", bytes(spoilt)))
+        result = as_grey(EncodedPicture("spoilt", bytes(spoilt)))
     except VobenchError:
         return
     assert result.dtype == np.uint8
@@ -133,8 +133,8 @@ def test_what_was_not_read_is_named_but_hidden_files_are_not(tmp_path):
     ],
 )
 def test_pixels_have_a_kind_as_files_have(pixels, text, is_grey8):
-    kind = kind_of(Picture("x", pixels))
+    kind = kind_of(EncodedPicture("x", pixels))
     assert str(kind) == text
     assert kind.is_grey8 == is_grey8
-    form = as_file(Picture("x", pixels), kind)[1]
+    form = as_file(EncodedPicture("x", pixels), kind)[1]
     assert form == "png"

@@ -17,13 +17,13 @@ from vobench.dataset.read_back import (
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
-from vobench.geometry.rig import PRESETS, Rig, mounted
+from vobench.geometry.rig import PRESETS, Rig, mounted_rig
 from vobench.trajectory.trajectory import Trajectory
 
 
 def preset_rig(name: str) -> Rig:
     pair = PRESETS[name]
-    return mounted(pair.left, pair.right, pair.T_left_right, pitch_deg=20.0)
+    return mounted_rig(pair.left, pair.right, pair.T_left_right, pitch_deg=20.0)
 
 
 @pytest.mark.parametrize("field", ["fx_px", "cy_px", "k1", "p2"])

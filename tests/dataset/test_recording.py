@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from vobench.dataset.picture import Picture
+from vobench.dataset.picture import EncodedPicture
 from vobench.dataset.recording import NO_TRUTH, UNRECTIFIABLE, PictureStream, RecordedFrame, Recording, assemble
 from vobench.errors import InputError
 from vobench.geometry import se3
@@ -25,7 +25,7 @@ def file(end: str = ".png", pixels: np.ndarray = GREY) -> bytes:
 def stream(*frames: tuple[bytes | np.ndarray, ...]) -> PictureStream:
     def shots() -> Iterator[RecordedFrame]:
         for t_ns, contents in enumerate(frames):
-            yield RecordedFrame(t_ns, tuple(Picture(f"picture {t_ns}", content) for content in contents))
+            yield RecordedFrame(t_ns, tuple(EncodedPicture(f"picture {t_ns}", content) for content in contents))
 
     return PictureStream.open(shots)
 

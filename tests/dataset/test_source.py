@@ -9,7 +9,7 @@ from vobench.dataset.source import Views, open_source, png_frames, rate_hz, rect
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import pixel_grid
-from vobench.geometry.rig import PRESETS, Rig, mounted
+from vobench.geometry.rig import PRESETS, Rig, mounted_rig
 
 Make = Callable[..., Any]
 
@@ -30,7 +30,7 @@ def test_a_rectified_pair_stays_as_it_was_recorded(rig_of: Callable[..., Rig]) -
 
 def test_rectified_rows_are_those_of_one_point() -> None:
     pair = PRESETS["euroc"]
-    rig = mounted(pair.left, pair.right, pair.T_left_right, pitch_deg=10.0)
+    rig = mounted_rig(pair.left, pair.right, pair.T_left_right, pitch_deg=10.0)
     views = rectified(rig)
     assert views.source_px is not None
     points_left = np.array([[0.3, -0.2, 4.0], [-1.0, 0.5, 6.0]])

@@ -11,7 +11,7 @@ from vobench.estimator.stereo import Eye, coarse_disparity, predicted, small_siz
 from vobench.estimator.tracking import corners_per_cell
 from vobench.geometry import se3
 from vobench.geometry.camera import DoubleSphere
-from vobench.geometry.rig import PRESETS, mounted, paper_lens, stereo_rig
+from vobench.geometry.rig import PRESETS, mounted_rig, paper_lens, stereo_rig
 
 LENS = paper_lens(square_pixels=True)
 STRAIGHT = stereo_rig(LENS, pitch_deg=10)
@@ -19,7 +19,7 @@ STRAIGHT = stereo_rig(LENS, pitch_deg=10)
 
 def wild(name):
     preset = PRESETS[name]
-    return mounted(preset.left, preset.right, preset.T_left_right, pitch_deg=15)
+    return mounted_rig(preset.left, preset.right, preset.T_left_right, pitch_deg=15)
 
 
 def bulging():

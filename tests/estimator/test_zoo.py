@@ -25,9 +25,10 @@ from vobench.runner.estimate import LOG, estimate, read_outcome
 from vobench.runner.frames import ANSWERS, TIMES, read_table
 from vobench.runner.store import SilentProgress
 from vobench.sequence import SequenceWriter
+from vobench.suite.entrant import EstimatorEntry
 from vobench.suite.manifest import read_manifest
+from vobench.suite.plan import Trial
 from vobench.suite.source import RecordedCase, Source
-from vobench.suite.suite import Entrant, Trial
 
 # ruff: noqa: E501 - one animal is one line
 
@@ -255,7 +256,7 @@ def trial_of(animal, place):
     limits = Limits(**{name: getattr(animal, name) for name in names})
     manifest = read_manifest(folder)
     case = RecordedCase(name="case", variant={}, source=Source(path="."))
-    return Trial(case, Entrant("bad", folder, manifest, {}, limits), 0)
+    return Trial(case, EstimatorEntry("bad", folder, manifest, {}, limits), 0)
 
 
 def left_over(mark):

@@ -15,7 +15,7 @@ from vobench.geometry.rig import (
     PRESETS,
     CalibrationError,
     looking,
-    mounted,
+    mounted_rig,
     paper_lens,
     stereo_rig,
     true_rig,
@@ -145,7 +145,7 @@ def test_pictures_of_nothing_are_no_crash_and_no_nan(bed, estimator, size):
 @pytest.mark.parametrize("name", ["euroc", "fisheye"])
 def test_points_are_followed_through_lenses_that_bend_lines(bed, name):
     preset, legs = PRESETS[name], ((3, 0.5, 0.0), (3, 0.4, 1.0))
-    rig = mounted(preset.left, preset.right, preset.T_left_right, pitch_deg=15)
+    rig = mounted_rig(preset.left, preset.right, preset.T_left_right, pitch_deg=15)
     T_world_body = bed.drive(*legs)
     results = bed.estimated("stereo_pnp", rig, bed.film(rig, T_world_body))
     accuracy = bed.accuracy(results, T_world_body @ rig.T_body_left)

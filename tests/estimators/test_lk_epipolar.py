@@ -9,7 +9,7 @@ from vobench.errors import VobenchError
 from vobench.estimator import Result, Status
 from vobench.geometry import se3
 from vobench.geometry.camera import DoubleSphere, Equirectangular, Pinhole
-from vobench.geometry.rig import PRESETS, CalibrationError, mounted, paper_lens, stereo_rig, true_rig
+from vobench.geometry.rig import PRESETS, CalibrationError, mounted_rig, paper_lens, stereo_rig, true_rig
 
 SQUARE, LITERAL = paper_lens(square_pixels=True), paper_lens(square_pixels=False)
 DOWN, AHEAD = stereo_rig(SQUARE, pitch_deg=90), stereo_rig(SQUARE, pitch_deg=10)
@@ -198,7 +198,7 @@ LENS_LEGS = ((3, 0.5, 0.0), (3, 0.4, 1.0))
 
 def mounted_preset(name, **error):
     preset = PRESETS[name]
-    rig = mounted(preset.left, preset.right, preset.T_left_right, pitch_deg=15)
+    rig = mounted_rig(preset.left, preset.right, preset.T_left_right, pitch_deg=15)
     return rig, true_rig(rig, CalibrationError(**error))
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.geometry.rig import LENSES, PRESETS, Rig, mounted, rectification, stereo_rig
+from vobench.geometry.rig import LENSES, PRESETS, Rig, mounted_rig, rectification, stereo_rig
 
-RIGS = {name: mounted(p.left, p.right, p.T_left_right, pitch_deg=20) for name, p in PRESETS.items()}
+RIGS = {name: mounted_rig(p.left, p.right, p.T_left_right, pitch_deg=20) for name, p in PRESETS.items()}
 PLAIN = stereo_rig(LENSES["paper_literal"], pitch_deg=20)
 POINTS = np.random.default_rng(1).uniform([-0.5, -0.4, 0.5], [0.5, 0.4, 4.0], (200, 3))
 

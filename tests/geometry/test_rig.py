@@ -17,16 +17,16 @@ from vobench.geometry.rig import (
     RESIDUALS,
     SPREAD,
     CalibrationError,
-    EyeError,
+    CameraError,
+    CustomStereoPair,
     Lens,
-    OwnPair,
     Rig,
     StereoPreset,
-    drawn,
+    custom_stereo_pair,
+    drawn_calibration_error,
     lens_of,
     looking,
-    mounted,
-    own_pair,
+    mounted_rig,
     paper_lens,
     projection,
     rectification,
@@ -35,7 +35,7 @@ from vobench.geometry.rig import (
     true_rig,
 )
 
-RIGS = {name: mounted(p.left, p.right, p.T_left_right, pitch_deg=12.3) for name, p in PRESETS.items()}
+RIGS = {name: mounted_rig(p.left, p.right, p.T_left_right, pitch_deg=12.3) for name, p in PRESETS.items()}
 EUROC = RIGS["euroc"]
 
 every_rig = pytest.mark.parametrize("rig", RIGS.values(), ids=list(RIGS))
@@ -118,12 +118,12 @@ def test_all_turns_together_stay_a_rotation() -> None:
 
 def test_an_eyes_own_error_is_added_to_that_of_both_and_is_of_no_other_eye() -> None:
     both = true_rig(EUROC, CalibrationError(focal_ratio=0.01, right_yaw_deg=0.2))
-    own = EyeError(focal_ratio=0.01, center_px=(1.0, 2.0), yaw_deg=-0.2)
+    own = CameraError(focal_ratio=0.01, center_px=(1.0, 2.0), yaw_deg=-0.2)
     right = true_rig(EUROC, CalibrationError(focal_ratio=0.01, right_yaw_deg=0.2, right=own))
     assert right.left == both.left
     assert right.right.fx_px == pytest.approx(EUROC.right.fx_px * 1.02)
     np.testing.assert_allclose(turned_deg(right, EUROC), 0, atol=1e-12)
-    left = true_rig(EUROC, CalibrationError(left=EyeError(roll_deg=0.3)))
+    left = true_rig(EUROC, CalibrationError(left=CameraError(roll_deg=0.3)))
     turn = Rotation.from_matrix(EUROC.T_body_left[:3, :3].T @ left.T_body_left[:3, :3])
     np.testing.assert_allclose(turn.as_rotvec(degrees=True), [0, 0, 0.3], atol=1e-12)
     np.testing.assert_array_equal(left.T_body_right, EUROC.T_body_right)
@@ -131,7 +131,7 @@ def test_an_eyes_own_error_is_added_to_that_of_both_and_is_of_no_other_eye() -> 
 
 @every_rig
 def test_a_pair_that_is_written_into_a_suite_comes_back(rig: Rig) -> None:
-    preset = own_pair(rig).preset()
+    preset = custom_stereo_pair(rig).preset()
     assert (preset.left, preset.right) == (rig.left, rig.camera("right"))
     np.testing.assert_allclose(preset.T_left_right, rig.T_left_right, atol=1e-12)
 
@@ -139,7 +139,7 @@ def test_a_pair_that_is_written_into_a_suite_comes_back(rig: Rig) -> None:
 def test_what_is_given_besides_a_level_is_added_to_what_the_level_stands_for() -> None:
     given = CalibrationError(center_px=(20.0, -7.0), focal_ratio=0.1, baseline_ratio=0.2, distortion_ratio=0.3)
     alone, both = (
-        drawn(error, EUROC, np.random.default_rng(3))
+        drawn_calibration_error(error, EUROC, np.random.default_rng(3))
         for error in (CalibrationError(level="worn"), replace(given, level="worn"))
     )
     np.testing.assert_allclose(np.subtract(both.center_px, alone.center_px), given.center_px)
@@ -152,8 +152,8 @@ def test_what_is_given_besides_a_level_is_added_to_what_the_level_stands_for() -
 def test_a_drawn_calibration_is_off_by_its_levels_pixels_whatever_the_focal_length(rig: Rig, level: str) -> None:
     usual, found = RESIDUALS[level], []
     for seed in range(20):
-        error = drawn(CalibrationError(level=level), rig, np.random.default_rng(seed))
-        assert drawn(error, rig, np.random.default_rng(seed)) is error
+        error = drawn_calibration_error(CalibrationError(level=level), rig, np.random.default_rng(seed))
+        assert drawn_calibration_error(error, rig, np.random.default_rng(seed)) is error
         true_rig(rig, error)
         turns = np.tan(np.deg2rad([error.right_yaw_deg, error.right_pitch_deg, error.right_roll_deg]))
         arms_px = np.array([rig.left.K[0, 0], rig.left.K[0, 0], rig.left.width_px / 2])
@@ -267,7 +267,7 @@ def test_another_baseline_moves_the_right_camera_and_turns_it_not(preset: Stereo
 def test_the_papers_presets_on_the_robot_are_its_rig_to_the_last_bit(name: str) -> None:
     preset = PRESETS[name]
     old = stereo_rig(LENSES[name], pitch_deg=33.3, baseline_m=0.12)
-    new = mounted(preset.left, preset.right, preset.at_baseline(0.12), pitch_deg=33.3)
+    new = mounted_rig(preset.left, preset.right, preset.at_baseline(0.12), pitch_deg=33.3)
     assert (new.left, new.right) == (old.left, old.right)
     assert new.T_body_right.tobytes() == old.T_body_right.tobytes()
 
@@ -357,7 +357,7 @@ def test_the_errors_drawn_from_a_seed_stay_the_same() -> None:
     signs = rng.choice([-1.0, 1.0], 8)
     yaw, roll, pitch, focal, baseline, x, y, distortion = signs * rng.uniform(1 - SPREAD, 1 + SPREAD, 8)
     usual = RESIDUALS["worn"]
-    error = drawn(given, EUROC, np.random.default_rng(3))
+    error = drawn_calibration_error(given, EUROC, np.random.default_rng(3))
     f_px = EUROC.left.fx_px
 
     assert error.right_yaw_deg == pytest.approx(np.degrees(yaw * np.arctan(usual.yaw_px / f_px)))
@@ -372,12 +372,12 @@ def test_the_errors_drawn_from_a_seed_stay_the_same() -> None:
 
 
 def test_a_settings_class_of_errors_is_no_error_by_default() -> None:
-    numbers = [getattr(EyeError(), name) for name in EyeError.__dataclass_fields__]
+    numbers = [getattr(CameraError(), name) for name in CameraError.__dataclass_fields__]
     assert numbers == [0.0, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0]
     error = CalibrationError()
-    assert (error.level, error.left, error.right) == ("none", EyeError(), EyeError())
-    assert error.of_eye("left") == error.of_eye("right") == EyeError()
-    assert drawn(error, EUROC, np.random.default_rng(0)) is error
+    assert (error.level, error.left, error.right) == ("none", CameraError(), CameraError())
+    assert error.of_eye("left") == error.of_eye("right") == CameraError()
+    assert drawn_calibration_error(error, EUROC, np.random.default_rng(0)) is error
 
 
 @pytest.mark.parametrize("preset", PRESETS.values(), ids=list(PRESETS))
@@ -392,7 +392,7 @@ def test_a_presets_lens_has_nearly_square_pixels_and_its_centre_near_that_of_the
 
 def test_an_own_pair_without_turns_is_parallel_and_its_right_lens_is_by_default_the_left_one() -> None:
     lens = lens_of(EUROC.left)
-    pair = OwnPair(left=lens, right_at_m=(0.3, 0.0, 0.0)).preset()
+    pair = CustomStereoPair(left=lens, right_at_m=(0.3, 0.0, 0.0)).preset()
 
     assert pair.right == pair.left == EUROC.left
     np.testing.assert_array_equal(pair.T_left_right, se3.transform(np.eye(3), [0.3, 0, 0]))

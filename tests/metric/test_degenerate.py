@@ -11,12 +11,12 @@ from vobench.errors import AlignmentError, SettingError, TrajectoryError
 from vobench.geometry import se3
 from vobench.metric.score import ScoreSettings, score
 from vobench.metric.settings import LIKE
-from vobench.trajectory.align import Kind
+from vobench.trajectory.align import AlignmentKind
 from vobench.trajectory.trajectory import Trajectory
 
 N = 60
 T_NS = np.arange(N, dtype=np.int64) * 10**8
-KINDS = list(Kind.__args__)
+KINDS = list(AlignmentKind.__args__)
 SETTINGS = [ScoreSettings(alignment=kind, full=True) for kind in KINDS] + list(LIKE.values())
 NAMES = [*KINDS, *LIKE]
 DIRECTIONS = [(1, 0, 0), (0, 0, 1), (0.6, 0.8, 0), (0.36, 0.48, 0.8), (-1, 2, -3)]

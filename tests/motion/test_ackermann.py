@@ -41,7 +41,7 @@ def test_it_turns_as_its_steering_says_and_steers_within_its_limits(target):
     k = motion.at(motion.nodes_s * 1e9)
     steer_rad = motion.state[:, 3]
     np.testing.assert_allclose(
-        k.turn_radps[:, 2] * SMALL.wheelbase_m, k.velocity_mps[:, 0] * np.tan(steer_rad), atol=1e-12
+        k.angular_velocity_radps[:, 2] * SMALL.wheelbase_m, k.velocity_mps[:, 0] * np.tan(steer_rad), atol=1e-12
     )
     assert np.abs(steer_rad).max() <= SMALL.max_steer_rad
     assert np.abs(np.diff(steer_rad) / np.diff(motion.nodes_s)).max() <= SMALL.max_steer_radps * (1 + 1e-9)

@@ -13,7 +13,7 @@ from vobench.motion.controller import CONTROLLERS, ControllerSettings, Vehicle, 
 from vobench.motion.course import Circle, PureRotation, Reverse, rolled
 from vobench.motion.drive import Drive, drive, follow, led_by
 from vobench.motion.pioneer import THETAS, AccelerationLimits, Theta, feed_forward, velocities
-from vobench.motion.slip import DELTAS, SLIPS, SlipNow
+from vobench.motion.slip import DELTAS, SLIPS, Disturbance
 from vobench.trajectory.kinematics import CurveMotion, level
 
 SQUARE = ((1, 1), (0, 1), (1, 0), (2, 2))
@@ -183,8 +183,8 @@ def told(
     """The robot told what would take it along a way, and how far (N,) from there it is."""
     t_ns = np.arange(int(way.end_ns * rate_hz / 1e9) + 1) * 1e9 / rate_hz
     ideal, amid = way.at(t_ns).T_world_body, way.at(t_ns + 0.5e9 / rate_hz)
-    speeds = amid.velocity_mps[:, 0], amid.turn_radps[:, 2]
-    rates = amid.acceleration_mps2[:, 0], amid.turn_rate_radps2[:, 2]
+    speeds = amid.velocity_mps[:, 0], amid.angular_velocity_radps[:, 2]
+    rates = amid.acceleration_mps2[:, 0], amid.angular_acceleration_radps2[:, 2]
     asked = np.stack(feed_forward(*speeds, *rates, theta=THETAS[theta]), -1)
     h_m = ideal[0, :2, 3] + 0.2 * ideal[0, :2, 0]
     start = (*h_m.tolist(), float(np.arctan2(*ideal[0, 1::-1, 0])))
@@ -329,7 +329,7 @@ def vehicle(theta: Theta | None = THETAS["pioneer_3dx"], **options: object) -> V
 
 
 def test_the_wheels_are_foreseen_where_they_are_a_period_on_if_nothing_is_asked_to_change() -> None:
-    robot, slip = vehicle(None), SlipNow(beta=0.1, skid_s=0.02)
+    robot, slip = vehicle(None), Disturbance(beta=0.1, skid_s=0.02)
     for state in STATES:
         x, y, psi = robot.advance(state, (state[3], state[4]), slip)[-1, :3]
         T_world_body = level(x - 0.2 * np.cos(psi), y - 0.2 * np.sin(psi), psi)
@@ -340,14 +340,14 @@ def test_the_wheels_are_foreseen_where_they_are_a_period_on_if_nothing_is_asked_
 
 def test_turning_on_the_spot_the_wheels_are_foreseen_on_their_circle() -> None:
     state = np.array([0.2, 0.0, 0.0, 0.0, 3.0, 0.0, 0.0])
-    left, right, _ = vehicle().contacts_ahead(state, SlipNow())
+    left, right, _ = vehicle().contacts_ahead(state, Disturbance())
     half = PIONEER_WHEELS.track_m / 2
     np.testing.assert_allclose(np.subtract(left, right), 2 * half * np.array([-np.sin(0.1), np.cos(0.1)]), atol=1e-12)
 
 
 def test_speeds_of_the_ideal_unicycle_run_evenly_to_what_is_asked_in_one_period() -> None:
     for state in STATES:
-        speeds = vehicle(None).advance(state, (0.5, -1.0), SlipNow())[:, 3:5]
+        speeds = vehicle(None).advance(state, (0.5, -1.0), Disturbance())[:, 3:5]
         share = np.array([0.25, 0.5, 0.75, 1.0])[:, None]
         np.testing.assert_allclose(speeds, (1 - share) * state[3:5] + share * [0.5, -1.0], atol=1e-12)
 
@@ -360,7 +360,7 @@ def test_a_push_acts_beyond_the_limits_of_the_drive_train() -> None:
 
 
 def test_slip_that_stays_is_the_same_however_it_is_said() -> None:
-    robot, slip = vehicle(), SlipNow(0.02, -0.03, 0.05, 0.01, 0.02, 0.1, -0.1)
+    robot, slip = vehicle(), Disturbance(0.02, -0.03, 0.05, 0.01, 0.02, 0.1, -0.1)
     almost = slip._replace(left=0.02 + 1e-15)
     for state in STATES:
         held, running = robot.advance(state, (0.5, 0.3), slip, slip), robot.advance(state, (0.5, 0.3), slip, almost)

@@ -13,9 +13,9 @@ from vobench.geometry.rig import PIONEER_WHEELS
 from vobench.geometry.se3 import Array
 from vobench.motion.course import (
     Circle,
+    CoursePiece,
     Figure8,
     Lissajous,
-    Piece,
     PureRotation,
     Reverse,
     Square,
@@ -36,7 +36,7 @@ def place(pieces, s):
 @given(st.floats(0.1, 10), st.floats(0.1, 50))
 def test_an_arc_lies_on_its_circle(radius_m, length_m):
     s = np.linspace(0, length_m, 50)
-    x, y = place([Piece(length_m, 1 / radius_m)], s).T
+    x, y = place([CoursePiece(length_m, 1 / radius_m)], s).T
     np.testing.assert_allclose(x, radius_m * np.sin(s / radius_m), atol=1e-12 * (radius_m + length_m))
     np.testing.assert_allclose(y, radius_m * (1 - np.cos(s / radius_m)), atol=1e-12 * (radius_m + length_m))
 
@@ -45,15 +45,17 @@ def test_an_arc_lies_on_its_circle(radius_m, length_m):
 def test_a_clothoid_is_fresnels(bent, length_m):
     s, scale = np.linspace(0, length_m, 50), np.sqrt(np.pi / bent)
     sine, cosine = fresnel(s / scale)
-    np.testing.assert_allclose(place([Piece(length_m, bent=bent)], s), scale * np.stack([cosine, sine], -1), atol=1e-11)
+    np.testing.assert_allclose(
+        place([CoursePiece(length_m, bent=bent)], s), scale * np.stack([cosine, sine], -1), atol=1e-11
+    )
 
 
 def test_a_line_back_ends_behind():
-    np.testing.assert_allclose(place([Piece(3.0, advance=-1.0)], 3.0), [[-3, 0]], atol=1e-15)
+    np.testing.assert_allclose(place([CoursePiece(3.0, advance=-1.0)], 3.0), [[-3, 0]], atol=1e-15)
 
 
 def test_a_turn_on_the_spot_changes_the_heading_alone():
-    k = course([Piece(1.0), Piece(np.pi / 2, 1.0, advance=0.0), Piece(2.0)]).at(
+    k = course([CoursePiece(1.0), CoursePiece(np.pi / 2, 1.0, advance=0.0), CoursePiece(2.0)]).at(
         np.array([1.0 + np.pi / 2, 3 + np.pi / 2])
     )
     np.testing.assert_allclose(k.T_world_body[:, :2, 3], [[1, 0], [1, 2]], atol=1e-15)
@@ -61,18 +63,22 @@ def test_a_turn_on_the_spot_changes_the_heading_alone():
 
 
 def test_ahead_and_back_along_a_clothoid_is_nowhere():
-    there, back = Piece(4.0, 0.3, 0.2), Piece(4.0, -1.1, 0.2, advance=-1.0)
+    there, back = CoursePiece(4.0, 0.3, 0.2), CoursePiece(4.0, -1.1, 0.2, advance=-1.0)
     k = course([there, back]).at(np.array([8.0]))
     np.testing.assert_allclose(k.T_world_body[0], np.eye(4), atol=1e-13)
 
 
 def test_breaks_are_where_pieces_meet_however_far_they_turn():
-    np.testing.assert_allclose(course([Piece(30.0, 2.0), Piece(1.0), Piece(5.0, -3.0)]).breaks, [30, 31])
+    np.testing.assert_allclose(
+        course([CoursePiece(30.0, 2.0), CoursePiece(1.0), CoursePiece(5.0, -3.0)]).breaks, [30, 31]
+    )
 
 
 @pytest.mark.parametrize("laps", [1, 100, 1000])
 def test_many_laps_close(laps):
-    np.testing.assert_allclose(place([Piece(2 * np.pi * laps, 1.0)], 2 * np.pi * laps), [[0, 0]], atol=1e-12 * laps)
+    np.testing.assert_allclose(
+        place([CoursePiece(2 * np.pi * laps, 1.0)], 2 * np.pi * laps), [[0, 0]], atol=1e-12 * laps
+    )
 
 
 SHAPES = [
@@ -113,8 +119,8 @@ def test_a_circle_is_one_of_them():
     curve = lissajous_curve((6.0, 6.0), (1, 1), phase_rad=np.pi / 2)
     k = curve.at(np.linspace(0, curve.arc.length, 100))
     assert curve.arc.length == pytest.approx(6 * np.pi, rel=1e-13)
-    np.testing.assert_allclose(k.turn_radps[:, 2], 1 / 3, rtol=1e-12)
-    np.testing.assert_allclose(k.turn_rate_radps2, 0, atol=1e-12)
+    np.testing.assert_allclose(k.angular_velocity_radps[:, 2], 1 / 3, rtol=1e-12)
+    np.testing.assert_allclose(k.angular_acceleration_radps2, 0, atol=1e-12)
 
 
 def test_it_begins_at_the_origin_along_x_and_every_lap_again():
@@ -150,7 +156,7 @@ def test_a_circle_is_laps_times_its_circumference_on_its_circle(radius_m, laps, 
     assert motion.law.length == pytest.approx(2 * np.pi * radius_m * laps)
     k, p = states(motion, 101)
     np.testing.assert_allclose(np.hypot(p[:, 0], p[:, 1] - radius_m), radius_m, rtol=1e-10)
-    np.testing.assert_allclose(k.turn_radps[:, 2] * radius_m, k.velocity_mps[:, 0], atol=1e-12)
+    np.testing.assert_allclose(k.angular_velocity_radps[:, 2] * radius_m, k.velocity_mps[:, 0], atol=1e-12)
     assert k.velocity_mps[:, 0].max() <= speed_mps * (1 + 1e-12)
 
 
@@ -167,7 +173,7 @@ def test_a_circle_is_laps_times_its_circumference_on_its_circle(radius_m, laps, 
 def test_clockwise_is_the_mirror_image(kind):
     (left, p_left), (right, p_right) = states(kind(False), 200), states(kind(True), 200)
     np.testing.assert_allclose(p_right, p_left * [1, -1], atol=1e-12)
-    np.testing.assert_allclose(right.turn_radps, -left.turn_radps, atol=1e-12)
+    np.testing.assert_allclose(right.angular_velocity_radps, -left.angular_velocity_radps, atol=1e-12)
     np.testing.assert_allclose(right.velocity_mps, left.velocity_mps, atol=1e-12)
     assert p_left[:, 1].max() >= 0
 
@@ -175,12 +181,14 @@ def test_clockwise_is_the_mirror_image(kind):
 def test_a_square_with_stops_has_its_four_corners_and_no_others():
     motion = Square(side_m=2.0, speed_mps=1, laps=2, turn_radps=1.5).way()
     k, p = states(motion)
-    turning = np.abs(k.turn_radps[:, 2]) > 1e-6
+    turning = np.abs(k.angular_velocity_radps[:, 2]) > 1e-6
     assert not np.abs(k.velocity_mps[turning]).max() > 1e-9
     corners = np.unique(np.round(p[turning], 9) + 0.0, axis=0)
     np.testing.assert_allclose(corners, [[0, 0], [0, 2], [2, 0], [2, 2]], atol=1e-9)
     assert np.diff(motion.breaks_ns).min() > 1e7  # where it stops, the way's break and the law's are one
-    assert k.turn_radps[:, 2].max() == pytest.approx(1.2944, rel=1e-3)  # sqrt(8/15 pi/2 2): too short for 1.5
+    assert k.angular_velocity_radps[:, 2].max() == pytest.approx(
+        1.2944, rel=1e-3
+    )  # sqrt(8/15 pi/2 2): too short for 1.5
 
 
 @pytest.mark.parametrize("radius_m", [0.05, 0.3])
@@ -189,7 +197,7 @@ def test_a_rounded_square_stays_within_its_sides_and_never_turns_tighter(radius_
     k, p = states(motion)
     assert np.ptp(p, axis=0) == pytest.approx([3, 3], abs=1e-6)
     moving = k.velocity_mps[:, 0] > 1e-3
-    bend = k.turn_radps[moving, 2] / k.velocity_mps[moving, 0]
+    bend = k.angular_velocity_radps[moving, 2] / k.velocity_mps[moving, 0]
     assert bend.max() == pytest.approx(1 / radius_m, rel=0.02)
     assert bend.min() > -1e-12
     np.testing.assert_allclose(motion.law.length, np.linalg.norm(np.diff(p, axis=0), axis=1).sum(), rtol=1e-5)
@@ -198,7 +206,7 @@ def test_a_rounded_square_stays_within_its_sides_and_never_turns_tighter(radius_
 def test_a_figure_8_turns_as_much_to_either_side_and_has_its_size():
     motion = Figure8(length_m=4, speed_mps=1, laps=3).way()
     k, p = states(motion)
-    assert k.turn_radps[:, 2].max() == pytest.approx(-k.turn_radps[:, 2].min(), rel=1e-4)
+    assert k.angular_velocity_radps[:, 2].max() == pytest.approx(-k.angular_velocity_radps[:, 2].min(), rel=1e-4)
     assert np.hypot(*p.T).max() == pytest.approx(2.0, abs=0.02)
     assert motion.law.length == pytest.approx(3 * Figure8(length_m=4, speed_mps=1).way().law.length)
 
@@ -214,8 +222,8 @@ def test_stop_and_go_rests_for_its_pause_between_its_legs():
 def test_a_pure_rotation_turns_by_its_angle_and_goes_nowhere():
     motion = PureRotation(angle_deg=np.rad2deg(9.0), turn_radps=0.7).way()
     k, p = states(motion)
-    assert np.trapezoid(k.turn_radps[:, 2], dx=motion.end_ns / 1e9 / 4000) == pytest.approx(9.0, rel=1e-6)
-    assert k.turn_radps[:, 2].max() == pytest.approx(0.7)
+    assert np.trapezoid(k.angular_velocity_radps[:, 2], dx=motion.end_ns / 1e9 / 4000) == pytest.approx(9.0, rel=1e-6)
+    assert k.angular_velocity_radps[:, 2].max() == pytest.approx(0.7)
     assert not p.any()
 
 

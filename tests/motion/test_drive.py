@@ -262,10 +262,10 @@ def test_the_turn_is_the_derivative_of_heading_and_its_rate_that_of_the_turn(kin
     middle, half = (knots[1:] + knots[:-1])[:, None] / 2, np.diff(knots)[:, None] / 2
     now = run.motion.at((middle + half * nodes).ravel())
     ends = run.motion.at(np.stack([knots[:-1] + 1e-3, knots[1:] - 1e-3], -1).ravel())
-    turned = now.turn_radps[:, 2].reshape(-1, 4) @ weights * half[:, 0] / 1e9
-    sped_up = now.turn_rate_radps2[:, 2].reshape(-1, 4) @ weights * half[:, 0] / 1e9
+    turned = now.angular_velocity_radps[:, 2].reshape(-1, 4) @ weights * half[:, 0] / 1e9
+    sped_up = now.angular_acceleration_radps2[:, 2].reshape(-1, 4) @ weights * half[:, 0] / 1e9
     np.testing.assert_allclose(turned.reshape(-1, KINDS[kind]["substeps"]).sum(1), np.diff(run.state[:, 2]), atol=1e-11)
-    np.testing.assert_allclose(sped_up, np.diff(ends.turn_radps[:, 2].reshape(-1, 2))[:, 0], atol=1e-9)
+    np.testing.assert_allclose(sped_up, np.diff(ends.angular_velocity_radps[:, 2].reshape(-1, 2))[:, 0], atol=1e-9)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -273,7 +273,7 @@ def test_pose_and_speeds_at_the_frames_are_those_of_the_states(kind: str) -> Non
     run = driven_driven(kind)
     now = run.motion.at(run.t_ns)
     np.testing.assert_allclose(now.T_world_body, axle_poses(*run.state[:, :3].T, a_m=0.2), atol=1e-12)
-    speeds = np.stack([now.velocity_mps[:, 0], now.turn_radps[:, 2]], -1)
+    speeds = np.stack([now.velocity_mps[:, 0], now.angular_velocity_radps[:, 2]], -1)
     np.testing.assert_allclose(speeds, run.state[:, 3:], atol=1e-11)
     assert not now.twist[:, 2:5].any()
 
@@ -297,7 +297,7 @@ def test_between_two_states_acceleration_runs_evenly_and_does_not_ring(kind: str
     knots, share = run.encoder_t_ns.astype(float), np.array([1e-9, 0.25, 0.5, 0.75, 1 - 1e-9])
     now = run.motion.at((knots[:-1, None] + share * np.diff(knots)[:, None]).ravel())
     world = np.einsum("nij,nj->ni", now.T_world_body[:, :3, :3], now.acceleration_mps2)
-    rates = np.column_stack([world[:, :2], now.turn_rate_radps2[:, 2]]).reshape(-1, 5, 3)
+    rates = np.column_stack([world[:, :2], now.angular_acceleration_radps2[:, 2]]).reshape(-1, 5, 3)
     line = rates[:, :1] + share[:, None] * (rates[:, -1:] - rates[:, :1])
     assert (np.abs(rates - line).max((0, 1)) < 0.004 * np.abs(rates).max((0, 1))).all()
 
@@ -318,7 +318,7 @@ def test_with_fine_steps_it_is_the_solution_of_18_and_19_at_any_instant() -> Non
         u_rate, omega_rate = accelerations(state[3], state[4], u_ref, omega_ref, theta=theta)
         np.testing.assert_allclose(now.velocity_mps[:, :2], np.stack([state[3], 0 * state[3]], -1), atol=1e-9)
         np.testing.assert_allclose(now.acceleration_mps2[:, :2], np.stack([u_rate, state[3] * state[4]], -1), atol=1e-6)
-        np.testing.assert_allclose(now.turn_rate_radps2[:, 2], omega_rate, atol=1e-6)
+        np.testing.assert_allclose(now.angular_acceleration_radps2[:, 2], omega_rate, atol=1e-6)
 
 
 def test_the_slide_of_a_side_slipping_robot_is_in_its_velocity_and_its_acceleration() -> None:
@@ -337,10 +337,10 @@ def test_before_its_start_the_robot_rests_and_after_its_end_it_goes_on_with_its_
     assert not before.acceleration_mps2.any()
     np.testing.assert_allclose(after.T_world_body, longer.motion.at(longer.t_ns[-1:]).T_world_body, atol=1e-12)
     late = run.motion.at(run.t_ns[-1:] + np.arange(80_000_000, 960_000_000, 40_000_000))
-    speeds = late.velocity_mps[:, 0], late.turn_radps[:, 2]
+    speeds = late.velocity_mps[:, 0], late.angular_velocity_radps[:, 2]
     u_rate, omega_rate = accelerations(*speeds, *run.references[-1].tolist(), theta=THETAS["pioneer_3dx"])
     np.testing.assert_allclose(late.acceleration_mps2[:, 0], u_rate, atol=1e-9)
-    np.testing.assert_allclose(late.turn_rate_radps2[:, 2], omega_rate, atol=1e-9)
+    np.testing.assert_allclose(late.angular_acceleration_radps2[:, 2], omega_rate, atol=1e-9)
     assert (run.motion.start_ns, run.motion.end_ns) == (0, run.t_ns[-1])
 
 

@@ -93,7 +93,13 @@ def test_something_mounted_is_a_body_carried_without_moving():
     still = np.zeros((20, 3))
     load = type(carrier)(np.broadcast_to(T_body_sensor, (20, 4, 4)), still, still, still, still)
     found, expected = composed(carrier, load), carrier.of_mounted(T_body_sensor)
-    for field in ("T_world_body", "velocity_mps", "turn_radps", "acceleration_mps2", "turn_rate_radps2"):
+    for field in (
+        "T_world_body",
+        "velocity_mps",
+        "angular_velocity_radps",
+        "acceleration_mps2",
+        "angular_acceleration_radps2",
+    ):
         np.testing.assert_allclose(getattr(found, field), getattr(expected, field), atol=1e-13)
 
 

@@ -45,8 +45,8 @@ def test_the_motion_of_a_robot_of_its_own_tells_that_robots_theta() -> None:
     assert run.theta != THETAS["pioneer_3dx"]
     middle_ns = (np.arange(len(run.t_ns) - 1) + 0.5) * 1e9 / 30
     seen = run.motion.at(middle_ns)
-    speeds = np.stack([seen.velocity_mps[:, 0], seen.turn_radps[:, 2]], -1)
-    rates = np.stack([seen.acceleration_mps2[:, 0], seen.turn_rate_radps2[:, 2]], -1)
+    speeds = np.stack([seen.velocity_mps[:, 0], seen.angular_velocity_radps[:, 2]], -1)
+    rates = np.stack([seen.acceleration_mps2[:, 0], seen.angular_acceleration_radps2[:, 2]], -1)
     fit = identify(speeds, rates, run.references[:-1])
     np.testing.assert_allclose(astuple(fit.theta), astuple(run.theta), rtol=1e-9)
 

@@ -154,7 +154,9 @@ def test_turn_is_the_derivative_of_rotation_in_body_axes(kind):
     k = motion.at(t_s * 1e9)
     R_rate = derivative(lambda t: motion.at(t * 1e9).T_world_body[:, :3, :3], t_s)
     skew = np.swapaxes(k.T_world_body[:, :3, :3], -1, -2) @ R_rate
-    np.testing.assert_allclose(k.turn_radps, np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], -1), atol=2e-7)
+    np.testing.assert_allclose(
+        k.angular_velocity_radps, np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], -1), atol=2e-7
+    )
 
 
 @every_kind
@@ -162,7 +164,7 @@ def test_turn_rate_is_the_derivative_of_turn(kind):
     motion = motion_of(kind)
     t_s = instants(motion)
     expected = derivative(lambda t: motion.at(t * 1e9).turn_radps, t_s)
-    np.testing.assert_allclose(motion.at(t_s * 1e9).turn_rate_radps2, expected, atol=5e-6)
+    np.testing.assert_allclose(motion.at(t_s * 1e9).angular_acceleration_radps2, expected, atol=5e-6)
 
 
 @every_kind
@@ -202,7 +204,9 @@ def test_rotations_are_rotations_and_all_is_finite(kind):
     motion = motion_of(kind)
     k = motion.at(np.linspace(motion.start_ns, motion.end_ns, 500))
     assert se3.is_rotation(k.T_world_body[:, :3, :3], tolerance=1e-12)
-    assert np.isfinite([k.velocity_mps, k.acceleration_mps2, k.turn_radps, k.turn_rate_radps2]).all()
+    assert np.isfinite(
+        [k.velocity_mps, k.acceleration_mps2, k.angular_velocity_radps, k.angular_acceleration_radps2]
+    ).all()
 
 
 @every_kind
@@ -233,8 +237,10 @@ def test_wheels_roll_along_x_and_turn_about_z_alone(kind):
     motion = motion_of(kind)
     k = motion.at(np.linspace(motion.start_ns, motion.end_ns, 500))
     assert not k.velocity_mps[:, 1:].any()
-    assert not k.turn_radps[:, :2].any()
-    np.testing.assert_allclose(k.acceleration_mps2[:, 1], k.velocity_mps[:, 0] * k.turn_radps[:, 2], atol=1e-12)
+    assert not k.angular_velocity_radps[:, :2].any()
+    np.testing.assert_allclose(
+        k.acceleration_mps2[:, 1], k.velocity_mps[:, 0] * k.angular_velocity_radps[:, 2], atol=1e-12
+    )
     assert not k.T_world_body[:, 2, 3].any()
 
 

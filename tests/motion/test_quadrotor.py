@@ -55,7 +55,7 @@ def test_it_looks_along_the_way_at_its_points():
 
 def test_its_nose_turns_the_shorter_way_also_across_the_rear():
     around = [[0, 0, 1], [-2, 0.5, 1], [-4, 0, 1], [-6, -0.8, 1]]
-    turned_rad = sampled(Quadrotor(points_m=around, speed_mps=1).motion()).turn_radps[:, 2]
+    turned_rad = sampled(Quadrotor(points_m=around, speed_mps=1).motion()).angular_velocity_radps[:, 2]
     assert (
         np.abs(np.cumsum(turned_rad)).max() * Quadrotor(points_m=around, speed_mps=1).motion().end_ns / 1e9 / 2000
         < np.pi / 3

@@ -42,7 +42,7 @@ def test_backwards_is_the_same_rail():
 def test_two_points_are_a_straight_line():
     motion = Rail(points_m=[[0, 0, 0], [3, 4, 0]], speed_mps=1).motion()
     assert motion.law.length == pytest.approx(5)
-    np.testing.assert_allclose(motion.at(np.linspace(0, motion.end_ns, 50)).turn_radps, 0, atol=1e-12)
+    np.testing.assert_allclose(motion.at(np.linspace(0, motion.end_ns, 50)).angular_velocity_radps, 0, atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_smoothed_gives_back_a_smooth_motion():
     truth, found = motion.at(between(motion)), replay.at(between(motion))
     np.testing.assert_allclose(found.T_world_body, truth.T_world_body, atol=1e-4)
     np.testing.assert_allclose(found.acceleration_mps2, truth.acceleration_mps2, atol=5e-3)
-    np.testing.assert_allclose(found.turn_radps, truth.turn_radps, atol=5e-3)
+    np.testing.assert_allclose(found.angular_velocity_radps, truth.angular_velocity_radps, atol=5e-3)
 
 
 def test_of_a_noisy_recording_smoothing_leaves_a_tenth_of_the_false_acceleration():
@@ -79,7 +79,9 @@ def test_of_a_noisy_recording_smoothing_leaves_a_tenth_of_the_false_acceleration
     false = [rms(k.acceleration_mps2 - truth.acceleration_mps2) for k in (exact, smooth)]
     assert false[0] > 1  # which is why interpolation is for cameras only
     assert false[1] < 0.1 * false[0]
-    assert rms(smooth.turn_radps - truth.turn_radps) < 0.2 * rms(exact.turn_radps - truth.turn_radps)
+    assert rms(smooth.angular_velocity_radps - truth.angular_velocity_radps) < 0.2 * rms(
+        exact.angular_velocity_radps - truth.angular_velocity_radps
+    )
 
 
 def test_what_smoothing_leaves_of_a_recording_is_its_noise():
@@ -121,7 +123,7 @@ def test_the_order_of_quaternion_signs_does_not_matter():
     t_s = np.arange(0, 11, 0.02)
     spinning = Trajectory(np.rint(t_s * 1e9).astype(np.int64), se3.transform(se3.rotation_z(2 * t_s), np.zeros(3)))
     k = smoothed(spinning).at(np.linspace(0, 10e9, 500))
-    np.testing.assert_allclose(k.turn_radps, np.broadcast_to([0, 0, 2], (500, 3)), atol=1e-4)
+    np.testing.assert_allclose(k.angular_velocity_radps, np.broadcast_to([0, 0, 2], (500, 3)), atol=1e-4)
 
 
 @pytest.mark.parametrize("replayed", [interpolated, smoothed])

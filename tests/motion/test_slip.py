@@ -22,14 +22,14 @@ from vobench.motion.slip import (
     SLIPS,
     SURFACES,
     DeltaSettings,
+    Disturbance,
     FloorPatch,
     Generators,
-    Ground,
-    SlipNow,
+    GroundSlip,
     SlipSettings,
     drawn,
+    ground_effect,
     ornstein_uhlenbeck,
-    under,
 )
 
 
@@ -101,7 +101,7 @@ def test_the_pushes_are_in_the_accelerations_of_the_motion() -> None:
     u, omega, asked = run.state[:, 3], run.state[:, 4], run.references
     modelled = np.stack(accelerations(u, omega, asked[:, 0], asked[:, 1], theta=run.theta), -1)
     now = run.motion.at(run.t_ns)
-    found = np.stack([now.acceleration_mps2[:, 0], now.turn_rate_radps2[:, 2]], -1)
+    found = np.stack([now.acceleration_mps2[:, 0], now.angular_acceleration_radps2[:, 2]], -1)
     np.testing.assert_allclose(found - modelled, run.delta, atol=1e-9)
     assert run.delta.std(0).min() > 0.05
 
@@ -169,13 +169,13 @@ def test_delta_out_of_range_is_refused(bad: tuple[float, ...]) -> None:
 NOMINAL = SLIPS["nominal"]
 FAR, EVERYWHERE = ((9.0, 9.0), (1.0, 1.0)), ((0.0, 0.0), (20.0, 20.0))
 GROUNDS = {
-    "double": Ground(2.0),
-    "fivefold": Ground(5.0),
-    "doubly biased": Ground(2.0, 0.01, -0.01),
-    "triply biased": Ground(3.0, 0.02, -0.02),
-    "sticky": Ground(ratio_bias=0.1, angle_bias_rad=0.2),
-    "sloping": Ground(angle_bias_rad=0.1),
-    "icy": Ground(50.0, 0.3, 0.3),
+    "double": GroundSlip(2.0),
+    "fivefold": GroundSlip(5.0),
+    "doubly biased": GroundSlip(2.0, 0.01, -0.01),
+    "triply biased": GroundSlip(3.0, 0.02, -0.02),
+    "sticky": GroundSlip(ratio_bias=0.1, angle_bias_rad=0.2),
+    "sloping": GroundSlip(angle_bias_rad=0.1),
+    "icy": GroundSlip(50.0, 0.3, 0.3),
 }
 
 
@@ -210,8 +210,8 @@ def test_a_patch_turns_with_its_yaw_about_its_center() -> None:
 
 def test_where_patches_overlap_factors_multiply_and_biases_add() -> None:
     patches = [patch_of(f"{times} biased", (0.0, 0.0), (1.0, 1.0)) for times in ("doubly", "triply")]
-    assert under(patches, 0.2, 0.2) == (6.0, pytest.approx(0.03), pytest.approx(-0.03))
-    assert under(patches, 0.6, 0.2) == (1.0, 0.0, 0.0)
+    assert ground_effect(patches, 0.2, 0.2) == (6.0, pytest.approx(0.03), pytest.approx(-0.03))
+    assert ground_effect(patches, 0.6, 0.2) == (1.0, 0.0, 0.0)
 
 
 def test_a_patch_that_is_never_crossed_changes_nothing_to_the_last_bit() -> None:
@@ -261,8 +261,8 @@ def test_slip_is_cut_before_the_formulas_lose_their_meaning() -> None:
 @pytest.mark.parametrize(
     ("make", "sentence"),
     [
-        (lambda: Ground(factor=-1.0), "factor: should be 0 or more"),
-        (lambda: Ground(ratio_bias=float("nan")), "ratio_bias: should be a finite number"),
+        (lambda: GroundSlip(factor=-1.0), "factor: should be 0 or more"),
+        (lambda: GroundSlip(ratio_bias=float("nan")), "ratio_bias: should be a finite number"),
         (lambda: patch_of("wett", *FAR), "surface: no surface named 'wett'. Did you mean 'wet'"),
         (lambda: patch_of("wet", (0.0, float("nan")), (1.0, 1.0)), r"center_m\.1: should be a finite number"),
         (lambda: patch_of("wet", (0.0, 0.0), (1.0, 0.0)), r"size_m\.1: should be greater than 0"),
@@ -312,12 +312,12 @@ def test_the_three_processes_are_independent() -> None:
 
 
 def test_a_slipping_rim_runs_ahead_of_the_ground() -> None:
-    left, right = SlipNow(left=0.2, right=0.0).rim_rates(0.4, 0.4, radius_m=0.1)
+    left, right = Disturbance(left=0.2, right=0.0).rim_rates(0.4, 0.4, radius_m=0.1)
     assert (left, right) == (pytest.approx(5.0), pytest.approx(4.0))
 
 
 def test_skid_pushes_the_robot_out_of_its_turn() -> None:
-    assert SlipNow(skid_s=0.02).side_speed(0.5, 1.0) == pytest.approx(-0.01)
+    assert Disturbance(skid_s=0.02).side_speed(0.5, 1.0) == pytest.approx(-0.01)
 
 
 def test_without_slip_no_generator_is_needed_and_with_slip_its_lack_is_named() -> None:
@@ -327,14 +327,14 @@ def test_without_slip_no_generator_is_needed_and_with_slip_its_lack_is_named() -
 
 
 def test_between_two_instants_slip_is_on_the_straight_line() -> None:
-    first, second = SlipNow(0.1, -0.2, 0.3, 0.02, 0.0, 1.0, -1.0), SlipNow(0.3, 0.0, -0.1, 0.02, 0.0, 0.0, 0.0)
+    first, second = Disturbance(0.1, -0.2, 0.3, 0.02, 0.0, 1.0, -1.0), Disturbance(0.3, 0.0, -0.1, 0.02, 0.0, 0.0, 0.0)
     assert first.towards(second, 0.0) == first
     np.testing.assert_allclose(first.towards(second, 0.25), [0.15, -0.15, 0.2, 0.02, 0.0, 0.75, -0.75])
 
 
 @pytest.mark.parametrize("speed", [0.4, -0.4])
 def test_a_strained_rim_runs_ahead_of_the_ground_where_it_is_driven_on_and_behind_where_it_brakes(speed: float) -> None:
-    slip = SlipNow(traction_s2pm=0.1)
+    slip = Disturbance(traction_s2pm=0.1)
     on, braked = (slip.rim_rates(speed, speed, radius_m=0.1, driven_mps2=(s * speed, s * speed)) for s in (1, -1))
     assert abs(on[0]) > abs(speed) / 0.1 > abs(braked[0])
 

@@ -109,7 +109,7 @@ def test_poses_on_an_even_line_give_even_motion():
     t_s = np.array([0.0, 1.0, 2.5, 4.0])
     T = se3.transform(se3.rotation_z(0.3 * t_s), np.outer(t_s, [1.0, 2.0, 0.0]))
     k = pose_spline(t_s, T).at(np.linspace(0, 4e9, 30))
-    np.testing.assert_allclose(k.turn_radps, np.broadcast_to([0, 0, 0.3], (30, 3)), atol=1e-12)
+    np.testing.assert_allclose(k.angular_velocity_radps, np.broadcast_to([0, 0, 0.3], (30, 3)), atol=1e-12)
     np.testing.assert_allclose(k.acceleration_mps2, 0, atol=1e-11)
 
 

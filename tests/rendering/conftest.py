@@ -18,7 +18,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.bake import BakedScene, Patches
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import STEADY, Level, PointLight
 from vobench.scene.material import Material, reflectance
 from vobench.scene.mesh import areas_m2
@@ -88,7 +88,7 @@ class Hall:
     lattices: tuple[Lattice, ...]
 
     def picture(self, camera: Camera, T_world_camera: Array) -> Radiance:
-        return self.renderer.radiance(camera, still(camera, T_world_camera))
+        return self.renderer.radiance(camera, single_instant(camera, T_world_camera))
 
     def corners(self, camera: Camera, T_world_camera: Array, *, apart_px: float = 50) -> list[tuple[Lattice, Array]]:
         """Per surface the corners' pixels (M, 2) by K and the pose: those well inside, with room around, not askew."""

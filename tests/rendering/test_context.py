@@ -8,11 +8,11 @@ import pytest
 
 from vobench.errors import MissingDependencyError
 from vobench.rendering import context
-from vobench.rendering.context import Context, Device, create_context, driver_facts, ordered
+from vobench.rendering.context import Context, EglDevice, create_context, driver_facts, ordered
 
-GPU = Device(0, "/dev/dri/card0", is_software=False, handle=1)
-SECOND_GPU = Device(1, "/dev/dri/card1", is_software=False, handle=2)
-CPU = Device(2, "Mesa software driver", is_software=True, handle=3)
+GPU = EglDevice(0, "/dev/dri/card0", is_software=False, handle=1)
+SECOND_GPU = EglDevice(1, "/dev/dri/card1", is_software=False, handle=2)
+CPU = EglDevice(2, "Mesa software driver", is_software=True, handle=3)
 
 
 def refusal() -> str:
@@ -33,7 +33,7 @@ def test_gpus_come_before_the_cpu_whatever_the_order_of_the_list() -> None:
     ("wanted", "chosen"),
     [("cpu", [CPU]), ("gpu", [GPU, SECOND_GPU]), ("GPU ", [GPU, SECOND_GPU]), ("1", [SECOND_GPU]), ("2", [CPU])],
 )
-def test_a_setting_chooses_the_device(wanted: str, chosen: list[Device]) -> None:
+def test_a_setting_chooses_the_device(wanted: str, chosen: list[EglDevice]) -> None:
     assert ordered([GPU, SECOND_GPU, CPU], wanted) == chosen
 
 
@@ -60,7 +60,7 @@ def test_a_device_that_fails_gives_way_to_the_next(monkeypatch: pytest.MonkeyPat
     broken = replace(real, index=7, name="broken", is_software=False)
     create = context._capable_context
 
-    def fail_on_broken(device: Device) -> Context:
+    def fail_on_broken(device: EglDevice) -> Context:
         if device == broken:
             raise RuntimeError("no permission")
         return create(device)
@@ -73,7 +73,7 @@ def test_a_device_that_fails_gives_way_to_the_next(monkeypatch: pytest.MonkeyPat
 
 
 def test_a_device_that_is_asked_for_and_fails_is_not_replaced_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(device: Device) -> Context:
+    def fail(device: EglDevice) -> Context:
         raise RuntimeError("no permission")
 
     monkeypatch.setattr(context, "devices", lambda: [GPU, CPU])
@@ -162,7 +162,7 @@ def test_a_driver_without_a_shader_extension_is_refused(monkeypatch: pytest.Monk
 
 
 def test_a_display_that_fails_is_one_line_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(device: Device) -> None:
+    def fail(device: EglDevice) -> None:
         raise AssertionError("eglInitialize\n\treturned 0")
 
     monkeypatch.setattr(context, "_display", fail)

@@ -18,7 +18,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.batch import Batch, Geometry, geometry
 from vobench.rendering.culling import CullingSet
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import still
+from vobench.rendering.renderer import single_instant
 from vobench.rendering.view import NEAR_M, PinholeView, Plane, pinhole_view
 from vobench.scene.light import Sky
 from vobench.scene.material import Material
@@ -165,7 +165,7 @@ def drive(renderer: RasterRenderer, scene: Scene, *, frames: int = FRAMES) -> It
         at = (*0.62 * half_m * [np.cos(turn), np.sin(turn)], 0)
         camera = looking(pitch_deg=15 * np.sin(1.7 * index), position_m=(0, 0, 1.0))
         T = se3.transform(se3.rotation_z(2.4 * index), at) @ camera
-        yield renderer.radiance(CAMERA_mesh, still(CAMERA_mesh, T))
+        yield renderer.radiance(CAMERA_mesh, single_instant(CAMERA_mesh, T))
 
 
 def specks(picture: Array) -> int:

@@ -14,7 +14,7 @@ from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.rendering.illumination import AmbientLight, Illumination
 from vobench.rendering.render_target import MIRRORS
-from vobench.rendering.renderer import View, still
+from vobench.rendering.renderer import View, single_instant
 from vobench.rendering.view import Plane
 from vobench.scene.light import Sky
 from vobench.scene.material import Material, fresnel, pane_reflectance, under_coat
@@ -77,7 +77,7 @@ def test_the_image_of_an_image_lies_where_two_reflections_put_it(
     for heading, x_m, pitch_deg in ((0.0, 3.2, 45), (0.5, 2.5, 30), (-0.4, 2.8, 38), (0.1, 1.5, 25)):
         rig = stereo_rig(lens, pitch_deg=pitch_deg)
         T = se3.transform(se3.rotation_z(heading), (x_m, -0.2, 0)) @ rig.T_body_left
-        picture = renderer.radiance(lens, still(lens, T))
+        picture = renderer.radiance(lens, single_instant(lens, T))
         for image, uv in replace(hall, lattices=images).corners(lens, T, apart_px=32):
             for u, v in np.rint(uv).astype(int):
                 seen = picture[v - half : v + half + 1, u - half : u + half + 1] * np.pi / 100
@@ -96,7 +96,7 @@ def test_two_mirrors_face_to_face_hide_what_is_behind_them_but_not_what_is_besid
     in_near = np.abs(0.1 + 1.8 * pixel_rays(T)[..., 1] / pixel_rays(T)[..., 0]) < 0.75
     surfaces = [*hall_of({}), near, far]
     without, beside = (
-        draw(even_light(Scene("mirrors", tuple(s), MATERIALS, ()))).radiance(CAMERA, still(CAMERA, T))[in_near]
+        draw(even_light(Scene("mirrors", tuple(s), MATERIALS, ()))).radiance(CAMERA, single_instant(CAMERA, T))[in_near]
         for s in (surfaces, [*surfaces, *crate])
     )
     # What the last mirror shows is the mean of the scene, which the crate's own light is part of.
@@ -112,7 +112,7 @@ def test_between_parallel_mirrors_light_dims_by_the_tint_at_each_of_them(draw: A
     met = np.floor((eye_m[0] + way * rays[..., 0] + HALF_M) / (2 * HALF_M))
     # The last mirror is not followed: it shows the mean of the scene, which here is what it would show.
     expected = LUMINANCE * TINT ** np.minimum(met, MIRRORS + 1)
-    picture = renderer.radiance(CAMERA, still(CAMERA, T))
+    picture = renderer.radiance(CAMERA, single_instant(CAMERA, T))
     same = np.isclose(picture, expected, rtol=1e-4)
     assert min(same[met == n].mean() for n in range(4)) > 0.8
     assert same[met > MIRRORS].mean() > 0.5
@@ -122,7 +122,9 @@ def test_between_parallel_mirrors_light_dims_by_the_tint_at_each_of_them(draw: A
 def test_a_polished_floor_in_a_mirror_mirrors_too(draw: Any, even_light: Any) -> None:
     surfaces = hall_of({"wall_east": "steel"}, floor="wax")
     T = looking(pitch_deg=15, position_m=(2.5, 0.0, 0.8))
-    picture = draw(even_light(Scene("hall", tuple(surfaces), MATERIALS, ()))).radiance(CAMERA, still(CAMERA, T))
+    picture = draw(even_light(Scene("hall", tuple(surfaces), MATERIALS, ()))).radiance(
+        CAMERA, single_instant(CAMERA, T)
+    )
     rays, eye_m = pixel_rays(T), T[:3, 3]
     to_floor, to_mirror = reach(rays, eye_m, 2, 0, HEIGHT_M), reach(rays, eye_m, 0, -HALF_M, HALF_M)
     inside = (rays[..., 2] < 0) & (to_floor > 1.05 * to_mirror) & (to_floor < 6)
@@ -136,7 +138,9 @@ def test_a_pane_in_a_mirror_is_as_clear_and_mirrors_as_much_as_it_does_by_itself
     sky = Sky("sky", np.pi * 50, "uniform", ground_albedo=1.0)  # 50 cd/m² all around
     surfaces = hall_of({"wall_east": "glass"}, floor="steel")
     T = looking(pitch_deg=15, position_m=(1.0, 0.0, 0.8))
-    picture = draw(even_light(Scene("hall", tuple(surfaces), MATERIALS, (sky,)))).radiance(CAMERA, still(CAMERA, T))
+    picture = draw(even_light(Scene("hall", tuple(surfaces), MATERIALS, (sky,)))).radiance(
+        CAMERA, single_instant(CAMERA, T)
+    )
     rays, eye_m = pixel_rays(T), T[:3, 3]
     to_floor, to_pane = reach(rays, eye_m, 2, 0, HEIGHT_M), reach(rays, eye_m, 0, -HALF_M, HALF_M)
     sideways = np.abs(rays[..., 1] / rays[..., 0]) < 0.25
@@ -153,7 +157,7 @@ def test_strips_of_mirrors_in_mirrors_are_the_whole_picture(draw: Any, even_ligh
     T = se3.transform(se3.rotation_z(0.6), np.zeros(3)) @ looking(pitch_deg=15, position_m=(0.0, 0.0, 0.8))
     now = np.zeros(1, np.int64)
     strips = [View(slice(row, row + 10), T[None], now, now) for row in range(0, 120, 10)]
-    assert renderer.radiance(CAMERA, strips).tobytes() == renderer.radiance(CAMERA, still(CAMERA, T)).tobytes()
+    assert renderer.radiance(CAMERA, strips).tobytes() == renderer.radiance(CAMERA, single_instant(CAMERA, T)).tobytes()
 
 
 def test_the_mean_of_a_scene_counts_its_bodies_by_area_and_follows_the_light(even_light: Any) -> None:

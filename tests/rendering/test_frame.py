@@ -13,7 +13,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import KannalaBrandt, Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
-from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import AreaLight, Sky
 from vobench.scene.material import LUMINANCE, Material, Picture, linear
 from vobench.scene.mesh import Thing, flat, make_mesh, quad, textured
@@ -64,7 +64,7 @@ def scene(*things: tuple[Trimesh, str], lights: Any = (), sides: str | None = "g
 @pytest.fixture(scope="module")
 def snap(draw: Any, even_light: Any) -> Any:
     def of(shown: Scene, weights: Any = None, camera: Any = CAMERA, T: Array = AHEAD) -> Radiance:
-        picture: Radiance = draw(even_light(shown)).radiance(camera, still(camera, T), weights=weights)
+        picture: Radiance = draw(even_light(shown)).radiance(camera, single_instant(camera, T), weights=weights)
         return picture
 
     return of
@@ -86,7 +86,7 @@ def test_a_colour_picture_times_the_weights_is_the_picture_of_one_channel(
     )
     shown = replace(shown, things=tuple(s for s in shown.things if s.name != "ceiling"))
     renderer = draw(even_light(shown))
-    colours, mono = (renderer.radiance(camera, still(camera, AHEAD), weights=w) for w in (None, WEIGHTS))
+    colours, mono = (renderer.radiance(camera, single_instant(camera, AHEAD), weights=w) for w in (None, WEIGHTS))
     assert colours.shape == (*mono.shape, 3)
     np.testing.assert_allclose(colours @ np.array(WEIGHTS), mono, rtol=1e-5, atol=1e-4)
     assert np.ptp(colours, axis=-1).max() > 10
@@ -112,7 +112,7 @@ def test_a_picture_on_a_wall_shows_its_linear_colours_where_they_belong(draw: An
     # Row 0 lies at v = 0, which is the lower edge here.
     wall = textured(board(2.0, 2.0, 1.2), np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]]))
     shown = replace(scene((wall, "print")), materials=MATERIALS | {"print": Material(texture=Picture(big, 1.0))})
-    picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
+    picture = draw(even_light(shown)).radiance(CAMERA, single_instant(CAMERA, AHEAD), weights=None)
     for row in range(2):
         for column in range(3):
             u, v = 89.5 + 164.5 * (column - 1) * 0.333, 59.5 - 136.2 * (row - 0.5) * 0.3
@@ -144,8 +144,8 @@ def test_what_is_under_the_cut_out_is_not_there(draw: Any, even_light: Any) -> N
     materials = MATERIALS | {"leaf": Material(texture=Picture(leaf, 1.0), cutout=0.5)}
     mesh = textured(board(2.0, 1.0, 1.0), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
     shown = replace(scene((mesh, "leaf")), materials=materials)
-    picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
-    without = draw(even_light(scene())).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
+    picture = draw(even_light(shown)).radiance(CAMERA, single_instant(CAMERA, AHEAD), weights=None)
+    without = draw(even_light(scene())).radiance(CAMERA, single_instant(CAMERA, AHEAD), weights=None)
     right, left = slice(95, 125), slice(55, 85)
     np.testing.assert_array_equal(picture[40:80, right], without[40:80, right])
     np.testing.assert_allclose(picture[40:80, left], LIGHT, rtol=1e-5)
@@ -157,7 +157,7 @@ def test_what_glows_adds_its_emission_and_its_picture_to_what_it_reflects(draw: 
     screen = Material(colour=(0.2, 0.2, 0.2), emission_cd_m2=(50, 80, 20), emission_texture=Picture(half, 1.0))
     mesh = textured(board(2.0, 1.0, 1.0), np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]))
     shown = replace(scene((mesh, "screen")), materials=MATERIALS | {"screen": screen})
-    picture = draw(even_light(shown)).radiance(CAMERA, still(CAMERA, AHEAD), weights=None)
+    picture = draw(even_light(shown)).radiance(CAMERA, single_instant(CAMERA, AHEAD), weights=None)
     np.testing.assert_allclose(picture[60, 60], 0.2 * LIGHT + np.array([50, 80, 20]), rtol=1e-5)
     np.testing.assert_allclose(picture[60, 120], 0.2 * LIGHT, rtol=1e-5)
 
@@ -166,7 +166,7 @@ def test_the_face_of_a_lamp_shows_what_the_map_of_light_holds_there(draw: Any, e
     lamp = ceiling_light("lamp", np.array([0.0, 0, 1.5]), (0.5, 0.5), power_lm=100)
     assert isinstance(lamp, AreaLight)
     up = looking(pitch_deg=-90, position_m=(0, 0, 1.0))
-    picture = draw(even_light(scene(lights=(lamp,)))).radiance(CAMERA, still(CAMERA, up))
+    picture = draw(even_light(scene(lights=(lamp,)))).radiance(CAMERA, single_instant(CAMERA, up))
     assert picture[60, 90] == pytest.approx(LIGHT, rel=1e-5)
 
 
@@ -179,7 +179,7 @@ def test_the_sky_has_its_colour(snap: Any) -> None:
 
 def test_the_default_weights_are_those_of_luminance(draw: Any, even_light: Any) -> None:
     renderer = draw(even_light(scene((ball(0.5, at_m=(2.0, 0, 1.0)), "clay"), sides=None)))
-    assert renderer.radiance(CAMERA, still(CAMERA, AHEAD))[60, 90] == pytest.approx(
+    assert renderer.radiance(CAMERA, single_instant(CAMERA, AHEAD))[60, 90] == pytest.approx(
         np.dot(LUMINANCE, [0.7, 0.3, 0.1]) * LIGHT, rel=1e-5
     )
 

@@ -13,7 +13,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
 from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.geometry.se3 import Array
-from vobench.rendering.renderer import still
+from vobench.rendering.renderer import single_instant
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose
@@ -149,7 +149,7 @@ def test_the_outline_of_a_box_lies_where_its_edges_project(
     renderer = draw(even_light(Scene("box", surfaces, materials, ()), illuminance_lx=np.pi))
     T_world_body = se3.transform(se3.rotation_z(np.deg2rad(heading_deg)), (0, 0.1, 0))
     for camera, T_world_camera in eyes(stereo_rig(lens, pitch_deg=15), T_world_body):
-        picture = renderer.radiance(camera, still(camera, T_world_camera))
+        picture = renderer.radiance(camera, single_instant(camera, T_world_camera))
         edges = sorted(upright_edges(camera, T_world_camera), key=lambda edge: float(edge[:, 0].mean()))
         for edge, inside in ((edges[0], 1), (edges[-1], -1)):
             errors = edge_errors(picture, edge, inside=inside)

@@ -17,7 +17,7 @@ from vobench.rendering.emitter import Emitter, bulb_emitter, panel_emitter
 from vobench.rendering.geometry import BoundingSphere, RayCaster
 from vobench.rendering.illumination import Illumination
 from vobench.rendering.mover_light import Casters, may_shade, parts
-from vobench.rendering.renderer import still
+from vobench.rendering.renderer import single_instant
 from vobench.rendering.view import Box, PinholeView, pinhole_view
 from vobench.scene.light import PointLight, Sky
 from vobench.scene.material import Material
@@ -92,7 +92,7 @@ def test_a_picture_has_shade_wherever_it_looks(
         @ looking(pitch_deg=10, position_m=(0, 0.1 * side, 1.2))
         for side in (1, -1)
     ]
-    shots = [still(CAMERA, eye, t_ns=t) for t in (0, 10**8) for eye in eyes]
+    shots = [single_instant(CAMERA, eye, t_ns=t) for t in (0, 10**8) for eye in eyes]
     renderer = draw(cell)
     ours = [renderer.radiance(CAMERA, shot) for shot in shots]
     everywhere = Illumination.at

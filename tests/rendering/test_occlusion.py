@@ -10,7 +10,7 @@ from tests.rendering.rectangles import box, rectangle, room
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.rendering.occlusion import Bodies, back_faces, dot
-from vobench.rendering.shot import Shot, shot_transforms
+from vobench.rendering.shot import CameraShot, shot_transforms
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, flipped, make_mesh, moved, quad, table, texture_coordinates, two_sided
 from vobench.scene.scene import Mover, Path, Scene
@@ -52,7 +52,7 @@ def nearest_fronts_m(bodies: Bodies, directions: Array, T_bodies_camera: list[Ar
 
 
 def test_what_a_camera_sees_is_the_nearest_front_to_float64() -> None:
-    transforms = shot_transforms(SCENE.movers, Shot(POSE, T_NS))
+    transforms = shot_transforms(SCENE.movers, CameraShot(POSE, T_NS))
     rays = unit_rays(5000)
     hits = BODIES.visible(rays, transforms.T_bodies_camera)
     expected = nearest_fronts_m(BODIES, rays, transforms.T_bodies_camera, glass=False)
@@ -61,7 +61,7 @@ def test_what_a_camera_sees_is_the_nearest_front_to_float64() -> None:
 
 
 def test_glass_is_looked_through_and_lies_before_what_is_seen_behind_it() -> None:
-    transforms = shot_transforms(SCENE.movers, Shot(POSE, T_NS))
+    transforms = shot_transforms(SCENE.movers, CameraShot(POSE, T_NS))
     rays = unit_rays(5000)
     hits = BODIES.visible(rays, transforms.T_bodies_camera)
     pane_m = nearest_fronts_m(BODIES, rays, transforms.T_bodies_camera, glass=True)
@@ -74,7 +74,7 @@ def test_glass_is_looked_through_and_lies_before_what_is_seen_behind_it() -> Non
 
 
 def test_a_point_is_hidden_from_another_as_that_is_from_it() -> None:
-    transforms = shot_transforms(SCENE.movers, Shot(POSE, T_NS))
+    transforms = shot_transforms(SCENE.movers, CameraShot(POSE, T_NS))
     count = 3000
     starts = RNG.uniform([-2.9, -2.4, 0.1], [2.9, 2.4, 2.9], (count, 3)).astype(np.float32)
     ends = RNG.uniform([-2.9, -2.4, 0.1], [2.9, 2.4, 2.9], (count, 3)).astype(np.float32)
@@ -86,7 +86,7 @@ def test_a_point_is_hidden_from_another_as_that_is_from_it() -> None:
 
 
 def test_rays_without_reach_are_not_blocked_and_a_shorter_reach_never_blocks_more() -> None:
-    transforms = shot_transforms(SCENE.movers, Shot(POSE, T_NS))
+    transforms = shot_transforms(SCENE.movers, CameraShot(POSE, T_NS))
     starts = np.tile(POSE[:3, 3], (2000, 1)).astype(np.float32)
     vectors = (10 * unit_rays(2000)).astype(np.float32)
     blocked = [

@@ -15,7 +15,7 @@ from vobench.geometry.camera import KannalaBrandt, Pinhole, pixel_grid
 from vobench.geometry.rig import looking
 from vobench.rendering import mitsuba
 from vobench.rendering.path import PathRenderer
-from vobench.rendering.renderer import View, still
+from vobench.rendering.renderer import View, single_instant
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import LUMINANCE, Material, Picture, fresnel, linear, pane_reflectance, under_coat
 from vobench.scene.mesh import Thing, quad, two_sided, unit
@@ -39,7 +39,7 @@ def trace() -> Trace:
 
     def picture(scene, T_world_camera=DOWN, camera=SMALL, *, views=None, weights=LUMINANCE, **settings):
         renderer = PathRenderer(scene, **{"samples": 64, **settings})
-        light = renderer.radiance(camera, views or still(camera, T_world_camera), weights=weights)
+        light = renderer.radiance(camera, views or single_instant(camera, T_world_camera), weights=weights)
         renderer.close()
         return light
 
@@ -210,7 +210,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_time_or_pose_anothe
     elsewhere = looking(pitch_deg=90, position_m=(0, 1e-6, 1.5))
     for other in (trace(scene, seed=2), trace(scene, seed=1, T_world_camera=elsewhere)):
         assert not np.isclose(other, picture, rtol=1e-5).any()
-    assert not np.isclose(trace(scene, seed=1, views=still(SMALL, DOWN, t_ns=1)), picture, rtol=1e-5).any()
+    assert not np.isclose(trace(scene, seed=1, views=single_instant(SMALL, DOWN, t_ns=1)), picture, rtol=1e-5).any()
 
 
 def instant(rows: slice, T_world_camera, start_ns=0, end_ns=0) -> View:
@@ -287,7 +287,7 @@ def test_one_renderer_shows_lights_suns_and_movers_as_they_are_at_each_time(trac
     )
     renderer = PathRenderer(scene, samples=64, max_depth=2)
     for t_s, albedo, elevation_deg in ((0.0, 0.2, 90.0), (1.0, 0.5, 30.0), (0.0, 0.2, 90.0)):
-        shown = renderer.radiance(SMALL, still(SMALL, DOWN, t_ns=int(t_s * 1e9)))
+        shown = renderer.radiance(SMALL, single_instant(SMALL, DOWN, t_ns=int(t_s * 1e9)))
         expected = albedo * 1000 / np.pi * np.sin(np.deg2rad(elevation_deg))
         assert shown.mean() == pytest.approx(expected, rel=0.01)
     renderer.close()

@@ -13,7 +13,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.probe import FACES, LEVELS, glints, level_of, roughness_of
-from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import Flicker, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Material, inner_reflectance
 from vobench.scene.mesh import Thing, make_mesh, quad
@@ -62,7 +62,7 @@ def on_ball(T: Array = AHEAD, *, within: float = 0.97) -> Any:
 def snap(draw: Any, even_light: Any) -> Any:
     def of(scene: Scene, illuminance_lx: float = np.pi * BRIGHT, weights: Any = None) -> Radiance:
         renderer = draw(even_light(scene, illuminance_lx=illuminance_lx))
-        picture: Radiance = renderer.radiance(CAMERA, still(CAMERA, AHEAD), weights=weights)
+        picture: Radiance = renderer.radiance(CAMERA, single_instant(CAMERA, AHEAD), weights=weights)
         return picture
 
     return of
@@ -102,7 +102,7 @@ def test_metal_whose_normals_lie_square_to_the_view_has_a_luminance(draw: Any, e
     metal = {"metal": Material(colour=(0.5, 0.5, 0.5), metal=1.0, roughness=0.25)}
     camera = Pinhole(320, 240, 160.0, 160.0, 159.25, 119.25)
     renderer = draw(even_light(Scene("bevel", (Thing("bevel", bevel, "metal"),), metal, ())))
-    picture = renderer.radiance(camera, still(camera, looking(pitch_deg=0, position_m=(0, 0, 0))))
+    picture = renderer.radiance(camera, single_instant(camera, looking(pitch_deg=0, position_m=(0, 0, 0))))
     assert np.isfinite(picture).all()
 
 
@@ -215,7 +215,8 @@ def test_a_flickering_lamp_scales_what_the_probe_shows(draw: Any, even_light: An
     baked = even_light(scene, level=Flicker(depth=0.9))
     renderer = draw(baked)
     bright, dim = (
-        renderer.radiance(CAMERA, still(CAMERA, AHEAD, t_ns=t_ns))[on_ball(within=0.9)[0]] for t_ns in (0, 5_000_000)
+        renderer.radiance(CAMERA, single_instant(CAMERA, AHEAD, t_ns=t_ns))[on_ball(within=0.9)[0]]
+        for t_ns in (0, 5_000_000)
     )
     level = baked.scene.lights[0].level
     np.testing.assert_allclose(dim / bright, level.mean(5_000_000, 5_000_000) / level.mean(0, 0), rtol=1e-3)

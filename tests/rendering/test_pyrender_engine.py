@@ -15,7 +15,7 @@ from vobench.geometry.camera import KannalaBrandt, Pinhole
 from vobench.geometry.rig import looking
 from vobench.rendering import pyrender_material
 from vobench.rendering.pyrender_engine import PyrenderRenderer
-from vobench.rendering.renderer import Radiance, View, still
+from vobench.rendering.renderer import Radiance, View, single_instant
 from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import Thing, quad, two_sided
@@ -38,7 +38,7 @@ def opened(scene: Scene, *, white_cd_m2: float = WHITE_CD_M2) -> Iterator[Pyrend
 def drawn(scene: Scene, T_world_camera=DOWN, camera=CAMERA, *, t_ns: int = 0, white_cd_m2=WHITE_CD_M2) -> Radiance:
     """A picture (H, W, 3), white at 1."""
     with opened(scene, white_cd_m2=white_cd_m2) as renderer:
-        views = still(camera, T_world_camera, t_ns=t_ns)
+        views = single_instant(camera, T_world_camera, t_ns=t_ns)
         return renderer.radiance(camera, views, weights=None) / np.float32(white_cd_m2)
 
 
@@ -182,7 +182,7 @@ def test_strips_are_rows_of_the_whole_picture_and_sub_frames_their_mean() -> Non
     now = np.zeros(1, np.int64)
     moved = looking(pitch_deg=80, position_m=(0.1, 0, 1.5))
     with opened(scene(floor(), floor=Material(texture=quarters()))) as renderer:
-        first, second = (renderer.radiance(CAMERA, still(CAMERA, T)) for T in (DOWN, moved))
+        first, second = (renderer.radiance(CAMERA, single_instant(CAMERA, T)) for T in (DOWN, moved))
         strips = [View(slice(0, 50), DOWN[None], now, now), View(slice(50, 121), moved[None], now, now)]
         both = renderer.radiance(CAMERA, strips)
         two = np.zeros(2, np.int64)

@@ -18,7 +18,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene, BakeSettings, bake
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene, ceiling_light, triangles
 
@@ -32,7 +32,7 @@ MATERIALS = {
 
 
 def snap(renderer: RasterRenderer, camera: Camera, T_world_camera: Array) -> Radiance:
-    return renderer.radiance(camera, still(camera, T_world_camera))
+    return renderer.radiance(camera, single_instant(camera, T_world_camera))
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 from tests.rendering.rectangles import box
 from vobench.geometry import se3
-from vobench.rendering.shot import Shot, at_rows, moved, of_rays, rays_in, shot_transforms, turn
+from vobench.rendering.shot import CameraShot, at_rows, moved, of_rays, rays_in, shot_transforms, turn
 from vobench.scene.scene import Mover, Path
 
 RNG = np.random.default_rng(0)
@@ -18,7 +18,7 @@ POSE = se3.transform(se3.rotation_z(0.3), [1.0, 2.0, 3.0])
 
 
 def test_transforms_there_and_back_are_inverse_and_agree_with_the_camera() -> None:
-    shot = shot_transforms([CART], Shot(POSE, 500_000_000))
+    shot = shot_transforms([CART], CameraShot(POSE, 500_000_000))
     assert len(shot.T_world_bodies) == 2
     for body in range(2):
         there = shot.T_world_bodies[body] @ shot.T_bodies_world[body]
@@ -34,7 +34,7 @@ def test_transforms_there_and_back_are_inverse_and_agree_with_the_camera() -> No
 
 def test_rows_have_poses_of_their_own_where_something_moves() -> None:
     t_ns = np.array([0, 500_000_000, 1_000_000_000])
-    shot = shot_transforms([CART], Shot(np.tile(POSE, (3, 1, 1)), t_ns))
+    shot = shot_transforms([CART], CameraShot(np.tile(POSE, (3, 1, 1)), t_ns))
     assert shot.by_row
     for row, t in enumerate(t_ns.tolist()):
         np.testing.assert_allclose(shot.T_world_bodies[1][row], CART.path.pose(t))

@@ -14,7 +14,7 @@ from vobench.geometry.camera import Camera, DoubleSphere, KannalaBrandt, Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import View, still
+from vobench.rendering.renderer import View, single_instant
 from vobench.scene.light import Dimmer, Flicker, Sky
 from vobench.scene.material import Material
 from vobench.scene.scene import Mover, Path, Scene
@@ -72,7 +72,7 @@ def cut(height: int, T_world_camera: Array, times_ns: Any, *, count: int) -> lis
 @pytest.mark.parametrize("count", [3, 40])
 def test_strips_of_one_pose_are_the_whole_picture(gallery: RasterRenderer, camera: Camera, count: int) -> None:
     strips = cut(camera.height_px, AHEAD[None], instants(SECOND_NS), count=count)
-    whole = gallery.radiance(camera, still(camera, AHEAD, t_ns=SECOND_NS))
+    whole = gallery.radiance(camera, single_instant(camera, AHEAD, t_ns=SECOND_NS))
     assert gallery.radiance(camera, strips).tobytes() == whole.tobytes()
     assert whole.std() > 0
 
@@ -84,7 +84,7 @@ def test_strips_of_many_poses_are_cut_from_the_pictures_of_those_poses(gallery: 
     now = instants(SECOND_NS)
     rolled = gallery.radiance(camera, [View(r, T[None], now, now) for r, T in zip(rows, way, strict=True)])
     for r, T in zip(rows, way, strict=True):
-        np.testing.assert_array_equal(rolled[r], gallery.radiance(camera, still(camera, T, t_ns=SECOND_NS))[r])
+        np.testing.assert_array_equal(rolled[r], gallery.radiance(camera, single_instant(camera, T, t_ns=SECOND_NS))[r])
 
 
 @every_camera
@@ -92,7 +92,7 @@ def test_strips_of_many_poses_are_cut_from_the_pictures_of_those_poses(gallery: 
 def test_sub_frames_of_one_pose_are_the_still(gallery: RasterRenderer, camera: Camera, count: int) -> None:
     now = instants(*[SECOND_NS] * count)
     view = View(slice(0, camera.height_px), np.repeat(AHEAD[None], count, 0), now, now)
-    whole = gallery.radiance(camera, still(camera, AHEAD, t_ns=SECOND_NS))
+    whole = gallery.radiance(camera, single_instant(camera, AHEAD, t_ns=SECOND_NS))
     np.testing.assert_allclose(gallery.radiance(camera, [view]), whole, rtol=3e-5)
 
 
@@ -101,7 +101,8 @@ def test_a_blurred_picture_is_the_mean_of_its_sub_frames(gallery: RasterRenderer
     times = instants(0, SECOND_NS // 2, SECOND_NS)
     blurred = gallery.radiance(camera, [View(slice(0, camera.height_px), poses(3), times, times)])
     sharp = [
-        gallery.radiance(camera, still(camera, T, t_ns=int(t))) for T, t in zip(poses(3), times.tolist(), strict=True)
+        gallery.radiance(camera, single_instant(camera, T, t_ns=int(t)))
+        for T, t in zip(poses(3), times.tolist(), strict=True)
     ]
     np.testing.assert_allclose(blurred, np.mean(sharp, 0), rtol=1e-4, atol=1e-4)
 
@@ -115,7 +116,7 @@ def test_strips_with_sub_frames_are_the_picture_with_sub_frames(gallery: RasterR
 def test_two_renderers_side_by_side_draw_the_same_bytes(gallery: RasterRenderer, even_light: Any) -> None:
     other = RasterRenderer(even_light(GALLERY))
     for camera in CAMERAS.values():
-        view = still(camera, AHEAD, t_ns=SECOND_NS // 3)
+        view = single_instant(camera, AHEAD, t_ns=SECOND_NS // 3)
         assert other.radiance(camera, view).tobytes() == gallery.radiance(camera, view).tobytes()
     other.close()
 
@@ -139,11 +140,15 @@ def test_a_mirror_that_moves_mirrors_from_where_it_is(draw: Any, even_light: Any
     materials = MATERIALS | {"steel": MATERIALS["wall"], "wax": MATERIALS["wall"]}
     cart = replace(CART, things=(replace(CART.things[3], material="chrome"),))
     plain = replace(DARK, materials=materials)
-    moving = draw(even_light(replace(plain, movers=(cart,)))).radiance(PINHOLE, still(PINHOLE, AHEAD, t_ns=SECOND_NS))
+    moving = draw(even_light(replace(plain, movers=(cart,)))).radiance(
+        PINHOLE, single_instant(PINHOLE, AHEAD, t_ns=SECOND_NS)
+    )
     T = PATH.pose(SECOND_NS)
     parked = replace(plain, movers=(), things=(*SURFACES, *(s.moved(T) for s in cart.things)))
     diffuse = replace(parked, materials=materials | {"chrome": MATERIALS["board"]})
-    standing, without = (draw(even_light(one)).radiance(PINHOLE, still(PINHOLE, AHEAD)) for one in (parked, diffuse))
+    standing, without = (
+        draw(even_light(one)).radiance(PINHOLE, single_instant(PINHOLE, AHEAD)) for one in (parked, diffuse)
+    )
     assert (np.abs(moving - standing) > 0.01 * standing).mean() < 0.002
     assert (standing != without).mean() > 0.01
 
@@ -157,7 +162,7 @@ def test_a_light_counts_with_its_mean_over_each_sub_frame(draw: Any, even_light:
     view = View(slice(0, 120), np.repeat(AHEAD[None], 2, 0), start, end)
     level = (flicker.mean(0, 2_000_000) + flicker.mean(3_000_000, 7_000_000)) / 2
     np.testing.assert_allclose(
-        lit.radiance(PINHOLE, [view]), level * steady.radiance(PINHOLE, still(PINHOLE, AHEAD)), rtol=1e-5
+        lit.radiance(PINHOLE, [view]), level * steady.radiance(PINHOLE, single_instant(PINHOLE, AHEAD)), rtol=1e-5
     )
 
 
@@ -165,7 +170,7 @@ def test_the_sky_follows_its_level(draw: Any, even_light: Any) -> None:
     pane = rectangle(np.array([0, 0, -9.0]), np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), "wall")
     sky = Sky("sky", 1000.0, level=Dimmer((0.0, 1.0), (1.0, 0.0)))
     renderer = draw(even_light(Scene("sky", (pane,), MATERIALS, (sky,))))
-    bright, dim = (renderer.radiance(PINHOLE, still(PINHOLE, AHEAD, t_ns=t)) for t in (0, SECOND_NS * 3 // 4))
+    bright, dim = (renderer.radiance(PINHOLE, single_instant(PINHOLE, AHEAD, t_ns=t)) for t in (0, SECOND_NS * 3 // 4))
     np.testing.assert_allclose(dim, bright / 4, rtol=1e-5)
 
 

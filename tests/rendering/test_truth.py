@@ -21,7 +21,7 @@ from vobench.geometry.camera import (
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.lamp import lamp_of
-from vobench.rendering.truth import Shot, TruthCaster
+from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import Thing, Triangles, flat, flipped, joined, quad, two_sided, unit
@@ -88,7 +88,7 @@ CAMERAS = {
 HERE = se3.transform(se3.rotation_z(-0.1), (-1.1, 0.1, 0)) @ looking(pitch_deg=12, position_m=(0.25, 0.06, 0.5))
 NEXT = se3.transform(se3.rotation_z(-0.05), (-0.99, 0.16, 0)) @ looking(pitch_deg=12, position_m=(0.25, 0.06, 0.5))
 STEP_NS = SECOND_NS // 10
-NOW, LATER = Shot(HERE, 0), Shot(NEXT, STEP_NS)
+NOW, LATER = CameraShot(HERE, 0), CameraShot(NEXT, STEP_NS)
 
 
 def met(faces: Triangles, origin_m: Array, directions: Array) -> Array:
@@ -173,7 +173,7 @@ def test_pixels_that_no_direction_leads_to_have_no_truth(caster):
 def test_depth_is_exact_to_20_m_at_grazing_angles():
     floor = sheet("floor", np.zeros(3), [60.0, 0, 0], [0, 60.0, 0])
     camera, pose = LENSES["paper_literal"], looking(pitch_deg=15, position_m=(0, 0, 0.4))
-    depth = TruthCaster(Scene("plain", (floor,), MATERIALS, ())).frame(camera, Shot(pose, 0), ["depth"]).depth
+    depth = TruthCaster(Scene("plain", (floor,), MATERIALS, ())).frame(camera, CameraShot(pose, 0), ["depth"]).depth
     assert depth is not None
     rays = camera.rays(pixel_grid(camera))
     exact = rays[..., 2] * -0.4 / (rays @ pose[:3, :3].T)[..., 2]
@@ -295,7 +295,7 @@ def test_a_channel_that_does_not_exist_is_named(caster):
         caster.frame(CAMERAS["pinhole"], NOW, ["dept"])
 
 
-def rolling(count: int) -> tuple[Shot, Shot]:
+def rolling(count: int) -> tuple[CameraShot, CameraShot]:
     """A camera that turns and walks while its rows are exposed, and the picture after it."""
     t_ns = np.arange(count) * 60_000_000 // count
 
@@ -303,7 +303,7 @@ def rolling(count: int) -> tuple[Shot, Shot]:
         turned, walked = se3.rotation_z(1.5 * t), np.stack([0.8 * t, 0.3 * t, 0 * t], -1)
         return se3.transform(turned, walked) @ HERE
 
-    return Shot(at(t_ns / SECOND_NS), t_ns), Shot(at((t_ns + STEP_NS) / SECOND_NS), t_ns + STEP_NS)
+    return CameraShot(at(t_ns / SECOND_NS), t_ns), CameraShot(at((t_ns + STEP_NS) / SECOND_NS), t_ns + STEP_NS)
 
 
 def test_each_row_of_a_rolling_shutter_is_that_of_a_still_camera_at_its_instant(caster):
@@ -311,7 +311,7 @@ def test_each_row_of_a_rolling_shutter_is_that_of_a_still_camera_at_its_instant(
     now, later = rolling(camera.height_px)
     whole = caster.frame(camera, now, later=later)
     for row in (0, 1, 60, camera.height_px - 1):
-        still = caster.frame(camera, Shot(now.T_world_camera[row], now.t_ns[row]))
+        still = caster.frame(camera, CameraShot(now.T_world_camera[row], now.t_ns[row]))
         for name in ("depth", "normals", "instance", "material", "mirror", "moving"):
             np.testing.assert_allclose(getattr(whole, name)[row], getattr(still, name)[row], rtol=2e-6, atol=2e-6)
 
@@ -347,7 +347,7 @@ TOP = Pinhole(201, 201, 200.0, 200.0, 100.0, 100.0)  # column c sees x = (c - 10
 
 
 def shadow(caster: TruthCaster, *, t_ns: int = 0) -> np.ndarray:
-    found = caster.frame(TOP, Shot(ABOVE, t_ns), ["shadow"]).shadow
+    found = caster.frame(TOP, CameraShot(ABOVE, t_ns), ["shadow"]).shadow
     assert found is not None
     return found
 
@@ -426,7 +426,7 @@ def test_one_thread_and_two_give_the_same_bytes(caster, monkeypatch):
 def test_backs_are_not_seen_but_hide_lights():
     ceiling = sheet("ceiling", [0, 0, 1.5], [0, 1.0, 0], [1.0, 0, 0])
     caster = stage(PointLight("bulb", np.array([0, 0, 3.0]), 100.0), things=(ceiling,))
-    truth = caster.frame(TOP, Shot(ABOVE, 0), ["depth", "shadow"])
+    truth = caster.frame(TOP, CameraShot(ABOVE, 0), ["depth", "shadow"])
     assert (ceiling.mesh.vertex_normals[:, 2] < 0).all()
     np.testing.assert_allclose(truth.depth, 2.0, rtol=1e-6)
     assert truth.shadow[100, 100] == 1
@@ -463,7 +463,7 @@ def ball_scene(*, splits: int) -> tuple[TruthCaster, Array, float]:
 def test_a_ball_of_faces_is_as_deep_as_the_ball_within_its_faceting(splits):
     caster, center_m, radius_m = ball_scene(splits=splits)
     camera, pose = CAMERAS["pinhole"], looking(pitch_deg=10, position_m=(0, 0, 0.5))
-    depth = caster.frame(camera, Shot(pose, 0), ["depth"]).depth
+    depth = caster.frame(camera, CameraShot(pose, 0), ["depth"]).depth
     rays = camera.rays(pixel_grid(camera))
     away = center_m - pose[:3, 3]
     along = rays @ pose[:3, :3].T @ away
@@ -484,7 +484,7 @@ def test_flow_on_a_ball_is_its_points_projected_again():
     caster, _, _ = ball_scene(splits=3)
     camera, pose = CAMERAS["pinhole"], looking(pitch_deg=10, position_m=(0, 0, 0.5))
     onward = se3.transform(se3.rotation_z(0.02), (0.05, -0.03, 0.01)) @ pose
-    truth = caster.frame(camera, Shot(pose, 0), later=Shot(onward, STEP_NS))
+    truth = caster.frame(camera, CameraShot(pose, 0), later=CameraShot(onward, STEP_NS))
     seen = np.isfinite(truth.depth)
     rays = camera.rays(pixel_grid(camera))[seen]
     points_m = nearest(caster._scene, pose[:3, 3], rays @ pose[:3, :3].T, t_ns=0)[1][:, None] * rays
@@ -515,7 +515,7 @@ def test_ids_and_depth_of_many_meshes_are_those_of_every_triangle_tried_in_float
     scene = shards(300, seed)
     caster, faces = TruthCaster(scene), triangles(scene, t_ns=STEP_NS)
     camera, pose = CAMERAS["pinhole"], looking(pitch_deg=3, position_m=(0, 0.1, 0.05))
-    truth = caster.frame(camera, Shot(pose, STEP_NS), ["depth", "instance", "normals"])
+    truth = caster.frame(camera, CameraShot(pose, STEP_NS), ["depth", "instance", "normals"])
     rays = camera.rays(pixel_grid(camera)).reshape(-1, 3)
     face, distance_m = nearest(scene, pose[:3, 3], rays @ pose[:3, :3].T, t_ns=STEP_NS)
     names = ["swarm" if mover >= 0 else faces.things[n].name for n, mover in zip(faces.thing, faces.mover, strict=True)]
@@ -539,7 +539,7 @@ def test_rays_through_corners_and_edges_of_faces_meet_one_of_them():
     wall = flipped(tessellated([5.0, -1.5, -1.0], [0, 3.0, 0], [0, 0, 2.0], 20))
     camera, pose = Pinhole(21, 21, 100.0 / 3, 50.0, 10.0, 10.0), looking(pitch_deg=0, position_m=(0, 0, 0))
     caster = TruthCaster(Scene("wall", (Thing("wall", wall, "diffuse"),), MATERIALS, ()))
-    truth = caster.frame(camera, Shot(pose, 0), ["depth", "instance"])
+    truth = caster.frame(camera, CameraShot(pose, 0), ["depth", "instance"])
     inner = slice(1, -1), slice(1, -1)
     np.testing.assert_allclose(truth.depth[inner], 5.0, rtol=1e-7)
     assert (truth.instance[inner] == 1).all()
@@ -552,7 +552,7 @@ def test_every_ray_inside_a_closed_room_ends(seed):
     T = se3.transform(turned * np.linalg.det(turned), rng.uniform(-40, 40, 3))
     inside = joined([side.flipped() for side in sides([0, 0, 1.5], rng.uniform(3, 12, 3))]).moved(T)
     caster = TruthCaster(Scene("room", (Thing("room", inside, "diffuse"),), MATERIALS, ()))
-    shot = Shot(T @ se3.transform(np.eye(3), [0.1, -0.3, 1.6]), 0)
+    shot = CameraShot(T @ se3.transform(np.eye(3), [0.1, -0.3, 1.6]), 0)
     truth = caster.frame(Equirectangular(720, 360), shot, ["depth", "normals", "instance"])
     assert np.isfinite(truth.depth).all()
     assert np.isfinite(truth.normals).all()
@@ -566,7 +566,7 @@ def test_the_back_of_a_sheet_of_two_sides_is_seen_as_its_front_is():
     ahead = looking(pitch_deg=0, position_m=(0, 0, 0))
     behind = se3.transform(se3.rotation_z(np.pi), [4.0, 0, 0]) @ ahead
     for pose in (ahead, behind):
-        truth = caster.frame(camera, Shot(pose, 0), ["depth", "normals"])
+        truth = caster.frame(camera, CameraShot(pose, 0), ["depth", "normals"])
         seen = np.isfinite(truth.depth)
         assert 0.13 < seen.mean() < 0.16
         np.testing.assert_allclose(truth.depth[seen], 2.0, rtol=1e-6)
@@ -596,7 +596,7 @@ def test_what_is_seen_through_holes_is_what_is_behind_and_light_falls_through():
     off_edge = np.abs((stripe * 2) % 1 - 0.5) < 0.49
     for scene in (still, moving):
         caster = TruthCaster(scene)
-        truth = caster.frame(TOP, Shot(ABOVE, 0), ["instance", "depth", "shadow"])
+        truth = caster.frame(TOP, CameraShot(ABOVE, 0), ["instance", "depth", "shadow"])
         paper = caster.names.instance.index("paper")
         assert ((truth.instance == paper) == (stripe < 0.5))[on_paper & off_edge].all()
         through = on_paper & off_edge & (stripe > 0.5)
@@ -627,7 +627,7 @@ def test_things_far_from_the_origin_throw_no_shadow_on_themselves():
     sun = Sun("sun", 1e5, (0.0,), (0.0,), (60.0,))
     caster = TruthCaster(Scene("far", (floor, ball), MATERIALS, (sun,)))
     above = se3.transform(np.diag([1.0, -1.0, -1.0]), [300.0, -200.0, 8.0])
-    truth = caster.frame(Pinhole(201, 201, 200.0, 200.0, 100.0, 100.0), Shot(above, 0), ["instance", "shadow"])
+    truth = caster.frame(Pinhole(201, 201, 200.0, 200.0, 100.0, 100.0), CameraShot(above, 0), ["instance", "shadow"])
     on_ball = truth.instance == caster.names.instance.index("ball")
     assert 0.01 < (truth.shadow[~on_ball] > 0).mean() < 0.2
     assert not truth.shadow[on_ball].any()

@@ -13,7 +13,7 @@ from vobench.geometry.camera import KannalaBrandt, Pinhole, pixel_grid
 from vobench.geometry.rig import LENSES, looking, stereo_rig
 from vobench.geometry.se3 import Array
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.renderer import Radiance, single_instant
 from vobench.rendering.view import Plane, visible_boxes, within
 from vobench.scene.light import Sky
 from vobench.scene.material import Material, fresnel, pane_reflectance, under_coat
@@ -33,7 +33,7 @@ LUMINANCE = 0.5 * 100 / np.pi  # of grey under 100 lx
 
 
 def snap(renderer: RasterRenderer, T_world_camera: Array, camera: Pinhole = CAMERA) -> Radiance:
-    return renderer.radiance(camera, still(camera, T_world_camera))
+    return renderer.radiance(camera, single_instant(camera, T_world_camera))
 
 
 def upside_down(surface: Rectangle) -> Rectangle:
@@ -93,7 +93,7 @@ def test_what_a_mirror_floor_shows_lies_where_reflection_puts_it(
         for pitch_deg in (20, 50):
             rig = stereo_rig(lens, pitch_deg=pitch_deg)
             T = se3.transform(se3.rotation_z(heading), (0.3, -0.2, 0)) @ rig.T_body_left
-            picture = renderer.radiance(lens, still(lens, T))
+            picture = renderer.radiance(lens, single_instant(lens, T))
             for image, uv in replace(hall, lattices=tuple(images)).corners(lens, T):
                 for u, v in np.rint(uv).astype(int):
                     seen = picture[v - half : v + half + 1, u - half : u + half + 1] * np.pi / 100
@@ -205,7 +205,7 @@ def test_mirrors_work_through_a_fisheye_too(draw: Any, even_light: Any) -> None:
     sky = Sky("sky", 10000.0, "clear", sun_direction=np.array([0.6, 0.48, 0.64]))
     floor = rectangle(np.zeros(3), np.array([60.0, 0, 0]), np.array([0, 60.0, 0]), "steel")
     T = looking(pitch_deg=90, position_m=(0, 0, 0.4))
-    picture = draw(even_light(Scene("sky", (floor,), MATERIALS, (sky,)))).radiance(camera, still(camera, T))
+    picture = draw(even_light(Scene("sky", (floor,), MATERIALS, (sky,)))).radiance(camera, single_instant(camera, T))
     rays = camera.rays(pixel_grid(camera)) @ T[:3, :3].T
     inside = rays[..., 2] < -0.15
     expected = 0.8 * sky.luminance_cd_m2(rays * [1, 1, -1])

@@ -10,7 +10,7 @@ import pytest
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 from vobench.report.rerun import save_trial
 from vobench.report.trial_view import TrialView
 from vobench.runner import estimate as estimate_file
@@ -148,4 +148,4 @@ def placed(scored):
     here = Environment(
         vobench="1.0", processors=(Processor("Some_CPU 9", "x86-64-v3"),), drawn_by=("pipe & co",), date="2026-11-24"
     )
-    return board([scored("a"), scored("b")], {}, environment=here)
+    return make_board([scored("a"), scored("b")], {}, environment=here)

@@ -6,12 +6,12 @@ import pytest
 
 from vobench.report import page
 from vobench.report.board_formats import FORMATS
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 
 
 @pytest.mark.parametrize("form", FORMATS)
 def test_every_form_but_a_table_for_a_paper_says_which_cases_have_no_sequence(incomplete, form):
-    text = FORMATS[form](board(incomplete, {}), "ate")
+    text = FORMATS[form](make_board(incomplete, {}), "ate")
     assert ("no light" in text) == (form != "latex")
     assert "a" in text
 
@@ -30,8 +30,8 @@ HOSTILE = "<script>alert(1)</script>|&_%$#{}~^\\\x1b[2J\0"
 def test_a_hostile_name_and_reason_harm_no_form(tmp_path, scored, write_run, form):
     scores = [scored("<script>", "crashed", ate_m=None, reason=HOSTILE), scored("fine")]
     folder = write_run(tmp_path / "suite" / "stamp", scores)
-    made = page.board_of(folder, scores)
-    text = page.html(folder, scores, made, tmp_path) if form == "html" else FORMATS[form](made, "ate")
+    made = page.run_board(folder, scores)
+    text = page.board_page(folder, scores, made, tmp_path) if form == "html" else FORMATS[form](made, "ate")
     assert not {"\x1b", "\0"} & set(text)
     if form in ("md", "html"):
         assert "<script>alert" not in text
@@ -41,7 +41,7 @@ def test_a_hostile_name_and_reason_harm_no_form(tmp_path, scored, write_run, for
 
 
 def test_a_board_without_any_sequence_is_empty_and_says_why(incomplete):
-    made = board([score for score in incomplete if score.case != "down"], {})
+    made = make_board([score for score in incomplete if score.case != "down"], {})
     assert (made.cells, made.totals) == ((), ())
     for form, write in FORMATS.items():
         assert write(made, "ate"), form

@@ -7,12 +7,12 @@ import pytest
 from vobench.report import page
 from vobench.report.board_latex import latex
 from vobench.report.cell import CaseFacts
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 
 
 @pytest.fixture
 def made(run, mixed):
-    return page.board_of(run, mixed)
+    return page.run_board(run, mixed)
 
 
 def test_latex_is_a_table_with_caption_label_and_every_special_character_escaped(made):
@@ -42,24 +42,24 @@ def several(scored, estimators, cases, **changes):
 
 
 def test_whichever_are_fewer_are_the_columns(scored):
-    tall = rows_of(latex(board(several(scored, 2, 3), {})))
+    tall = rows_of(latex(make_board(several(scored, 2, 3), {})))
     assert tall[0] == ["", "e0", "e1"]
     assert [row[0] for row in tall[1:]] == ["c0", "c1", "c2", "score", "place"]
-    wide = rows_of(latex(board(several(scored, 3, 2), {})))
+    wide = rows_of(latex(make_board(several(scored, 3, 2), {})))
     assert wide[0] == ["", "c0", "c1", "score", "place"]
     assert [row[0] for row in wide[1:]] == ["e0", "e1", "e2"]
-    square = rows_of(latex(board(several(scored, 2, 2), {})))
+    square = rows_of(latex(make_board(several(scored, 2, 2), {})))
     assert square[0] == ["", "e0", "e1"]
 
 
 def test_a_rule_parts_cases_from_totals_where_the_totals_are_rows(scored):
-    assert latex(board(several(scored, 2, 3), {})).count(r"\midrule") == 2
-    assert latex(board(several(scored, 3, 2), {})).count(r"\midrule") == 1
+    assert latex(make_board(several(scored, 2, 3), {})).count(r"\midrule") == 2
+    assert latex(make_board(several(scored, 3, 2), {})).count(r"\midrule") == 1
 
 
 @pytest.mark.parametrize(("columns", "is_rotated"), [(6, False), (7, True)])
 def test_more_than_six_names_are_rotated(scored, columns, is_rotated):
-    text = latex(board(several(scored, columns, columns), {}))
+    text = latex(make_board(several(scored, columns, columns), {}))
     assert (r"\rotatebox{60}{e0}" in text) == (r"\usepackage{graphicx}" in text) == is_rotated
     assert text.splitlines()[0].endswith(".")
     assert r"\begin{tabular}{l" + "r" * columns + "}" in text
@@ -70,15 +70,15 @@ def test_ranges_are_shown_where_at_most_three_columns_need_room(scored, columns,
     trials = several(scored, columns, columns)
     worse = {"metrics": [{"name": "ate_trans", "rmse": 0.2}]}
     again = [trial.model_copy(update={"repeat": 1, "score": worse}) for trial in trials]
-    text = latex(board([*trials, *again], {}))
+    text = latex(make_board([*trials, *again], {}))
     assert (r"{\tiny" in text) == has_range
     assert (", median and range of its trials" in text) == has_range
     assert ", median" in text
-    assert ", median" not in latex(board(trials, {}))
+    assert ", median" not in latex(make_board(trials, {}))
 
 
 def test_best_is_bold_failures_are_italic_and_undecided_ones_have_a_tilde(scored):
-    text = latex(board([scored("a", ate_m=0.01), scored("b", ate_m=0.02), scored("c", "lost")], {}))
+    text = latex(make_board([scored("a", ate_m=0.01), scored("b", ate_m=0.02), scored("c", "lost")], {}))
     assert r"\textbf{1.00}$^{\sim}$" in text
     assert r"\textit{lost}" in text
     assert " 2.00 " in text
@@ -86,26 +86,26 @@ def test_best_is_bold_failures_are_italic_and_undecided_ones_have_a_tilde(scored
 
 def test_calibration_groups_have_no_totals_in_the_table(scored):
     facts = {"c0": CaseFacts(group="worn"), "c1": CaseFacts()}
-    assert "score" not in latex(board(several(scored, 2, 2), {}, facts))
+    assert "score" not in latex(make_board(several(scored, 2, 2), {}, facts))
 
 
 def test_an_estimator_without_a_total_leaves_all_totals_out(scored):
     facts = {"c0": CaseFacts(group="worn")}
     trials = [scored("a", case="c0"), scored("b", case="c1"), scored("c", case="c2")]
-    assert "score" not in latex(board(trials, {}, facts))
+    assert "score" not in latex(make_board(trials, {}, facts))
 
 
 def test_a_letter_that_a_paper_may_not_have_is_a_question_mark(scored):
-    text = latex(board([scored("名", case="a<b|c>d^e~f\\g{h}")], {}))
+    text = latex(make_board([scored("名", case="a<b|c>d^e~f\\g{h}")], {}))
     assert "? " in text
     assert r"a$<$b$|$c$>$d\textasciicircum{}e\textasciitilde{}f\textbackslash{}g\{h\}" in text
-    assert r"$^\circ$" in latex(board([scored("a")], {}), "rpe_deg")
+    assert r"$^\circ$" in latex(make_board([scored("a")], {}), "rpe_deg")
 
 
 def test_the_label_is_the_title_in_plain_letters(scored):
-    assert r"\label{tab:my-suite-2}" in latex(board([scored("a")], {}, title="my suite_2"))
-    assert r"\label{tab:board}" in latex(board([scored("a")], {}))
+    assert r"\label{tab:my-suite-2}" in latex(make_board([scored("a")], {}, title="my suite_2"))
+    assert r"\label{tab:board}" in latex(make_board([scored("a")], {}))
 
 
 def test_an_empty_board_is_a_table_without_rows():
-    assert rows_of(latex(board([], {}))) == [[""]]
+    assert rows_of(latex(make_board([], {}))) == [[""]]

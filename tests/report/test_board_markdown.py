@@ -6,12 +6,12 @@ import pytest
 
 from vobench.report import page
 from vobench.report.board_markdown import markdown
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 
 
 @pytest.fixture
 def made(run, mixed):
-    return page.board_of(run, mixed)
+    return page.run_board(run, mixed)
 
 
 def test_markdown_has_as_many_cells_in_every_line_of_a_table(made):
@@ -24,7 +24,7 @@ def test_markdown_has_as_many_cells_in_every_line_of_a_table(made):
 
 
 def test_words_are_left_aligned_and_numbers_right_aligned(scored):
-    lines = markdown(board([scored("a"), scored("b")], {})).splitlines()
+    lines = markdown(make_board([scored("a"), scored("b")], {})).splitlines()
     rules = [line for line in lines if line.startswith("|---")]
     assert rules == [
         "|---|---:|---:|",
@@ -36,10 +36,10 @@ def test_words_are_left_aligned_and_numbers_right_aligned(scored):
 
 def test_sentences_on_access_and_origin_follow_the_legend(scored, placed):
     assert markdown(placed).splitlines()[-1].startswith("Made on Some_CPU 9")
-    text = markdown(board([scored("a")], {}))
+    text = markdown(make_board([scored("a")], {}))
     assert "Made on" not in text
     assert text.endswith("a: what it could see is not recorded.\n")
 
 
 def test_the_legend_keeps_its_tilde(scored):
-    assert "; \\~ not decided" in markdown(board([scored("a")], {}))
+    assert "; \\~ not decided" in markdown(make_board([scored("a")], {}))

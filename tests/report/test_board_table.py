@@ -23,7 +23,7 @@ from vobench.report.board_table import (
     totals,
 )
 from vobench.report.frame_statistics import EstimatorStatistics
-from vobench.report.leaderboard import Board, board
+from vobench.report.leaderboard import Board, make_board
 from vobench.runner.folder import TrialScore
 
 OPEN = Sandbox("none", ("the user's files", "the network"))
@@ -47,7 +47,7 @@ def trial(estimator: str, sandbox: Sandbox | None) -> TrialScore:
 
 
 def board_of(**sandboxes: Sandbox | None) -> Board:
-    return board([trial(name, sandbox) for name, sandbox in sandboxes.items()], {})
+    return make_board([trial(name, sandbox) for name, sandbox in sandboxes.items()], {})
 
 
 @pytest.mark.parametrize("form", ["md", "json", "csv", "latex", "terminal"])
@@ -82,11 +82,11 @@ def test_each_row_says_what_its_own_trials_saw():
 
 def test_a_cell_shows_the_median_and_range_of_its_trials_and_how_many_failed(scored):
     trials = [scored("a", repeat=n, ate_m=ate) for n, ate in enumerate((0.02, 0.01, 0.05))]
-    (shown,) = matrix(board(trials, {}), "ate_mm")[0][1]
+    (shown,) = matrix(make_board(trials, {}), "ate_mm")[0][1]
     assert (shown.text, shown.range) == ("20.0", "10.0–50.0")
-    (shown,) = matrix(board([*trials, scored("a", "lost", repeat=3)], {}), "ate_mm")[0][1]
+    (shown,) = matrix(make_board([*trials, scored("a", "lost", repeat=3)], {}), "ate_mm")[0][1]
     assert str(shown) == "20.0 (10.0–50.0, 1/4 lost)"
-    (shown,) = matrix(board([scored("a", "crashed", repeat=n, ate_m=None) for n in (0, 1)], {}), "ate")[0][1]
+    (shown,) = matrix(make_board([scored("a", "crashed", repeat=n, ate_m=None) for n in (0, 1)], {}), "ate")[0][1]
     assert (str(shown), shown.failed) == ("2/2 crashed", True)
 
 
@@ -112,7 +112,7 @@ def test_a_number_has_three_digits_and_at_most_five_decimals(value, text):
 
 @pytest.fixture
 def total(scored):
-    return board([scored("a")], {}).totals[0]
+    return make_board([scored("a")], {}).totals[0]
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def rows_of(made):
 
 
 def test_the_columns_of_a_total(total, scored):
-    made = board([scored("a"), scored("b", "lost")], {})
+    made = make_board([scored("a"), scored("b", "lost")], {})
     first = replace(made.totals[0], ratio_interval=(0.5, 2.0), cpu_ms=1.5, memory_mib=30.0, is_efficient=True)
     second = replace(made.totals[1], p_above=0.01, decided_above=True, mean_place=1.25)
     rows = rows_of(replace(made, totals=(first, second)))
@@ -163,15 +163,15 @@ def test_the_columns_of_a_total(total, scored):
 
 def test_costs_have_columns_only_where_one_is_known(scored):
     scores = [scored("a"), scored("b")]
-    assert not {"CPU ms/frame", "MiB"} & set(rows_of(board(scores, {}))[0])
+    assert not {"CPU ms/frame", "MiB"} & set(rows_of(make_board(scores, {}))[0])
     one = {("down", "a"): EstimatorStatistics(1.0)}
-    assert {"CPU ms/frame", "MiB"} <= set(rows_of(board(scores, one))[0])
+    assert {"CPU ms/frame", "MiB"} <= set(rows_of(make_board(scores, one))[0])
 
 
 def test_a_table_of_totals_is_named_by_its_cases_and_its_group_where_there_are_several(scored):
-    one = board([scored("a")], {})
+    one = make_board([scored("a")], {})
     assert [scope for scope, _ in totals(one)] == ["1 case"]
-    two = board([scored("a"), scored("a", case="ahead")], {})
+    two = make_board([scored("a"), scored("a", case="ahead")], {})
     assert [scope for scope, _ in totals(two)] == ["2 cases"]
     groups = tuple(replace(two.totals[0], group=group) for group in ("", "worn"))
     assert [scope for scope, _ in totals(replace(two, totals=groups))] == [
@@ -182,7 +182,7 @@ def test_a_table_of_totals_is_named_by_its_cases_and_its_group_where_there_are_s
 
 def test_an_undecided_order_says_what_would_decide_it(scored):
     scores = [scored(name, repeat=repeat, ate_m=0.1) for name in "ab" for repeat in (0, 1)]
-    made = board(scores, {})
+    made = make_board(scores, {})
     first = made.totals[0]
 
     def sentences(**changes):
@@ -206,20 +206,20 @@ def test_an_undecided_order_says_what_would_decide_it(scored):
 
 def test_a_note_on_several_cells_is_written_once_with_its_first_case(scored):
     lost = [scored("a", "lost", case=case) for case in ("down", "ahead", "far")]
-    assert cell_notes(board(lost, {})) == ["ahead and 2 more: a: lost: it went dark"]
-    assert cell_notes(board(lost[:2], {})) == ["ahead and 1 more: a: lost: it went dark"]
-    assert cell_notes(board([lost[0], scored("b", case="far")], {})) == ["down: a: lost: it went dark"]
-    assert cell_notes(board(lost[:1], {})) == ["a: lost: it went dark"]
+    assert cell_notes(make_board(lost, {})) == ["ahead and 2 more: a: lost: it went dark"]
+    assert cell_notes(make_board(lost[:2], {})) == ["ahead and 1 more: a: lost: it went dark"]
+    assert cell_notes(make_board([lost[0], scored("b", case="far")], {})) == ["down: a: lost: it went dark"]
+    assert cell_notes(make_board(lost[:1], {})) == ["a: lost: it went dark"]
 
 
 def test_a_cell_without_a_number_and_one_without_trials_are_not_the_same(scored):
-    made = board([scored("a", drift_m=0.1), scored("b"), scored("b", case="ahead")], {})
+    made = make_board([scored("a", drift_m=0.1), scored("b"), scored("b", case="ahead")], {})
     shown = {case: [str(cell) for cell in cells] for case, cells in matrix(made, "ate")}
     assert shown == {"ahead": ["10.0", ""], "down": ["10.0", "–"]}
 
 
 def test_scores_have_four_decimals_and_costs_are_shown_even_of_failures(scored):
-    made = board([scored("a", coverage=0.98765), scored("b", "lost")], {("down", "b"): EstimatorStatistics(2.0)})
+    made = make_board([scored("a", coverage=0.98765), scored("b", "lost")], {("down", "b"): EstimatorStatistics(2.0)})
     assert str(matrix(made, "coverage")[0][1][0]) == "0.9877"
     costs = dict(zip(made.estimators, matrix(made, "cpu_ms")[0][1], strict=True))
     assert (str(costs["b"]), costs["b"].failed) == ("2.00 (1/1 lost)", True)
@@ -227,5 +227,5 @@ def test_scores_have_four_decimals_and_costs_are_shown_even_of_failures(scored):
 
 
 def test_an_origin_that_is_not_known_is_no_line(scored, placed):
-    assert origin(board([scored("a")], {})) == ""
+    assert origin(make_board([scored("a")], {})) == ""
     assert origin(placed).startswith("Made on Some_CPU 9 (x86-64-v3), ")

@@ -7,13 +7,13 @@ import pytest
 from vobench.estimator.sandbox import Sandbox
 from vobench.report.cell import CaseFacts, make_cell
 from vobench.report.frame_statistics import EstimatorStatistics
-from vobench.report.leaderboard import board
-from vobench.runner.consistency import Consistency
+from vobench.report.leaderboard import make_board
+from vobench.runner.consistency import CovarianceConsistency
 
 
 def test_a_still_case_shows_the_largest_drift_of_its_trials_and_no_error(scored):
     scores = [scored("a", repeat=n, drift_m=drift, ate_m=9.0) for n, drift in enumerate((0.0023, 0.001))]
-    (cell,) = board(scores, {}).cells
+    (cell,) = make_board(scores, {}).cells
     assert (cell.drift_mm, cell.spread("ate_mm"), cell.failed) == (2.3, None, 0)
 
 
@@ -69,7 +69,7 @@ def test_revised_poses_and_scale_are_means_over_the_trials_that_survived(scored)
 
 def test_the_consistency_is_that_of_the_median_trial_that_survived(scored):
     def trial(repeat, gap, status="ok"):
-        consistency = Consistency(poses=9, nees_mean=1.0, nees_median=1.0, scale_gap=gap, covered_90=0.9)
+        consistency = CovarianceConsistency(poses=9, nees_mean=1.0, nees_median=1.0, scale_gap=gap, covered_90=0.9)
         return scored("a", status, repeat=repeat, consistency=consistency)
 
     cell = make([trial(0, 3.0), trial(1, 1.0), trial(2, 2.0), trial(3, 99.0, "lost"), trial(4, 98.0, "lost")])

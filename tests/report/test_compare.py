@@ -17,7 +17,7 @@ from vobench.report.compare import (
     compare,
     environment_differences,
 )
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 from vobench.runner.environment import Environment, Processor
 
 
@@ -25,7 +25,7 @@ from vobench.runner.environment import Environment, Processor
 def trials(scored):
     def make(name="a", *, factor=1.0, cases=8, repeats=1, noise=0.1, seed=0):
         rng = np.random.default_rng(seed)
-        return board(
+        return make_board(
             [
                 scored(name, case=f"c{c}", repeat=r, ate_m=0.01 * factor * np.exp(rng.normal(0, noise)))
                 for c in range(cases)
@@ -72,12 +72,12 @@ def test_many_trials_decide_a_cell(trials):
 
 
 def test_what_fails_now_and_what_no_longer_does(scored):
-    well, ill = board([scored("a")], {}), board([scored("a", "crashed", ate_m=None)], {})
+    well, ill = make_board([scored("a")], {}), make_board([scored("a", "crashed", ate_m=None)], {})
     assert [verdicts(*pair)[1][0].verdict for pair in ((well, ill), (ill, well))] == [FAILS, MENDED]
 
 
 def test_cells_of_one_run_alone_are_named(scored):
-    old, new = board([scored("a"), scored("b")], {}), board([scored("a"), scored("a", case="ahead")], {})
+    old, new = make_board([scored("a"), scored("b")], {}), make_board([scored("a"), scored("a", case="ahead")], {})
     assert {(c.case, c.estimator): c.verdict for c in verdicts(old, new)[1]} == {
         ("down", "a"): SAME,
         ("down", "b"): GONE,
@@ -86,8 +86,8 @@ def test_cells_of_one_run_alone_are_named(scored):
 
 
 def test_a_case_that_one_run_could_not_make_is_neither_gone_nor_worse(scored):
-    whole = board([scored("a"), scored("a", case="flat")], {})
-    partial = board([scored("a"), scored("a", "no_sequence", case="flat", ate_m=None)], {})
+    whole = make_board([scored("a"), scored("a", case="flat")], {})
+    partial = make_board([scored("a"), scored("a", "no_sequence", case="flat", ate_m=None)], {})
     for pair in ((whole, partial), (partial, whole)):
         totals, cells = verdicts(*pair)
         assert totals["a"].verdict == SAME
@@ -96,11 +96,12 @@ def test_a_case_that_one_run_could_not_make_is_neither_gone_nor_worse(scored):
 
 def test_another_processor_is_named_and_runs_that_do_not_state_theirs_differ_in_nothing(scored):
     boards = [
-        board([scored("a")], {}, environment=Environment(processors=(Processor("cpu", simd),))) for simd in ("v3", "v4")
+        make_board([scored("a")], {}, environment=Environment(processors=(Processor("cpu", simd),)))
+        for simd in ("v3", "v4")
     ]
     assert environment_differences(*boards) == ["processor cpu (v3) → cpu (v4)"]
     assert environment_differences(boards[0], boards[0]) == []
-    assert environment_differences(board([scored("a")], {}), boards[1]) == []
+    assert environment_differences(make_board([scored("a")], {}), boards[1]) == []
 
 
 def test_runs_of_different_suites_are_a_sentence(scored):
@@ -108,12 +109,12 @@ def test_runs_of_different_suites_are_a_sentence(scored):
         InputError,
         match="the two runs have no estimator on the same case: the old run has a on down, the new run has a on ahead",
     ):
-        compare(board([scored("a")], {}), board([scored("a", case="ahead")], {}))
+        compare(make_board([scored("a")], {}), make_board([scored("a", case="ahead")], {}))
 
 
 def one_cell(scored, errors, statuses=None):
     statuses = statuses or ["ok"] * len(errors)
-    return board(
+    return make_board(
         [
             scored("a", status, repeat=n, ate_m=ate)
             for n, (status, ate) in enumerate(zip(statuses, errors, strict=True))
@@ -132,12 +133,12 @@ def test_a_cell_is_described_by_its_error_and_its_failures(scored):
     assert (change.old, change.new) == ("3 %", "5 %, 1/2 lost")
     failed = cell_change(scored, ([None], ["crashed"]), ([0.02],))
     assert (failed.old, failed.new) == ("1/1 crashed", "2 %")
-    stationary = board([scored("a", drift_m=0.1)], {})
+    stationary = make_board([scored("a", drift_m=0.1)], {})
     assert verdicts(stationary, stationary)[1][0].old == "ok"
 
 
 def test_a_cell_of_one_run_alone_has_a_dash_for_the_other(scored):
-    old, new = board([scored("a"), scored("b")], {}), board([scored("a")], {})
+    old, new = make_board([scored("a"), scored("b")], {}), make_board([scored("a")], {})
     gone = next(change for change in verdicts(old, new)[1] if change.verdict == GONE)
     assert (gone.old, gone.new, gone.ratio, gone.p) == ("10 %", "–", None, None)
 
@@ -191,7 +192,7 @@ def test_a_total_has_both_scores_and_the_limit_counts_for_it_too(trials):
 
 
 def test_totals_come_first_by_name_and_then_every_cell(trials, scored):
-    made = board([scored(name, case=case) for name in ("b", "a") for case in ("x", "y")], {})
+    made = make_board([scored(name, case=case) for name in ("b", "a") for case in ("x", "y")], {})
     changes = compare(made, made)
     assert [(change.estimator, change.case) for change in changes] == [
         ("a", ""),

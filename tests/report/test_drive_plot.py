@@ -233,12 +233,12 @@ def test_a_log_is_that_of_its_drive():
         )
 
     state = np.arange(12.0).reshape(3, 4)
-    log = drive_plot.log_of(drive("circle", SimpleNamespace(state=state)))
+    log = drive_plot.drive_log(drive("circle", SimpleNamespace(state=state)))
     assert log.title == "circle"
     assert log.t_s.tolist() == [0.0, 0.5]
     assert log.point_m.tolist() == [[0, 1], [8, 9]]
     assert (log.targets_m, log.patches) == (None, ())
-    alone = drive_plot.log_of(drive("mine", None))
+    alone = drive_plot.drive_log(drive("mine", None))
     assert (alone.title, alone.point_m) == ("mine: circle", None)
 
 

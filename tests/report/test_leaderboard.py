@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.boards import CASES, outcomes_of_four, scores_of
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 from vobench.runner.folder import SURVIVED
 
 
@@ -18,7 +18,7 @@ def failed(results):
 @settings(max_examples=25)
 @given(outcomes_of_four)
 def test_no_failure_ranks_before_a_survivor_however_small_its_error(outcomes):
-    made = board(scores_of(outcomes), {})
+    made = make_board(scores_of(outcomes), {})
     lost = [total.failed for total in made.totals]
     assert lost == sorted(lost)
     places = {total.estimator: total.place for total in made.totals}
@@ -31,7 +31,7 @@ def test_no_failure_ranks_before_a_survivor_however_small_its_error(outcomes):
 @settings(max_examples=25)
 @given(outcomes_of_four)
 def test_everyone_who_ran_is_in_the_totals_once_and_in_every_case(outcomes):
-    made = board(scores_of(outcomes), {})
+    made = make_board(scores_of(outcomes), {})
     assert {total.estimator: total.failed for total in made.totals} == {n: failed(r) for n, r in outcomes.items()}
     assert sorted((cell.case, cell.estimator) for cell in made.cells) == sorted((c, n) for c in CASES for n in outcomes)
 
@@ -41,19 +41,19 @@ def test_everyone_who_ran_is_in_the_totals_once_and_in_every_case(outcomes):
 def test_the_order_of_scores_does_not_matter(outcomes, random):
     shuffled = scores_of(outcomes)
     random.shuffle(shuffled)
-    assert board(shuffled, {}) == board(scores_of(outcomes), {})
+    assert make_board(shuffled, {}) == make_board(scores_of(outcomes), {})
 
 
 @given(st.floats(0, 0.1), st.floats(0, 0.1))
 def test_among_survivors_the_smaller_error_is_first(one, other):
-    totals = board(scores_of({"p": [("ok", one)] * 2, "q": [("ok", other)] * 2}), {}).totals
+    totals = make_board(scores_of({"p": [("ok", one)] * 2, "q": [("ok", other)] * 2}), {}).totals
     if abs(one - other) > 1e-6:
         assert totals[0].estimator == ("p" if one < other else "q")
 
 
 def test_cases_without_a_sequence_are_one_sentence_and_change_nothing_else(incomplete):
-    made = board(incomplete, {})
-    complete = board([score for score in incomplete if score.case == "down"], {})
+    made = make_board(incomplete, {})
+    complete = make_board([score for score in incomplete if score.case == "down"], {})
     assert (made.cells, made.totals) == (complete.cells, complete.totals)
     assert made.remarks == (
         "3 of 4 cases could not be simulated or imported and count for no estimator: dark, dim: no light; far: too far",
@@ -62,7 +62,7 @@ def test_cases_without_a_sequence_are_one_sentence_and_change_nothing_else(incom
 
 
 def test_one_that_never_survived_has_no_error_and_a_reason(mixed):
-    made = board(mixed, {})
+    made = make_board(mixed, {})
     dead = made.totals[-1]
     assert (dead.estimator, dead.failed, dead.trials, dead.ate_percent) == ("dead", 2, 2, None)
     assert made.cell("down", "dead").status == "crashed"
@@ -76,7 +76,7 @@ def test_a_case_that_stands_still_changes_no_error_and_no_rank(outcomes, drift_m
     still = [
         s.model_copy(update={"case": "still", "drift_m": drift_m, "status": "ok"}) for s in moving if s.case == "a"
     ]
-    before, after = (board(scores, {}).totals for scores in (moving, [*moving, *still]))
+    before, after = (make_board(scores, {}).totals for scores in (moving, [*moving, *still]))
     shown = [[(t.place, t.estimator, round(t.score, 9), t.ate_percent) for t in each] for each in (before, after)]
     assert shown[0] == shown[1]
 
@@ -107,5 +107,5 @@ def timed_board(cases, estimators):
         for n in range(estimators)
     ]
     began = time.process_time()
-    made = board(trials, {})
+    made = make_board(trials, {})
     return made, time.process_time() - began

@@ -42,7 +42,7 @@ class Outline(HTMLParser):
 
 
 def text_of(run, scores):
-    return page.html(run, scores, page.board_of(run, scores), run.path)
+    return page.board_page(run, scores, page.run_board(run, scores), run.path)
 
 
 @pytest.fixture
@@ -222,5 +222,5 @@ def test_costs_are_means_and_memory_a_maximum(scored, write_run, tmp_path):
 def test_a_run_without_any_number_has_a_page(tmp_path, scored, write_run):
     trials = [scored("a", "crashed", ate_m=None, drift_m=0.0, coverage=0.0)]
     folder = write_run(tmp_path / "suite" / "stamp", trials)
-    made = page.board_of(folder, [])
-    assert '<option value="ate" selected>ATE % of path</option>' in page.html(folder, [], made, tmp_path)
+    made = page.run_board(folder, [])
+    assert '<option value="ate" selected>ATE % of path</option>' in page.board_page(folder, [], made, tmp_path)

@@ -9,7 +9,7 @@ import pytest
 from vobench.report import page_data as module
 from vobench.report.board_table import matrix
 from vobench.report.frame_statistics import EstimatorStatistics
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 from vobench.report.page_data import page_data
 from vobench.report.practice import PRACTICES
 from vobench.report.thumbnail import Thumbnails
@@ -18,7 +18,7 @@ from vobench.runner.frames import COLUMNS, FRAMES, new_table
 
 
 def data_of(folder, trials, *, metrics=("ate",), answered=None, beside=None):
-    made = board(trials, answered or {})
+    made = make_board(trials, answered or {})
     matrices = {name: matrix(made, name) for name in metrics}
     data = page_data(folder, trials, made, matrices, thumbnails=Thumbnails(folder), beside=beside or folder.path)
     return json.loads(json.dumps(data, allow_nan=False))

@@ -3,13 +3,13 @@
 import pytest
 
 from vobench.report.board_metric import METRICS
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 from vobench.report.run_tables import FIRST_COLUMNS, board_frame, cell_frame, frames_frame, trial_frame
 
 
 def test_the_board_has_a_row_per_estimator_the_best_first(scored):
     scores = [scored("a", case=f"c{k}", ate_m=0.02 + 0.001 * k, claims=("Sim(3)", "not causal")) for k in range(8)]
-    made = board([*scores, *(scored("b", case=f"c{k}", ate_m=0.01) for k in range(8))], {})
+    made = make_board([*scores, *(scored("b", case=f"c{k}", ate_m=0.01) for k in range(8))], {})
     table = board_frame(made)
     assert tuple(table.columns[: len(FIRST_COLUMNS)]) == FIRST_COLUMNS
     assert list(table["estimator"]) == ["b", "a"]
@@ -22,14 +22,14 @@ def test_the_board_has_a_row_per_estimator_the_best_first(scored):
 
 
 def test_tables_of_nothing_are_empty(tmp_path):
-    assert board_frame(board([], {})).empty
-    assert cell_frame(board([], {})).empty
+    assert board_frame(make_board([], {})).empty
+    assert cell_frame(make_board([], {})).empty
     assert trial_frame([]).empty
     assert frames_frame(None, []).empty
 
 
 def test_cells_have_a_row_per_case_and_estimator(scored):
-    table = cell_frame(board([scored("a"), scored("a", case="ahead"), scored("b")], {}))
+    table = cell_frame(make_board([scored("a"), scored("a", case="ahead"), scored("b")], {}))
     assert list(zip(table["case"], table["estimator"], strict=True)) == [("ahead", "a"), ("down", "a"), ("down", "b")]
 
 

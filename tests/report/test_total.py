@@ -5,31 +5,31 @@ import pytest
 from vobench.report.board_markdown import markdown
 from vobench.report.cell import CaseFacts
 from vobench.report.frame_statistics import EstimatorStatistics
-from vobench.report.leaderboard import board
+from vobench.report.leaderboard import make_board
 
 
 def test_who_lacks_a_sensor_in_some_cases_is_ranked_on_the_others_and_in_all_of_them_behind(scored):
     trials = [scored("blind", ate_m=0.9), scored("blind", case="flat", ate_m=0.9), scored("wheels", ate_m=0.01)]
     unfit = scored("wheels", "not_applicable", case="flat", ate_m=None, coverage=0.0)
-    made = board([*trials, unfit], {})
+    made = make_board([*trials, unfit], {})
     assert [(total.estimator, total.failed, total.cases) for total in made.totals] == [
         ("wheels", 0, 1),
         ("blind", 0, 1),
     ]
     assert "Totals cover the 1 of 2 cases that all estimators share (wheels has 1)" in made.remarks[0]
     everywhere = [scored("wheels", "not_applicable", case=case, ate_m=None, coverage=0.0) for case in ("down", "flat")]
-    last = board([*trials[:2], *everywhere], {}).totals[-1]
+    last = make_board([*trials[:2], *everywhere], {}).totals[-1]
     assert (last.estimator, last.failed) == ("wheels", 2)
 
 
 def test_totals_are_over_the_cases_that_all_have_and_say_so(scored):
-    made = board([scored("a"), scored("a", case="ahead"), scored("b")], {})
+    made = make_board([scored("a"), scored("a", case="ahead"), scored("b")], {})
     assert {total.cases for total in made.totals} == {1}
     assert "Totals cover the 1 of 2 cases that all estimators share (b has 1)" in made.remarks[0]
 
 
 def test_estimators_that_share_no_case_are_not_ranked(scored):
-    made = board([scored("a"), scored("b", case="ahead")], {})
+    made = make_board([scored("a"), scored("b", case="ahead")], {})
     assert made.totals == ()
     assert "No estimator is ranked" in made.remarks[0]
     assert "| ahead |" in markdown(made)
@@ -37,14 +37,14 @@ def test_estimators_that_share_no_case_are_not_ranked(scored):
 
 def test_calibrations_have_totals_of_their_own(scored):
     facts = {"down": CaseFacts(group="none"), "ahead": CaseFacts(group="worn")}
-    made = board([scored(n, case=case) for n in "ab" for case in facts], {}, facts)
+    made = make_board([scored(n, case=case) for n in "ab" for case in facts], {}, facts)
     assert [(total.group, total.cases) for total in made.totals] == [("none", 1)] * 2 + [("worn", 1)] * 2
 
 
 def test_whoever_is_cheaper_than_all_before_is_efficient(scored):
     costs = {"a": 10.0, "b": 20.0, "c": 5.0}
     answered = {("down", name): EstimatorStatistics(cost) for name, cost in costs.items()}
-    made = board([scored(n, ate_m=ate) for n, ate in (("a", 0.001), ("b", 0.002), ("c", 0.003))], answered)
+    made = make_board([scored(n, ate_m=ate) for n, ate in (("a", 0.001), ("b", 0.002), ("c", 0.003))], answered)
     assert [(total.estimator, total.is_efficient) for total in made.totals] == [("a", True), ("b", False), ("c", True)]
 
 
@@ -52,7 +52,7 @@ def test_an_error_is_never_averaged_over_paths_of_other_lengths(scored):
     """The one that is a tenth of its path off on 1 m and exact on 1 km is no better than the other way round."""
     ways = [("short", 1.0, "down", 0.09), ("short", 1000.0, "ahead", 1.0), ("long", 1.0, "down", 0.001)]
     ways.append(("long", 1000.0, "ahead", 90.0))
-    made = board([scored(name, case=case, path_m=path, ate_m=ate) for name, path, case, ate in ways], {})
+    made = make_board([scored(name, case=case, path_m=path, ate_m=ate) for name, path, case, ate in ways], {})
     assert [total.place for total in made.totals] == [1, 1]
     assert [total.ate_percent for total in made.totals] == pytest.approx([4.55, 4.55])
 
@@ -62,7 +62,7 @@ def test_a_total_adds_up_its_cells(scored):
     costs["ahead", "a"] = EstimatorStatistics(4.0, memory_mib=10.0)
     costs["far", "a"] = EstimatorStatistics(9.0, memory_mib=20.0)
     trials = [scored("a", case=case, ate_m=ate) for case, ate in (("down", 0.01), ("ahead", 0.02), ("far", 0.06))]
-    (total,) = board([*trials, scored("a", "lost", case="far", repeat=1)], costs).totals
+    (total,) = make_board([*trials, scored("a", "lost", case="far", repeat=1)], costs).totals
     assert (total.trials, total.failed, total.cases) == (4, 1, 3)
     assert total.ate_percent == pytest.approx(2.0)
     assert (total.cpu_ms, total.memory_mib) == (5.0, 30.0)
@@ -75,7 +75,7 @@ def test_a_score_is_one_minus_the_geometric_mean_of_the_losses(scored):
         scored("a", case=case, score={"metrics": [], "failure": {"lost_aware": 1 - loss}})
         for case, loss in zip(("down", "ahead"), losses, strict=True)
     ]
-    (total,) = board(trials, {}).totals
+    (total,) = make_board(trials, {}).totals
     assert total.score == pytest.approx(1 - (losses[0] * losses[1]) ** 0.5)
     assert total.loss_ratio == pytest.approx(1.0)
 
@@ -95,28 +95,28 @@ def test_too_few_trials_and_too_few_cases_are_remarks(scored, cases, repeats, re
         for case in range(cases)
         for repeat in range(repeats)
     ]
-    assert board(trials, {}).remarks == ((remark,) if remark else ())
+    assert make_board(trials, {}).remarks == ((remark,) if remark else ())
     alone = [trial for trial in trials if trial.estimator == "a"]
-    assert board(alone, {}).remarks == ()
+    assert make_board(alone, {}).remarks == ()
 
 
 def test_the_estimator_with_the_fewest_cases_is_named_the_first_of_several(scored):
     trials = [scored("c", case=case) for case in ("down", "ahead", "far")]
     trials += [scored("b", case=case) for case in ("down", "ahead")]
     trials += [scored("a", case=case) for case in ("down", "far")]
-    assert board(trials, {}).remarks[0] == "Totals cover the 1 of 3 cases that all estimators share (a has 2)"
+    assert make_board(trials, {}).remarks[0] == "Totals cover the 1 of 3 cases that all estimators share (a has 2)"
 
 
 def test_without_a_cost_nobody_is_efficient_and_an_equal_cost_is_not_less(scored):
     scores = [scored("a", ate_m=0.001), scored("b", ate_m=0.002)]
-    assert [total.is_efficient for total in board(scores, {}).totals] == [False, False]
+    assert [total.is_efficient for total in make_board(scores, {}).totals] == [False, False]
     equal = {("down", name): EstimatorStatistics(3.0) for name in "ab"}
-    assert [total.is_efficient for total in board(scores, equal).totals] == [True, False]
+    assert [total.is_efficient for total in make_board(scores, equal).totals] == [True, False]
     one = {("down", "b"): EstimatorStatistics(3.0)}
-    assert [total.is_efficient for total in board(scores, one).totals] == [False, True]
+    assert [total.is_efficient for total in make_board(scores, one).totals] == [False, True]
 
 
 def test_of_two_with_the_same_score_the_cheaper_one_is_efficient(scored):
     costs = {("down", "a"): EstimatorStatistics(3.0), ("down", "b"): EstimatorStatistics(2.0)}
-    made = board([scored("a"), scored("b")], costs)
+    made = make_board([scored("a"), scored("b")], costs)
     assert {total.estimator: total.is_efficient for total in made.totals} == {"a": False, "b": True}

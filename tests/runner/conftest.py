@@ -11,7 +11,8 @@ from vobench.runner.executor import Serial
 from vobench.runner.folder import RunFolder
 from vobench.runner.import_recording import read_all
 from vobench.runner.run import run_suite
-from vobench.suite.suite import Plan, read_plan
+from vobench.suite.plan import Plan
+from vobench.suite.suite import read_plan
 
 CLOSET = """
 name: closet

@@ -13,7 +13,7 @@ from vobench.runner.consistency import (
     HEAD,
     MEDIAN,
     NINETY_PERCENT,
-    Consistency,
+    CovarianceConsistency,
     format_covariances,
     read_covariances,
     trial_consistency,
@@ -36,7 +36,7 @@ def mean_nees(found):
 
 
 def board_of(run):
-    return page.board_of(run, run.scores())
+    return page.run_board(run, run.scores())
 
 
 def test_the_quantiles_are_those_of_the_law():
@@ -142,7 +142,7 @@ def test_a_file_of_covariances_of_other_poses_is_refused(tmp_path):
 
 @pytest.mark.parametrize(("factor", "verdict"), [(1, "what it holds"), (5, "too much"), (0.2, "too little")])
 def test_the_gap_is_the_factor_between_errors_and_deviations(factor, verdict):
-    found = Consistency.of(factor**2 * np.random.default_rng(2).chisquare(6, 20_000))
+    found = CovarianceConsistency.of(factor**2 * np.random.default_rng(2).chisquare(6, 20_000))
     assert found.scale_gap == pytest.approx(factor, rel=0.02)
     assert found.sentence.startswith(f"claims {verdict}: ")
 
@@ -196,5 +196,5 @@ def test_without_stated_covariances_there_is_no_consistency(tmp_path):
     ("gap", "verdict"), [(1.99, "what it holds"), (2.01, "too much"), (0.51, "what it holds"), (0.49, "too little")]
 )
 def test_a_gap_within_a_half_and_two_is_let_pass(gap, verdict):
-    found = Consistency.of(np.full(3, MEDIAN * gap**2))
+    found = CovarianceConsistency.of(np.full(3, MEDIAN * gap**2))
     assert found.sentence.startswith(f"claims {verdict}: ")

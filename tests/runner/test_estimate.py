@@ -20,8 +20,9 @@ from vobench.runner.frames import ANSWERS, read_table
 from vobench.runner.store import SilentProgress
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import SequenceWriter
+from vobench.suite.entrant import EstimatorEntry
 from vobench.suite.manifest import read_manifest
-from vobench.suite.suite import Entrant, Trial
+from vobench.suite.plan import Trial
 
 LENS = Pinhole(64, 48, 50.0, 50.0, 31.5, 23.5)
 STEREO = replace(stereo_rig(LENS, pitch_deg=15), imu=ImuCalibration(np.eye(4), 100.0, 1e-4, 1e-3, 1e-5, 1e-4))
@@ -70,7 +71,7 @@ def recorded(folder: Path, rig: Rig, *, frames: int = 3) -> Path:
 
 
 def estimated(tmp_path: Path, sequence: Path, plugin: Path) -> Path:
-    entrant, folder = Entrant("mine", plugin, read_manifest(plugin), {}), tmp_path / "estimate"
+    entrant, folder = EstimatorEntry("mine", plugin, read_manifest(plugin), {}), tmp_path / "estimate"
     folder.mkdir()
     estimate(Trial(Named(), entrant, 0), sequence, folder, SilentProgress())
     return folder

@@ -15,7 +15,7 @@ import pytest
 from vobench.report import page
 from vobench.report.verify import verify_run
 from vobench.runner import executor
-from vobench.runner.executor import Dask, Done, Event, Executor, LocalProcesses, Serial, perform_all
+from vobench.runner.executor import Dask, Executor, LocalProcesses, Serial, TaskEvent, TaskOutcome, perform_all
 from vobench.runner.folder import PAGE, RunFolder
 from vobench.runner.run import run_suite
 from vobench.runner.store import locked
@@ -33,7 +33,7 @@ class Recorder:
     """An executor that keeps what runs beside what; a task ends at the next turn, by the failures that are given."""
 
     slots: int
-    failures: dict[str, Done] = field(default_factory=dict)
+    failures: dict[str, TaskOutcome] = field(default_factory=dict)
     beside: list[tuple[str, int]] = field(default_factory=list)
     running: list = field(default_factory=list)
     threads: dict[str, int] = field(default_factory=dict)
@@ -46,7 +46,7 @@ class Recorder:
         self.running.append(future)
         self.threads[one.inputs["name"]] = threads
         self.beside.append((one.inputs["name"], sum(not other.done() for other in self.running) - 1))
-        Timer(0.02, lambda: future.set_result(self.failures.get(one.key, Done()))).start()
+        Timer(0.02, lambda: future.set_result(self.failures.get(one.key, TaskOutcome()))).start()
         return future
 
     def close(self):
@@ -61,7 +61,7 @@ ALL = [LIGHT, *PICTURES, *ESTIMATES, *SCORES]
 
 
 def test_tasks_come_after_what_they_need_and_two_at_a_time(tmp_path):
-    executor, heard = Recorder(2), list[Event]()
+    executor, heard = Recorder(2), list[TaskEvent]()
     assert perform_all(ALL, tmp_path, executor, heard=heard.append) == {}
     ended = list[str]()
     for event in heard:
@@ -123,10 +123,10 @@ def test_each_slot_has_cores_of_its_own_as_long_as_there_are_some(slot, threads,
 
 
 def test_a_failure_takes_what_needs_it_along_and_nothing_else(tmp_path):
-    failures = {PICTURES[1].key: Done("crashed", "lens fell off")}
+    failures = {PICTURES[1].key: TaskOutcome("crashed", "lens fell off")}
     found = perform_all(ALL, tmp_path, Recorder(2, failures))
     assert set(found) == {PICTURES[1].key, ESTIMATES[1].key, SCORES[1].key}
-    assert found[SCORES[1].key] == Done("crashed", "its sequence could not be made: lens fell off")
+    assert found[SCORES[1].key] == TaskOutcome("crashed", "its sequence could not be made: lens fell off")
 
 
 def test_ten_thousand_tasks_are_handed_out_in_little_time(tmp_path):
@@ -135,7 +135,7 @@ def test_ten_thousand_tasks_are_handed_out_in_little_time(tmp_path):
             from concurrent.futures import Future
 
             future = Future()
-            future.set_result(Done())
+            future.set_result(TaskOutcome())
             return future
 
     tasks = [task(f"s{n}") for n in range(2000)]
@@ -318,7 +318,7 @@ def test_a_case_that_cannot_be_simulated_counts_for_no_estimator(bench, tmp_path
 
     monkeypatch.setitem(stages.PERFORMERS, "sequence", some)
     folder = run(bench, tmp_path, Serial())
-    board = page.board_of(folder, folder.scores())
+    board = page.run_board(folder, folder.scores())
     assert board.cases == ["full"]
     assert {total.failed for total in board.totals} == {0}
     assert {s.status for s in folder.scores() if s.case == "dim"} == {"no_sequence"}

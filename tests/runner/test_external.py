@@ -20,9 +20,10 @@ from vobench.runner.frames import read_frames
 from vobench.runner.store import SilentProgress
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import SequenceWriter
+from vobench.suite.entrant import EstimatorEntry
 from vobench.suite.manifest import read_manifest
+from vobench.suite.plan import Trial
 from vobench.suite.source import RecordedCase, Source
-from vobench.suite.suite import Entrant, Trial
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
 
@@ -103,7 +104,7 @@ def test_a_program_by_stream_stands_where_the_null_hypothesis_stands(bench, firs
     folder = manifest(tmp_path / "streamed", stream=f"[{sys.executable}, ./stream_client.py]")
     shutil.copy(EXAMPLES / "stream_client.py", folder)
     run = bench.run((ESTIMATORS, f"[{folder}, stand_still]"))
-    cells = {cell.estimator: cell for cell in page.board_of(run, run.scores()).cells}
+    cells = {cell.estimator: cell for cell in page.run_board(run, run.scores()).cells}
     assert cells["streamed"].status == cells["stand_still"].status
     assert cells["streamed"].values["ate_mm"] == cells["stand_still"].values["ate_mm"]
     frames = read_frames(run.estimate("full", "streamed", 0))
@@ -160,7 +161,7 @@ def test_a_perfect_program_is_perfect_whatever_frame_it_gives_the_poses_of(tmp_p
     (folder / "poses.tum").write_text(format_tum(Trajectory(t_ns, T_world_body @ T_body_frame)))
     case = RecordedCase(name="case", variant={}, source=Source(path="."))
     (tmp_path / "estimate").mkdir()
-    entrant = Entrant("perfect", folder, read_manifest(folder), {})
+    entrant = EstimatorEntry("perfect", folder, read_manifest(folder), {})
     estimate(Trial(case, entrant, 0), tmp_path / "sequence", tmp_path / "estimate", SilentProgress())
     assert read_outcome(tmp_path / "estimate").reason == ""
     est, gt = read_tum(tmp_path / "estimate" / ESTIMATE), T_world_body @ rig.T_body_left

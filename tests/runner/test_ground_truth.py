@@ -7,7 +7,7 @@ from vobench.geometry import se3
 from vobench.runner.frames import EXPOSURES, GROUND_TRUTH, read_table
 from vobench.runner.ground_truth import LONGEST_GAP_NS, is_known, left_truth, noisy, write_ground_truth
 from vobench.sequence import Sequence, read_truth
-from vobench.suite.suite import EXACT, TruthNoise
+from vobench.suite.suite_spec import EXACT, TruthNoise
 from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Trajectory
 

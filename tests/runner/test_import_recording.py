@@ -120,7 +120,7 @@ def test_a_recording_that_stands_still_has_a_drift_and_no_error_among_others(ben
     assert (unfit.status, unfit.reason) == ("not_applicable", "it needs 'encoders', but this recording has no wheels")
     board = (run.path / "leaderboard.md").read_text()
     assert f"lk_epipolar: drift of {1e3 * drift_m:.1f} mm while the camera is stationary" in board
-    made = page.board_of(run, run.scores())
+    made = page.run_board(run, run.scores())
     kitti = {cell.estimator: cell.spread("ate") for cell in made.cells if cell.case == "kitti"}
     assert all(total.ate_percent == kitti[total.estimator][0] for total in made.totals if kitti[total.estimator])
 

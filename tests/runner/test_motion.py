@@ -75,8 +75,14 @@ def test_velocity_is_the_slope_of_position_and_acceleration_that_of_velocity(cas
     np.testing.assert_allclose(slope(*speeds), now.acceleration_mps2, atol=1e-4)
     turned = np.swapaxes(before.T_world_body[:, :3, :3], -1, -2) @ after.T_world_body[:, :3, :3]
     skew = (turned - np.swapaxes(turned, -1, -2)) / 2 / step_s
-    np.testing.assert_allclose(np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], -1), now.turn_radps, atol=1e-6)
-    np.testing.assert_allclose((after.turn_radps - before.turn_radps) / step_s, now.turn_rate_radps2, atol=1e-4)
+    np.testing.assert_allclose(
+        np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], -1), now.angular_velocity_radps, atol=1e-6
+    )
+    np.testing.assert_allclose(
+        (after.angular_velocity_radps - before.angular_velocity_radps) / step_s,
+        now.angular_acceleration_radps2,
+        atol=1e-4,
+    )
 
 
 @pytest.mark.parametrize("name", WAYS)

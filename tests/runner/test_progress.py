@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from vobench.runner.executor import Event
+from vobench.runner.executor import TaskEvent
 from vobench.runner.progress import RunProgress, spell_time
 
 
@@ -22,13 +22,13 @@ CHAIN = [
 ]
 
 
-def done(of: Any, wall_s: float) -> Event:
-    return Event("done", of, slot=0, wall_s=wall_s)
+def done(of: Any, wall_s: float) -> TaskEvent:
+    return TaskEvent("done", of, slot=0, wall_s=wall_s)
 
 
 def test_a_started_task_is_not_done():
     progress = RunProgress(CHAIN)
-    progress.count(Event("started", CHAIN[0], slot=0))
+    progress.count(TaskEvent("started", CHAIN[0], slot=0))
     assert (progress.finished, progress.planned, progress.share) == (0, 5, 0.0)
 
 
@@ -46,7 +46,7 @@ def test_the_share_is_by_tasks_where_a_stage_has_never_been_timed():
 
 def test_a_failed_task_takes_all_that_need_it_with_it():
     progress = RunProgress(CHAIN)
-    progress.count(Event("failed", CHAIN[0], slot=0, reason="no driver"))
+    progress.count(TaskEvent("failed", CHAIN[0], slot=0, reason="no driver"))
     assert (progress.finished, progress.share) == (5, 1.0)
 
 

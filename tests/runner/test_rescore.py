@@ -147,7 +147,7 @@ def test_a_trial_that_the_hashes_do_not_name_is_reported(honest, tmp_path):
 
 def test_a_forged_rank_is_not_the_rank_of_the_board(honest, tmp_path):
     with opened(packed(first_rank(dict(honest)), tmp_path / "a.zip")) as folder:
-        board = page.board_of(folder, check(folder).scores)
+        board = page.run_board(folder, check(folder).scores)
     assert [total.estimator for total in board.totals] == ["wheel_odometry", "stand_still"]
 
 
@@ -189,7 +189,7 @@ def test_the_name_of_a_runs_file_gets_into_no_label_as_it_is(honest, tmp_path):
 def test_a_text_that_a_spreadsheet_would_execute_is_a_text(first):
     scores = first.scores()
     scores[0] = scores[0].model_copy(update={"reason": "=cmd|' /C calc'!A0", "status": "crashed"})
-    text = board_records.as_csv(page.board_of(first, scores))
+    text = board_records.as_csv(page.run_board(first, scores))
     assert "'=cmd|" in text
     assert ",=cmd|" not in text
 

@@ -5,7 +5,7 @@ import pytest
 
 from vobench.geometry import se3
 from vobench.metric.definitions import DEFINITIONS
-from vobench.runner.estimate import FINISHED, REVISED, Outcome
+from vobench.runner.estimate import FINISHED, REVISED, EstimatorOutcome
 from vobench.runner.score import (
     LEAST_DIVERGED_M,
     OF_NO_SCALE,
@@ -25,7 +25,7 @@ from vobench.trajectory.trajectory import Trajectory
 
 POSES = 41
 T_NS = np.arange(POSES, dtype=np.int64) * 50_000_000
-DONE = Outcome(kind=FINISHED, reason="")
+DONE = EstimatorOutcome(kind=FINISHED, reason="")
 
 
 def path(positions_m, angles_rad=None) -> Trajectory:
@@ -115,7 +115,7 @@ def test_the_drift_is_the_extent_of_a_scored_estimate_where_the_truth_stands_sti
 
 def test_a_process_that_failed_counts_before_its_answers():
     gt = straight(1.0)
-    failed = Outcome(kind="crashed", reason="signal SIGSEGV")
+    failed = EstimatorOutcome(kind="crashed", reason="signal SIGSEGV")
     assert status_of(failed, score_estimate(gt, gt, ()), gt) == ("crashed", "signal SIGSEGV")
 
 

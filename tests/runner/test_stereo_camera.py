@@ -12,7 +12,8 @@ from vobench.rendering.renderer import Radiance, View
 from vobench.runner.motion import body_motion
 from vobench.runner.stereo_camera import Displacement, StereoCamera, World
 from vobench.scene.material import LUMINANCE, Rgb
-from vobench.suite.suite import Case, read_plan
+from vobench.suite.case import Case
+from vobench.suite.suite import read_plan
 
 WHITE_CD_M2 = 50
 SCENE = """name: cell

@@ -237,7 +237,7 @@ def test_whoever_waits_answers_a_stop_within_a_second(store, held, monkeypatch):
         with pytest.raises(stop.Stopped):
             store.get("kind", {}, write(""))
     finally:
-        stop.forget()
+        stop.withdraw_requests()
     assert len(naps_s) > 1
     assert max(naps_s) < 1
 

@@ -5,7 +5,7 @@ import pytest
 
 from vobench.asset.outdoors import walker
 from vobench.geometry import se3
-from vobench.scene.scene import Gait, Path
+from vobench.scene.scene import LimbMotion, Path
 
 PATH = Path(np.array([1.0, 3.0, 4.0]), np.array([[0.0, 0, 0], [2, 0, 0], [2, 3, 0.5]]), np.array([0.0, 0.0, 90.0]))
 AGAIN = Path(PATH.times_s, PATH.positions_m, PATH.yaw_deg, repeats=True)
@@ -44,10 +44,10 @@ def test_a_way_that_repeats_goes_on_growing() -> None:
     assert [AGAIN.distance_m(t * 1e9) for t in (2, 5, 8)] == pytest.approx([1, 1 + length_m, 1 + 2 * length_m])
 
 
-def gaits(path: Path, by: float = 1.0) -> list[tuple[Gait, np.ndarray]]:
+def gaits(path: Path, by: float = 1.0) -> list[tuple[LimbMotion, np.ndarray]]:
     """The limbs of a walker, and the points of each."""
     who = walker(np.random.default_rng(0))
-    ways = [Gait(path, who.cycle_m, limb.joints_m, limb.pitch_rad, who.rise_m).sized(by) for limb in who.limbs]
+    ways = [LimbMotion(path, who.cycle_m, limb.joints_m, limb.pitch_rad, who.rise_m).sized(by) for limb in who.limbs]
     points = [np.concatenate([part.mesh.vertices for part in limb.parts]) * by for limb in who.limbs]
     return list(zip(ways, points, strict=True))
 

@@ -10,7 +10,15 @@ from scipy.optimize import curve_fit
 from vobench.errors import InputError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.scene.light import Flicker
-from vobench.sensor.exposure import AutoExposure, Exposure, Strip, row_stamps, start, step, strips
+from vobench.sensor.exposure import (
+    AutoExposure,
+    Exposure,
+    RowStrip,
+    initial_exposures,
+    next_exposures,
+    row_stamps,
+    strips,
+)
 from vobench.sensor.image_sensor import CAMERAS, CameraSensor, CameraSettings, NoiseStreams, Radiance, expose
 
 FREE = AutoExposure(t_min_ms=1e-3, t_max_ms=1e4)
@@ -24,10 +32,10 @@ SCENES: dict[str, Radiance] = {
 
 def levels(loop: AutoExposure, chip: CameraSensor, scene: Radiance, first: Exposure, pictures: int) -> Array:
     """Time × gain of each picture."""
-    state, noise, taken = start(loop, first), NoiseStreams(*np.random.default_rng(1).spawn(2)), []
+    state, noise, taken = initial_exposures(loop, first), NoiseStreams(*np.random.default_rng(1).spawn(2)), []
     for _ in range(pictures):
         taken.append(state[0].time_s * state[0].amplification)
-        state = step(
+        state = next_exposures(
             loop, state, expose(scene, CameraSettings(chip=chip), noise, exposure=state[0]), chip.signal_of_grey
         )
     return np.array(taken)
@@ -86,9 +94,9 @@ def test_time_comes_before_gain_and_both_keep_their_limits() -> None:
     loop, chip = AutoExposure(t_min_ms=1.0, t_max_ms=8.0, gain_max_db=12.0), CAMERAS["clean"]
     noise, seen = NoiseStreams(RNG, RNG), []
     for level in (1e-6, 0.02, 0.05, 0.1, 0.3, 1.0, 1e3):
-        state, scene = start(loop, Exposure(0.005)), np.full((8, 8), level, np.float32)
+        state, scene = initial_exposures(loop, Exposure(0.005)), np.full((8, 8), level, np.float32)
         for _ in range(30):
-            state = step(
+            state = next_exposures(
                 loop, state, expose(scene, CameraSettings(chip=chip), noise, exposure=state[0]), chip.signal_of_grey
             )
         seen.append(state[0])
@@ -103,8 +111,8 @@ def test_time_comes_before_gain_and_both_keep_their_limits() -> None:
 
 def test_a_start_beyond_the_limits_is_brought_within() -> None:
     loop = AutoExposure(t_max_ms=8.0, gain_max_db=6.0)
-    assert start(loop, Exposure(1.0))[0] == Exposure(8e-3, 6.0)
-    assert start(loop, Exposure(1e-6))[0] == Exposure(loop.t_min_ms / 1e3)
+    assert initial_exposures(loop, Exposure(1.0))[0] == Exposure(8e-3, 6.0)
+    assert initial_exposures(loop, Exposure(1e-6))[0] == Exposure(loop.t_min_ms / 1e3)
 
 
 def test_the_percentile_meters_the_share_of_pixels_it_says() -> None:
@@ -170,7 +178,7 @@ def test_strips_tile_the_picture_and_parts_the_exposure(row_strips: int, sub_fra
         assert np.ptp(strip.end_ns - strip.start_ns) <= 1
 
 
-def middle_ns(strip: Strip) -> float:
+def middle_ns(strip: RowStrip) -> float:
     return (int(strip.start_ns[0]) + int(strip.end_ns[-1])) / 2
 
 
@@ -206,7 +214,7 @@ def test_a_rolling_shutter_that_takes_no_time_is_a_global_one() -> None:
         np.testing.assert_array_equal(strip.start_ns, whole.start_ns)
 
 
-def picture(scene: Callable[[float], Array], cut: list[Strip]) -> Array:
+def picture(scene: Callable[[float], Array], cut: list[RowStrip]) -> Array:
     """What a camera keeps of a moving scene: per strip the mean over its parts."""
     kept = np.empty((HEIGHT, WIDTH))
     for strip in cut:

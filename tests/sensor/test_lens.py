@@ -11,12 +11,12 @@ from vobench.geometry.se3 import Array
 from vobench.sensor.image_sensor import CameraSettings, Radiance
 from vobench.sensor.lens import (
     LensMaps,
+    apply_lens,
     blur,
     dirt,
     disc_transfer,
     gaussian_transfer,
     lens_maps,
-    through_lens,
     vignetting,
 )
 
@@ -43,34 +43,34 @@ def maps(effects: CameraSettings, seed: int = 0) -> LensMaps:
 def test_a_lens_without_effects_hands_light_through_untouched() -> None:
     radiance = light()
     assert maps(CLEAN) == LensMaps()
-    assert through_lens(radiance, maps(CLEAN)) is radiance
+    assert apply_lens(radiance, maps(CLEAN)) is radiance
 
 
 def test_flare_moves_light_in_proportion_and_keeps_its_sum() -> None:
     flares = maps(replace(CLEAN, flare=0.2, ghost=0.05, blur_sigma_px=0.7))
     one, other = light(1), 40 * light(2) ** 20
     for radiance in (one, other):
-        assert through_lens(radiance, flares).sum() == pytest.approx(radiance.sum(), rel=1e-6)
-    both = through_lens(one, flares) + through_lens(other, flares)
-    np.testing.assert_allclose(through_lens(one + other, flares), both, rtol=1e-5)
+        assert apply_lens(radiance, flares).sum() == pytest.approx(radiance.sum(), rel=1e-6)
+    both = apply_lens(one, flares) + apply_lens(other, flares)
+    np.testing.assert_allclose(apply_lens(one + other, flares), both, rtol=1e-5)
 
 
 def test_a_lamp_has_its_veil_about_it_and_its_ghost_across_the_middle() -> None:
     lamp = np.zeros(SHAPE, np.float32)
     lamp[30, 100] = 1000.0
-    seen = through_lens(lamp, maps(replace(CLEAN, flare=0.1, ghost=0.04)))
+    seen = apply_lens(lamp, maps(replace(CLEAN, flare=0.1, ghost=0.04)))
     assert seen[30, 100] == pytest.approx(860, rel=0.01)  # and what the veil is there
     ghost = seen[89 - 10 : 89 + 11, 59 - 10 : 59 + 11]  # three sigma of it to all sides
     assert ghost.argmax() == 10 * 21 + 10
-    alone = through_lens(lamp, maps(replace(CLEAN, flare=0.1)))
+    alone = apply_lens(lamp, maps(replace(CLEAN, flare=0.1)))
     assert (ghost - alone[79:100, 49:70]).sum() == pytest.approx(40, rel=0.01)
     h_px, r_px = 0.1 * SHAPE[1], 12
-    middle = through_lens(np.roll(lamp, (30, -20), (0, 1)), maps(replace(CLEAN, flare=0.1)))
+    middle = apply_lens(np.roll(lamp, (30, -20), (0, 1)), maps(replace(CLEAN, flare=0.1)))
     assert middle[60, 80 + r_px] == pytest.approx(100 * h_px / (2 * np.pi * (h_px**2 + r_px**2) ** 1.5), rel=0.05)
 
 
 def test_falloff_is_the_fourth_power_of_the_cosine() -> None:
-    seen = through_lens(np.full(SHAPE, 0.7, np.float32), maps(replace(CLEAN, vignetting=1.0)))
+    seen = apply_lens(np.full(SHAPE, 0.7, np.float32), maps(replace(CLEAN, vignetting=1.0)))
     cosine = rays()[..., 2]
     np.testing.assert_allclose(seen, 0.7 * cosine**4, rtol=0.01)
     exponent, _ = np.polyfit(np.log(cosine.ravel()), np.log(seen.ravel()), 1)
@@ -158,14 +158,14 @@ def test_a_disc_within_a_pixel_changes_nothing() -> None:
 
 @pytest.mark.parametrize("effects", [CameraSettings(blur_sigma_px=2.5), CameraSettings(defocus_px=7.0)])
 def test_blur_keeps_the_sum_of_any_picture_and_even_light_even(effects: CameraSettings) -> None:
-    assert through_lens(light(), maps(effects)).sum(dtype=float) == pytest.approx(light().sum(dtype=float), rel=1e-6)
-    np.testing.assert_allclose(through_lens(np.full(SHAPE, 0.3, np.float32), maps(effects)), 0.3, rtol=1e-6)
+    assert apply_lens(light(), maps(effects)).sum(dtype=float) == pytest.approx(light().sum(dtype=float), rel=1e-6)
+    np.testing.assert_allclose(apply_lens(np.full(SHAPE, 0.3, np.float32), maps(effects)), 0.3, rtol=1e-6)
 
 
 def test_blurring_leaves_no_negative_light_beside_a_lamp() -> None:
     radiance = light() * 1e-3
     radiance[50:60, 70:80] = 1e5
-    blurred = through_lens(radiance, maps(CameraSettings(blur_sigma_px=1.0)))
+    blurred = apply_lens(radiance, maps(CameraSettings(blur_sigma_px=1.0)))
     assert blurred.min() >= 0
     assert blurred[:10].max() < 1.1e-3
 
@@ -204,7 +204,7 @@ def test_the_dirt_of_a_seed_stays_what_it_was_so_that_sequences_come_again() -> 
 def test_dirt_dims_what_is_bright_and_veils_what_is_dark() -> None:
     dirty, radiance = maps(CameraSettings(dirt=0.2)), np.zeros(SHAPE, np.float32)
     radiance[:60] = 2.0
-    seen = through_lens(radiance, dirty)
+    seen = apply_lens(radiance, dirty)
     assert (seen[:60] <= 2.0).all()
     assert (seen[60:] > 0).any()
     assert seen.sum() < radiance.sum()
@@ -216,8 +216,8 @@ def test_effects_work_in_the_order_of_the_light() -> None:
         maps(effect)
         for effect in (CameraSettings(dirt=0.1), CameraSettings(vignetting=1.0), CameraSettings(blur_sigma_px=1.5))
     )
-    stepwise = through_lens(through_lens(through_lens(light(), dirty), shaded), blurred)
-    np.testing.assert_allclose(through_lens(light(), maps(effects)), stepwise, atol=1e-6)
+    stepwise = apply_lens(apply_lens(apply_lens(light(), dirty), shaded), blurred)
+    np.testing.assert_allclose(apply_lens(light(), maps(effects)), stepwise, atol=1e-6)
 
 
 @pytest.mark.parametrize("name", ["vignetting", "blur_sigma_px", "defocus_px"])
@@ -245,6 +245,6 @@ def test_a_lens_that_cannot_be_is_refused(change: dict[str, float], said: str) -
 def test_each_channel_of_a_colour_picture_passes_the_lens_as_a_grey_one_would() -> None:
     lens = maps(CameraSettings(dirt=0.1, vignetting=1.0, blur_sigma_px=1.0, flare=0.1))
     picture = np.random.default_rng(3).random((*SHAPE, 3), np.float32)
-    seen = through_lens(picture, lens)
+    seen = apply_lens(picture, lens)
     for channel in range(3):
-        np.testing.assert_array_equal(seen[..., channel], through_lens(picture[..., channel], lens))
+        np.testing.assert_array_equal(seen[..., channel], apply_lens(picture[..., channel], lens))

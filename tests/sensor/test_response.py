@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vobench.errors import InputError
-from vobench.sensor.response import LINEAR, SRGB, Power, Table, linear_of_grey, quantise
+from vobench.sensor.response import LINEAR, SRGB, Power, ResponseTable, linear_of_grey, quantise
 
-MEASURED = Table(tuple(np.linspace(0, 1, 256) ** 1.8 + 0.3 * np.linspace(0, 1, 256)))
+MEASURED = ResponseTable(tuple(np.linspace(0, 1, 256) ** 1.8 + 0.3 * np.linspace(0, 1, 256)))
 RESPONSES = {"linear": LINEAR, "srgb": SRGB, "gamma": Power(2.2), "steep": Power(6.0), "table": MEASURED}
 every_response = pytest.mark.parametrize("response", RESPONSES.values(), ids=list(RESPONSES))
 
@@ -43,7 +43,7 @@ def test_rounding_is_monotone_and_exact_at_the_borders(response) -> None:
 
 
 def test_a_table_of_a_curve_is_that_curve() -> None:
-    table, signal = Table(tuple(17.0 * linear_of_grey(SRGB))), np.linspace(0, 1, 500)
+    table, signal = ResponseTable(tuple(17.0 * linear_of_grey(SRGB))), np.linspace(0, 1, 500)
     np.testing.assert_allclose(table.encode(signal), SRGB.encode(signal), atol=1e-3)
 
 
@@ -58,7 +58,7 @@ def test_a_table_of_a_curve_is_that_curve() -> None:
 )
 def test_a_table_that_cannot_be_inverted_is_refused(values: tuple[float, ...], said: str) -> None:
     with pytest.raises(InputError, match=said):
-        Table(values)
+        ResponseTable(values)
 
 
 def test_a_gamma_that_cannot_be_is_refused() -> None:

@@ -11,16 +11,16 @@ from hypothesis import strategies as st
 from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, DoubleSphere, Equirectangular, KannalaBrandt, Pinhole
-from vobench.geometry.rig import PRESETS, mounted, rectification, stereo_rig
+from vobench.geometry.rig import PRESETS, mounted_rig, rectification, stereo_rig
 from vobench.sequence import messages as ros
-from vobench.sequence.messages import picture_in, pictured, serialise, stamped
+from vobench.sequence.messages import picture_in, serialise, with_picture, with_stamp
 
 STAMPS = st.integers(0, 2**31 * 10**9 - 1)
 
 
 @given(STAMPS, st.binary(max_size=9), st.sampled_from(["png", "jpeg"]), st.text("abcdefgh", max_size=9))
 def test_a_picture_in_a_template_is_the_message_and_comes_out_as_it_went_in(t_ns, encoded, form, frame):
-    made = pictured(serialise(ros.image(0, frame, b"", form)), t_ns, encoded)
+    made = with_picture(serialise(ros.image(0, frame, b"", form)), t_ns, encoded)
     assert made == serialise(ros.image(t_ns, frame, encoded, form))
     found_ns, found_form, colour, found = picture_in(memoryview(made))
     assert colour == "mono8"
@@ -30,14 +30,14 @@ def test_a_picture_in_a_template_is_the_message_and_comes_out_as_it_went_in(t_ns
 @given(STAMPS)
 def test_a_calibration_stamped_anew_is_the_calibration_of_that_stamp(t_ns):
     camera = Pinhole(48, 32, 40.5, 41.25, 23.5, 15.5)
-    made = stamped(serialise(ros.camera_info(0, "cam_left", camera)), t_ns)
+    made = with_stamp(serialise(ros.camera_info(0, "cam_left", camera)), t_ns)
     assert made == serialise(ros.camera_info(t_ns, "cam_left", camera))
 
 
 @pytest.mark.parametrize("t_ns", [-1, 2**31 * 10**9])
 def test_a_stamp_that_ros_cannot_hold_is_refused(t_ns):
     with pytest.raises(SequenceError, match=rf"lies between 0 and 2147483647999999999 ns \(in 2038\), got {t_ns} ns"):
-        stamped(bytes(20), t_ns)
+        with_stamp(bytes(20), t_ns)
 
 
 def test_a_message_cut_anywhere_is_no_picture():
@@ -119,7 +119,7 @@ def test_a_distortion_model_that_is_not_ours_is_refused_by_name(model, d):
 
 def test_rectified_rays_of_both_cameras_meet_in_one_row_and_a_disparity():
     """What R and P promise: R turns a ray into the view, P takes it to a pixel."""
-    rig = mounted(*(getattr(PRESETS["euroc"], k) for k in ("left", "right", "T_left_right")), pitch_deg=10)
+    rig = mounted_rig(*(getattr(PRESETS["euroc"], k) for k in ("left", "right", "T_left_right")), pitch_deg=10)
     point_left = np.array([0.3, -0.2, 2.0])
     point_right = se3.apply(se3.inverse(rig.T_left_right), point_left[None])[0]
     rays = (rig.left.rays(rig.left.project(point_left)), rig.right.rays(rig.right.project(point_right)))

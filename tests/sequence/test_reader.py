@@ -22,7 +22,7 @@ from vobench.geometry.rig import (
     ImuCalibration,
     Rig,
     WheelGeometry,
-    mounted,
+    mounted_rig,
     stereo_rig,
     true_rig,
 )
@@ -85,7 +85,7 @@ def test_rig_comes_back(recording, folder):
 @pytest.mark.parametrize("name", PRESETS)
 def test_estimators_are_told_the_nominal_rig_and_the_truth_holds_the_true_one(name, tmp_path):
     preset = PRESETS[name]
-    nominal = mounted(preset.left, preset.right, preset.T_left_right, pitch_deg=12)
+    nominal = mounted_rig(preset.left, preset.right, preset.T_left_right, pitch_deg=12)
     true = true_rig(
         nominal, CalibrationError(focal_ratio=0.01, center_px=(2.0, -1.0), baseline_ratio=-0.02, right_yaw_deg=1)
     )

@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 
 from vobench.scene.scene import Scene
+from vobench.suite.plan import Plan
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 from vobench.suite.scene_spec import LightOverride
-from vobench.suite.suite import Plan, read_plan
+from vobench.suite.suite import read_plan
 
 SUITE = """name: tiny
 seed: 1

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vobench.geometry.rig import drawn, true_rig
+from vobench.geometry.rig import drawn_calibration_error, true_rig
 
 # ruff: noqa: E501 - an entry stands in one line
 
@@ -55,7 +55,9 @@ def test_a_drawn_calibration_error_depends_on_the_seed_alone(bent):
 def test_random_calibration_errors_come_from_a_stream_of_their_own(bent):
     case = bent(("pitch_deg: 90", "pitch_deg: 90, calibration_error: worn")).cases[0]
     rig = case.build_rig()
-    expected = true_rig(rig, drawn(case.rig.calibration_error, rig, np.random.default_rng([1, 7_301])))
+    expected = true_rig(
+        rig, drawn_calibration_error(case.rig.calibration_error, rig, np.random.default_rng([1, 7_301]))
+    )
     assert case.build_true_rig().T_body_right.tobytes() == expected.T_body_right.tobytes()
 
 

@@ -12,7 +12,8 @@ from vobench.suite.manifest import read_manifest
 from vobench.suite.scenario import ScenarioFile, read_scenario
 from vobench.suite.scene_file import read_scene
 from vobench.suite.scene_spec import SceneFile
-from vobench.suite.suite import Suite, read_plan
+from vobench.suite.suite import read_plan
+from vobench.suite.suite_spec import Suite
 
 MODELS = {"suite": Suite, "scenario": ScenarioFile, "scene": SceneFile, "estimator": Manifest}
 SUITE = "name: mine\nscenes: [room]\nestimators: [stand_still]\n"

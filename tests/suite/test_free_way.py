@@ -17,11 +17,11 @@ from vobench.suite.free_way import (
     MOST_LENGTH_M,
     RATE_HZ,
     SPEED_MPS,
-    Free,
+    FreeCircle,
     ceiling_above,
     circular_path,
-    down,
-    free_circle,
+    downward_directions,
+    largest_free_circle,
 )
 
 GREY = {"grey": Material(colour=(0.5, 0.5, 0.5))}
@@ -47,9 +47,9 @@ def scene(*things: Thing) -> Scene:
     return Scene("yard", things, GREY, ())
 
 
-def circle(*things: Thing) -> Free | None:
+def circle(*things: Thing) -> FreeCircle | None:
     faces = triangles(scene(*things), t_ns=0)
-    return free_circle(faces, RayCaster(faces))
+    return largest_free_circle(faces, RayCaster(faces))
 
 
 def test_the_circle_of_an_empty_floor_ends_exactly_at_its_edge() -> None:
@@ -154,7 +154,7 @@ def test_a_long_floor_has_larger_cells() -> None:
 
 
 def test_rays_down_are_unit_vectors_along_minus_z() -> None:
-    np.testing.assert_array_equal(down(3), [[0, 0, -1]] * 3)
+    np.testing.assert_array_equal(downward_directions(3), [[0, 0, -1]] * 3)
 
 
 def test_the_path_is_a_circle_around_the_centre_along_its_tangent() -> None:
@@ -230,7 +230,7 @@ def test_half_a_roof_hides_part_of_the_sky() -> None:
 def test_a_low_room_gets_one_lamp_above_the_free_circle() -> None:
     room = hall(4, 4)
     faces = triangles(room, t_ns=0)
-    free = free_circle(faces, RayCaster(faces))
+    free = largest_free_circle(faces, RayCaster(faces))
     assert free is not None
     ((x_m, y_m, z_m),) = ceiling_above(room)[1]
     assert (x_m, y_m) == (free.x_m, free.y_m)

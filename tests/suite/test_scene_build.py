@@ -15,7 +15,7 @@ from vobench.scene.light import AreaLight, PointLight
 from vobench.scene.material import LUMINANCE, linear
 from vobench.scene.scene import Scene
 from vobench.suite.scene_build import build
-from vobench.suite.scene_file import content, read_scene
+from vobench.suite.scene_file import read_scene, scene_content
 
 YAML = """name: yard
 white_cd_m2: 50
@@ -216,10 +216,10 @@ def test_files_count_by_what_is_in_them_wherever_they_lie(yard, tmp_path: Path) 
         (tmp_path / folder).mkdir()
         (tmp_path / folder / "yard.yaml").write_text(f"{YAML}maker: maker.py\n")
         (tmp_path / folder / "maker.py").write_text(MAKER)
-        said.append(content(read_scene(tmp_path / folder / "yard.yaml")))
+        said.append(scene_content(read_scene(tmp_path / folder / "yard.yaml")))
     assert said[0] == said[1]
     (tmp_path / "b" / "maker.py").write_text(MAKER + "# another\n")
-    assert content(read_scene(tmp_path / "b" / "yard.yaml")) != said[0]
+    assert scene_content(read_scene(tmp_path / "b" / "yard.yaml")) != said[0]
 
 
 def test_furniture_and_models_can_move(yard, tmp_path: Path) -> None:

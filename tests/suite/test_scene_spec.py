@@ -9,18 +9,18 @@ from vobench.scene.material import LUMINANCE
 from vobench.suite.scene_spec import (
     BoardSpec,
     BoxSpec,
+    DiffuseSpec,
     FurnitureSpec,
-    Glass,
+    GlassSpec,
     LevelSpec,
-    Luminous,
-    Matt,
-    Mirror,
+    LuminousSpec,
+    MirrorSpec,
     ModelSpec,
     MoverSpec,
     PanelLamp,
     PathKey,
     PointLamp,
-    Polished,
+    PolishedSpec,
     RoomSpec,
     SceneFile,
     SkySpec,
@@ -28,7 +28,7 @@ from vobench.suite.scene_spec import (
     SunKey,
     SunSpec,
     WindowSpec,
-    hue,
+    unit_luminance_colour,
 )
 
 KEYS = (PathKey(t_s=0.0, position_m=(0.0, 0.0, 0.0)), PathKey(t_s=1.0, position_m=(1.0, 0.0, 0.0)))
@@ -58,25 +58,25 @@ def test_a_level_has_exactly_one_form():
 
 @pytest.mark.parametrize("colour", [(1.0, 1.0, 1.0), (1.0, 0.0, 0.0), (0.2, 0.4, 0.1)])
 def test_a_hue_has_luminance_1_and_the_ratios_of_its_colour(colour):
-    scaled = hue(colour)
+    scaled = unit_luminance_colour(colour)
     assert np.dot(scaled, LUMINANCE) == pytest.approx(1)
     np.testing.assert_allclose(np.cross(scaled, colour), 0, atol=1e-12)
 
 
 def test_black_light_is_refused():
     with pytest.raises(SettingError, match="light should not be black"):
-        hue((0.0, 0.0, 0.0))
+        unit_luminance_colour((0.0, 0.0, 0.0))
 
 
 def test_a_luminous_material_has_its_luminance_in_any_hue():
     for colour in ((1.0, 1.0, 1.0), (1.0, 0.5, 0.0)):
-        emission = Luminous(luminance_cd_m2=80.0, colour=colour).build().emission_cd_m2
+        emission = LuminousSpec(luminance_cd_m2=80.0, colour=colour).build().emission_cd_m2
         assert np.dot(emission, LUMINANCE) == pytest.approx(80)
 
 
 def test_mirrors_and_panes_have_their_tint():
-    assert (Mirror(tint=0.7).build().kind, Mirror(tint=0.7).build().tint) == ("mirror", 0.7)
-    pane = Glass(eta=1.4, tint=0.6).build()
+    assert (MirrorSpec(tint=0.7).build().kind, MirrorSpec(tint=0.7).build().tint) == ("mirror", 0.7)
+    pane = GlassSpec(eta=1.4, tint=0.6).build()
     assert (pane.kind, pane.eta, pane.tint) == ("pane", 1.4, 0.6)
 
 
@@ -200,20 +200,20 @@ def test_what_is_left_out_changes_nothing():
 
 
 def test_materials_have_usual_values_if_nothing_is_said():
-    assert (Mirror().tint, Mirror().roughness) == (0.9, 0)
-    assert (Glass().eta, Glass().tint) == (1.5, 1)
-    polished = Polished(pattern="plain", albedo=0.5)
+    assert (MirrorSpec().tint, MirrorSpec().roughness) == (0.9, 0)
+    assert (GlassSpec().eta, GlassSpec().tint) == (1.5, 1)
+    polished = PolishedSpec(pattern="plain", albedo=0.5)
     assert (polished.eta, polished.tint, polished.roughness, polished.colour) == (1.5, 1, 0, (1, 1, 1))
-    assert Matt(pattern="plain", albedo=0.5).build().is_coated is False
+    assert DiffuseSpec(pattern="plain", albedo=0.5).build().is_coated is False
     assert polished.build().is_coated is True
 
 
 @pytest.mark.parametrize(
     ("build", "bound"),
     [
-        (lambda value: Glass(eta=value), (1.0, 4.0)),
-        (lambda value: Mirror(roughness=value), (0.0, 0.5)),
-        (lambda value: Mirror(tint=value), (0.0, 1.0)),
+        (lambda value: GlassSpec(eta=value), (1.0, 4.0)),
+        (lambda value: MirrorSpec(roughness=value), (0.0, 0.5)),
+        (lambda value: MirrorSpec(tint=value), (0.0, 1.0)),
         (lambda value: SceneFile(name="a", white_cd_m2=1.0, maker="a.py", scale=value), (0.05, 20.0)),
     ],
 )

@@ -4,11 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from vobench.errors import MOST_SAID, Place, SuiteError, VobenchError
+from vobench.errors import MOST_SAID, FilePlace, SuiteError, VobenchError
 from vobench.runner.motion import body_motions
 from vobench.suite import catalog, entrant, scene_build, scene_file
+from vobench.suite.case import AXES
 from vobench.suite.catalog import builtin_root
-from vobench.suite.suite import AXES, read_plan
+from vobench.suite.suite import read_plan
 from vobench.suite.yaml_file import checked, plain
 
 MORE = (
@@ -285,10 +286,10 @@ def test_every_mistake_has_its_file_line_key_and_value_apart(bent, tmp_path):
     with pytest.raises(SuiteError) as refused:
         bent(("seed: 1", "seed: one"), scene=("wall: grain", "wall: grane"))
     seed, wall = refused.value.mistakes
-    assert seed.places == (Place(str(tmp_path / "tiny.yaml"), 2, key="seed", value="one"),)
+    assert seed.places == (FilePlace(str(tmp_path / "tiny.yaml"), 2, key="seed", value="one"),)
     asking, at_fault = wall.places
     assert (asking.line, asking.key, asking.value) == (3, "scenes.0", "closet")
-    assert at_fault == Place(str(tmp_path / "scenes" / "closet.yaml"), 4, key="room.wall", value="grane")
+    assert at_fault == FilePlace(str(tmp_path / "scenes" / "closet.yaml"), 4, key="room.wall", value="grane")
     assert wall.sentence.startswith("no material named 'grane'. Did you mean 'grain'? Known: brick, carpet,")
 
 

@@ -8,7 +8,7 @@ import pytest
 from annotated_types import Ge, Gt, Le
 
 from vobench.errors import SettingError, SuiteError
-from vobench.setting import ByKind, Like, Name, OneOf, Share, settings
+from vobench.setting import ByKind, FromPreset, Name, OneOf, Share, settings
 from vobench.suite.yaml_file import read, read_all
 
 
@@ -62,7 +62,7 @@ class File:
     name: Name
     seed: Annotated[int, Ge(0), Le(9)] = 0
     lens: Annotated[str, OneOf("lens", ("wide", "tele"))] = "wide"
-    chips: dict[Name, Annotated[Chip, Like("chip", CHIPS)]] | None = None
+    chips: dict[Name, Annotated[Chip, FromPreset("chip", CHIPS)]] | None = None
     courses: dict[Name, Course] | None = None
     limits: Limits | None = None
     times_s: tuple[float, ...] = ()

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.errors import Place, SuiteError
+from vobench.errors import FilePlace, SuiteError
 from vobench.suite import yaml_parser
 from vobench.suite.yaml_parser import MOST_BYTES, MOST_DEPTH, MOST_DIGITS, parse_file, parse_text
 
@@ -25,8 +25,8 @@ def test_the_first_of_duplicate_keys_counts_and_each_other_is_reported_with_line
     parsed = parse_text(FILE, "a: 1\nb: {c: 1, c: 2}\na: 3\n")
     assert parsed.tree == {"a": 1, "b": {"c": 1}}
     inner, outer = parsed.duplicates
-    assert inner.places == (Place("file.yaml", 2, 11),)
-    assert outer.places == (Place("file.yaml", 3, 1),)
+    assert inner.places == (FilePlace("file.yaml", 2, 11),)
+    assert outer.places == (FilePlace("file.yaml", 3, 1),)
     assert outer.sentence == 'found duplicate key "a" with value "3" (original value: "1")'
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.errors import InputError, Mistake, Place, SuiteError
+from vobench.errors import FilePlace, InputError, Mistake, SuiteError
 from vobench.suite.yaml_parser import parse_text
 from vobench.suite.yaml_source import Mistakes, YamlFile, line_of, plain_tree, without_nothing
 
@@ -46,13 +46,13 @@ def file(text: str = TEXT, name: str = "file.yaml", **more: object) -> YamlFile:
     ],
 )
 def test_a_place_is_that_of_the_last_key_that_the_file_has(keys, line, key, value):
-    assert file().place(keys) == Place("file.yaml", line, key=key, value=value)
+    assert file().place(keys) == FilePlace("file.yaml", line, key=key, value=value)
 
 
 def test_the_file_that_has_more_of_the_keys_is_named():
     over = file(included=file(BASE, "base.yaml"))
-    assert over.place(("seed",)) == Place("base.yaml", 2, key="seed", value=7)
-    assert over.place(("rigs", "down", "height_m")) == Place("base.yaml", 3, key="rigs.down.height_m", value=0.3)
+    assert over.place(("seed",)) == FilePlace("base.yaml", 2, key="seed", value=7)
+    assert over.place(("rigs", "down", "height_m")) == FilePlace("base.yaml", 3, key="rigs.down.height_m", value=0.3)
     assert over.place(("rigs", "down", "pitch_deg")).file == "file.yaml"
     assert over.place(("name",)).file == "file.yaml", "the including file counts where both have the key"
     assert [each.path.name for each in over.files] == ["file.yaml", "base.yaml"]
@@ -84,13 +84,13 @@ def test_entries_have_their_number_in_the_file():
 
 
 def test_a_mistake_gets_the_place_of_the_keys_in_front_of_its_own():
-    inner = Mistake("is wrong", (Place("scene.yaml", 4),))
+    inner = Mistake("is wrong", (FilePlace("scene.yaml", 4),))
     (placed,) = file().placed(SuiteError(inner), "scenes", 1)
     assert [str(place) for place in placed.places] == ["file.yaml:2: scenes.1", "scene.yaml:4"]
 
 
 def test_without_keys_only_a_mistake_without_a_place_gets_the_file():
-    inner = Mistake("is wrong", (Place("scene.yaml", 4),))
+    inner = Mistake("is wrong", (FilePlace("scene.yaml", 4),))
     bare, placed = file().placed(SuiteError("is bare", inner))
     assert [str(place) for place in bare.places] == ["file.yaml"]
     assert placed == inner
@@ -118,8 +118,8 @@ def test_a_block_without_a_mistake_adds_none_and_other_errors_pass():
 
 def test_a_mistake_without_a_line_comes_first():
     assert line_of(Mistake("no place")) == 0
-    assert line_of(Mistake("no line", (Place("file.yaml"),))) == 0
-    assert line_of(Mistake("a line", (Place("file.yaml", 3), Place("other.yaml", 9)))) == 3
+    assert line_of(Mistake("no line", (FilePlace("file.yaml"),))) == 0
+    assert line_of(Mistake("a line", (FilePlace("file.yaml", 3), FilePlace("other.yaml", 9)))) == 3
 
 
 def test_a_plain_tree_has_types_of_python_and_no_keys_that_are_no_text():

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.trajectory.align import Alignment, Kind, align, align_positions, turn
+from vobench.trajectory.align import Alignment, AlignmentKind, align, align_positions, rotation_between
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -51,7 +51,7 @@ def test_se3_is_the_least_squares_answer(seed):
     fit = align_positions(x, y, kind="se3")
     best = np.sum((x @ fit.rotation.T + fit.translation - y) ** 2)
     for _ in range(5):
-        R = turn([0, 0, 1], [0, 0, 1] + 1e-3 * rng.normal(size=3)) @ fit.rotation
+        R = rotation_between([0, 0, 1], [0, 0, 1] + 1e-3 * rng.normal(size=3)) @ fit.rotation
         t = fit.translation + 1e-3 * rng.normal(size=3)
         assert np.sum((x @ R.T + t - y) ** 2) >= best
     assert fit.scale == 1.0
@@ -102,7 +102,7 @@ def test_on_a_line_positions_alone_give_the_smallest_turn(seed):
     a, b = rng.normal(size=(2, 3))
     s = np.linspace(-1, 1, 11)[:, None]
     fit = align_positions(s * a / np.linalg.norm(a), s * b / np.linalg.norm(b), kind="sim3")
-    np.testing.assert_allclose(fit.rotation, turn(a, b), atol=1e-7)
+    np.testing.assert_allclose(fit.rotation, rotation_between(a, b), atol=1e-7)
     np.testing.assert_allclose(fit.scale, 1.0, rtol=1e-12)
 
 
@@ -136,7 +136,7 @@ def test_turn_takes_one_direction_onto_the_other_by_the_smallest_angle(seed):
     rng = np.random.default_rng(seed)
     a = rng.normal(size=3)
     for b in (rng.normal(size=3), a, -a, a + 1e-13 * rng.normal(size=3), -a + 1e-9 * rng.normal(size=3)):
-        R = turn(a, b)
+        R = rotation_between(a, b)
         assert se3.is_rotation(R, tolerance=1e-14)
         np.testing.assert_allclose(R @ a / np.linalg.norm(a), b / np.linalg.norm(b), atol=3e-12)
         between = np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)
@@ -155,7 +155,7 @@ def test_positions_too_large_to_square_are_an_error_of_ours():
         align(T, T, kind="se3")
 
 
-@pytest.mark.parametrize("kind", get_args(Kind))
+@pytest.mark.parametrize("kind", get_args(AlignmentKind))
 def test_an_alignment_comes_back_from_json_as_it_was(kind):
     rng = np.random.default_rng(3)
     T_est, T_gt = (np.tile(np.eye(4), (9, 1, 1)) for _ in range(2))

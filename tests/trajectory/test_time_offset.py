@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.trajectory.time_offset import estimate_offset, likeness, offsets_in_stretches, speeds
+from vobench.trajectory.time_offset import estimate_offset, motion_correlation, offsets_in_stretches, speeds
 from vobench.trajectory.trajectory import Trajectory
 
 
@@ -119,21 +119,21 @@ def test_speeds_count_a_turn_about_any_axis_relative_to_the_body():
 
 def test_a_motion_correlates_fully_with_itself_and_less_with_itself_shifted():
     truth = wander(np.arange(600) * 50_000_000)
-    own = likeness(truth, truth, 0)
+    own = motion_correlation(truth, truth, 0)
     assert own == pytest.approx(1.0)
-    assert likeness(truth, truth, 300_000_000) < 0.9
-    assert likeness(truth, truth, 300_000_000) < likeness(truth, truth, 100_000_000) < own
+    assert motion_correlation(truth, truth, 300_000_000) < 0.9
+    assert motion_correlation(truth, truth, 300_000_000) < motion_correlation(truth, truth, 100_000_000) < own
 
 
 def test_a_motion_of_constant_speed_has_no_likeness():
     t_ns = np.arange(100) * 10**8
     straight = Trajectory(t_ns, se3.transform(np.eye(3), np.arange(100)[:, None] * [0.1, 0, 0]))
-    assert likeness(straight, straight, 0) is None
+    assert motion_correlation(straight, straight, 0) is None
 
 
 def test_recordings_that_do_not_overlap_have_no_likeness():
     truth = wander(np.arange(100) * 10**8)
-    assert likeness(truth, truth, 100 * 10**8) is None
+    assert motion_correlation(truth, truth, 100 * 10**8) is None
 
 
 def test_a_motion_that_never_turns_is_compared_by_its_speed_alone():

@@ -11,7 +11,7 @@ from vobench.errors import InputError, TrajectoryError
 from vobench.geometry import se3
 from vobench.trajectory import trajectory as trajectory_module
 from vobench.trajectory.associate import associate, match
-from vobench.trajectory.trajectory import Move, Trajectory, parse_move, poses_at
+from vobench.trajectory.trajectory import PoseConvention, Trajectory, parse_pose_convention, poses_at
 
 AXES = [
     ",".join(sign + axis for sign, axis in zip(signs, order, strict=True))
@@ -30,34 +30,34 @@ def poses(n=20):
 def test_all_48_axes_read_back_and_keep_poses_rigid(axes):
     T = poses()
     for kind in ("axes", "positions"):
-        move = parse_move(f"{kind}:{axes}")
+        move = parse_pose_convention(f"{kind}:{axes}")
         assert str(move) == f"{kind}:{axes}"
         moved = move.apply(T)
         assert se3.is_rotation(moved[:, :3, :3])
-        np.testing.assert_array_equal(Move(move.kind, move.matrix.T).apply(moved), T)
+        np.testing.assert_array_equal(PoseConvention(move.kind, move.matrix.T).apply(moved), T)
 
 
 def test_axes_say_where_the_new_ones_are_found_in_the_file():
     T = se3.transform(np.eye(3), [1.0, 2.0, 3.0])
-    assert parse_move("positions:z,-x,-y").apply(T)[:3, 3].tolist() == [3, -1, -2]
+    assert parse_pose_convention("positions:z,-x,-y").apply(T)[:3, 3].tolist() == [3, -1, -2]
 
 
 def test_turned_axes_turn_motions_with_them():
-    T, move = poses(), parse_move("axes:z,-x,-y")
+    T, move = poses(), parse_pose_convention("axes:z,-x,-y")
     motion = se3.inverse(T[:-1]) @ T[1:]
     moved = move.apply(T)
     np.testing.assert_allclose(se3.inverse(moved[:-1]) @ moved[1:], move.apply(motion), atol=1e-14)
 
 
 def test_a_mount_is_a_constant_motion_in_the_bodys_own_frame():
-    T, move = poses(), parse_move("mount:0.1,0.2,0.3,0,0,0.6,0.8")
+    T, move = poses(), parse_pose_convention("mount:0.1,0.2,0.3,0,0,0.6,0.8")
     np.testing.assert_allclose(se3.inverse(T) @ move.apply(T), np.broadcast_to(move.matrix, T.shape), atol=1e-14)
     assert str(move) == "mount:0.1,0.2,0.3,0,0,0.6,0.8"
 
 
 @pytest.mark.parametrize("word", ["inverse", "rotations:inverse"])
 def test_an_inverse_reads_back_and_undoes_itself(word):
-    T, move = poses(), parse_move(word)
+    T, move = poses(), parse_pose_convention(word)
     assert str(move) == word
     np.testing.assert_allclose(move.apply(move.apply(T)), T, atol=1e-14)
     undone = T @ move.apply(T) if word == "inverse" else T[:, :3, :3] @ move.apply(T)[:, :3, :3]
@@ -83,7 +83,7 @@ def test_an_inverse_reads_back_and_undoes_itself(word):
 )
 def test_a_word_that_means_nothing_is_named(word, sentence):
     with pytest.raises(InputError, match=sentence):
-        parse_move(word)
+        parse_pose_convention(word)
 
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -15,7 +15,7 @@ from vobench.sequence.picture import Image
 
 
 @dataclass(frozen=True, slots=True)
-class Look:
+class CameraLook:
     """What a camera is fitted to: mean and standard deviation of grey values, noise of flat parts, width of edges.
 
     `flat_dn` (N,) are grey values of flat parts.
@@ -28,7 +28,7 @@ class Look:
     flat_dn: Array
 
 
-def look_of(pictures: Sequence[Image]) -> Look:
+def look_of(pictures: Sequence[Image]) -> CameraLook:
     """The look of grey images, as means over them."""
     rows = []
     flat_dn = []
@@ -38,7 +38,7 @@ def look_of(pictures: Sequence[Image]) -> Look:
         rows.append((picture.mean(), picture.std(), sigma_dn, width_px))
         flat_dn.append(flat_values_dn)
     mean_dn, sd_dn, mean_sigma_dn, mean_width_px = np.mean(rows, axis=0).tolist()
-    return Look(mean_dn, sd_dn, mean_sigma_dn, mean_width_px, np.concatenate(flat_dn))
+    return CameraLook(mean_dn, sd_dn, mean_sigma_dn, mean_width_px, np.concatenate(flat_dn))
 
 
 Develop = Callable[[CameraSettings], list[Image]]  # the images that a camera takes of the scene
@@ -88,7 +88,7 @@ def camera_of(gain: float, gamma: float, blur_px: float, noise: float) -> Camera
     return CameraSettings(chip=chip, exposure_gain=gain, blur_sigma_px=blur_px)
 
 
-def fit_camera(wanted: Look, develop: Develop) -> tuple[CameraSettings, Look]:
+def fit_camera(wanted: CameraLook, develop: Develop) -> tuple[CameraSettings, CameraLook]:
     """Fit the camera whose images look most as wanted; return it and the look of its images."""
     parameters = _Parameters(gain=1.0, gamma=0.45, blur_px=0.0, noise=0.05)
     for _ in range(ROUNDS):
@@ -100,7 +100,7 @@ def fit_camera(wanted: Look, develop: Develop) -> tuple[CameraSettings, Look]:
     return settings, look_of(develop(settings))
 
 
-def _fit_gamma(parameters: _Parameters, wanted: Look, develop: Develop) -> float:
+def _fit_gamma(parameters: _Parameters, wanted: CameraLook, develop: Develop) -> float:
     """The exponent that gives the standard deviation of grey values, each with the gain that gives their mean."""
 
     def sd_dn(gamma: float) -> float:
@@ -112,7 +112,7 @@ def _fit_gamma(parameters: _Parameters, wanted: Look, develop: Develop) -> float
     return solve_increasing(sd_dn, wanted.sd_dn, GAMMA_BOUNDS)
 
 
-def _fit_gain(parameters: _Parameters, wanted: Look, develop: Develop) -> float:
+def _fit_gain(parameters: _Parameters, wanted: CameraLook, develop: Develop) -> float:
     """The exposure that gives the mean of grey values."""
 
     def mean_dn(log_gain: float) -> float:
@@ -123,7 +123,7 @@ def _fit_gain(parameters: _Parameters, wanted: Look, develop: Develop) -> float:
     return float(np.exp(solve_increasing(mean_dn, wanted.mean_dn, (low, high))))
 
 
-def _fit_blur_px(parameters: _Parameters, wanted: Look, develop: Develop) -> float:
+def _fit_blur_px(parameters: _Parameters, wanted: CameraLook, develop: Develop) -> float:
     """The blur that gives the width of edges."""
 
     def width_px(blur_px: float) -> float:
@@ -132,7 +132,7 @@ def _fit_blur_px(parameters: _Parameters, wanted: Look, develop: Develop) -> flo
     return solve_increasing(width_px, wanted.edge_px, BLUR_BOUNDS_PX)
 
 
-def _fit_noise(parameters: _Parameters, wanted: Look) -> float:
+def _fit_noise(parameters: _Parameters, wanted: CameraLook) -> float:
     """The noise of the chip relative to one of WELL_E electrons, at the grey values of flat parts."""
     if not len(wanted.flat_dn):
         return NOISE_BOUNDS[0]

@@ -24,7 +24,7 @@ MAX_DIVERGENCE_LOSS = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Course:
+class ErrorSeries:
     """One trial: the conditions (N,) of its frames by name, and the error (N,) since the frame before.
 
     The first frame has error 0.
@@ -94,7 +94,7 @@ class Attribution:
 class _Window:
     """The frames of one segment: the trial, its number among all trials, and the first frame."""
 
-    trial: Course
+    trial: ErrorSeries
     trial_number: int
     first: int
 
@@ -113,7 +113,7 @@ class _Window:
         return [self.mean(self.trial.conditions[name]) for name in names]
 
 
-def attribute(courses: Sequence[Course]) -> Attribution | None:
+def attribute(courses: Sequence[ErrorSeries]) -> Attribution | None:
     """Regress the logarithm of the error on all conditions that vary; return None if there are too few segments.
 
     Conditions whose correlation is COLLINEAR or more are merged. The confidence intervals come from resampling the
@@ -158,7 +158,7 @@ def attribute(courses: Sequence[Course]) -> Attribution | None:
     )
 
 
-def _windows(courses: Sequence[Course]) -> Iterator[_Window]:
+def _windows(courses: Sequence[ErrorSeries]) -> Iterator[_Window]:
     """Yield all segments of all trials; the first frame has no error and belongs to none."""
     for number, course in enumerate(courses):
         for first in range(1, len(course.loss), SEGMENT_FRAMES):

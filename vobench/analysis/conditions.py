@@ -11,13 +11,13 @@ from vobench.analysis.image_noise import BLACK_DN, SATURATED_DN
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.rendering.truth import Shot, TruthCaster
+from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.material import Material, linear
 from vobench.sensor.image_sensor import CameraSensor
 from vobench.sensor.pixel_truth import TruthFrame
 from vobench.sensor.response import FULL_SCALE_DN
 from vobench.sequence.reader import StereoFrame
-from vobench.suite.suite import Case
+from vobench.suite.case import Case
 from vobench.trajectory.trajectory import Trajectory
 
 # Every condition of a frame, with its unit and what it is.
@@ -71,8 +71,8 @@ def conditions(
     previous = None
     for frame, T_world_left, index in zip(frames, gt.T_world_frame, range(len(gt)), strict=False):
         next_index = min(index + 1, len(gt) - 1)
-        next_shot = Shot(gt.T_world_frame[next_index], int(gt.t_ns[next_index]))
-        of_scene = observer.conditions(Shot(T_world_left, frame.t_ns), next_shot)
+        next_shot = CameraShot(gt.T_world_frame[next_index], int(gt.t_ns[next_index]))
+        of_scene = observer.conditions(CameraShot(T_world_left, frame.t_ns), next_shot)
 
         nominal_exposure = (case.camera.exposure_ms / 1e3, case.camera.gain_db)
         exposure_s, gain_db = exposures.get(frame.t_ns, nominal_exposure)
@@ -152,7 +152,7 @@ class _SceneObserver:
         self._is_coated = np.array([bool(material and material.is_coated) for material in materials])
         self._rays = self._camera.rays(pixel_grid(cast("Camera", self._camera)))  # (H, W, 3)
 
-    def conditions(self, now: Shot, later: Shot) -> dict[str, float]:
+    def conditions(self, now: CameraShot, later: CameraShot) -> dict[str, float]:
         """The conditions that follow from geometry and materials, with the flow to a later shot."""
         channels = ("depth", "flow", "material", "mirror", "shadow", "moving")
         truth = self._caster.frame(cast("Camera", self._camera), now, channels, later=later)

@@ -14,9 +14,9 @@ from vobench.geometry.se3 import Array
 from vobench.metric.settings import Side
 from vobench.trajectory.align import align
 from vobench.trajectory.associate import MAX_DIFF_NS, associate
-from vobench.trajectory.formats import DIGITS, WORDS, Reading, seconds
-from vobench.trajectory.time_offset import estimate_offset, likeness, offsets_in_stretches
-from vobench.trajectory.trajectory import Move, Trajectory
+from vobench.trajectory.formats import DIGITS, WORDS, TrajectoryReading, seconds
+from vobench.trajectory.time_offset import estimate_offset, motion_correlation, offsets_in_stretches
+from vobench.trajectory.trajectory import PoseConvention, Trajectory
 
 Fault = Literal[
     "stamp_unit",
@@ -75,7 +75,7 @@ class Finding:
         }
 
 
-def diagnose(gt: Reading, est: Reading) -> tuple[Finding, ...]:
+def diagnose(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Finding, ...]:
     """Find the faults between two trajectories of one motion; none if they only differ by errors of the estimate.
 
     Each fault is looked for after the previous ones are corrected. Raises AlignmentError where fewer than MIN_POSES
@@ -117,7 +117,9 @@ def _unrelated(before: float, after: float) -> Finding:
 MAX_DURATION_RATIO = 30.0  # between recordings in one unit; units differ by a factor of 1000
 
 
-def _in_right_units(gt: Reading, est: Reading, findings: list[Finding]) -> tuple[Reading, Reading]:
+def _in_right_units(
+    gt: TrajectoryReading, est: TrajectoryReading, findings: list[Finding]
+) -> tuple[TrajectoryReading, TrajectoryReading]:
     """Both trajectories in units in which their durations are similar."""
     gt_in_unit = _in_right_unit(gt, est)
     est_in_unit = _in_right_unit(est, gt)
@@ -128,7 +130,7 @@ def _in_right_units(gt: Reading, est: Reading, findings: list[Finding]) -> tuple
     return gt_in_unit, est_in_unit
 
 
-def _in_right_unit(reading: Reading, other: Reading) -> Reading:
+def _in_right_unit(reading: TrajectoryReading, other: TrajectoryReading) -> TrajectoryReading:
     """The trajectory in the finer unit that makes durations similar, if both its steps and duration are far too long.
 
     A lost track shortens the duration and keyframes lengthen the steps, but neither does both.
@@ -157,7 +159,9 @@ def _in_right_unit(reading: Reading, other: Reading) -> Reading:
     return replace(reading, trajectory=Trajectory(t_ns, reading.trajectory.T_world_frame), unit=unit_of_best)
 
 
-def _unit_finding(side: Side, as_read: Reading, corrected: Reading, other: Reading) -> Finding:
+def _unit_finding(
+    side: Side, as_read: TrajectoryReading, corrected: TrajectoryReading, other: TrajectoryReading
+) -> Finding:
     """The finding that time stamps are not in the unit that files of their form have."""
     assert as_read.form_unit is not None
     assert as_read.unit is not None
@@ -190,13 +194,13 @@ STEADY_TOLERANCE = 0.5  # of the offset
 STRETCH_SEARCH = 1.5  # of the offset
 
 
-def _on_one_clock(gt: Reading, est: Reading, findings: list[Finding]) -> Reading:
+def _on_one_clock(gt: TrajectoryReading, est: TrajectoryReading, findings: list[Finding]) -> TrajectoryReading:
     """The estimate on the clock of the ground truth."""
     try:
         lag = estimate_offset(gt.trajectory, est.trajectory)
     except AlignmentError:  # too little motion to compare clocks
         return est
-    before = likeness(gt.trajectory, est.trajectory, 0)
+    before = motion_correlation(gt.trajectory, est.trajectory, 0)
     after = lag.correlation
     if abs(lag.offset_ns) <= MIN_OFFSET_NS or after < MIN_CORRELATION:
         return est
@@ -233,7 +237,7 @@ def _is_steady(gt: Trajectory, est: Trajectory, offset_ns: int) -> bool:
 # --- Frames ---
 
 
-def _matched_poses(gt: Reading, est: Reading) -> tuple[Array, Array]:
+def _matched_poses(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Array, Array]:
     """At most MAX_POSES matched poses (K, 4, 4), evenly chosen, at most half a step of the ground truth apart."""
     steps_ns = np.diff(gt.trajectory.t_ns)
     half_step_ns = int(np.median(steps_ns)) // 2 if len(steps_ns) else 0
@@ -248,8 +252,8 @@ def _matched_poses(gt: Reading, est: Reading) -> tuple[Array, Array]:
 def _in_right_frames(
     T_gt: Array,
     T_est: Array,
-    gt: Reading,
-    est: Reading,
+    gt: TrajectoryReading,
+    est: TrajectoryReading,
     findings: list[Finding],
 ) -> tuple[Array, Array]:
     """The matched poses (K, 4, 4) with their fault of frames corrected."""
@@ -274,8 +278,8 @@ def _in_right_frames(
 
 def _frame_sentence(
     mismatch: Mismatch,
-    gt: Reading,
-    est: Reading,
+    gt: TrajectoryReading,
+    est: TrajectoryReading,
 ) -> tuple[str, tuple[str, ...]]:
     """A sentence about a fault of frames, and the options that correct it."""
     side = mismatch.correction.side
@@ -295,7 +299,7 @@ def _frame_sentence(
     return _axes_sentence(mismatch.kind, move), options
 
 
-def _mount_sentence(move: Move) -> str:
+def _mount_sentence(move: PoseConvention) -> str:
     angle_rad = se3.rotation_angle(move.matrix[:3, :3])
     angle_deg = float(np.rad2deg(angle_rad))
     length_m = float(np.linalg.norm(move.matrix[:3, 3]))
@@ -305,7 +309,7 @@ def _mount_sentence(move: Move) -> str:
     )
 
 
-def _axes_sentence(kind: Fault, move: Move) -> str:
+def _axes_sentence(kind: Fault, move: PoseConvention) -> str:
     values = "positions and rotations" if move.kind == "axes" else "positions, but not its rotations,"
     axes = str(move).partition(":")[2]
     verb = "mirrored" if kind == "mirrored_axes" else "swapped"
@@ -347,7 +351,7 @@ NOISE_RATIO = 1.5
 CLEAR_NOISE_RATIO = 2.0
 
 
-def _swapped_inputs(gt: Reading, est: Reading) -> Iterator[Finding]:
+def _swapped_inputs(gt: TrajectoryReading, est: TrajectoryReading) -> Iterator[Finding]:
     """Yield a finding if enough signs show that ground truth and estimate are exchanged."""
     pairs = associate(gt.trajectory.t_ns, est.trajectory.t_ns)
     gt_noise = _noise(gt.trajectory.positions_m[pairs.gt])
@@ -415,11 +419,11 @@ def _extent_m(T: Array) -> float:
     return float(np.sqrt(T[:, :3, 3].var(axis=0).sum()))
 
 
-def _step_ns(reading: Reading) -> float:
+def _step_ns(reading: TrajectoryReading) -> float:
     steps_ns = np.diff(reading.trajectory.t_ns)
     return float(np.median(steps_ns)) if len(steps_ns) else 1.0
 
 
-def _duration_ns(reading: Reading) -> int:
+def _duration_ns(reading: TrajectoryReading) -> int:
     t_ns = reading.trajectory.t_ns
     return int(t_ns[-1] - t_ns[0]) if len(t_ns) else 0

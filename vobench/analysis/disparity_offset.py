@@ -26,7 +26,7 @@ SHARED = slice(6, None)
 
 
 @dataclass(frozen=True, slots=True)
-class DisparityOffset:
+class FittedOffset:
     """How much too large disparities at the centre of the image are, and the standard deviation of that, in px."""
 
     value_px: float
@@ -73,7 +73,7 @@ def fit_offset(
     windows: Sequence[Sequence[MatchedShot]],
     pair: StereoPair,
     roll_pitch_rad: Array,
-) -> DisparityOffset | None:
+) -> FittedOffset | None:
     """Fit the offset of disparity that the right camera's yaw causes; None if the motion does not determine it.
 
     The image motion of a point gives its distance in units of the camera's motion. All motions and the errors of the
@@ -109,7 +109,7 @@ def fit_offset(
 
     sigma_px = float(np.linalg.inv(information)[0, 0]) ** 0.5
     is_determined = sigma_px < MAX_RELATIVE_SIGMA * SHARED_SIGMA[0]
-    return DisparityOffset(float(shared[0]), sigma_px) if is_determined else None
+    return FittedOffset(float(shared[0]), sigma_px) if is_determined else None
 
 
 # --- The model of one motion ---

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from vobench.analysis.nuisance import Nuisance, without
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.suite.suite import Case
+from vobench.suite.case import Case
 from vobench.trajectory.trajectory import Trajectory
 
 # --- The error of a trial ---

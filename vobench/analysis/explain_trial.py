@@ -13,7 +13,7 @@ from vobench.runner.data_frame import data_frame
 from vobench.runner.finished_trial import FinishedTrial, read_finished_trial, run_variants
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.store import SILENT, Progress
-from vobench.suite.suite import Case
+from vobench.suite.case import Case
 
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame

@@ -11,9 +11,9 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.settings import Side
 from vobench.trajectory.align import align
-from vobench.trajectory.formats import Order
+from vobench.trajectory.formats import QuaternionOrder
 from vobench.trajectory.trajectory import Kind as MoveKind
-from vobench.trajectory.trajectory import Move
+from vobench.trajectory.trajectory import PoseConvention
 
 Kind = Literal[
     "quaternion_order", "axis_swap", "mirrored_axes", "body_frame_offset", "inverse_poses", "inverse_rotations"
@@ -85,7 +85,7 @@ class Correction:
     """
 
     side: Side
-    move: Move | None
+    move: PoseConvention | None
     misfit: Misfit
     T_gt: Array
     T_est: Array
@@ -150,8 +150,8 @@ def find_mismatch(
     T_gt: Array,
     T_est: Array,
     *,
-    gt_order: Order | None,
-    est_order: Order | None,
+    gt_order: QuaternionOrder | None,
+    est_order: QuaternionOrder | None,
 ) -> Mismatch | None:
     """Find the fault of frames that explains most between matched poses (K, 4, 4); None if there is none.
 
@@ -177,8 +177,8 @@ def _best_discrete(
     T_gt: Array,
     T_est: Array,
     *,
-    gt_order: Order | None,
-    est_order: Order | None,
+    gt_order: QuaternionOrder | None,
+    est_order: QuaternionOrder | None,
 ) -> Correction:
     """The discrete correction with the smallest misfit."""
     candidates = list(discrete_corrections(T_gt, T_est, gt_order=gt_order, est_order=est_order))
@@ -216,8 +216,8 @@ def discrete_corrections(
     T_gt: Array,
     T_est: Array,
     *,
-    gt_order: Order | None,
-    est_order: Order | None,
+    gt_order: QuaternionOrder | None,
+    est_order: QuaternionOrder | None,
 ) -> Iterator[Correction]:
     """Yield the other quaternion order and the inverses of either side, and all 47 other signed axes of the estimate.
 
@@ -228,24 +228,24 @@ def discrete_corrections(
     if gt_order:
         yield _correction("gt", None, _reordered(T_gt, gt_order), T_est)
     for kind in INVERSE:
-        inverse = Move(kind)
+        inverse = PoseConvention(kind)
         yield _correction("est", inverse, T_gt, inverse.apply(T_est))
         yield _correction("gt", inverse, inverse.apply(T_gt), T_est)
     for axes in SIGNED_AXES:
-        for move in (Move("positions", axes), Move("axes", axes)):
+        for move in (PoseConvention("positions", axes), PoseConvention("axes", axes)):
             yield _correction("est", move, T_gt, move.apply(T_est))
 
 
 def _correction(
     side: Side,
-    move: Move | None,
+    move: PoseConvention | None,
     T_gt: Array,
     T_est: Array,
 ) -> Correction:
     return Correction(side, move, misfit(T_gt, T_est), T_gt, T_est)
 
 
-def _reordered(T: Array, read_as: Order) -> Array:
+def _reordered(T: Array, read_as: QuaternionOrder) -> Array:
     """Poses (K, 4, 4) as they read if the quaternions have the other order than `read_as`."""
     as_read = se3.to_quaternion(T[:, :3, :3])  # (K, 4), scalar last
     # The numbers in the file were taken as x, y, z, w or as w, x, y, z; exchange the two readings.
@@ -281,7 +281,7 @@ def mounted(T_gt: Array, T_est: Array) -> Correction:
         lever_m = np.zeros(3)
 
     R_est_gt = _mean_rotation_left(T_gt, T_est, lever_m)
-    move = Move("mount", se3.transform(R_est_gt, lever_m))
+    move = PoseConvention("mount", se3.transform(R_est_gt, lever_m))
     return _correction("est", move, T_gt, move.apply(T_est))
 
 

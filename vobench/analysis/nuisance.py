@@ -8,23 +8,23 @@ from typing import Any
 import numpy as np
 
 from vobench.geometry.rig import CalibrationError
-from vobench.sensor.image_sensor import CameraSensor, Eyes
+from vobench.sensor.image_sensor import CameraDifferences, CameraSensor
 from vobench.sensor.response import FULL_SCALE_DN, linear_of_grey
-from vobench.suite.scene_file import materials_used
+from vobench.suite.case import Case
+from vobench.suite.scene_check import materials_used
 from vobench.suite.scene_spec import (
     STEADY,
-    Glass,
+    DiffuseSpec,
+    GlassSpec,
     LevelSpec,
     LightOverride,
     MaterialSpec,
-    Matt,
-    Mirror,
+    MirrorSpec,
     PanelLamp,
-    Polished,
+    PolishedSpec,
     SceneFile,
     SkySpec,
 )
-from vobench.suite.suite import Case
 
 MIN_SHOWN_SHARE = 2e-3  # of the pixels of a frame
 
@@ -162,9 +162,9 @@ def _with_materials(change: MaterialChange) -> Change:
 
 
 # Mirrors become textured stone: a plain surface would add the nuisance of low texture.
-STONE = Matt("terrazzo", 0.45, contrast=0.5)
+STONE = DiffuseSpec("terrazzo", 0.45, contrast=0.5)
 # Built-in finishes with a glossy coat, and those with little texture; the others are textured by a picture.
-COATED_FINISHES = {"terrazzo": Matt("terrazzo", 0.45, contrast=0.4)}
+COATED_FINISHES = {"terrazzo": DiffuseSpec("terrazzo", 0.45, contrast=0.4)}
 FAINT_FINISHES = ("white_plaster", "sage_plaster", "paint")
 FAINT_CONTRAST = 0.3
 STRONG_CONTRAST = 0.7
@@ -174,14 +174,14 @@ STRONG_ALBEDO = 0.55  # at most: a brighter pattern of this contrast would be cl
 
 def _diffuse_mirror(name: str, defined: MaterialSpec | None) -> MaterialSpec | None:
     """Stone in place of a mirror, and a pane without reflections."""
-    if isinstance(defined, Mirror):
+    if isinstance(defined, MirrorSpec):
         return STONE
-    if isinstance(defined, Glass):
+    if isinstance(defined, GlassSpec):
         return replace(defined, eta=1.0)
     if defined is None and name == "mirror":
         return STONE
     if defined is None and name == "pane":
-        return Glass(eta=1.0)
+        return GlassSpec(eta=1.0)
     return defined
 
 
@@ -189,17 +189,17 @@ def _without_coat(name: str, defined: MaterialSpec | None) -> MaterialSpec | Non
     """The diffuse material below a glossy coat."""
     if defined is None:
         return COATED_FINISHES.get(name)
-    if isinstance(defined, Polished):
-        names = [field.name for field in fields(Matt) if field.name != "kind"]
-        return Matt(**{name: getattr(defined, name) for name in names})
+    if isinstance(defined, PolishedSpec):
+        names = [field.name for field in fields(DiffuseSpec) if field.name != "kind"]
+        return DiffuseSpec(**{name: getattr(defined, name) for name in names})
     return defined
 
 
 def _with_strong_texture(name: str, defined: MaterialSpec | None) -> MaterialSpec | None:
     """A pattern of strong contrast in place of a plain or faint one."""
     if defined is None and name in FAINT_FINISHES:
-        return Matt("poster", STRONG_ALBEDO, contrast=STRONG_CONTRAST, tile_m=STRONG_TILE_M)
-    if not isinstance(defined, Matt | Polished):
+        return DiffuseSpec("poster", STRONG_ALBEDO, contrast=STRONG_CONTRAST, tile_m=STRONG_TILE_M)
+    if not isinstance(defined, DiffuseSpec | PolishedSpec):
         return defined
     if defined.contrast < FAINT_CONTRAST or defined.pattern == "plain":
         albedo = min(defined.albedo, STRONG_ALBEDO)
@@ -296,7 +296,7 @@ NUISANCES = (
     ),
     Nuisance("blur", "a short exposure and a sharp lens", _without_blur),
     Nuisance("noise", "a chip without noise", _without_noise),
-    Nuisance("unlike eyes", "two equal cameras", _with_camera(unlike=Eyes())),
+    Nuisance("unlike eyes", "two equal cameras", _with_camera(unlike=CameraDifferences())),
     Nuisance("dropped frames", "every frame, once", _with_timing(drop_share=0.0, repeat_share=0.0)),
     Nuisance("late pictures", "both images taken at their time stamp", _with_timing(jitter_ms=0.0, right_delay_ms=0.0)),
     Nuisance("late IMU", "readings stamped when they are taken", _with_timing(imu_delay_ms=0.0)),

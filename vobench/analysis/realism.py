@@ -100,7 +100,7 @@ class Realism:
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class FrameSample:
     """The grey images of one instant, and the true pose of the left camera in the world where it is known."""
 
     left: Image
@@ -125,7 +125,7 @@ def window_starts(count: int, *, windows: int = WINDOWS) -> list[int]:
     return sorted({round(start) for start in starts})
 
 
-def measure(runs: Sequence[Sequence[Shot]], rig: Rig) -> Realism:
+def measure(runs: Sequence[Sequence[FrameSample]], rig: Rig) -> Realism:
     """Compute the statistics of runs of successive grey images of a rig."""
     images = [image for run in runs for image in _left_images(run)]
     tracks_of_runs = [track_statistics(_left_images(run)) for run in runs]
@@ -154,7 +154,7 @@ def measure(runs: Sequence[Sequence[Shot]], rig: Rig) -> Realism:
     )
 
 
-def _left_images(run: Sequence[Shot]) -> list[Image]:
+def _left_images(run: Sequence[FrameSample]) -> list[Image]:
     return [shot.left for shot in run]
 
 
@@ -178,7 +178,7 @@ def _track_means(tracks_of_runs: Sequence[TrackStatistics]) -> dict[str, float]:
     return {"tracks_home": 100 * float(np.mean(consistent_shares)), "flow_px": float(np.mean(flows_px))}
 
 
-def _fit_stereo(runs: Sequence[Sequence[Shot]], rig: Rig) -> StereoFit | None:
+def _fit_stereo(runs: Sequence[Sequence[FrameSample]], rig: Rig) -> StereoFit | None:
     """The fit of the stereo pair; None where the rig or the first run has none."""
     pairs_of_runs = [_pairs(run) for run in runs]
     if not rectification(rig) or not pairs_of_runs[0]:
@@ -186,7 +186,7 @@ def _fit_stereo(runs: Sequence[Sequence[Shot]], rig: Rig) -> StereoFit | None:
     return fit_pair(pairs_of_runs, stereo_pair(rig, "the pair's fit"))
 
 
-def _pairs(run: Sequence[Shot]) -> list[PairShot]:
+def _pairs(run: Sequence[FrameSample]) -> list[PairShot]:
     return [PairShot(shot.left, shot.right, shot.T_world_left) for shot in run if shot.right is not None]
 
 
@@ -207,11 +207,11 @@ def _gradient_counts(images: Iterable[Image]) -> Array:
 # --- The images of a recording ---
 
 
-def shots_of(recording: Recording) -> list[list[Shot]]:
+def shots_of(recording: Recording) -> list[list[FrameSample]]:
     """Return the runs of images that a recording is measured by."""
     starts = window_starts(recording.frame_count)
     frames_end = starts[-1] + WINDOW
-    runs: list[list[Shot]] = [[] for _ in starts]
+    runs: list[list[FrameSample]] = [[] for _ in starts]
     for frame in islice(recording.encoded_frames(), frames_end):
         run = int(np.searchsorted(starts, frame.index, side="right")) - 1
         if starts[run] <= frame.index < starts[run] + WINDOW:
@@ -219,10 +219,10 @@ def shots_of(recording: Recording) -> list[list[Shot]]:
     return runs
 
 
-def _shot(frame: EncodedFrame, recording: Recording) -> Shot:
+def _shot(frame: EncodedFrame, recording: Recording) -> FrameSample:
     left = _decoded(frame, recording, "left", frame.left)
     right = None if frame.right is None else _decoded(frame, recording, "right", frame.right)
-    return Shot(left, right, _true_pose(frame.t_ns, recording))
+    return FrameSample(left, right, _true_pose(frame.t_ns, recording))
 
 
 def _decoded(frame: EncodedFrame, recording: Recording, side: Side, encoded: bytes) -> Image:
@@ -251,7 +251,7 @@ MIN_GAIN_DIFFERENCE = 0.05
 MIN_OFFSET_PX = 0.05
 
 
-def says(found: Realism) -> list[str]:
+def pair_sentences(found: Realism) -> list[str]:
     """Return sentences about the errors of the stereo pair and their most likely causes."""
     pair = found.pair
     if pair is None:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vobench.analysis.realism import STATISTICS, Realism, Statistic, measure, residual, says, shots_of
+from vobench.analysis.realism import STATISTICS, Realism, Statistic, measure, pair_sentences, residual, shots_of
 from vobench.analysis.stereo_fit import StereoFit, Uncertain
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.runner.data_frame import data_frame
@@ -39,7 +39,7 @@ class RealismReport:
 
     def sentences(self) -> list[str]:
         """The errors of the stereo pair and their most likely causes, in sentences."""
-        return says(self.found)
+        return pair_sentences(self.found)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, as `vobench realism --json` prints them."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vobench.analysis.camera_fit import Look, fit_camera, look_of
+from vobench.analysis.camera_fit import CameraLook, fit_camera, look_of
 from vobench.analysis.path_placement import Placement, cell_disparities, levelled, place_path
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
 from vobench.analysis.realism import Realism, residual, shots_of
@@ -19,7 +19,7 @@ from vobench.dataset.picture import require_free
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.tools import stereo_pair
-from vobench.geometry.rig import own_pair
+from vobench.geometry.rig import custom_stereo_pair
 from vobench.geometry.se3 import Array, inverse
 from vobench.runner.data_frame import data_frame
 from vobench.runner.estimate import ESTIMATE
@@ -287,7 +287,7 @@ def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
     if recording.form == "kitti":  # its world is the first camera, which need not be level
         T_world_left = levelled(T_world_left)
 
-    rig = RigSettings(own=own_pair(recording.rig), pitch_deg=0, forward_m=0, height_m=0)
+    rig = RigSettings(own=custom_stereo_pair(recording.rig), pitch_deg=0, forward_m=0, height_m=0)
     return _RecordedPath(t_ns, T_world_left, rig, realism.pair)
 
 
@@ -345,7 +345,7 @@ def _fit_camera(
     return _camera_settings(settings, gain=gain)
 
 
-def _look(recording: Recording) -> Look:
+def _look(recording: Recording) -> CameraLook:
     """The look of a recording's images, from some that are spread over it."""
     pictures = [shot.left for run in shots_of(recording) for shot in run]
     return look_of(_evenly(pictures))

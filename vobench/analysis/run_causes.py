@@ -5,9 +5,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vobench.analysis.causes import Attribution, Course, attribute
+from vobench.analysis.causes import Attribution, ErrorSeries, attribute
 from vobench.analysis.conditions import CONDITIONS
-from vobench.analysis.trial_data import read_conditions, read_course
+from vobench.analysis.trial_data import read_conditions, read_error_series
 from vobench.errors import require_known
 from vobench.geometry.se3 import Array
 from vobench.runner.data_frame import data_frame
@@ -31,7 +31,7 @@ class EstimatorCauses:
 
     estimator: str
     statuses: tuple[str, ...]
-    courses: tuple[Course, ...]
+    courses: tuple[ErrorSeries, ...]
     attribution: Attribution | None
 
     def trials(self) -> list[dict[str, Any]]:
@@ -125,6 +125,6 @@ def _causes_of(
     conditions_of_cases: Mapping[str, Mapping[str, Array]],
 ) -> EstimatorCauses:
     """The causes of one estimator. `conditions_of_cases` are those of frames, by case."""
-    courses = tuple(read_course(folder, score, conditions_of_cases[score.case]) for score in trials)
+    courses = tuple(read_error_series(folder, score, conditions_of_cases[score.case]) for score in trials)
     statuses = tuple(score.status for score in trials)
     return EstimatorCauses(estimator, statuses, courses, attribute(courses))

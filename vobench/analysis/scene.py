@@ -10,7 +10,7 @@ from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture
 from vobench.scene.mesh import Triangles, distinct, open_edges, unit, welded
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import Free, free_circle
+from vobench.suite.free_way import FreeCircle, largest_free_circle
 
 EYE_HEIGHT_M = 1.2
 DIRECTIONS = 4096  # in which a survey looks for the backs of faces
@@ -36,7 +36,7 @@ class SceneSurvey:
     open_edges: int
     twins: int
     backs: float
-    free: Free | None
+    free: FreeCircle | None
 
 
 def survey(scene: Scene) -> SceneSurvey:
@@ -47,7 +47,7 @@ def survey(scene: Scene) -> SceneSurvey:
     corners_m = faces.corners_m.reshape(-1, 3)
     low_m = corners_m.min(0)
     high_m = corners_m.max(0)
-    free = free_circle(faces, caster)
+    free = largest_free_circle(faces, caster)
     eye_m = (low_m + high_m) / 2
     if free:
         eye_m = np.array([free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M])

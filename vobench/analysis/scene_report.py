@@ -19,7 +19,7 @@ from vobench.suite import catalog
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 from vobench.suite.scene_spec import ModelSpec, SceneFile
-from vobench.suite.suite import Rendering
+from vobench.suite.suite_spec import Rendering
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,11 +12,11 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.geometry import RayCaster
-from vobench.rendering.renderer import Renderer, still
+from vobench.rendering.renderer import Renderer, single_instant
 from vobench.scene.material import reflectance, srgb
 from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import Free, down
+from vobench.suite.free_way import FreeCircle, downward_directions
 
 Rgb8 = NDArray[np.uint8]
 CELL_WIDTH_PX = 480
@@ -35,19 +35,19 @@ def sheet(
     lines: Sequence[str],
 ) -> Rgb8:
     """Draw a picture (640, 1440, 3): the plan, lines of text, and views in four directions from the free circle."""
-    free = found.free or Free(0.0, 0.0, found.low_m[2], 0.0)
+    free = found.free or FreeCircle(0.0, 0.0, found.low_m[2], 0.0)
     views = [_view(renderer, free, yaw_deg, white_cd_m2) for yaw_deg in VIEWS_DEG]
     upper = np.hstack([plan(scene, found), views[0], views[1]])
     lower = np.hstack([_text(lines), views[2], views[3]])
     return np.vstack([upper, lower])
 
 
-def _view(renderer: Renderer, free: Free, yaw_deg: float, white_cd_m2: float) -> Rgb8:
+def _view(renderer: Renderer, free: FreeCircle, yaw_deg: float, white_cd_m2: float) -> Rgb8:
     """A view (H, W, 3) from the centre of the free circle."""
     eye_m = [free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M]
     T_world_body = se3.transform(se3.rotation_z(np.deg2rad(yaw_deg)), eye_m)
     T_world_camera = T_world_body @ looking(pitch_deg=VIEW_PITCH_DEG, position_m=(0, 0, 0))
-    radiance = renderer.radiance(LENS, still(LENS, T_world_camera), weights=None)
+    radiance = renderer.radiance(LENS, single_instant(LENS, T_world_camera), weights=None)
     return srgb(radiance / (VIEW_WHITE * white_cd_m2))
 
 
@@ -110,7 +110,7 @@ def plan(scene: Scene, found: SceneSurvey) -> Rgb8:
 
 def _shaded(scene: Scene, faces: Triangles, origins_m: Array) -> Array:
     """The shade (N,) of what is below points (N, 3), white where there is nothing."""
-    hits = RayCaster(faces).hits(origins_m, down(len(origins_m)))
+    hits = RayCaster(faces).hits(origins_m, downward_directions(len(origins_m)))
     is_hit = hits.face >= 0
     tone_of_material = {name: reflectance(material).mean() for name, material in scene.materials.items()}
     materials = [thing.material for thing in faces.things]

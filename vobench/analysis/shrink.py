@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import takewhile
 
 from vobench.analysis.nuisance import Nuisance, without
-from vobench.suite.suite import Case, Window
+from vobench.suite.case import Case
+from vobench.suite.suite_spec import Window
 
 FIRST_SHARE = 0.1  # of all frames, in the first windows
 WINDOW_OVERLAP = 4  # windows begin a quarter of their length apart

@@ -10,7 +10,7 @@ from vobench.analysis.shrink import MIN_FRAMES, Failure, Shrunk, shrink
 from vobench.analysis.trial_data import TrialPaths, read_paths
 from vobench.errors import InputError
 from vobench.runner.data_frame import data_frame
-from vobench.runner.estimate import FINISHED, Outcome
+from vobench.runner.estimate import FINISHED, EstimatorOutcome
 from vobench.runner.finished_trial import FinishedTrial, read_finished_trial, run_variants
 from vobench.runner.folder import TrialScore
 from vobench.runner.frames import read_frames
@@ -18,8 +18,9 @@ from vobench.runner.motion import body_motion
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.score import score_estimate, status_of
 from vobench.runner.store import SILENT, Progress
+from vobench.suite.case import Case
 from vobench.suite.case_file import write_case
-from vobench.suite.suite import Case, Window
+from vobench.suite.suite_spec import Window
 from vobench.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -151,7 +152,7 @@ def _likely_windows(
         if len(part.gt) < MIN_FRAMES:
             return False
         scored = score_estimate(part.est, part.gt, trial.score.claims)
-        status, reason = status_of(Outcome(kind=FINISHED, reason=""), scored, part.gt)
+        status, reason = status_of(EstimatorOutcome(kind=FINISHED, reason=""), scored, part.gt)
         return Failure.of(status, reason) == wanted
 
     whole = (min(stamps_ns), max(stamps_ns) + 1)

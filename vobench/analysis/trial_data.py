@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vobench.analysis.causes import Course
+from vobench.analysis.causes import ErrorSeries
 from vobench.analysis.conditions import conditions
 from vobench.analysis.explain import Outcome, loss_between, segment_loss
 from vobench.errors import InputError
@@ -14,7 +14,7 @@ from vobench.runner.estimate import ESTIMATE
 from vobench.runner.folder import ESTIMATES, SEQUENCE, SURVIVED, RunFolder, TrialScore, read_tum
 from vobench.runner.frames import GROUND_TRUTH, read_frames
 from vobench.sequence import Sequence
-from vobench.suite.suite import Case
+from vobench.suite.case import Case
 from vobench.trajectory.trajectory import Trajectory
 
 
@@ -42,13 +42,13 @@ def read_outcome(folder: RunFolder, score: TrialScore) -> Outcome:
     return Outcome(score.status, survived, segment_loss(paths.gt, paths.est, scale=paths.scale))
 
 
-def read_course(folder: RunFolder, score: TrialScore, frame_conditions: Mapping[str, Array]) -> Course:
+def read_error_series(folder: RunFolder, score: TrialScore, frame_conditions: Mapping[str, Array]) -> ErrorSeries:
     """Read the error of a trial frame by frame; `frame_conditions` are those of its case, by `read_conditions`."""
     paths = read_paths(folder, score)
     every_frame = np.arange(len(paths.gt))
     loss = loss_between(paths.gt, paths.est, every_frame, scale=paths.scale)
     loss = np.append(0.0, loss)  # the first frame has no predecessor
-    return Course(score.case, score.repeat, frame_conditions, loss)
+    return ErrorSeries(score.case, score.repeat, frame_conditions, loss)
 
 
 def read_conditions(folder: RunFolder, case: Case) -> dict[str, Array]:

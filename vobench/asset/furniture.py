@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vobench.asset import picture
-from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PAPER, SAGE, SAND, TEAL, Rng, Spines, some
+from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PAPER, SAGE, SAND, TEAL, Rng, Spines, one_of
 from vobench.asset.shape import (
     at,
     block,
@@ -304,7 +304,7 @@ def shelf(
         parts.append(stood(plank_m, board, 0, y, z - 0.02, bevel=0.002, u=rng.uniform(0, 2)))
         has_boxes = rng.random() < 0.12
         if has_boxes:
-            cardboard = matt(some(rng, SAGE, SAND, NAVY))
+            cardboard = matt(one_of(rng, SAGE, SAND, NAVY))
             for side in (-1, 1):
                 box_y = y + side * 0.2 * bay_m
                 parts.append(stood(box_m, cardboard, depth_m / 2 - 0.15, box_y, z))
@@ -372,7 +372,7 @@ def keyboard(_: Rng) -> list[Part]:
 
 def mouse(rng: Rng) -> list[Part]:
     """A mouse on its mat."""
-    mat_colour = matt(some(rng, NAVY, TEAL, INK))
+    mat_colour = matt(one_of(rng, NAVY, TEAL, INK))
     mat = stood((0.2, 0.24, 0.003), mat_colour, bevel=0.001)
     body = cushion((0.11, 0.06, 0.036), power=2.6)
     return [mat, put(body, BLACK, 0.01, 0, 0.019)]
@@ -380,7 +380,7 @@ def mouse(rng: Rng) -> list[Part]:
 
 def mug(rng: Rng) -> list[Part]:
     """A glazed mug with a handle and coffee."""
-    glaze = coated(some(rng, BRICK, PAPER, TEAL, OCHRE, NAVY), roughness=0.08)
+    glaze = coated(one_of(rng, BRICK, PAPER, TEAL, OCHRE, NAVY), roughness=0.08)
     turn_deg = rng.uniform(0, 360)
     body = lathe(mm("0 0, 34 0, 40 8, 41 94, 38 96, 36 90, 35 12, 0 10"), sections=32)
     handle_path = spline(mm("38 0 22, 68 0 26, 68 0 72, 39 0 78"), 12)

@@ -8,7 +8,7 @@ from PIL import Image, ImageDraw
 
 from vobench.asset import picture
 from vobench.asset.furniture import BLACK, DARK, STEEL, WHITE, Part, cloth, coated, matt, mm, put, stood, wood
-from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, SAGE, SAND, Rng, some
+from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, SAGE, SAND, Rng, one_of
 from vobench.asset.shape import at, card, cushion, lathe, sheet, spline, tube
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import flipped, joined, moved
@@ -191,7 +191,7 @@ def pendant(
     profile = mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232") * [scale, scale]
     shade = lathe(profile, sections=36)
     inner = moved(flipped(shade), np.diag([0.985, 0.985, 0.985, 1]))
-    paint = coated(colour or some(rng, NAVY, INK, "#5c6b5a"), roughness=0.3)
+    paint = coated(colour or one_of(rng, NAVY, INK, "#5c6b5a"), roughness=0.3)
     cord = tube(np.array([[0, 0, 0.2 - drop_m], [0, 0, 0]]), 0.004, sections=6)
     rose = lathe(mm("0 -30, 50 -25, 50 0, 0 0"))
     return [
@@ -215,7 +215,7 @@ def fruit_bowl(rng: Rng) -> list[Part]:
         x = radius * np.cos(angle)
         y = radius * np.sin(angle)
         z = 0.12 if is_on_top else 0.075
-        colour = some(rng, "#a62a22", "#8fa03a", "#d8812a", "#c9492c")
+        colour = one_of(rng, "#a62a22", "#8fa03a", "#d8812a", "#c9492c")
         parts.append(put(fruit, coated(colour, roughness=0.25), x, y, z))
     return parts
 
@@ -254,7 +254,7 @@ def low_board(
         parts.append(stood(door_m, look, d / 2 - 0.008, y, 0.083, u=3 * side))
         parts.append(put(knob, DARK, d / 2 + 0.01, knob_y, 0.55 * h))
 
-    box = cloth(some(rng, SAGE, SAND, NAVY))
+    box = cloth(one_of(rng, SAGE, SAND, NAVY))
     box_m = (0.28, 0.42 * third, 0.6 * inner)
     parts += [stood(box_m, box, 0, side * 0.24 * third, 0.083) for side in (-1, 1)]
     return parts

@@ -14,7 +14,7 @@ from vobench.asset.gltf_file import MOST_BYTES, located
 from vobench.asset.gltf_material import Look
 from vobench.asset.mesh_file import read_as_glb
 from vobench.asset.vertex_colour import painted
-from vobench.errors import ModelError, unknown
+from vobench.errors import ModelError, unknown_name_sentence
 from vobench.geometry.se3 import Array
 from vobench.scene.material import LUMINANCE, Material
 from vobench.scene.mesh import Faces, MeshArrays, Thing, areas_m2, arrays, corners, face_normals, is_closed_body
@@ -140,7 +140,7 @@ def _require_matched(roles: Roles, nodes: Sequence[Node]) -> None:
     names = sorted({name for node in nodes for name in node.names})
     for glob in roles:
         if not any(fnmatchcase(name, glob) for name in names):
-            raise ModelError(unknown("node", glob, names))
+            raise ModelError(unknown_name_sentence("node", glob, names))
 
 
 def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles: Roles) -> Model:
@@ -238,7 +238,7 @@ def _role(node: Node, roles: Roles) -> _Role:
     names = [_own_role(name, in_file, roles) for name, in_file in zip(node.names, node.roles, strict=True)]
     for name in names:
         if name and name not in ROLES:
-            raise ModelError(f"{node}: {unknown('role', name, [*ROLES])}")
+            raise ModelError(f"{node}: {unknown_name_sentence('role', name, [*ROLES])}")
     mover = names.index("mover") if "mover" in names else None
     if "ignored" in names:
         return _Role("ignored", mover)

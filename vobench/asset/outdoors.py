@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw
 
 from vobench.asset import picture
 from vobench.asset.furniture import BLACK, CHROME, DARK, GREY, STEEL, Part, cloth, coated, matt, mm, put, stood
-from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PLUM, SAGE, SAND, TEAL, Rng, some
+from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PLUM, SAGE, SAND, TEAL, Rng, one_of
 from vobench.asset.shape import at, block, card, cards_arrays, cushion, lathe, sheet, spline, tube
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material, Picture
@@ -56,7 +56,7 @@ def _outline(points_m: Array) -> _Outline:
 
 def car(rng: Rng, colour: str = "") -> list[Part]:
     """A hatchback 4.2 m long with wheels, lamps, plates and mirrors, its windows dark."""
-    paint = coated(colour or some(rng, *PAINTS), roughness=0.12)
+    paint = coated(colour or one_of(rng, *PAINTS), roughness=0.12)
     parts = [Part(_body(), paint), *_cabin(paint)]
     for side in (-1, 1):
         parts += _wheels(side)
@@ -259,11 +259,11 @@ class _Clothes:
 
 def walker(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.0) -> Walker:
     """Somebody who walks along x, in trousers and a coat or a jumper; their feet do not slip."""
-    coat = some(rng, *COATS)
-    trousers = some(rng, *TROUSERS)
-    skin = matt(some(rng, *SKINS))
+    coat = one_of(rng, *COATS)
+    trousers = one_of(rng, *TROUSERS)
+    skin = matt(one_of(rng, *SKINS))
     clothes = _Clothes(cloth(coat), cloth(trousers), skin, matt("#241f1c"))
-    hair = matt(some(rng, *HAIR))
+    hair = matt(one_of(rng, *HAIR))
 
     hip_rad, knee_rad = _leg_angles(stride_deg)
     trunk = Limb(_trunk(clothes.coat, skin, hair), np.zeros((0, 3)), np.zeros((STEPS, 0)))
@@ -423,7 +423,7 @@ def foliage(seed: int = 0, px: int = 512) -> Picture:
 
 def _leaves(rng: Rng, colours: tuple[str, ...], seed: int) -> Material:
     """Leaves cut out of foliage, in one of some tones."""
-    material = matt(some(rng, *colours), foliage(seed))
+    material = matt(one_of(rng, *colours), foliage(seed))
     return replace(material, cutout=0.5)
 
 
@@ -531,7 +531,7 @@ def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
     points_m = points_m * (1 + 0.02 * roughness)[:, None]
 
     stone = matt(
-        some(rng, "#c9c4ba", "#a8a59e", "#b9ad9a"),
+        one_of(rng, "#c9c4ba", "#a8a59e", "#b9ad9a"),
         picture.ground("concrete", 3, 1024, 1.4),
     )
     boulder = flat(points_m, mesh.faces, texture_coordinates(mesh))

@@ -123,7 +123,7 @@ WORDS = (
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Unpainted:
+class LazyTexture:
     """A texture whose pixels are painted when they are first asked for."""
 
     pixels: Callable[[], NDArray[Any]]
@@ -142,7 +142,7 @@ def painted(paint: Callable[..., Picture]) -> Callable[..., Texture]:
         call = parameters.bind(*args, **kwargs)
         call.apply_defaults()
         tile_m = call.arguments.get("tile_m", 1.0)
-        return Unpainted(cache(lambda: paint(*args, **kwargs).values), tile_m)
+        return LazyTexture(cache(lambda: paint(*args, **kwargs).values), tile_m)
 
     return wraps(paint)(texture)
 
@@ -440,7 +440,7 @@ def _on(colour: str) -> str:
     return PAPER if is_dark else INK
 
 
-def some(rng: Rng, *colours: str) -> str:
+def one_of(rng: Rng, *colours: str) -> str:
     """One of the colours."""
     return str(rng.choice(colours))
 
@@ -455,7 +455,7 @@ def _chart(draw: Draw, rng: Rng, box: Box) -> None:
         walk = np.cumsum(rng.normal(0, 0.16, len(xs)))
         shares = np.clip(0.5 + walk, 0.06, 0.96)
         ys = y1 - (y1 - y0) * shares
-        ink = some(rng, *INKS)
+        ink = one_of(rng, *INKS)
         if has_bars:
             _bars(draw, xs, ys, y1, ink)
         else:
@@ -504,9 +504,9 @@ def pages(seed: int = 0) -> Picture:
 
 def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
     """A sheet with its upper left corner at x, y: a title over one or two columns."""
-    band = some(rng, PAPER, PAPER, *INKS)
+    band = one_of(rng, PAPER, PAPER, *INKS)
     split = rng.choice([220, 440])
-    paper = some(rng, "#f4f2ec", PAPER, "#ebe8df")
+    paper = one_of(rng, "#f4f2ec", PAPER, "#ebe8df")
     draw.rectangle([x, y, x + 479, y + 679], fill=paper)
     draw.rectangle([x, y, x + 479, y + 90], fill=band)
     title = _words(rng, 3).title()
@@ -552,7 +552,7 @@ def spines(seed: int = 0, count: int = 52) -> Spines:
 
 def _binders(rng: Rng) -> list[Image.Image]:
     """Ring binders of one owner, lying on their side as books are."""
-    colour = some(rng, NAVY, INK, BRICK, "#8a8d8f")
+    colour = one_of(rng, NAVY, INK, BRICK, "#8a8d8f")
     owner = _words(rng, 1).upper()
     w = round(0.07 * SPINE_PX_PER_M)
     h = round(0.318 * SPINE_PX_PER_M)
@@ -574,8 +574,8 @@ def _series(rng: Rng) -> list[Image.Image]:
     w = round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
     height_m = float(rng.choice([0.178, 0.2, 0.216, 0.235, 0.24, 0.28]))
     h = round(height_m * SPINE_PX_PER_M)
-    colour = some(rng, *INKS, INK, PAPER, "#e2d9c6", "#4a5a4d")
-    accent = some(rng, *INKS, PAPER)
+    colour = one_of(rng, *INKS, INK, PAPER, "#e2d9c6", "#4a5a4d")
+    accent = one_of(rng, *INKS, PAPER)
     title = _words(rng, int(rng.integers(2, 5))).title()
     author = _words(rng, 1).upper()
 
@@ -620,7 +620,7 @@ def screen(seed: int = 0) -> Picture:
         indent = 26 * abs((3 * row) % 8 - 4) * (row % 5 > 0)
         x = 240.0 + indent
         for word in _words(rng, int(rng.integers(1, 7))).split():
-            colour = some(rng, ink, ink, TEAL, OCHRE, SKY, SAGE)
+            colour = one_of(rng, ink, ink, TEAL, OCHRE, SKY, SAGE)
             _text(draw, (x, 36 + 17 * row), word, 13, colour)
             x += 8.5 * len(word)
 
@@ -667,9 +667,9 @@ def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
     """Quarters and halves of circles in squares."""
     side = w // 5
     for y, x in product(range(0, h, side), range(0, w, side)):
-        background = some(rng, *INKS[:6], PAPER)
-        foreground = some(rng, *INKS[:6], PAPER)
-        dot_colour = some(rng, *INKS[:6], PAPER)
+        background = one_of(rng, *INKS[:6], PAPER)
+        foreground = one_of(rng, *INKS[:6], PAPER)
+        dot_colour = one_of(rng, *INKS[:6], PAPER)
         quarter = int(rng.integers(4))
         is_half = rng.random() < 0.4
         draw.rectangle([x, y, x + side, y + side], fill=background)
@@ -689,7 +689,7 @@ def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
 
 def _talk(draw: Draw, rng: Rng, w: int, h: int) -> None:
     """A title over three columns of text and charts."""
-    banner = some(rng, NAVY, TEAL, PLUM)
+    banner = one_of(rng, NAVY, TEAL, PLUM)
     draw.rectangle([0, 0, w, 0.12 * h], fill=banner)
     _text(draw, (0.04 * w, 0.03 * h), _words(rng, 4).title(), 0.04 * h, PAPER)
     _text(draw, (0.04 * w, 0.08 * h), _words(rng, 6).title(), 0.02 * h, SAND)
@@ -697,7 +697,7 @@ def _talk(draw: Draw, rng: Rng, w: int, h: int) -> None:
         x0 = w * (0.04 + 0.32 * k)
         x1 = w * (0.32 + 0.32 * k)
         y = h * (0.2 + 0.3 * (k % 2))
-        heading = some(rng, *INKS)
+        heading = one_of(rng, *INKS)
         draw.rectangle([x0, 0.15 * h, x1, 0.18 * h], fill=heading)
         _column(draw, rng, (x0, 0.2 * h, x1, 0.96 * h), 0.011 * h)
         draw.rectangle([x0, y, x1, y + 0.2 * h], fill=PAPER)
@@ -720,7 +720,7 @@ def whiteboard(seed: int = 0) -> Picture:
     for k in range(24):
         x, y = rng.uniform(40, [1100, 760])
         is_wiped = k < wiped_diagrams
-        ink = "#dcdcda" if is_wiped else some(rng, NAVY, BRICK, "#2f6b4a", INK)
+        ink = "#dcdcda" if is_wiped else one_of(rng, NAVY, BRICK, "#2f6b4a", INK)
         arrow_end = (x + 290, y + rng.uniform(-40, 120))
         draw.rounded_rectangle([x, y, x + 200, y + 74], 12, outline=ink, width=4)
         draw.line([x + 200, y + 37, *arrow_end], fill=ink, width=4)

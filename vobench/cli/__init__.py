@@ -43,7 +43,7 @@ def _stoppable() -> Iterator[None]:
     The first signal is a request, which the block checks from time to time. If the block has not ended after GRACE_S,
     or at a second signal, a watching thread ends the process, whatever it is doing.
     """
-    stop.forget()
+    stop.withdraw_requests()
     read_end, write_end = os.pipe()
     os.set_blocking(write_end, False)
     watcher = threading.Thread(target=_watch, args=(read_end,), name="stop", daemon=True)
@@ -74,7 +74,7 @@ def _exit_if_stopped() -> None:
     print(_stopped_json(), end="", flush=True)
     print(_stopped_line(), end="", file=sys.stderr, flush=True)
     code = 128 + stop.requested()
-    stop.forget()
+    stop.withdraw_requests()
     # Called before all other exit functions, because libraries take a second or two to unload.
     atexit.register(os._exit, code)
     raise SystemExit(code) from None
@@ -101,7 +101,7 @@ def _next_signal(read_end: int) -> int:
 
 def _end_process(number: int) -> None:
     """Clean up and end the process, whatever its main thread is doing."""
-    stop.undo_all()
+    stop.clean_up_all()
     line = _stopped_line()
     if os.isatty(STDERR):
         line = f"{CLEAR_LINE}{SHOW_CURSOR}{line}"

@@ -53,7 +53,7 @@ def score_bundle(path: Path, *, as_json: bool) -> None:
             scores.append(score)
             if not is_same:
                 differing.append(score)
-        board = page.board_of(folder, scores)
+        board = page.run_board(folder, scores)
 
     if as_json:
         terminal.print_json({"trials": len(scores), "differ": [_trial_name(score) for score in differing]})

@@ -13,7 +13,7 @@ from vobench.cli import terminal
 from vobench.cli.option import Json
 from vobench.errors import InputError
 from vobench.runner.key import cache_folder
-from vobench.runner.store import GB, Entry, Store
+from vobench.runner.store import GB, Store, StoreEntry
 
 ACTIONS = ("ls", "gc", "verify")
 DAY_S = 86400.0
@@ -48,14 +48,14 @@ def cache_command(
     _list(store, removed, as_json=json)
 
 
-def _collect(store: Store, keep_gb: float | None, older_days: float | None) -> list[Entry]:
+def _collect(store: Store, keep_gb: float | None, older_days: float | None) -> list[StoreEntry]:
     """Remove entries; return those that were removed."""
     keep_bytes = math.inf if keep_gb is None else keep_gb * GB
     older_s = math.inf if older_days is None else older_days * DAY_S
     return store.collect(keep_bytes=keep_bytes, older_s=older_s)
 
 
-def _list(store: Store, removed: Sequence[Entry] | None, *, as_json: bool) -> None:
+def _list(store: Store, removed: Sequence[StoreEntry] | None, *, as_json: bool) -> None:
     """Print the entries of each kind, and what was removed before, if anything was to be."""
     kinds = [_facts(kind, list(entries)) for kind, entries in groupby(store.entries(), key=lambda entry: entry.kind)]
     removed_bytes = sum(entry.bytes for entry in removed or ())
@@ -72,7 +72,7 @@ def _list(store: Store, removed: Sequence[Entry] | None, *, as_json: bool) -> No
         print(f"removed {len(removed)} entries of {removed_bytes / GB:.3g} GB")
 
 
-def _facts(kind: str, entries: Sequence[Entry]) -> dict[str, Any]:
+def _facts(kind: str, entries: Sequence[StoreEntry]) -> dict[str, Any]:
     now_s = time.time()
     return {
         "kind": kind,

@@ -57,7 +57,7 @@ def _checked_board(folder: RunFolder, path: Path) -> Board:
     checked = check(folder, wrong_truths(folder) if path.is_file() else {})
     for note in checked.notes:
         terminal.warn(f"{path.name}: {note}")
-    return page.board_of(folder, checked.scores)
+    return page.run_board(folder, checked.scores)
 
 
 def _print_changes(changes: Sequence[compare.Change], environment_differences: Sequence[str]) -> None:

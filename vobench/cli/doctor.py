@@ -30,7 +30,7 @@ PATH_TRACING = "path tracing (Mitsuba)"
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class MachineCheck:
     """The result of one check, and the command that helps if it failed; optional dependencies may be missing."""
 
     check: str
@@ -57,21 +57,21 @@ def doctor_command(
         raise MissingDependencyError("; ".join(f"{check.check}: {check.remedy}" for check in failed))
 
 
-def _all_checks(*, fix: bool) -> list[Check]:
-    python = Check("Python", True, sys.version.split()[0])
+def _all_checks(*, fix: bool) -> list[MachineCheck]:
+    python = MachineCheck("Python", True, sys.version.split()[0])
     drawing = _check_drawing()
     if fix and not drawing[0].well:
         drawing = _install_drawing()
     return [python, _check_libraries(), *drawing, _check_cache(), _check_sandbox(), _check_path_tracing()]
 
 
-def _verdict(check: Check) -> str:
+def _verdict(check: MachineCheck) -> str:
     if check.well:
         return "ok"
     return "optional" if check.optional else "MISSING"
 
 
-def _check_libraries() -> Check:
+def _check_libraries() -> MachineCheck:
     """Whether all requirements of the vobench distribution, without extras, are installed."""
     missing = list[str]()
     for requirement in requires("vobench") or []:
@@ -84,10 +84,10 @@ def _check_libraries() -> Check:
             missing.append(name)
     result = f"missing: {', '.join(missing)}" if missing else "all installed"
     remedy = f"run: {sys.executable} -m pip install {' '.join(missing)}"
-    return Check("Python libraries", not missing, result, remedy)
+    return MachineCheck("Python libraries", not missing, result, remedy)
 
 
-def _check_drawing() -> list[Check]:
+def _check_drawing() -> list[MachineCheck]:
     """Whether a test image is correct, rendered in a process of its own, which a broken driver may kill."""
     process = stop.run([sys.executable, "-P", "-m", "vobench.rendering.self_test"])
     if process.returncode != 0:
@@ -101,24 +101,24 @@ def _check_drawing() -> list[Check]:
 
     driver = "{renderer}, OpenGL {version}, device {device}".format(**report["driver"])
     device_names = ", ".join(report["devices"])
-    devices = Check("drawing devices", True, f"{device_names}; {DEVICE_VARIABLE} selects one", optional=True)
+    devices = MachineCheck("drawing devices", True, f"{device_names}; {DEVICE_VARIABLE} selects one", optional=True)
     if not report["well"]:
         return [_wrong_image(driver, report), devices]
     result = f"a test image is correct, with {driver}; light and truth are computed on the CPU"
-    return [Check(DRAWING, True, result), devices]
+    return [MachineCheck(DRAWING, True, result), devices]
 
 
-def _failed_drawing(result: str, remedy: str) -> Check:
-    return Check(DRAWING, False, result, f"run: {_with_sudo(remedy)}")
+def _failed_drawing(result: str, remedy: str) -> MachineCheck:
+    return MachineCheck(DRAWING, False, result, f"run: {_with_sudo(remedy)}")
 
 
-def _wrong_image(driver: str, report: dict[str, Any]) -> Check:
+def _wrong_image(driver: str, report: dict[str, Any]) -> MachineCheck:
     """The check of a driver that renders, but not what geometry and photometry predict."""
     error_percent = 100 * report["largest_error"]
     stray_light = f"stray light {report['stray_cd_m2']:.3g} cd/m²"
     result = f"a test image is wrong by up to {error_percent:.3g} %, {stray_light}, with {driver}"
     remedy = f"update the driver, or set {DEVICE_VARIABLE} to another device ({', '.join(report['devices'])})"
-    return Check(DRAWING, False, result, remedy)
+    return MachineCheck(DRAWING, False, result, remedy)
 
 
 def _with_sudo(command: str) -> str:
@@ -126,7 +126,7 @@ def _with_sudo(command: str) -> str:
     return command if os.geteuid() == 0 else command.replace("apt-get", "sudo apt-get")
 
 
-def _install_drawing() -> list[Check]:
+def _install_drawing() -> list[MachineCheck]:
     """Install Mesa's EGL with apt if this user may, and check again."""
     if os.geteuid() != 0 or shutil.which("apt-get") is None:
         return _check_drawing()
@@ -145,30 +145,30 @@ def _install_drawing() -> list[Check]:
     return _check_drawing()
 
 
-def _check_cache() -> Check:
+def _check_cache() -> MachineCheck:
     root = cache_folder()
     is_writable = not why_unwritable(root)
     result = str(root) if is_writable else f"cannot write {root}"
-    return Check("cache", is_writable, result, "set VOBENCH_CACHE to a folder that can be written")
+    return MachineCheck("cache", is_writable, result, "set VOBENCH_CACHE to a folder that can be written")
 
 
-def _check_sandbox() -> Check:
+def _check_sandbox() -> MachineCheck:
     """Whether estimators can be kept from reading the ground truth; they run without a sandbox, too."""
     sandbox = sandbox_here()
     if sandbox.level == "full":
-        return Check(SANDBOX, True, "estimators see their own files and nothing else", optional=True)
+        return MachineCheck(SANDBOX, True, "estimators see their own files and nothing else", optional=True)
     reason = f" ({sandbox.why})" if sandbox.why else ""
     result = f"estimators can see {', '.join(sandbox.sees)}{reason}; every trial records this"
     remedy = "allow user namespaces: sysctl user.max_user_namespaces, kernel.apparmor_restrict_unprivileged_userns"
-    return Check(SANDBOX, False, result, remedy, optional=True)
+    return MachineCheck(SANDBOX, False, result, remedy, optional=True)
 
 
-def _check_path_tracing() -> Check:
+def _check_path_tracing() -> MachineCheck:
     """Whether Mitsuba can render, in a process of its own, which a wrong libLLVM would kill."""
     try:
         library = mitsuba.working_library()
     except MissingDependencyError as error:
         result, _, command = str(error).partition("; run: ")
         remedy = _with_sudo(command)
-        return Check(PATH_TRACING, False, f"{result}; run: {remedy}", remedy, optional=True)
-    return Check(PATH_TRACING, True, f"works with {library}", optional=True)
+        return MachineCheck(PATH_TRACING, False, f"{result}; run: {remedy}", remedy, optional=True)
+    return MachineCheck(PATH_TRACING, True, f"works with {library}", optional=True)

@@ -8,7 +8,7 @@ import typer
 from vobench.asset import MODEL_SUFFIXES
 from vobench.cli import terminal
 from vobench.cli.option import Json
-from vobench.errors import UnknownNameError, VobenchError, unknown
+from vobench.errors import UnknownNameError, VobenchError, unknown_name_sentence
 from vobench.suite import catalog
 from vobench.suite.catalog import KINDS, Entry
 from vobench.suite.file_kind import Kind
@@ -34,7 +34,7 @@ def list_command(
     kinds = [known for known in KINDS if kind in (None, known, f"{known}s")]
     if not kinds:
         known_kinds = [f"{known}s" for known in KINDS]
-        raise UnknownNameError(unknown("kind", str(kind), known_kinds))
+        raise UnknownNameError(unknown_name_sentence("kind", str(kind), known_kinds))
     rows = list[dict[str, Any]]()
     for each in kinds:
         rows += _entry_rows(each)

@@ -10,7 +10,7 @@ from vobench.cli.option import option_group
 from vobench.dataset.export import TRAJECTORY_FORMS
 from vobench.dataset.layout import layouts, writable
 from vobench.dataset.recording import ReadOptions, Topics
-from vobench.errors import UnknownNameError, unknown
+from vobench.errors import UnknownNameError, unknown_name_sentence
 
 TOPIC_ROLES = tuple(Topics.__dataclass_fields__)
 
@@ -48,7 +48,7 @@ def parse_topics(entries: list[str] | None) -> Topics:
     for entry in entries or ():
         role, _, name = entry.partition("=")
         if role not in TOPIC_ROLES or not name:
-            sentence = unknown("topic", role, list(TOPIC_ROLES))
+            sentence = unknown_name_sentence("topic", role, list(TOPIC_ROLES))
             raise UnknownNameError(f"--topic {entry}: {sentence}; as in --topic left=/cam0")
         name_by_role[role] = name
     return Topics(**name_by_role)

@@ -118,7 +118,7 @@ def _checked_board(folder: RunFolder, wrong_truth_by_case: dict[str, str], signa
     remarks = (*checked.notes, *signatures)
     for remark in remarks:
         terminal.warn(remark)
-    board = page.board_of(folder, checked.scores)
+    board = page.run_board(folder, checked.scores)
     board = replace(board, remarks=(*board.remarks, *remarks))
     return _CheckedBoard(board, checked.scores, checked.claimed)
 
@@ -127,7 +127,7 @@ def _report_text(format_name: str, folder: RunFolder, checked: _CheckedBoard, me
     if format_name != "html":
         return FORMATS[format_name](checked.board, metric)
     page_folder = out.resolve().parent if out else folder.path  # where relative links start
-    return page.html(folder, checked.scores, checked.board, page_folder)
+    return page.board_page(folder, checked.scores, checked.board, page_folder)
 
 
 def _print_claimed(claimed: Sequence[Rescored]) -> None:

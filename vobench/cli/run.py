@@ -164,7 +164,7 @@ def run_command(
 
     folder = _run(plan, out, execution, progress)
     scores = folder.scores()
-    board = page.board_of(folder, scores)
+    board = page.run_board(folder, scores)
     _print_board(board, as_json=json)
     if not json:
         _print_remarks(folder, shares_time=execution.share_time or plan.suite.share_time)

@@ -10,7 +10,7 @@ from vobench.errors import printable
 from vobench.runner.progress import RunProgress
 
 if TYPE_CHECKING:
-    from vobench.runner.executor import Event
+    from vobench.runner.executor import TaskEvent
     from vobench.runner.task import Task
 
 BAR_WIDTH = 24
@@ -53,7 +53,7 @@ class TerminalDisplay:
         if tasks:
             self._overall_bar = self._bars.add_task("all", total=1.0, status=self._progress.describe(0.0))
 
-    def hear(self, event: "Event") -> None:
+    def hear(self, event: "TaskEvent") -> None:
         """Show and log one event."""
         if self._log:
             print(json_module.dumps(_logged(event), ensure_ascii=False), file=self._log, flush=True)
@@ -75,16 +75,16 @@ class TerminalDisplay:
         status = self._progress.describe(time.monotonic() - self._start_s)
         self._bars.update(self._overall_bar, completed=self._progress.share, status=status)
 
-    def _add_bar(self, event: "Event") -> None:
+    def _add_bar(self, event: "TaskEvent") -> None:
         if self._draws_bars:
             self._bar_by_task[event.task.key] = self._bars.add_task(_task_name(event), total=None, status="")
 
-    def _remove_bar(self, event: "Event") -> None:
+    def _remove_bar(self, event: "TaskEvent") -> None:
         bar = self._bar_by_task.pop(event.task.key, None)
         if bar is not None:
             self._bars.remove_task(bar)
 
-    def _print_result(self, event: "Event") -> None:
+    def _print_result(self, event: "TaskEvent") -> None:
         if event.what == "failed":
             self._print(f"{_task_name(event)}: failed: {event.reason}")
         elif event.what == "done" and self._prints_finished:
@@ -109,11 +109,11 @@ class TerminalDisplay:
             self._log.close()
 
 
-def _task_name(event: "Event") -> str:
+def _task_name(event: "TaskEvent") -> str:
     return f"{event.task.stage} {event.task.name}"
 
 
-def _logged(event: "Event") -> dict[str, Any]:
+def _logged(event: "TaskEvent") -> dict[str, Any]:
     """An event as a line of the log."""
     return {
         "t_s": round(time.time(), 3),

@@ -10,7 +10,7 @@ from vobench.cli import terminal
 from vobench.cli.option import Json, RunPath, option_group, with_option_groups
 from vobench.errors import InputError
 from vobench.report.rerun import PictureForm
-from vobench.report.viewer import Recording, open_viewer, save_recordings
+from vobench.report.viewer import TrialRecording, open_viewer, save_recordings
 from vobench.runner.folder import open_run
 
 IMAGE_FORMS: dict[str, PictureForm] = {"jpeg": "jpeg", "png": "png"}
@@ -81,11 +81,11 @@ def view_command(
         open_viewer([recording.path for recording in recordings], web=web)
 
 
-def _trial_names(recording: Recording) -> str:
+def _trial_names(recording: TrialRecording) -> str:
     return " and ".join(f"{trial.estimator} on {trial.case} ({trial.status})" for trial in recording.trials)
 
 
-def _facts(recordings: Sequence[Recording]) -> dict[str, Any]:
+def _facts(recordings: Sequence[TrialRecording]) -> dict[str, Any]:
     """The first recording, and all of them, as JSON."""
     first = recordings[0]
     first_trial = first.trials[0]
@@ -98,7 +98,7 @@ def _facts(recordings: Sequence[Recording]) -> dict[str, Any]:
     }
 
 
-def _recording_facts(recording: Recording) -> dict[str, Any]:
+def _recording_facts(recording: TrialRecording) -> dict[str, Any]:
     return {
         "path": str(recording.path),
         "case": recording.trials[0].case,

@@ -17,7 +17,7 @@ from vobench.dataset.bag_topics import Chosen, choose
 from vobench.dataset.bag_writer import write_ros2
 from vobench.dataset.kalibr import chain_has_imu, chain_rig, find_imu, read_imu
 from vobench.dataset.layout import Layout, Writing, head
-from vobench.dataset.picture import Picture, require_themselves
+from vobench.dataset.picture import EncodedPicture, refuse_lfs_pointers
 from vobench.dataset.picture_list import partners
 from vobench.dataset.recording import (
     CalibratedImu,
@@ -59,7 +59,7 @@ class BagContents:
 
 def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
     """The recording of a bag, whose pictures are read when they are iterated. Raises InputError."""
-    require_themselves(path)
+    refuse_lfs_pointers(path)
     if form == "mcap":
         _require_ros2(path)
     with opened(path) as reader:
@@ -241,7 +241,7 @@ def _read_pictures(
     t_ns: Stamps,
 ) -> Iterator[RecordedFrame]:
     """The frames in order; a picture is held until its partner comes, and a limited number of them at once."""
-    waiting: dict[int, dict[str, Picture]] = {}  # pictures by topic, by the frame's index
+    waiting: dict[int, dict[str, EncodedPicture]] = {}  # pictures by topic, by the frame's index
     due = 0
     with opened(path) as reader:
         connections = [connection for connection in reader.connections if connection.topic in indices]

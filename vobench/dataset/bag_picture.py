@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.dataset.picture import Picture
+from vobench.dataset.picture import EncodedPicture
 from vobench.errors import InputError
 
 # Bytes of a pixel by the encodings of grey pictures, channels by those of 8-bit colour ones.
@@ -21,21 +21,21 @@ MOSAICS = {
 }
 
 
-def picture(message: Any, name: str) -> Picture:
+def picture(message: Any, name: str) -> EncodedPicture:
     """The picture of an Image or CompressedImage. Raises InputError for an unknown encoding."""
     if not hasattr(message, "encoding"):
-        return Picture(name, message.data.tobytes())
+        return EncodedPicture(name, message.data.tobytes())
     encoding = message.encoding.lower()
     if encoding in GREY:
         grey = _pixels(message, name, 1, GREY[encoding])
-        return Picture(name, grey[..., 0])
+        return EncodedPicture(name, grey[..., 0])
     if encoding in COLOURS:
         colour = _pixels(message, name, COLOURS[encoding], 1)[..., :3]  # without alpha
         blue_green_red = colour[..., ::-1] if encoding.startswith("rgb") else colour
-        return Picture(name, np.ascontiguousarray(blue_green_red))
+        return EncodedPicture(name, np.ascontiguousarray(blue_green_red))
     if encoding in MOSAICS:
         mosaic = _pixels(message, name, 1, 1)[..., 0]
-        return Picture(name, np.asarray(cv2.cvtColor(mosaic, MOSAICS[encoding])))
+        return EncodedPicture(name, np.asarray(cv2.cvtColor(mosaic, MOSAICS[encoding])))
     known = ", ".join((*GREY, *COLOURS, *MOSAICS))
     raise InputError(f"the encoding {message.encoding!r} is not supported. Known: {known}: {name}")
 

@@ -16,7 +16,7 @@ from vobench.dataset.photometric import write_photometric
 from vobench.dataset.picture import require_free
 from vobench.dataset.read_back import check_path, check_rig
 from vobench.dataset.source import PNG, ExportSource, Views, open_source
-from vobench.errors import InputError, SequenceError, unknown
+from vobench.errors import InputError, SequenceError, unknown_name_sentence
 from vobench.geometry.rig import Rig
 from vobench.trajectory.formats import format_euroc, format_kitti, format_times, format_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -87,7 +87,7 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
     """
     layout = writable().get(form)
     if layout is None:
-        raise InputError(unknown("form to export to", form, list(writable())))
+        raise InputError(unknown_name_sentence("form to export to", form, list(writable())))
     out = out.resolve()
     require_free(out)
     source = open_source(sequence)
@@ -113,7 +113,7 @@ def _building(out: Path) -> Iterator[Path]:
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         part = Path(mkdtemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part"))
-        with stop.undone(lambda: stop.remove(part)):
+        with stop.cleanup_after(lambda: stop.remove(part)):
             folder = part / out.name
             folder.mkdir()
             yield folder

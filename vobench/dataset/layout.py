@@ -11,10 +11,10 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
 
-from vobench.dataset.picture import enumerated, listed, require_itself
+from vobench.dataset.picture import enumerated, listed, refuse_lfs_pointer
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.dataset.source import ExportSource, Views
-from vobench.errors import InputError, unknown
+from vobench.errors import InputError, unknown_name_sentence
 from vobench.geometry.rig import Rig
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
@@ -109,7 +109,7 @@ def sniff(path: Path) -> str:
     if not path.exists():
         raise InputError(f"no file or folder at {path}")
     if path.is_file():
-        require_itself(head(path), str(path))
+        refuse_lfs_pointer(head(path), str(path))
     names = _matching(path)
     if not names:
         raise InputError(_unrecognised(path))
@@ -205,7 +205,7 @@ def read(
     try:
         known = layouts()
         if form is not None and form not in known:
-            raise InputError(unknown("form", form, list(known)))
+            raise InputError(unknown_name_sentence("form", form, list(known)))
         layout = known[sniff(path) if form is None else form]
         _require_heeded(options, layout)
         return layout.read(path, options)

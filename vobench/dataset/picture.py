@@ -34,7 +34,7 @@ def read_bytes(path: Path) -> bytes:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
         raise InputError(f"cannot read {path}: {reason}") from None
-    require_itself(data, str(path))
+    refuse_lfs_pointer(data, str(path))
     return data
 
 
@@ -51,20 +51,20 @@ def read_text(path: Path) -> str:
     return text
 
 
-def require_itself(data: bytes, name: str) -> None:
+def refuse_lfs_pointer(data: bytes, name: str) -> None:
     """Raise InputError for a Git-LFS pointer."""
     if data.startswith(LFS_POINTER.encode()):
         raise InputError(f"a Git-LFS pointer, not the file itself; fetch it with git lfs pull: {name}")
 
 
-def require_themselves(folder: Path) -> None:
+def refuse_lfs_pointers(folder: Path) -> None:
     """Raise InputError for the first file of a folder that is a Git-LFS pointer."""
     for name in listed(folder):
         path = folder / name
         if path.is_file():
             with path.open("rb") as file:
                 start = file.read(len(LFS_POINTER))
-            require_itself(start, str(path))
+            refuse_lfs_pointer(start, str(path))
 
 
 def inside(folder: Path, name: str, place: str) -> Path:
@@ -117,7 +117,7 @@ COLOURS = {1: "grey", 2: "grey with alpha", 3: "colour", 4: "colour with alpha"}
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class EncodedPicture:
     """A PNG's or JPEG's bytes, or pixels (H, W) or (H, W, 3) blue, green, red of 8 or 16 bits.
 
     `name` is for messages.
@@ -146,7 +146,7 @@ class Kind:
         return f"{self.width_px} x {self.height_px} pixels, {self.bits}-bit {COLOURS[self.channels]}"
 
 
-def kind_of(picture: Picture) -> Kind:
+def kind_of(picture: EncodedPicture) -> Kind:
     """The kind of a whole picture. Raises InputError for a file that is cut off, or neither PNG nor JPEG."""
     content = picture.content
     if not isinstance(content, bytes):
@@ -155,7 +155,7 @@ def kind_of(picture: Picture) -> Kind:
         bits = content.itemsize * 8
         return Kind(width, height, channels, bits, "pixels")
 
-    require_itself(content, picture.name)
+    refuse_lfs_pointer(content, picture.name)
     if not content.startswith((PNG, JPEG)):
         begins = f"it begins with {content[:8]!r}" if content else "it is empty"
         raise InputError(f"a picture should be a PNG or JPEG file, but {begins}: {picture.name}")
@@ -166,7 +166,7 @@ def kind_of(picture: Picture) -> Kind:
     return kind
 
 
-def grey(picture: Picture, kind: Kind) -> Image:
+def grey(picture: EncodedPicture, kind: Kind) -> Image:
     """The picture (H, W) in 8-bit grey; of 16 bits the upper eight. Raises InputError where it does not decode."""
     content = picture.content
     pixels: NDArray[Any] = _decoded(picture, kind) if isinstance(content, bytes) else content
@@ -178,7 +178,7 @@ def grey(picture: Picture, kind: Kind) -> Image:
     return np.ascontiguousarray(pixels, np.uint8)
 
 
-def as_file(picture: Picture, kind: Kind) -> tuple[bytes, str]:
+def as_file(picture: EncodedPicture, kind: Kind) -> tuple[bytes, str]:
     """An 8-bit grey PNG or JPEG file and its form; a file that is one already is kept. Raises InputError."""
     if isinstance(picture.content, bytes) and kind.is_grey8:
         return picture.content, kind.form
@@ -200,7 +200,7 @@ def conversions(kind: Kind) -> tuple[str, ...]:
     return tuple(sentences)
 
 
-def _decoded(picture: Picture, kind: Kind) -> NDArray[Any]:
+def _decoded(picture: EncodedPicture, kind: Kind) -> NDArray[Any]:
     data = np.frombuffer(bytes(picture.content), np.uint8)
     try:
         pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)

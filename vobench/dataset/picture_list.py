@@ -10,11 +10,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.dataset.picture import Picture, inside, listed, read_bytes, read_text
+from vobench.dataset.picture import EncodedPicture, inside, listed, read_bytes, read_text
 from vobench.dataset.recording import Notes, PictureStream, RecordedFrame
 from vobench.errors import InputError
 from vobench.trajectory.associate import associate
-from vobench.trajectory.formats import NUMBER, Table, Unit, content, stamps_ns
+from vobench.trajectory.formats import NUMBER, StampUnit, TrajectoryTable, content, stamps_ns
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
@@ -40,7 +40,7 @@ def read_list(
     folder: Path,
     *,
     separator: str | None,
-    unit: Unit,
+    unit: StampUnit,
 ) -> PictureList:
     """A list of stamps and names of pictures below `folder`. Raises InputError naming file and line."""
     rows = content(read_text(path))
@@ -56,7 +56,7 @@ def read_list(
     lines = [line for line, _ in rows]
     stamps = [row[0] for row in cells]
     no_values = np.empty((len(rows), 0))
-    table = Table(str(path), lines, stamps, no_values)
+    table = TrajectoryTable(str(path), lines, stamps, no_values)
     t_ns = stamps_ns(table, unit)
     paths = [inside(folder, row[1], table.place(index)) for index, row in enumerate(cells)]
     return PictureList(str(path), t_ns, tuple(paths))
@@ -80,7 +80,7 @@ def _stripped(cells: list[str]) -> list[str]:
 def listed_pictures(
     *lists: tuple[Path, Path],
     separator: str | None,
-    unit: Unit,
+    unit: StampUnit,
     within_ns: int = 0,
 ) -> tuple[list[PictureList], Notes]:
     """The existing pictures of one or two cameras, and notes on what was dropped.
@@ -230,7 +230,7 @@ def picture_files(t_ns: Stamps, *cameras: Sequence[Path]) -> PictureStream:
 
     def shots() -> Iterator[RecordedFrame]:
         for t, paths in zip(t_ns.tolist(), zip(*cameras, strict=True), strict=True):
-            pictures = [Picture(str(path), read_bytes(path)) for path in paths]
+            pictures = [EncodedPicture(str(path), read_bytes(path)) for path in paths]
             yield RecordedFrame(t, tuple(pictures))
 
     return PictureStream.open(shots)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.dataset.overlap import overlapping_imu, overlapping_truth
-from vobench.dataset.picture import Kind, Picture, as_file, conversions, grey, kind_of
+from vobench.dataset.picture import EncodedPicture, Kind, as_file, conversions, grey, kind_of
 from vobench.errors import InputError
 from vobench.geometry.rig import SIDES, ImuCalibration, Rig, rectification
 from vobench.geometry.se3 import Array
@@ -51,7 +51,7 @@ class RecordedFrame:
     """The pictures of one instant: the left one, or left and right."""
 
     t_ns: int
-    pictures: tuple[Picture, ...]
+    pictures: tuple[EncodedPicture, ...]
 
 
 Shots = Callable[[], Iterator[RecordedFrame]]
@@ -109,7 +109,7 @@ class PictureStream:
             right = files[1][0] if len(files) > 1 else None
             yield EncodedFrame(index, shot.t_ns, form, left, right)
 
-    def _checked(self, shot: RecordedFrame) -> Iterator[tuple[Picture, Kind]]:
+    def _checked(self, shot: RecordedFrame) -> Iterator[tuple[EncodedPicture, Kind]]:
         for picture, first in zip(shot.pictures, self.kinds, strict=True):
             kind = kind_of(picture)
             if replace(kind, form=first.form) != first:
@@ -117,8 +117,8 @@ class PictureStream:
             yield picture, kind
 
 
-def _as_png(picture: Picture, kind: Kind) -> tuple[bytes, str]:
-    pixels = Picture(picture.name, grey(picture, kind))
+def _as_png(picture: EncodedPicture, kind: Kind) -> tuple[bytes, str]:
+    pixels = EncodedPicture(picture.name, grey(picture, kind))
     return as_file(pixels, kind_of(pixels))
 
 

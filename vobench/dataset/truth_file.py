@@ -10,7 +10,7 @@ from vobench.dataset.recording import Notes, ReadOptions
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.trajectory.formats import Parsed, parse_any
+from vobench.trajectory.formats import ParsedTrajectory, parse_any
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 EXACT = 1e-9  # |RᵀR - I| up to which a rotation was written with all its digits
@@ -41,7 +41,7 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
     return Trajectory(t_ns, T), tuple(notes)
 
 
-def _unstamped(parsed: Parsed, frame_count: int, path: Path) -> InputError:
+def _unstamped(parsed: ParsedTrajectory, frame_count: int, path: Path) -> InputError:
     if parsed.frames is not None:
         return InputError(
             f"the first of 13 columns should be a picture's number, from 0 to {frame_count - 1}, "

@@ -18,10 +18,10 @@ from vobench.estimator.protocol import Frame, Result, Status
 from vobench.estimator.sandbox import Sandbox
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
-from vobench.trajectory.formats import Parsed, Unit, content, parse_any
+from vobench.trajectory.formats import ParsedTrajectory, StampUnit, content, parse_any
 from vobench.trajectory.trajectory import Stamps
 
-UNITS: tuple[Unit | None, ...] = (None, "ns", "us", "ms")
+UNITS: tuple[StampUnit | None, ...] = (None, "ns", "us", "ms")
 CALIBRATION = "camchain.yaml"
 # More than any form of poses takes; a frame's pose has a line.
 OUT_BYTES = 1 << 20
@@ -164,7 +164,7 @@ def poses_in(text: str, t_ns: Stamps) -> dict[int, Array]:
     raise EstimatorFailure("invalid_output", errors[0])
 
 
-def _matched(parsed: Parsed, t_ns: Stamps) -> dict[int, Array]:
+def _matched(parsed: ParsedTrajectory, t_ns: Stamps) -> dict[int, Array]:
     """Each pose by the stamp of the nearest frame.
 
     Raises TrajectoryError if a pose is too far away, or if a frame has no pose of its own stamp or several.

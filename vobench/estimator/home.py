@@ -42,7 +42,7 @@ class Home:
         return self._locked.parent
 
     def __enter__(self) -> Self:
-        self._undone = stop.undone(self.close)
+        self._undone = stop.cleanup_after(self.close)
         self._undone.__enter__()
         return self
 

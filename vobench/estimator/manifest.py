@@ -6,7 +6,7 @@ from typing import Annotated, Any, ClassVar, Literal
 
 from annotated_types import Ge, Le, MinLen
 
-from vobench.errors import SettingError, unknown
+from vobench.errors import SettingError, unknown_name_sentence
 from vobench.setting import Matching, Positive, settings
 
 MANIFEST_FILE = "estimator.yaml"
@@ -89,7 +89,7 @@ class Manifest:
         known = [*placeholders, *self.params]
         for name in PLACEHOLDER.findall(" ".join(argv)):
             if name not in known:
-                raise SettingError(unknown("placeholder or parameter", name, known), key)
+                raise SettingError(unknown_name_sentence("placeholder or parameter", name, known), key)
 
     @property
     def described(self) -> str:

@@ -44,7 +44,7 @@ WORKER = (sys.executable, "-P", "-m", "vobench.estimator.worker")
 
 
 @dataclass(frozen=True, slots=True)
-class Door:
+class Connector:
     """How an estimator is called: its argv and the payload of CALB for a trial, and the parts of a FRAM."""
 
     opened: Callable[[Rig, Mapping[str, Any], int], tuple[Sequence[str], bytes]]
@@ -55,7 +55,7 @@ class EstimatorProcess:
     """A running estimator; what it prints goes to `log`. Its methods raise EstimatorFailure."""
 
     def __init__(
-        self, door: Door, *, log: Path, limits: Limits, hidden: Sequence[Path] = (), folder: Path | None = None
+        self, door: Connector, *, log: Path, limits: Limits, hidden: Sequence[Path] = (), folder: Path | None = None
     ) -> None:
         self._door = door
         self._log = log
@@ -89,7 +89,7 @@ class EstimatorProcess:
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
             return argv, pickle.dumps((rig, dict(params), seed, is_watched))
 
-        return cls(Door(opened, pickled), log=log, limits=limits, hidden=hidden, folder=folder)
+        return cls(Connector(opened, pickled), log=log, limits=limits, hidden=hidden, folder=folder)
 
     @classmethod
     def of_stream(
@@ -115,7 +115,7 @@ class EstimatorProcess:
             words = filled(argv, folder, {**params, "seed": seed, "rate_hz": rate_hz})
             return words, json.dumps(content, default=str).encode()
 
-        return cls(Door(opened, framed), log=log, limits=limits, hidden=hidden, folder=folder)
+        return cls(Connector(opened, framed), log=log, limits=limits, hidden=hidden, folder=folder)
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Start it, send the calibration, and wait until it is ready; a second call starts it again."""

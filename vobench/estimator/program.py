@@ -136,7 +136,7 @@ class Program:
             for pipe in (self.process.stdin, self.process.stdout):
                 if pipe:
                     undone.callback(pipe.close)
-            undone.enter_context(stop.undone(self._kill, is_awaited=True))
+            undone.enter_context(stop.cleanup_after(self._kill, is_awaited=True))
 
             plan = sandbox.plan(
                 argv, home=self.home, homes=self._home.base, folder=folder, hidden=hidden, limits=limits

@@ -136,7 +136,7 @@ def looking(*, pitch_deg: float, position_m: tuple[float, float, float]) -> Arra
     return se3.transform(R_body_camera, position_m)
 
 
-def mounted(
+def mounted_rig(
     left: Camera,
     right: Camera,
     T_left_right: Array,
@@ -157,7 +157,7 @@ def mounted(
 def stereo_rig(lens: Camera, *, baseline_m: float = 0.12, **mount: Any) -> Rig:
     """A rig of two equal, parallel cameras side by side, with the arguments of `mounted`."""
     T_left_right = side_by_side(baseline_m)
-    return mounted(lens, lens, T_left_right, **mount)
+    return mounted_rig(lens, lens, T_left_right, **mount)
 
 
 def side_by_side(baseline_m: float) -> Array:
@@ -395,7 +395,7 @@ def lens_of(camera: Camera) -> Lens:
 
 
 @settings()
-class OwnPair:
+class CustomStereoPair:
     """Two user-defined lenses, with the right camera's position and rotation vector in the left camera's frame.
 
     Without `right` both lenses are equal.
@@ -418,7 +418,7 @@ class OwnPair:
         return StereoPreset(left, right, T_left_right, "the suite")
 
 
-def own_pair(rig: Rig) -> OwnPair:
+def custom_stereo_pair(rig: Rig) -> CustomStereoPair:
     """The pair of a rig as the settings of a suite. Raises InputError if the rig has one camera."""
     from scipy.spatial.transform import Rotation
 
@@ -426,7 +426,7 @@ def own_pair(rig: Rig) -> OwnPair:
     turn = Rotation.from_matrix(T[:3, :3])
     right_at_m: Any = tuple(T[:3, 3].tolist())
     right_turned_deg: Any = tuple(turn.as_rotvec(degrees=True).tolist())
-    return OwnPair(
+    return CustomStereoPair(
         left=lens_of(rig.left),
         right=lens_of(rig.camera("right")),
         right_at_m=right_at_m,
@@ -439,7 +439,7 @@ Angle = Annotated[float, Ge(-10), Le(10)]
 
 
 @settings()
-class EyeError:
+class CameraError:
     """The true parameters of one camera minus the nominal ones; turns are those of CalibrationError."""
 
     focal_ratio: Ratio = 0.0
@@ -470,17 +470,17 @@ class CalibrationError:
     right_roll_deg: Angle = 0.0
     right_pitch_deg: Angle = 0.0
     right_yaw_deg: Angle = 0.0
-    left: EyeError = EyeError()
-    right: EyeError = EyeError()
+    left: CameraError = CameraError()
+    right: CameraError = CameraError()
 
-    def of_eye(self, side: Side) -> EyeError:
+    def of_eye(self, side: Side) -> CameraError:
         """The total error of one camera."""
         single = self.left if side == "left" else self.right
         right_turns_deg = (self.right_roll_deg, self.right_pitch_deg, self.right_yaw_deg)
         roll_deg, pitch_deg, yaw_deg = right_turns_deg if side == "right" else (0.0, 0.0, 0.0)
         center_x_px = self.center_px[0] + single.center_px[0]
         center_y_px = self.center_px[1] + single.center_px[1]
-        return EyeError(
+        return CameraError(
             focal_ratio=self.focal_ratio + single.focal_ratio,
             center_px=(center_x_px, center_y_px),
             distortion_ratio=self.distortion_ratio + single.distortion_ratio,
@@ -491,7 +491,7 @@ class CalibrationError:
 
 
 @dataclass(frozen=True, slots=True)
-class Residual:
+class CalibrationResidual:
     """The usual size of the errors that a calibration leaves; of turns, the shift that they cause in the image."""
 
     yaw_px: float  # at the centre, an offset of every disparity
@@ -505,8 +505,8 @@ class Residual:
 
 # By experiment with recordings of cars and drones: the first has the row errors of EuRoC, the second those of KITTI,
 # whose disparities are off by 0.2 to 0.4 px at the centre.
-RESIDUALS: dict[Level, Residual] = {
-    "factory": Residual(
+RESIDUALS: dict[Level, CalibrationResidual] = {
+    "factory": CalibrationResidual(
         yaw_px=0.17,
         roll_px=0.25,
         pitch_px=0.12,
@@ -515,7 +515,7 @@ RESIDUALS: dict[Level, Residual] = {
         center_px=(0.5, 0.3),
         distortion_ratio=0.003,
     ),
-    "worn": Residual(
+    "worn": CalibrationResidual(
         yaw_px=0.55,
         roll_px=0.55,
         pitch_px=0.3,
@@ -528,7 +528,7 @@ RESIDUALS: dict[Level, Residual] = {
 SPREAD = 0.25  # a drawn error is its usual size, more or less by up to this share
 
 
-def drawn(
+def drawn_calibration_error(
     error: CalibrationError,
     nominal: Rig,
     rng: np.random.Generator,
@@ -587,7 +587,7 @@ def true_rig(nominal: Rig, error: CalibrationError) -> Rig:
     )
 
 
-def true_camera(nominal: Camera, error: EyeError) -> Camera:
+def true_camera(nominal: Camera, error: CameraError) -> Camera:
     """The camera with the errors of its focal length, centre and distortion. Raises VobenchError."""
     coefficients = {name: getattr(nominal, name) for name in nominal.coefficients}
     if error.distortion_ratio and not any(coefficients.values()):
@@ -607,7 +607,7 @@ def true_camera(nominal: Camera, error: EyeError) -> Camera:
     )
 
 
-def _turned(T_body_camera: Array, error: EyeError) -> Array:
+def _turned(T_body_camera: Array, error: CameraError) -> Array:
     """The camera's pose after its turns."""
     angles_deg = [error.roll_deg, error.pitch_deg, error.yaw_deg]
     if not any(angles_deg):

@@ -102,7 +102,7 @@ MIN_COVERAGE = 0.5  # an estimate of less than half of the recording has failed,
 
 
 @dataclass(frozen=True, slots=True)
-class Failure:
+class TrackingFailure:
     """Whether an estimate failed, and how wrong its poses are.
 
     `survived` means a pose at the end, and poses for half of the recording. `confidently_wrong` counts the estimated
@@ -121,21 +121,21 @@ def failure(
     covered: Coverage,
     *,
     fail_m: float,
-) -> Failure:
+) -> TrackingFailure:
     """The failure of an estimate by the position errors (K,) of its poses, each in its slot (K,) of the truth.
 
     A pose with an error above `fail_m` metres is wrong.
     """
     survived = not covered.ends_lost and covered.ratio >= MIN_COVERAGE
     if fail_m <= 0:
-        return Failure(survived, None, fail_m, None)
+        return TrackingFailure(survived, None, fail_m, None)
     n_slots = int(slots.max(initial=-1)) + 1
     best_m = np.full(n_slots, np.inf)
     np.minimum.at(best_m, slots, errors_m)
     covered_m = best_m[np.unique(slots)]
     lost_aware = lost_aware_score(covered_m, covered.ratio, survived=survived, fail_m=fail_m)
     confidently_wrong = int(np.count_nonzero(errors_m > fail_m))
-    return Failure(survived, lost_aware, fail_m, confidently_wrong)
+    return TrackingFailure(survived, lost_aware, fail_m, confidently_wrong)
 
 
 def lost_aware_score(

@@ -17,7 +17,7 @@ _PAIRS = {False: "consecutive", True: "all"}
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class IdentityPart:
     """One `key=value` of an identity, written for metrics that one of its settings changes, or for all if it has none.
 
     `write` returns None if the part is left out.
@@ -94,7 +94,7 @@ def _setting_part(
     write: Callable[[Any], str] = str,
     *,
     always: bool = False,
-) -> Part:
+) -> IdentityPart:
     """The part of one setting, written if its value is not the default, or always."""
 
     def written(settings: ScoreSettings) -> str | None:
@@ -102,24 +102,24 @@ def _setting_part(
         is_default = value == getattr(DEFAULTS, setting)
         return None if is_default and not always else write(value)
 
-    return Part(key, (setting,), written)
+    return IdentityPart(key, (setting,), written)
 
 
 PARTS = (
-    Part("delta", ("rpe_delta",), _delta),
-    Part("pairs", ("rpe_all_pairs",), _pairs),
+    IdentityPart("delta", ("rpe_delta",), _delta),
+    IdentityPart("pairs", ("rpe_all_pairs",), _pairs),
     _setting_part("rule", "rpe_rule"),
-    Part("lengths", ("segment_lengths_m",), _lengths),
+    IdentityPart("lengths", ("segment_lengths_m",), _lengths),
     _setting_part("step", "segment_step_frames", always=True),
     _setting_part("precision", "segment_precision"),
     _setting_part("mean", "segment_mean"),
     _setting_part("lengths", "relative_rule", always=True),
     _setting_part("fail", "fail_ratio", _number, always=True),
     _setting_part("slots", "coverage_of", always=True),
-    Part("align", ("alignment",), _align),
+    IdentityPart("align", ("alignment",), _align),
     _setting_part("scale", "scale_rule"),
     _setting_part("project", "project"),
-    Part("assoc", ("association",), _association),
+    IdentityPart("assoc", ("association",), _association),
     _setting_part("offset", "offset_ns", _ms),
-    Part("ddof", (), _ddof),
+    IdentityPart("ddof", (), _ddof),
 )

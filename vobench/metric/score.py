@@ -11,7 +11,7 @@ from vobench.geometry.se3 import Array
 from vobench.metric import nees
 from vobench.metric.ate import absolute
 from vobench.metric.comparison import DEFAULTS, Comparison, MetricDefinition, OverLengths, compare
-from vobench.metric.coverage import SLOT_NS, Coverage, Failure, coverage, failure, slots
+from vobench.metric.coverage import SLOT_NS, Coverage, TrackingFailure, coverage, failure, slots
 from vobench.metric.definitions import DEFINITIONS, identity
 from vobench.metric.segment import mean_drift
 from vobench.metric.settings import ScoreSettings
@@ -67,7 +67,7 @@ def statistics(errors: ArrayLike, *, ddof: int = 0) -> Statistics:
 
 
 @dataclass(frozen=True, slots=True)
-class Metric:
+class MetricResult:
     """One metric's statistics; `id` identifies how it was computed, so that numbers with equal ids are comparable."""
 
     id: str
@@ -121,10 +121,10 @@ class Samples:
         is_angle = self.of.unit == "deg/m"
         return replace(result, mean=float(np.rad2deg(mean)) if is_angle else mean)
 
-    def metric(self, settings: ScoreSettings, *, n: int, of: int) -> Metric:
+    def metric(self, settings: ScoreSettings, *, n: int, of: int) -> MetricResult:
         """The metric of errors of n matched out of so many true poses."""
         metric_id = identity(self.of, settings, n=n, of=of)
-        return Metric(metric_id, self.of.id, self.of.unit, self.statistics(settings))
+        return MetricResult(metric_id, self.of.id, self.of.unit, self.statistics(settings))
 
     def per_length(self, settings: ScoreSettings) -> Iterator[LengthMetric]:
         """The metric over each length alone; none for a metric without lengths."""
@@ -183,10 +183,10 @@ class Score:
     `settings` are complete; `samples` are the errors of the metrics, in the same order.
     """
 
-    metrics: tuple[Metric, ...]
+    metrics: tuple[MetricResult, ...]
     association: Association
     coverage: Coverage
-    failure: Failure
+    failure: TrackingFailure
     lost_aware_id: str
     alignment: Alignment
     warnings: tuple[str, ...]
@@ -206,7 +206,7 @@ class Score:
             metrics.extend(samples.per_length(self.settings))
         return tuple(metrics)
 
-    def metric(self, name: str) -> Metric | None:
+    def metric(self, name: str) -> MetricResult | None:
         """The metric of that name, None if the trajectories give it no sample."""
         return next((metric for metric in self.metrics if metric.name == name), None)
 
@@ -301,7 +301,7 @@ def _samples(comparison: Comparison, metrics: Iterable[MetricDefinition]) -> tup
 class Pooled:
     """Several sequences as one: the statistics of all their errors together, and what could not be pooled."""
 
-    metrics: tuple[Metric, ...]
+    metrics: tuple[MetricResult, ...]
     per_length: tuple[LengthMetric, ...]
     warnings: tuple[str, ...]
 
@@ -314,7 +314,7 @@ def pooled(scores: Sequence[Score]) -> Pooled:
     """
     n = sum(score.association.pairs for score in scores)
     n_true = sum(score.association.gt_poses for score in scores)
-    metrics: list[Metric] = []
+    metrics: list[MetricResult] = []
     lengths: list[LengthMetric] = []
     warnings: list[str] = []
     for name, samples in _samples_by_metric(scores).items():
@@ -368,7 +368,7 @@ def _time_warning(covered: Coverage) -> str:
     )
 
 
-def _missing_warnings(comparison: Comparison, metrics: tuple[Metric, ...]) -> Iterator[str]:
+def _missing_warnings(comparison: Comparison, metrics: tuple[MetricResult, ...]) -> Iterator[str]:
     measured = {metric.name for metric in metrics}
     settings = comparison.settings
     path_m = float(comparison.distances_m[-1])

@@ -8,7 +8,7 @@ from annotated_types import Ge, Le, MinLen
 
 from vobench.errors import SettingError
 from vobench.setting import Positive, require
-from vobench.trajectory.align import Kind
+from vobench.trajectory.align import AlignmentKind
 from vobench.trajectory.associate import MAX_DIFF_NS, Method
 
 Unit = Literal["f", "m", "s", "d", "r"]  # evo's letters: frames, metres, degrees, radians; and s for seconds
@@ -41,7 +41,7 @@ class ScoreSettings:
     measures all metrics, not only the headline metrics. Raises SettingError for values that cannot be measured.
     """
 
-    alignment: Kind = "se3"
+    alignment: AlignmentKind = "se3"
     align_n: Annotated[int, Ge(1)] | None = None
     association: Method = "nearest"
     max_diff_ns: Annotated[int, Ge(0), Le(10**15)] = MAX_DIFF_NS

@@ -237,7 +237,7 @@ def _reference(
         heading=np.arctan2(T[:, 1, 0], T[:, 0, 0]),
         speed=now.velocity_mps[:, 0],
         acceleration=now.acceleration_mps2[:, 0],
-        angular_velocity=now.turn_radps[:, 2],
+        angular_velocity=now.angular_velocity_radps[:, 2],
         curvature=curvature,
         advance=advance,
     )
@@ -249,7 +249,7 @@ def _by_progress(target: CurveMotion, t_s: Array) -> tuple[Array, Array]:
     progress, _, _ = target.law.at(inside_s)
     by_progress = target.curve.at(progress)
     advance = by_progress.velocity_mps[:, 0]
-    curvature = advance * by_progress.turn_radps[:, 2]
+    curvature = advance * by_progress.angular_velocity_radps[:, 2]
     return advance, curvature
 
 
@@ -280,7 +280,7 @@ def _require_drivable(target: CurveMotion, settings: AckermannSettings) -> None:
     by_progress = target.curve.at(progress)
     if (by_progress.velocity_mps[:, 0] == 0).any():
         raise MotionError("a car cannot turn on the spot; give the path corners with a radius, or use another robot")
-    sharpest = float(np.abs(by_progress.turn_radps[:, 2]).max())
+    sharpest = float(np.abs(by_progress.angular_velocity_radps[:, 2]).max())
     if sharpest * settings.sharpest_radius_m > 1:
         raise MotionError(
             f"the path turns with a radius of {1 / sharpest:.3g} m, but a wheelbase of {settings.wheelbase_m:g} m and "

@@ -23,7 +23,7 @@ from vobench.motion.pioneer import (
     velocities,
     wheel_speeds,
 )
-from vobench.motion.slip import SlipNow
+from vobench.motion.slip import Disturbance
 from vobench.setting import OneOf, Positive, require
 
 
@@ -248,7 +248,7 @@ class Vehicle:
         self,
         state: Array,
         reference: Pair[float],
-        slip: SlipNow,
+        slip: Disturbance,
         began: Pair[float],
     ) -> tuple[float, ...]:
         """Time derivative (7) of the state: equations (18) and (19), and the rates of the wheels."""
@@ -271,8 +271,8 @@ class Vehicle:
         self,
         state: Array,
         reference: Pair[float],
-        slip: SlipNow,
-        then: SlipNow | None = None,
+        slip: Disturbance,
+        then: Disturbance | None = None,
     ) -> Array:
         """States (substeps, 7) over one control period with constant references; slip changes linearly to `then`.
 
@@ -301,7 +301,7 @@ class Vehicle:
             raise MotionError(f"the motion diverged with {self.integrator}; use rk4, more sub-steps or a lower gain")
         return states
 
-    def contacts_ahead(self, state: Array, slip: SlipNow) -> tuple[Pair[float], ...]:
+    def contacts_ahead(self, state: Array, slip: Disturbance) -> tuple[Pair[float], ...]:
         """Positions of the left wheel, the right wheel and the axle's middle a period later at constant velocity."""
         x, y, psi, u, omega = state[:5].tolist()
         period_s = 1 / self.rate_hz

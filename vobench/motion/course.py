@@ -62,7 +62,7 @@ QUARTER_RAD = pi / 2
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class CoursePiece:
     """A piece of a course: metres driven ahead (advance 1) or back (-1), or radians turned on the spot (0).
 
     The turn in rad per unit of progress changes linearly from `bend` to `bend + bent * length`.
@@ -80,7 +80,7 @@ class Piece:
         of_change = self.bent * self.length**2 / 2
         return of_bend + of_change
 
-    def parts(self) -> Iterator["Piece"]:
+    def parts(self) -> Iterator["CoursePiece"]:
         """The piece in parts that turn by a quarter at most."""
         end_bend = self.bend + self.bent * self.length
         largest_turn_rad = max(abs(self.bend), abs(end_bend)) * self.length
@@ -88,7 +88,7 @@ class Piece:
         length = self.length / count
         for k in range(count):
             bend = self.bend + self.bent * k * length
-            yield Piece(length, bend, self.bent, self.advance)
+            yield CoursePiece(length, bend, self.bent, self.advance)
 
 
 def _running_sums(steps: ArrayLike) -> Array:
@@ -130,10 +130,10 @@ class Course:
         )
 
 
-def course(pieces: Iterable[Piece]) -> Course:
+def course(pieces: Iterable[CoursePiece]) -> Course:
     """The pieces laid end to end, each with the heading at the end of the one before."""
     pieces = list(pieces)
-    parts = list[Piece]()
+    parts = list[CoursePiece]()
     for piece in pieces:
         parts.extend(piece.parts())
     length = np.array([part.length for part in parts])
@@ -264,7 +264,7 @@ class Circle(Wheeled):
         length_m = 2 * pi * self.radius_m * self.laps
         law = rest_to_rest(length_m, speed=self.speed_mps, acceleration=self.accel_mps2)
         side = -1 if self.clockwise else 1
-        circle = Piece(length_m, bend=side / self.radius_m)
+        circle = CoursePiece(length_m, bend=side / self.radius_m)
         return CurveMotion(course([circle]), law, self.T_world_start)
 
 
@@ -291,7 +291,7 @@ class Square(Wheeled):
         count = CORNERS * self.laps
         if self.corner_radius_m:
             straight_m, corner = _rounded(self.side_m, self.corner_radius_m, side=side)
-            pieces = [Piece(straight_m), *corner] * count
+            pieces = [CoursePiece(straight_m), *corner] * count
             length_m = sum(piece.length for piece in pieces)
             law = rest_to_rest(length_m, speed=self.speed_mps, acceleration=self.accel_mps2)
             return CurveMotion(course(pieces), law, self.T_world_start)
@@ -299,8 +299,8 @@ class Square(Wheeled):
         straight_law = rest_to_rest(self.side_m, speed=self.speed_mps, acceleration=self.accel_mps2)
         turn_law = rest_to_rest(pi / 2, speed=self.turn_radps, acceleration=self.turn_accel_radps2)
         law = in_stages([straight_law, turn_law] * count)
-        straight = Piece(self.side_m)
-        turn = Piece(pi / 2, bend=side, advance=0.0)
+        straight = CoursePiece(self.side_m)
+        turn = CoursePiece(pi / 2, bend=side, advance=0.0)
         return CurveMotion(course([straight, turn] * count), law, self.T_world_start)
 
 
@@ -370,7 +370,7 @@ class StopAndGo(Wheeled):
             return rest_to_rest(leg_m, speed=self.speed_mps, acceleration=self.accel_mps2)
 
         law = in_stages([leg_law(leg_m) for leg_m in self.legs_m], pause_s=self.pause_s)
-        straight = course(Piece(leg_m) for leg_m in self.legs_m)
+        straight = course(CoursePiece(leg_m) for leg_m in self.legs_m)
         return CurveMotion(straight, law, self.T_world_start)
 
 
@@ -398,7 +398,7 @@ class PureRotation(Wheeled):
         angle_rad = abs(radians(self.angle_deg))
         law = rest_to_rest(angle_rad, speed=self.turn_radps, acceleration=self.turn_accel_radps2)
         side = -1.0 if self.angle_deg < 0 else 1.0
-        turn = Piece(angle_rad, bend=side, advance=0.0)
+        turn = CoursePiece(angle_rad, bend=side, advance=0.0)
         return CurveMotion(course([turn]), law, self.T_world_start)
 
 
@@ -432,8 +432,8 @@ class Reverse(Wheeled):
         bend = 1 / self.radius_m if self.radius_m else 0.0
         one_way = rest_to_rest(self.length_m, speed=self.speed_mps, acceleration=self.accel_mps2)
         law = in_stages([one_way, one_way], pause_s=self.pause_s)
-        ahead = Piece(self.length_m, bend)
-        back = Piece(self.length_m, -bend, advance=-1.0)
+        ahead = CoursePiece(self.length_m, bend)
+        back = CoursePiece(self.length_m, -bend, advance=-1.0)
         return CurveMotion(course([ahead, back]), law, self.T_world_start)
 
 
@@ -442,12 +442,12 @@ Unled = PureRotation | Reverse
 Planar = Circle | Square | Figure8 | Lissajous | StopAndGo | Unled
 
 
-def _rounded(side_m: float, radius_m: float, *, side: float) -> tuple[float, list[Piece]]:
+def _rounded(side_m: float, radius_m: float, *, side: float) -> tuple[float, list[CoursePiece]]:
     """The straight length between two corners, and a corner. Raises MotionError if no straight is left."""
     half_m = pi / 2 * radius_m  # a clothoid to 1/radius turns by half of that curvature times its length
     bent = side / (radius_m * half_m)
-    into_corner = Piece(half_m, 0.0, bent)
-    out_of_corner = Piece(half_m, side / radius_m, -bent)
+    into_corner = CoursePiece(half_m, 0.0, bent)
+    out_of_corner = CoursePiece(half_m, side / radius_m, -bent)
     corner = [into_corner, out_of_corner]
     corner_end = course(corner).at(np.array([2 * half_m]))
     end_m = corner_end.T_world_body[0, :2, 3]
@@ -478,7 +478,7 @@ def rolled(motion: Motion, t_ns: Stamps, wheels: WheelGeometry) -> Array:
     nodes_ns = middle_ns[:, None] + half_ns[:, None] * ROLL_NODES  # (P, 4)
     kinematics = motion.at(nodes_ns.ravel())
     u = kinematics.velocity_mps[:, 0]
-    omega = kinematics.turn_radps[:, 2]
+    omega = kinematics.angular_velocity_radps[:, 2]
 
     speeds_mps = np.stack(wheel_speeds(u, omega, track_m=wheels.track_m), -1)
     by_piece_mps = speeds_mps.reshape(-1, len(ROLL_NODES), 2).transpose(0, 2, 1)  # (P, 2, 4)

@@ -19,10 +19,10 @@ from vobench.motion.slip import (
     DELTAS,
     SLIPS,
     DeltaSettings,
+    Disturbance,
     Disturbances,
     FloorPatch,
     Generators,
-    SlipNow,
     SlipSettings,
     drawn,
     generator_of,
@@ -175,9 +175,9 @@ def _kinematics(position: Array, velocity: Array, acceleration: Array) -> Kinema
     return Kinematics(
         T_world_body=level(*position.T),
         velocity_mps=in_body(velocity),
-        turn_radps=about_z(velocity[:, 2]),
+        angular_velocity_radps=about_z(velocity[:, 2]),
         acceleration_mps2=in_body(acceleration),
-        turn_rate_radps2=about_z(acceleration[:, 2]),
+        angular_acceleration_radps2=about_z(acceleration[:, 2]),
     )
 
 
@@ -369,7 +369,7 @@ def _driven(
     if np.shape(start) != (3,) or not np.isfinite(start).all():
         raise MotionError(f"the start (x, y, psi) must be three finite values, got {start}")
     state = np.array([*start, 0.0, 0.0, 0.0, 0.0])
-    first_contacts = vehicle.contacts_ahead(state, SlipNow())
+    first_contacts = vehicle.contacts_ahead(state, Disturbance())
     slips = [disturbances.at(0, first_contacts)]
     periods = [state[None]]
     references = []
@@ -397,7 +397,7 @@ def _record(
     periods: list[Array],
     references: Array,
     ends: tuple[int, ...],
-    slips: list[SlipNow],
+    slips: list[Disturbance],
     *,
     vehicle: Vehicle,
 ) -> Drive:
@@ -429,7 +429,7 @@ def _record(
 def _with_tail(
     states: Array,
     references: Array,
-    slips: list[SlipNow],
+    slips: list[Disturbance],
     vehicle: Vehicle,
 ) -> DriveMotion:
     """The motion of the drive through states (P + 1, 7), continued with its last references and slip."""

@@ -69,9 +69,9 @@ class Shake:
         kinematics = Kinematics(
             T_world_body=se3.transform(np.eye(3), value[:3].T),
             velocity_mps=rate[:3].T,
-            turn_radps=zero,
+            angular_velocity_radps=zero,
             acceleration_mps2=change[:3].T,
-            turn_rate_radps2=zero,
+            angular_acceleration_radps2=zero,
         )
         for axis in (2, 1, 0):
             row = 3 + axis
@@ -165,11 +165,11 @@ def composed(carrier: Kinematics, load: Kinematics) -> Kinematics:
     R_carrier_load = load.T_world_body[:, :3, :3]
     arm_m = load.T_world_body[:, :3, 3]
     R_load_carrier = se3.transposed(R_carrier_load)
-    angular_velocity = carrier.turn_radps
+    angular_velocity = carrier.angular_velocity_radps
 
     # Velocity and acceleration of the point of the carrier at the load, in the carrier's axes.
     arm_mps = np.cross(angular_velocity, arm_m)
-    euler_mps2 = np.cross(carrier.turn_rate_radps2, arm_m)
+    euler_mps2 = np.cross(carrier.angular_acceleration_radps2, arm_m)
     centripetal_mps2 = np.cross(angular_velocity, arm_mps)
     arm_mps2 = euler_mps2 + centripetal_mps2
     relative_mps = turned(R_carrier_load, load.velocity_mps)
@@ -178,14 +178,14 @@ def composed(carrier: Kinematics, load: Kinematics) -> Kinematics:
     carried_mps = turned(R_load_carrier, carrier.velocity_mps + arm_mps)
     carried_mps2 = turned(R_load_carrier, carrier.acceleration_mps2 + arm_mps2 + coriolis_mps2)
     carried_radps = turned(R_load_carrier, angular_velocity)
-    carried_radps2 = turned(R_load_carrier, carrier.turn_rate_radps2)
-    axis_change_radps2 = np.cross(carried_radps, load.turn_radps)
+    carried_radps2 = turned(R_load_carrier, carrier.angular_acceleration_radps2)
+    axis_change_radps2 = np.cross(carried_radps, load.angular_velocity_radps)
     return Kinematics(
         T_world_body=carrier.T_world_body @ load.T_world_body,
         velocity_mps=carried_mps + load.velocity_mps,
-        turn_radps=carried_radps + load.turn_radps,
+        angular_velocity_radps=carried_radps + load.angular_velocity_radps,
         acceleration_mps2=carried_mps2 + load.acceleration_mps2,
-        turn_rate_radps2=carried_radps2 + axis_change_radps2 + load.turn_rate_radps2,
+        angular_acceleration_radps2=carried_radps2 + axis_change_radps2 + load.angular_acceleration_radps2,
     )
 
 
@@ -216,7 +216,7 @@ def _turned(
     return Kinematics(
         T_world_body=se3.transform(R, zero),
         velocity_mps=zero,
-        turn_radps=rate[:, None] * direction,
+        angular_velocity_radps=rate[:, None] * direction,
         acceleration_mps2=zero,
-        turn_rate_radps2=change[:, None] * direction,
+        angular_acceleration_radps2=change[:, None] * direction,
     )

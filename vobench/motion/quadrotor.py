@@ -51,9 +51,9 @@ class QuadrotorCurve:
         return Kinematics(
             T_world_body=se3.transform(attitude.R, self.position(s)),
             velocity_mps=attitude.in_body(velocity),
-            turn_radps=attitude.turn,
+            angular_velocity_radps=attitude.turn,
             acceleration_mps2=attitude.in_body(acceleration),
-            turn_rate_radps2=attitude.turn_rate,
+            angular_acceleration_radps2=attitude.turn_rate,
         )
 
     def _ahead(self, s: Array) -> Jet:

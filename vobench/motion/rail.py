@@ -52,9 +52,9 @@ class RailCurve:
         return Kinematics(
             T_world_body=se3.transform(by_u.R, self.position(u)),
             velocity_mps=ahead,
-            turn_radps=by_u.turn / speed,
+            angular_velocity_radps=by_u.turn / speed,
             acceleration_mps2=by_u.in_body(x.rate) / speed,
-            turn_rate_radps2=turn_change / speed**2,
+            angular_acceleration_radps2=turn_change / speed**2,
         )
 
 

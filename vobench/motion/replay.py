@@ -7,14 +7,14 @@ import numpy as np
 import scipy
 from annotated_types import Ge, Gt, Le
 
-from vobench.errors import InputError, MotionError, SettingError, unknown
+from vobench.errors import InputError, MotionError, SettingError, unknown_name_sentence
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.spline import FEWEST, Attitude, Jet, PoseCurve, of_quaternion, through
 from vobench.motion.wheeled import Rate
 from vobench.setting import Positive, Triple, settings
 from vobench.trajectory.kinematics import CurveMotion, evenly
-from vobench.trajectory.trajectory import Move, Trajectory, parse_move
+from vobench.trajectory.trajectory import PoseConvention, Trajectory, parse_pose_convention
 
 DEGREE = 5
 FEWEST_SMOOTHED = 2 * (DEGREE + 1)
@@ -23,12 +23,12 @@ MIN_POSES_PER_PIECE = 2
 # The move from a recording's poses to a body with x ahead, y left and z up, in a world with z up. camera: an optical
 # frame in such a world, as TUM RGB-D; kitti: an optical frame in the first one, assumed level. In both the body's
 # origin is the camera's. EuRoC's body is its IMU: x up, y right, z ahead. TartanAir is x ahead, y right, z down.
-AXES: dict[str, Move | None] = {
+AXES: dict[str, PoseConvention | None] = {
     "body": None,
-    "camera": parse_move("mount:0,0,0,0.5,-0.5,0.5,0.5"),
-    "kitti": parse_move("axes:z,-x,-y"),
-    "euroc": parse_move("mount:0,0,0,0.70710678118654752,0,0.70710678118654752,0"),
-    "tartanair": parse_move("axes:x,-y,-z"),
+    "camera": parse_pose_convention("mount:0,0,0,0.5,-0.5,0.5,0.5"),
+    "kitti": parse_pose_convention("axes:z,-x,-y"),
+    "euroc": parse_pose_convention("mount:0,0,0,0.70710678118654752,0,0.70710678118654752,0"),
+    "tartanair": parse_pose_convention("axes:x,-y,-z"),
 }
 
 
@@ -61,13 +61,13 @@ class Replay:
         if self.start_m is None and self.start_heading_deg:
             raise SettingError("belongs to start_m; without it the body starts as recorded", "start_heading_deg")
 
-    def move(self) -> Move | None:
+    def move(self) -> PoseConvention | None:
         """The move from the file's poses to the body's."""
         if self.axes in AXES:
             return AXES[self.axes]
         if ":" not in self.axes:
-            raise InputError(unknown("convention of axes", self.axes, list(AXES)))
-        return parse_move(self.axes)
+            raise InputError(unknown_name_sentence("convention of axes", self.axes, list(AXES)))
+        return parse_pose_convention(self.axes)
 
     def motion(self, recorded: Trajectory) -> CurveMotion:
         """The motion through, or near, recorded poses of the body. Raises MotionError for unsuitable poses."""

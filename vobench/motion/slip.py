@@ -48,7 +48,7 @@ SLIPS = {
 }
 
 
-class SlipNow(NamedTuple):
+class Disturbance(NamedTuple):
     """The disturbance at one instant: both sigmas, beta (rad), c (s), kappa (s^2/m), and the delta of (18)."""
 
     left: float = 0.0
@@ -59,10 +59,10 @@ class SlipNow(NamedTuple):
     delta_u: float = 0.0
     delta_omega: float = 0.0
 
-    def towards(self, later: "SlipNow", share: float) -> "SlipNow":
+    def towards(self, later: "Disturbance", share: float) -> "Disturbance":
         """The disturbance on the straight line from this (share 0) to a later one (share 1)."""
         values = (a + share * (b - a) for a, b in zip(self, later, strict=True))
-        return SlipNow(*values)
+        return Disturbance(*values)
 
     def side_speed(self, u: float, omega: float) -> float:
         """Speed of sliding to the left in m/s."""
@@ -122,7 +122,7 @@ Bias = Annotated[float, Ge(-0.3), Le(0.3)]
 
 
 @settings(kw_only=False)
-class Ground:
+class GroundSlip:
     """The effect of a floor on slip: a `factor` of slip ratios and side-slip angle, and a bias of each.
 
     `ratio_bias` is added to both ratios; `angle_bias_rad` slides the robot to the left, as a carpet's nap does.
@@ -135,9 +135,9 @@ class Ground:
 
 # Engineering choices: a wet patch spins the wheels, a carpet holds less well and pulls along its nap, a seam is a jolt.
 SURFACES = {
-    "wet": Ground(factor=6.0, ratio_bias=0.04),
-    "carpet": Ground(factor=1.5, ratio_bias=0.01, angle_bias_rad=radians(1.0)),
-    "seam": Ground(factor=10.0),
+    "wet": GroundSlip(factor=6.0, ratio_bias=0.04),
+    "carpet": GroundSlip(factor=1.5, ratio_bias=0.01, angle_bias_rad=radians(1.0)),
+    "seam": GroundSlip(factor=10.0),
 }
 
 
@@ -171,7 +171,7 @@ class FloorPatch:
         return along_m <= self.size_m[0] / 2 and across_m <= self.size_m[1] / 2
 
 
-def under(patches: Sequence[FloorPatch], x_m: float, y_m: float) -> tuple[float, float, float]:
+def ground_effect(patches: Sequence[FloorPatch], x_m: float, y_m: float) -> tuple[float, float, float]:
     """Factor, ratio bias and angle bias (rad) at a point: of overlapping patches factors multiply, biases add."""
     factor = 1.0
     ratio_bias = 0.0
@@ -226,18 +226,18 @@ class Disturbances:
     traction_s2pm: float
     floor: tuple[FloorPatch, ...]
 
-    def at(self, frame: int, contacts_m: Sequence[tuple[float, float]]) -> SlipNow:
+    def at(self, frame: int, contacts_m: Sequence[tuple[float, float]]) -> Disturbance:
         """The disturbance at a frame, with the left wheel, the right wheel and the axle's middle at these points."""
         left, right, beta, delta_u, delta_omega = self.rows[frame].tolist()
         if self.floor:
             left_m, right_m, middle_m = contacts_m
-            left_factor, left_bias, _ = under(self.floor, *left_m)
-            right_factor, right_bias, _ = under(self.floor, *right_m)
-            middle_factor, _, angle_bias_rad = under(self.floor, *middle_m)
+            left_factor, left_bias, _ = ground_effect(self.floor, *left_m)
+            right_factor, right_bias, _ = ground_effect(self.floor, *right_m)
+            middle_factor, _, angle_bias_rad = ground_effect(self.floor, *middle_m)
             left = left * left_factor + left_bias
             right = right * right_factor + right_bias
             beta = beta * middle_factor + angle_bias_rad
-        return SlipNow(
+        return Disturbance(
             left=_clipped(left),
             right=_clipped(right),
             beta=_clipped(beta),

@@ -121,9 +121,9 @@ class PoseCurve:
         return Kinematics(
             T_world_body=se3.transform(attitude.R, self.position(s)),
             velocity_mps=attitude.in_body(self.position(s, 1)),
-            turn_radps=attitude.turn,
+            angular_velocity_radps=attitude.turn,
             acceleration_mps2=attitude.in_body(self.position(s, 2)),
-            turn_rate_radps2=attitude.turn_rate,
+            angular_acceleration_radps2=attitude.turn_rate,
         )
 
 

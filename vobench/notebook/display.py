@@ -10,7 +10,7 @@ from vobench.errors import printable
 from vobench.runner.progress import RunDisplay, RunProgress
 
 if TYPE_CHECKING:
-    from vobench.runner.executor import Event
+    from vobench.runner.executor import TaskEvent
     from vobench.runner.task import Task
 
 REDRAW_S = 0.2  # a notebook gets at most five updates of the bar per second
@@ -45,7 +45,7 @@ class QuietDisplay:
         self._progress = RunProgress(tasks, seconds)
         self._began_s = time.monotonic()
 
-    def hear(self, event: "Event") -> None:
+    def hear(self, event: "TaskEvent") -> None:
         """Count a finished task, and print a failure."""
         self._progress.count(event)
         if event.what == "told":
@@ -67,7 +67,7 @@ class QuietDisplay:
 class LineDisplay(QuietDisplay):
     """Prints a line on standard error for each finished task."""
 
-    def hear(self, event: "Event") -> None:
+    def hear(self, event: "TaskEvent") -> None:
         """Print a finished task, and how much is left."""
         super().hear(event)
         if event.what == "done":
@@ -92,7 +92,7 @@ class NotebookDisplay(QuietDisplay):
 
             self._handle = display(HTML(self._html()), display_id=True)
 
-    def hear(self, event: "Event") -> None:
+    def hear(self, event: "TaskEvent") -> None:
         """Update the bar."""
         super().hear(event)
         if event.what == "started":

@@ -8,14 +8,15 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vobench.errors import InputError, UnknownNameError, unknown
+from vobench.errors import InputError, UnknownNameError, unknown_name_sentence
 from vobench.notebook.class_source import write_estimator
 from vobench.notebook.display import choose_display
 from vobench.runner.folder import open_run
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
 from vobench.runner.preflight import PlanSummary, summarize
-from vobench.suite.suite import Plan, read_plan
+from vobench.suite.plan import Plan
+from vobench.suite.suite import read_plan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -145,11 +146,11 @@ class Run:
     def _board(self) -> "Board":
         from vobench.report import page
 
-        return page.board_of(self._folder, self._scores)
+        return page.run_board(self._folder, self._scores)
 
     def _require(self, kind: str, name: str, known: Sequence[str]) -> str:
         if name not in known:
-            raise UnknownNameError(f"{unknown(kind, name, list(known))} in the run {self.path}")
+            raise UnknownNameError(f"{unknown_name_sentence(kind, name, list(known))} in the run {self.path}")
         return name
 
 
@@ -271,7 +272,7 @@ def read_board(path: Path | str) -> "pd.DataFrame":
     from vobench.report import board_records, page
 
     folder = open_run(Path(path))
-    return board_records.data_frame(page.board_of(folder, folder.scores()))
+    return board_records.data_frame(page.run_board(folder, folder.scores()))
 
 
 def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | None = None) -> "pd.DataFrame":
@@ -289,7 +290,7 @@ def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | No
     boards = []
     for given in (old, new):
         with opened(run_path(given)) as folder:
-            boards.append(page.board_of(folder, folder.scores()))
+            boards.append(page.run_board(folder, folder.scores()))
     changes = comparison.compare(boards[0], boards[1], at_most=at_most)
     return pd.DataFrame([_change_row(change) for change in changes])
 
@@ -335,7 +336,7 @@ def _only(planned: Plan, patterns: Sequence[str]) -> Plan:
             estimators.append(pattern)
         else:
             known = sorted({*case_names, *labels})
-            raise UnknownNameError(unknown("case, scene or estimator", pattern, known))
+            raise UnknownNameError(unknown_name_sentence("case, scene or estimator", pattern, known))
     entrants = planned.entrants
     if estimators:
         entrants = tuple(entrant for entrant in entrants if _matches_any(entrant.label, estimators))

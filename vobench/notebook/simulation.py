@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
-from vobench.errors import InputError, UnknownNameError, unknown
+from vobench.errors import InputError, UnknownNameError, unknown_name_sentence
 from vobench.notebook.display import choose_display
 from vobench.notebook.runs import plan
 from vobench.notebook.trajectories import read_trajectory
 from vobench.runner.launch import perform_tasks
 from vobench.runner.task import sequence_tasks
+from vobench.suite.case import Case
 from vobench.suite.source import RecordedCase
-from vobench.suite.suite import Case
 
 if TYPE_CHECKING:
     import numpy as np
@@ -109,5 +109,5 @@ def _case_of(cases: Collection[Case | RecordedCase], name: str | None) -> Case |
     by_name = {case.name: case for case in cases}
     chosen = next(iter(by_name)) if name is None else name
     if chosen not in by_name:
-        raise UnknownNameError(unknown("case", chosen, list(by_name)))
+        raise UnknownNameError(unknown_name_sentence("case", chosen, list(by_name)))
     return by_name[chosen]

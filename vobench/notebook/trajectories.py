@@ -11,7 +11,7 @@ from vobench.metric.comparison import DEFAULTS
 from vobench.metric.score import Score
 from vobench.metric.settings import ScoreSettings
 from vobench.runner.trajectory_pair import TrajectoryPair, TrajectorySource, read_one, read_pair
-from vobench.trajectory.formats import Reading
+from vobench.trajectory.formats import TrajectoryReading
 from vobench.trajectory.trajectory import Trajectory
 
 Given = Trajectory | Path | str
@@ -62,9 +62,9 @@ def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = F
     return read_pair(gt_source, est_source, times=_paths(times), any_unit=any_unit)
 
 
-def _reading(given: Given, times: Path | str | None, *, any_unit: bool) -> Reading:
+def _reading(given: Given, times: Path | str | None, *, any_unit: bool) -> TrajectoryReading:
     if isinstance(given, Trajectory):
-        return Reading(given, unit="ns", form_unit="ns", order=None)
+        return TrajectoryReading(given, unit="ns", form_unit="ns", order=None)
     source = TrajectorySource(Path(given))
     return read_one(source, times=_paths(times), any_unit=any_unit)
 

@@ -39,7 +39,7 @@ COLOUR_FORMATS = ("GL_R32F", "GL_RGBA32F")
 
 
 @dataclass(frozen=True, slots=True)
-class Device:
+class EglDevice:
     """A device that EGL can draw with; its handle is None for the default display."""
 
     index: int
@@ -78,7 +78,7 @@ class Context:
     It owns the context alone. The display belongs to all contexts of the process and is never ended.
     """
 
-    def __init__(self, device: Device) -> None:
+    def __init__(self, device: EglDevice) -> None:
         from OpenGL import EGL
 
         self.device = device
@@ -129,7 +129,7 @@ def create_context() -> Context:
     except Exception as error:  # PyOpenGL fails with whatever it trips over first
         raise _cannot_draw(error) from error
 
-    failures = list[tuple[Device, Exception]]()
+    failures = list[tuple[EglDevice, Exception]]()
     for device in candidates:
         try:
             return _capable_context(device)
@@ -138,7 +138,7 @@ def create_context() -> Context:
     raise _no_device(failures) from failures[-1][1]
 
 
-def _capable_context(device: Device) -> Context:
+def _capable_context(device: EglDevice) -> Context:
     """A context on a device. Raises MissingDependencyError where its driver lacks something that drawing needs."""
     context = Context(device)
     missing = missing_features()
@@ -151,7 +151,7 @@ def _capable_context(device: Device) -> Context:
     return context
 
 
-def _no_device(failures: Sequence[tuple[Device, Exception]]) -> MissingDependencyError:
+def _no_device(failures: Sequence[tuple[EglDevice, Exception]]) -> MissingDependencyError:
     """The error where every device failed: the last one's, which is the software device where there is one."""
     device, error = failures[-1]
     if isinstance(error, MissingDependencyError):
@@ -263,7 +263,7 @@ def _forget_driver() -> None:
     GLQuerier.extensions = None
 
 
-def ordered(found: Sequence[Device], wanted: str) -> list[Device]:
+def ordered(found: Sequence[EglDevice], wanted: str) -> list[EglDevice]:
     """The devices to try, in order: what VOBENCH_EGL_DEVICE asks for, or GPUs before the CPU.
 
     wanted: "" for all, "cpu", "gpu", or a device's index.
@@ -287,17 +287,17 @@ def ordered(found: Sequence[Device], wanted: str) -> list[Device]:
     return chosen
 
 
-def listed(found: Iterable[Device]) -> str:
+def listed(found: Iterable[EglDevice]) -> str:
     """Devices in one line."""
     return ", ".join(map(str, found)) or "none"
 
 
-def devices() -> list[Device]:
+def devices() -> list[EglDevice]:
     """All devices that EGL lists, in its order; the default display where it cannot list them."""
     query = _egl_function("eglQueryDevicesEXT", ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
     query_string = _egl_function("eglQueryDeviceStringEXT", ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int)
     if query is None or query_string is None:
-        return [Device(0, "default display", is_software=False)]
+        return [EglDevice(0, "default display", is_software=False)]
 
     count = ctypes.c_int()
     query(0, None, ctypes.byref(count))
@@ -310,7 +310,7 @@ def _described(
     index: int,
     handle: int | None,
     query_string: Any,
-) -> Device:
+) -> EglDevice:
     from OpenGL import EGL
 
     words = (query_string(handle, EGL.EGL_EXTENSIONS) or b"").decode("ascii", "replace").split()
@@ -322,10 +322,10 @@ def _described(
         names.append(query_string(handle, DRM_DEVICE_FILE))
     known = [name.decode("utf-8", "replace") for name in names if name]
     unnamed = "Mesa software driver" if is_software else "unnamed device"
-    return Device(index, " ".join(known) or unnamed, is_software, handle)
+    return EglDevice(index, " ".join(known) or unnamed, is_software, handle)
 
 
-def _display(device: Device) -> Any:
+def _display(device: EglDevice) -> Any:
     """The EGL display of a device, the same for every context of the process."""
     from OpenGL import EGL
 

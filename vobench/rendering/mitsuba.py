@@ -100,7 +100,7 @@ def major(library: Path) -> int:
 def failure(library: Path) -> str:
     """Why Mitsuba does not render with this library, "" if it does: tried in a process with an empty kernel cache."""
     home = tempfile.mkdtemp(prefix="vobench-llvm-")
-    with stop.undone(lambda: stop.remove(Path(home))):
+    with stop.cleanup_after(lambda: stop.remove(Path(home))):
         environment = os.environ | {VARIABLE: str(library), "HOME": home}
         command = [sys.executable, "-P", "-c", PROBE]
         try:

@@ -28,7 +28,7 @@ class View:
     end_ns: NDArray[np.int64]
 
 
-def still(
+def single_instant(
     camera: Camera,
     T_world_camera: Array,
     *,

@@ -13,7 +13,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakeSettings, bake
 from vobench.rendering.context import DriverFacts, devices, driver_facts
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import Radiance, still
+from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import PointLight
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, quad
@@ -75,7 +75,7 @@ def _drawn() -> Radiance:
     )
     renderer = RasterRenderer(bake(scene, settings))
     try:
-        return renderer.radiance(CAMERA, still(CAMERA, DOWN), weights=None)
+        return renderer.radiance(CAMERA, single_instant(CAMERA, DOWN), weights=None)
     finally:
         renderer.close()
 

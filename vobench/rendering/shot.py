@@ -13,7 +13,7 @@ from vobench.scene.scene import Mover
 
 
 @dataclass(frozen=True, slots=True)
-class Shot:
+class CameraShot:
     """Where a camera is and when it takes a picture: a pose (4, 4) and an instant, or (H, 4, 4) and (H,) by row."""
 
     T_world_camera: Array
@@ -35,7 +35,7 @@ class ShotTransforms:
         return any(T.ndim == 3 for T in self.T_bodies_camera)
 
 
-def shot_transforms(movers: Sequence[Mover], shot: Shot) -> ShotTransforms:
+def shot_transforms(movers: Sequence[Mover], shot: CameraShot) -> ShotTransforms:
     """The transforms of a shot of a scene with these movers."""
     T_world_bodies = _poses(movers, np.asarray(shot.t_ns, np.int64))
     T_bodies_world = [se3.inverse(T) for T in T_world_bodies]

@@ -15,12 +15,12 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Indices, Mask, Pixels
 from vobench.rendering.lamp import Lamp, lamps
 from vobench.rendering.occlusion import Bodies, dot
-from vobench.rendering.shot import Shot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
+from vobench.rendering.shot import CameraShot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
 
-__all__ = ["Shot", "TruthCaster"]
+__all__ = ["CameraShot", "TruthCaster"]
 
 # With a rolling shutter the row that sees a point next is found by iteration, to this or in so many rounds.
 CONVERGED_PX = 1e-5
@@ -266,10 +266,10 @@ class TruthCaster:
     def frame(
         self,
         camera: Camera,
-        now: Shot,
+        now: CameraShot,
         channels: Iterable[str] = tuple(CHANNELS),
         *,
-        later: Shot | None = None,
+        later: CameraShot | None = None,
     ) -> TruthFrame:
         """The channels of these names; `later` is the next picture, without which flow is NaN and all is occluded.
 

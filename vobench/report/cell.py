@@ -8,7 +8,7 @@ from statistics import fmean, median
 from vobench.metric import ranking
 from vobench.report.board_metric import METRICS, MM_PER_M, PERCENT, lost_aware
 from vobench.report.frame_statistics import EstimatorStatistics
-from vobench.runner.consistency import Consistency
+from vobench.runner.consistency import CovarianceConsistency
 from vobench.runner.folder import STATUSES, SURVIVED, TrialScore, seen_by, value_of
 
 ONLY_ITS_OWN = "only its own files"
@@ -115,7 +115,7 @@ def _loss(trial: TrialScore) -> float:
     return nan if score is None else max(1.0 - score, ranking.MIN_LOSS)
 
 
-def _median_consistency(trials: Sequence[TrialScore]) -> Consistency | None:
+def _median_consistency(trials: Sequence[TrialScore]) -> CovarianceConsistency | None:
     """The consistency of the covariances of the median trial, as the errors of one path are correlated."""
     known = [trial.consistency for trial in trials if trial.consistency]
     if not known:

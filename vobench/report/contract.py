@@ -19,9 +19,10 @@ from vobench.runner.folder import read_tum
 from vobench.runner.frames import ANSWERS, TIMES, read_table
 from vobench.runner.store import SilentProgress
 from vobench.sequence import Sequence as Recording
+from vobench.suite.entrant import EstimatorEntry
 from vobench.suite.manifest import read_manifest
+from vobench.suite.plan import Trial
 from vobench.suite.source import RecordedCase, Source
-from vobench.suite.suite import Entrant, Trial
 
 MOST_STATIONARY_M = 0.01  # which a tracker should not exceed within a second at rest
 MM_PER_M = 1e3
@@ -52,7 +53,7 @@ def contract(folder: Path) -> Iterator[Clause]:
     manifest = read_manifest(folder)
     for path, foreign in foreign_imports(folder):
         yield Clause("imports", Verdict.ADVICE, f"{path}:{foreign.line}: {foreign.full_name}: {foreign.remedy}")
-    entrant = Entrant(manifest.name, folder, manifest, manifest.params, manifest.limits)
+    entrant = EstimatorEntry(manifest.name, folder, manifest, manifest.params, manifest.limits)
     with tempfile.TemporaryDirectory(prefix="vobench-try-") as place:
         yield from _Attempt(entrant, Path(place)).clauses()
 
@@ -68,7 +69,7 @@ def assert_contract(folder: Path | str) -> None:
 class _Attempt:
     """An estimator that is run on practice recordings in a temporary folder."""
 
-    def __init__(self, entrant: Entrant, place: Path) -> None:
+    def __init__(self, entrant: EstimatorEntry, place: Path) -> None:
         self._entrant = entrant
         self._place = place
         self._recordings = {name: practice.write(place / name) for name, practice in PRACTICES.items()}

@@ -86,7 +86,7 @@ class DriveLog:
         return bool(rise_m > LEVEL or tilt > LEVEL)
 
 
-def log_of(drive: TrajectoryDrive) -> DriveLog:
+def drive_log(drive: TrajectoryDrive) -> DriveLog:
     """The log of a driven trajectory."""
     spec = drive.case.trajectory
     simulated = drive.motion.drive

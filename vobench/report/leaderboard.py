@@ -10,7 +10,7 @@ from vobench.report.cell import CaseFacts, Cell, make_cell
 from vobench.report.frame_statistics import Answered, EstimatorStatistics
 from vobench.report.total import Total, rank_group
 from vobench.runner.environment import Environment
-from vobench.runner.folder import TrialScore, Unmade, unmade_in, visible_to, with_sequence
+from vobench.runner.folder import TrialScore, UnavailableCases, unavailable_cases, visible_to, with_sequence
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,7 @@ class Board:
     totals: tuple[Total, ...]
     curves: tuple[BreakdownCurve, ...]
     remarks: tuple[str, ...]
-    unmade: tuple[Unmade, ...] = ()
+    unmade: tuple[UnavailableCases, ...] = ()
     environment: Environment | None = None
     visible: str = ""
     _cell_of: dict[tuple[str, str], Cell] = field(default_factory=dict, repr=False, compare=False)
@@ -58,7 +58,7 @@ class Board:
         return any(cell.spread(metric) for cell in self.cells)
 
 
-def board(
+def make_board(
     scores: Iterable[TrialScore],
     answered: Answered,
     facts: Mapping[str, CaseFacts] | None = None,
@@ -68,7 +68,7 @@ def board(
 ) -> Board:
     """The board of trials; `answered` is by case and estimator, `facts` by case, and entries may be missing in both."""
     scores = list(scores)
-    unmade = unmade_in(scores)
+    unmade = unavailable_cases(scores)
     trials = list(with_sequence(scores))
     cells = _cells(trials, answered, facts or {})
     remarks = _unmade_remark(unmade, cases=len({score.case for score in scores}))
@@ -109,7 +109,7 @@ def _cells(trials: Iterable[TrialScore], answered: Answered, facts: Mapping[str,
     return cells
 
 
-def _unmade_remark(unmade: Sequence[Unmade], *, cases: int) -> list[str]:
+def _unmade_remark(unmade: Sequence[UnavailableCases], *, cases: int) -> list[str]:
     """One sentence on the cases that could not be simulated or imported, with each cause once."""
     if not unmade:
         return []

@@ -39,7 +39,7 @@ class CellFrames:
     costs: dict[str, str]
 
 
-def board_of(folder: RunFolder, scores: list[TrialScore]) -> Board:
+def run_board(folder: RunFolder, scores: list[TrialScore]) -> Board:
     """The board of a run, with the cost of frames and the estimators' reasons."""
     return _board(folder, scores, _answered(_cell_frames(folder, scores)))
 
@@ -48,7 +48,7 @@ def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> B
     cases = {score.case for score in scores}
     facts = {case: case_facts(folder, case) for case in cases}
     title = folder.path.resolve().parent.name
-    return leaderboard.board(scores, answered, facts, title=title, environment=read_environment(folder))
+    return leaderboard.make_board(scores, answered, facts, title=title, environment=read_environment(folder))
 
 
 def _answered(frames: Iterator[CellFrames] | list[CellFrames]) -> Answered:
@@ -72,7 +72,7 @@ def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
         for each in frames:
             table.writerow({"case": each.case, "estimator": each.estimator, **each.costs})
     board = _board(folder, scores, answered)
-    (folder.path / PAGE).write_text(html(folder, scores, board, folder.path), encoding="utf-8")
+    (folder.path / PAGE).write_text(board_page(folder, scores, board, folder.path), encoding="utf-8")
 
 
 def _undated(board: Board) -> Board:
@@ -107,7 +107,7 @@ def _costs(rows: Sequence[FrameRow]) -> dict[str, str]:
     }
 
 
-def html(folder: RunFolder, scores: list[TrialScore], board: Board, beside: Path) -> str:
+def board_page(folder: RunFolder, scores: list[TrialScore], board: Board, beside: Path) -> str:
     """The page of a board, with links relative to the folder `beside`, where the page will be."""
     from jinja2 import Environment as Templates
     from jinja2 import FileSystemLoader

@@ -64,7 +64,7 @@ def save_trial(path: Path, trial: TrialView, *others: TrialView, form: PictureFo
     title = ", ".join(view.title for view in trials)
     part = path.with_name(path.name + ".part")
     with (
-        stop.undone(lambda: part.unlink(missing_ok=True)),
+        stop.cleanup_after(lambda: part.unlink(missing_ok=True)),
         rr.RecordingStream(application_id(title), recording_id=title, send_properties=False) as stream,
     ):
         stream.save(part)

@@ -18,7 +18,7 @@ from vobench.report import blueprint
 from vobench.report.rerun_stream import FrameStream
 from vobench.runner.folder import CASE, SEQUENCE, RunFolder
 from vobench.scene.material import Material, linear_texture, srgb
-from vobench.scene.scene import Way
+from vobench.scene.scene import MoverMotion
 from vobench.suite.scene_build import build
 from vobench.suite.scene_spec import LightOverride, SceneFile
 from vobench.suite.yaml_file import checked
@@ -43,7 +43,7 @@ class SceneMesh:
     light: NDArray[np.uint8]
     colors: NDArray[np.uint8]
     mover: NDArray[np.int32]
-    paths: tuple[Way, ...] = ()
+    paths: tuple[MoverMotion, ...] = ()
 
     def mesh(self, faces: NDArray[np.bool_]) -> rr.Mesh3D:
         """The selected faces (F,) as a mesh."""

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-from vobench.errors import InputError, unknown
+from vobench.errors import InputError, unknown_name_sentence
 from vobench.metric.definitions import DEFINITIONS
 from vobench.runner.folder import SURVIVED, TrialScore, with_sequence
 
@@ -76,4 +76,4 @@ def parse_threshold(text: str) -> Threshold:
 
 def _require_known(kind: str, name: str, known: Sequence[str]) -> None:
     if name not in known:
-        raise InputError(unknown(kind, name, list(known)))
+        raise InputError(unknown_name_sentence(kind, name, list(known)))

@@ -18,7 +18,7 @@ RERUN = (sys.executable, "-P", "-m", "rerun")
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class TrialRecording:
     """A Rerun file, and the trials that it shows side by side."""
 
     path: Path
@@ -35,7 +35,7 @@ def save_recordings(
     window: slice = slice(None),
     form: PictureForm = "jpeg",
     save: Path | None = None,
-) -> list[Recording]:
+) -> list[TrialRecording]:
     """Write trials of a run as Rerun files, failures first.
 
     Without `case` and `estimator` it is the gravest failure, or else the trial with the largest error. `compare` names
@@ -48,7 +48,7 @@ def save_recordings(
         path = _target(save, folder, trials, worst)
         views = [trial_view(folder, trial, window=window) for trial in trials]
         save_trial(path, *views, form=form)
-        recordings.append(Recording(path, tuple(trials)))
+        recordings.append(TrialRecording(path, tuple(trials)))
     return recordings
 
 

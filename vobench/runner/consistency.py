@@ -54,7 +54,7 @@ def read_covariances(path: Path, t_ns: Stamps) -> Array:
     return covariances
 
 
-class Consistency(BaseModel):
+class CovarianceConsistency(BaseModel):
     """Errors against stated covariances: NEES of poses, and the ratio of errors to stated deviations.
 
     `scale_gap` is the square root of the median NEES over that of its distribution, χ² with six degrees of freedom:
@@ -70,7 +70,7 @@ class Consistency(BaseModel):
     covered_90: float
 
     @classmethod
-    def of(cls, nees: Array) -> "Consistency":
+    def of(cls, nees: Array) -> "CovarianceConsistency":
         """The consistency of normalised errors squared (K,) of at least one pose."""
         median = float(np.median(nees))
         return cls(
@@ -97,7 +97,7 @@ class Consistency(BaseModel):
 
 def trial_consistency(
     estimate: Path, gt: Trajectory, est: Trajectory, *, start_ns: int, scale: float
-) -> Consistency | None:
+) -> CovarianceConsistency | None:
     """The consistency of a trial's covariances with its errors; None if it stated none.
 
     The covariances are of poses in odom, the left camera at the first frame's stamp, so nothing is fitted but the
@@ -120,4 +120,4 @@ def trial_consistency(
     T_odom_true = (se3.inverse(T_world_odom) @ gt.T_world_frame)[in_gt]
     alignment = Alignment("scale", np.eye(3), np.zeros(3), scale, ())
     nees = consistency(T_odom_true, est.T_world_frame[in_est], covariances[in_est], alignment)
-    return Consistency.of(nees.pose)
+    return CovarianceConsistency.of(nees.pose)

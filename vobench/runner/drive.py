@@ -15,7 +15,8 @@ from vobench.motion.wheeled import Wheeled
 from vobench.runner.data_frame import data_frame
 from vobench.runner.motion import NS_PER_S, BodyMotion, body_motion, check_cases
 from vobench.runner.sensors import wheel_error_m
-from vobench.suite.suite import Case, Plan
+from vobench.suite.case import Case
+from vobench.suite.plan import Plan
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.kinematics import Kinematics
 from vobench.trajectory.trajectory import Trajectory
@@ -109,7 +110,7 @@ class TrajectoryDrive:
             "duration_s": float(t_ns[-1] - t_ns[0]) / NS_PER_S,
             "path_m": float(_step_lengths_m(self.body).sum()),
             "max_speed_mps": float(np.linalg.norm(self.body.velocity_mps, axis=1).max()),
-            "max_turn_degps": float(np.rad2deg(np.linalg.norm(self.body.turn_radps, axis=1).max())),
+            "max_turn_degps": float(np.rad2deg(np.linalg.norm(self.body.angular_velocity_radps, axis=1).max())),
             "max_turn_per_frame_deg": float(np.rad2deg(_step_angles_rad(self.body).max())),
             "wheel_error_m": wheel_error_m(self.case, self.motion),
             "peak_V": None if voltages_V is None else float(np.abs(voltages_V).max()),

@@ -38,7 +38,7 @@ from vobench.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     from vobench.dataset.source import Views
     from vobench.runner.store import Progress
-    from vobench.suite.suite import Trial
+    from vobench.suite.plan import Trial
 
 ESTIMATE = "estimate.tum"
 REVISED = "revised.tum"
@@ -52,7 +52,7 @@ EARLIEST_NS = np.iinfo(np.int64).min
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # fixed, so that equal tracks are equal bytes
 
 
-class Outcome(BaseModel):
+class EstimatorOutcome(BaseModel):
     """How an estimator's process ended: FINISHED, or the kind of its failure and the reason; and what it could see.
 
     `sandbox` is None if no process was started.
@@ -65,9 +65,9 @@ class Outcome(BaseModel):
     sandbox: Sandbox | None = None
 
 
-def read_outcome(folder: Path) -> Outcome:
+def read_outcome(folder: Path) -> EstimatorOutcome:
     """How the estimate ended."""
-    return Outcome(**json.loads((folder / OUTCOME).read_text(encoding="utf-8")))
+    return EstimatorOutcome(**json.loads((folder / OUTCOME).read_text(encoding="utf-8")))
 
 
 def read_tracks(folder: Path, *, of: str = "") -> Iterator[tuple[int, NDArray[np.float32]]]:
@@ -109,7 +109,7 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
     sandbox = None
     if isinstance(running, EstimatorProcess | CommandProgram):
         sandbox = running.sandbox
-    outcome = Outcome(kind=kind, reason=reason, sandbox=sandbox)
+    outcome = EstimatorOutcome(kind=kind, reason=reason, sandbox=sandbox)
     (folder / OUTCOME).write_text(outcome.model_dump_json(), encoding="utf-8")
 
 

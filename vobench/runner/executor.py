@@ -67,7 +67,7 @@ PRELOADED = [
 
 
 @dataclass(frozen=True, slots=True)
-class Done:
+class TaskOutcome:
     """How a task ended: the kind of its failure and the reason, or none.
 
     `lacks` names what ends the whole run, since every other task would lack it, too.
@@ -82,7 +82,7 @@ class Done:
 
 
 @dataclass(frozen=True, slots=True)
-class Event:
+class TaskEvent:
     """An event of one task: `what` happens, on which slot of the executor, after how many seconds, and why.
 
     A message that the user should read, such as for whom the task waits, is in `told`, and comes at once.
@@ -101,7 +101,7 @@ class Executor(Protocol):
 
     slots: int
 
-    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[Done]":
+    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[TaskOutcome]":
         """Begin a task; `threads` is how many it may use, NO_LIMIT for as many as there are.
 
         `tell` is called with messages for the user while the task is under way, from any thread.
@@ -119,10 +119,10 @@ class Serial:
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
 
-    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[Done]":
+    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[TaskOutcome]":
         """Perform it now."""
         del slot, threads
-        future: Future[Done] = Future()
+        future: Future[TaskOutcome] = Future()
         future.set_result(performed(task, store, NO_LIMIT, self._progress or SilentProgress(tell)))
         return future
 
@@ -130,18 +130,18 @@ class Serial:
         """Nothing runs."""
 
 
-def performed(task: Task, store: Path, threads: int, progress: Progress) -> Done:
+def performed(task: Task, store: Path, threads: int, progress: Progress) -> TaskOutcome:
     """Perform a task; whatever it raises becomes its result, except a request to stop."""
     began_s = time.monotonic()
     try:
         perform(task, store, threads, progress=progress)
-        done = Done()
+        done = TaskOutcome()
     except MissingDependencyError as error:
-        done = Done("refused", _line(error), lacks="library")
+        done = TaskOutcome("refused", _line(error), lacks="library")
     except VobenchError as error:
-        done = Done("refused", _line(error))
+        done = TaskOutcome("refused", _line(error))
     except MemoryError:
-        done = Done("out_of_memory", "there was not enough memory")
+        done = TaskOutcome("out_of_memory", "there was not enough memory")
     except Exception as error:  # of one task; the others go on
         done = _unexpected(error, store)
     return replace(done, wall_s=time.monotonic() - began_s)
@@ -150,10 +150,10 @@ def performed(task: Task, store: Path, threads: int, progress: Progress) -> Done
 FULL = "no space is left on the device; free some, or let VOBENCH_CACHE name a folder elsewhere"
 
 
-def _unexpected(error: Exception, store: Path) -> Done:
+def _unexpected(error: Exception, store: Path) -> TaskOutcome:
     if isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
-        return Done("refused", f"{FULL}: {error.filename or store}", lacks="disk")
-    return Done("crashed", f"{type(error).__name__}: {_line(error)}")
+        return TaskOutcome("refused", f"{FULL}: {error.filename or store}", lacks="disk")
+    return TaskOutcome("crashed", f"{type(error).__name__}: {_line(error)}")
 
 
 def _line(error: Exception) -> str:
@@ -177,16 +177,16 @@ class LocalProcesses:
         self._idle: dict[int, _Worker] = {}
         self._stores: set[Path] = set()
 
-    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[Done]":
+    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[TaskOutcome]":
         """Give the task to a process; a thread waits for its messages and its end."""
-        future: Future[Done] = Future()
+        future: Future[TaskOutcome] = Future()
         self._stores.add(store)
         has_all = threads == NO_LIMIT or not self._pins_cores
         cores = self._cores if has_all else _share(self._cores, slot, threads)
         limit = len(cores) if self._pins_cores else threads
         first = self._worker(slot, task, cores)
 
-        def outcome() -> Done:
+        def outcome() -> TaskOutcome:
             worker = first
             done = worker.ask(task, store, limit, tell)
             if worker.had_fault and task.stage in REPEATABLE:
@@ -278,21 +278,21 @@ class _Worker:
             self.process.connection.send((os.getcwd(), dict(os.environ), self.cores))
             send_handle(self.process.connection, self.trace.fileno(), None)
 
-    def ask(self, task: Task, store: Path, threads: int, tell: Tell) -> Done:
+    def ask(self, task: Task, store: Path, threads: int, tell: Tell) -> TaskOutcome:
         """The process's report of how a task ended, or how the process died; its messages go to `tell` at once."""
         began_s = time.monotonic()
         try:
             self.process.connection.send((task, store, threads))
             while True:
                 answer = self.process.connection.recv()
-                if isinstance(answer, Done):
+                if isinstance(answer, TaskOutcome):
                     return answer
                 tell(answer)
         except (EOFError, OSError):
             done = _death(self.process.join(), time.monotonic() - began_s)
             return self._with_stack(done, task, store) if self.had_fault else done
 
-    def _with_stack(self, done: Done, task: Task, store: Path) -> Done:
+    def _with_stack(self, done: TaskOutcome, task: Task, store: Path) -> TaskOutcome:
         """The same failure with the stack that the process wrote when a fault ended it, which is kept in the store."""
         self.trace.seek(0)
         stack = self.trace.read(STACK_BYTES).decode("utf-8", "replace")
@@ -318,13 +318,13 @@ def _share(cores: Sequence[int], slot: int, threads: int) -> list[int]:
     return [cores[(first + n) % len(cores)] for n in range(count)]
 
 
-def _death(exit_code: int | None, wall_s: float) -> Done:
+def _death(exit_code: int | None, wall_s: float) -> TaskOutcome:
     if exit_code == -signal.SIGKILL:
-        return Done("out_of_memory", "its process was killed by the system, most likely for memory", wall_s)
+        return TaskOutcome("out_of_memory", "its process was killed by the system, most likely for memory", wall_s)
     cause = f"exit code {exit_code}"
     if exit_code and exit_code < 0:
         cause = f"signal {signal.Signals(-exit_code).name}"
-    return Done("crashed", f"its process ended with {cause}", wall_s)
+    return TaskOutcome("crashed", f"its process ended with {cause}", wall_s)
 
 
 def work(connection: Connection, vobench_fd: int) -> None:
@@ -360,7 +360,7 @@ def work(connection: Connection, vobench_fd: int) -> None:
 
 def _leave() -> None:
     """Tidy up and end this process, whatever its main thread does."""
-    stop.undo_all()
+    stop.clean_up_all()
     number = stop.requested()
     os._exit(128 + number if number else 1)
 
@@ -404,9 +404,9 @@ class Dask:
             raise InputError(f"this Dask scheduler has no workers: {address}")
         return list(versions_of)
 
-    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[Done]":
+    def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[TaskOutcome]":
         """Send the task to the worker of that slot, or to another if that one is gone."""
-        future: Future[Done] = Future()
+        future: Future[TaskOutcome] = Future()
         worker = self._workers[slot]
         self._tells[task.key] = tell
         sent = self._client.submit(
@@ -416,7 +416,7 @@ class Dask:
 
         def ended(sent: Any) -> None:
             error = sent.exception()
-            done = Done("crashed", f"on {worker}: {_line(error)}") if error else sent.result()
+            done = TaskOutcome("crashed", f"on {worker}: {_line(error)}") if error else sent.result()
             future.set_result(done)
 
         sent.add_done_callback(ended)
@@ -436,7 +436,7 @@ _processes_for: dict[str, LocalProcesses] = {}
 _leases_lock = threading.Lock()
 
 
-def _performed_for(lease: str, task: Task, store: Path, threads: int) -> Done:
+def _performed_for(lease: str, task: Task, store: Path, threads: int) -> TaskOutcome:
     """Perform a task on a Dask worker, in a process that ends as soon as the client that holds the lease is gone."""
     from distributed import get_worker
 
@@ -550,8 +550,8 @@ def perform_all(
     executor: Executor,
     *,
     shares_time: bool = False,
-    heard: Callable[[Event], object] = lambda _: None,
-) -> dict[str, Done]:
+    heard: Callable[[TaskEvent], object] = lambda _: None,
+) -> dict[str, TaskOutcome]:
     """Perform tasks, each after those that it needs; the failures by key, with those of the tasks that needed them.
 
     An estimator is timed: unless `shares_time`, nothing else runs beside it. `heard` is called with each event.
@@ -578,18 +578,18 @@ class _Schedule:
         executor: Executor,
         *,
         shares_time: bool,
-        heard: Callable[[Event], object],
+        heard: Callable[[TaskEvent], object],
     ) -> None:
-        self.failures: dict[str, Done] = {}
+        self.failures: dict[str, TaskOutcome] = {}
         self._queue = queue
         self._store = store
         self._executor = executor
         self._shares_time = shares_time
         self._heard = heard
         self._cores = len(os.sched_getaffinity(0))
-        self._running: dict[Future[Done], tuple[Task, int]] = {}
+        self._running: dict[Future[TaskOutcome], tuple[Task, int]] = {}
         self._last_inputs = [""] * executor.slots
-        self._messages: SimpleQueue[Event] = SimpleQueue()
+        self._messages: SimpleQueue[TaskEvent] = SimpleQueue()
 
     @property
     def is_finished(self) -> bool:
@@ -616,10 +616,10 @@ class _Schedule:
     def _begin(self, task: Task, slot: int) -> None:
         self._last_inputs[slot] = _main_input(task)
         threads = self._threads(task)
-        self._heard(Event("started", task, slot))
+        self._heard(TaskEvent("started", task, slot))
 
         def tell(sentence: str) -> None:
-            self._messages.put(Event("told", task, slot, told=sentence))
+            self._messages.put(TaskEvent("told", task, slot, told=sentence))
 
         future = self._executor.submit(task, self._store, slot, threads, tell)
         self._running[future] = (task, slot)
@@ -641,17 +641,17 @@ class _Schedule:
             task, slot = self._running.pop(future)
             self._end(task, slot, future.result())
 
-    def _end(self, task: Task, slot: int, done: Done) -> None:
+    def _end(self, task: Task, slot: int, done: TaskOutcome) -> None:
         if done.lacks == "library":
             raise MissingDependencyError(done.reason)
         if done.lacks:
             raise InputError(done.reason)
         what: Literal["failed", "done"] = "failed" if done.failure else "done"
-        self._heard(Event(what, task, slot, done.wall_s, done.reason))
+        self._heard(TaskEvent(what, task, slot, done.wall_s, done.reason))
         if not done.failure:
             self._queue.release(task.key)
             return
         self.failures[task.key] = done
         cause = f"its {PRODUCTS[task.stage]} could not be made: {done.reason}"
         for dependent in self._queue.drop_dependents(task.key):
-            self.failures[dependent.key] = Done(done.failure, cause, stack=done.stack)
+            self.failures[dependent.key] = TaskOutcome(done.failure, cause, stack=done.stack)

@@ -24,9 +24,13 @@ from vobench.runner.motion import body_motions
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.store import SILENT, Progress
 from vobench.suite import catalog
+from vobench.suite.case import Case
+from vobench.suite.entrant import EstimatorEntry
 from vobench.suite.manifest import read_manifest
-from vobench.suite.suite import Case, Entrant, Plan, Suite
-from vobench.suite.yaml_file import Mistakes, YamlFile, checked
+from vobench.suite.plan import Plan
+from vobench.suite.suite_spec import Suite
+from vobench.suite.yaml_file import checked
+from vobench.suite.yaml_source import Mistakes, YamlFile
 
 # RUN/cases/CASE/estimates/ESTIMATOR/REPEAT: how far above the folder of a trial its run is.
 LEVELS_TO_RUN = 5
@@ -39,7 +43,7 @@ class FinishedTrial:
     folder: RunFolder
     score: TrialScore
     case: Case
-    entrant: Entrant
+    entrant: EstimatorEntry
     suite: Suite
 
     @property
@@ -118,7 +122,7 @@ def _read_suite(folder: RunFolder) -> Suite:
         raise InputError(f"of another vobench, whose suites this one cannot read: {path}") from None
 
 
-def _read_entrant(folder: RunFolder, label: str, path: Path | None, progress: Progress) -> Entrant:
+def _read_entrant(folder: RunFolder, label: str, path: Path | None, progress: Progress) -> EstimatorEntry:
     """The estimator with the parameters, limits and mode of the run. Raises UnknownNameError where it is not found."""
     listed = json.loads((folder.path / ESTIMATORS).read_bytes())
     facts = next(entry for entry in listed if entry["label"] == label)
@@ -127,7 +131,7 @@ def _read_entrant(folder: RunFolder, label: str, path: Path | None, progress: Pr
     if folder_digest(place) != facts["code"]:
         progress.say(f"{place} has changed since the run, whose {label} this is")
     limits = replace(manifest.limits, **facts["limits"])
-    return Entrant(label, place, manifest, facts["params"], limits, facts["mode"])
+    return EstimatorEntry(label, place, manifest, facts["params"], limits, facts["mode"])
 
 
 def run_variants(trial: FinishedTrial, cases: Mapping[str, Case], *, name: str, run_plan: PlanRunner) -> RunFolder:

@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
 
 from vobench.errors import InputError, TrajectoryError
 from vobench.estimator.sandbox import Sandbox
-from vobench.runner.consistency import Consistency
+from vobench.runner.consistency import CovarianceConsistency
 from vobench.runner.entry import file_hash
 from vobench.runner.frames import TIMES
 from vobench.runner.store import sweep, unfinished, write_json
@@ -96,7 +96,7 @@ class TrialScore(BaseModel):
     score: dict[str, Any] | None
     drift_m: float | None = None
     claims: tuple[str, ...] = ()
-    consistency: Consistency | None = None
+    consistency: CovarianceConsistency | None = None
     revised: dict[str, Any] | None = None
     sandbox: Sandbox | None = None
 
@@ -113,7 +113,7 @@ class TrialScore(BaseModel):
 
 
 @dataclass(frozen=True, slots=True)
-class Unmade:
+class UnavailableCases:
     """Cases that could not be simulated or imported for one cause, which names the remedy where there is one."""
 
     cause: str
@@ -127,7 +127,7 @@ class Unmade:
         return f"{named} and {others} more" if others > 0 else named
 
 
-def unmade_in(scores: Iterable[TrialScore]) -> tuple[Unmade, ...]:
+def unavailable_cases(scores: Iterable[TrialScore]) -> tuple[UnavailableCases, ...]:
     """The cases without a sequence, grouped by cause, in order of their first case.
 
     A case that another of several merged runs has made is none of them.
@@ -142,7 +142,7 @@ def unmade_in(scores: Iterable[TrialScore]) -> tuple[Unmade, ...]:
     by_cause = dict[str, list[str]]()
     for case in sorted(causes.keys() - made):
         by_cause.setdefault(causes[case], []).append(case)
-    return tuple(Unmade(cause, tuple(cases)) for cause, cases in by_cause.items())
+    return tuple(UnavailableCases(cause, tuple(cases)) for cause, cases in by_cause.items())
 
 
 def with_sequence(scores: Iterable[TrialScore]) -> list[TrialScore]:
@@ -209,12 +209,12 @@ class RunFolder:
         """The folder of a case."""
         return self.path / "cases" / case
 
-    def unmade(self) -> tuple[Unmade, ...]:
+    def unmade(self) -> tuple[UnavailableCases, ...]:
         """The cases that could not be simulated or imported, by cause; empty if the run is complete.
 
         Raises InputError where the folder or a score is none of ours.
         """
-        return unmade_in(self.scores())
+        return unavailable_cases(self.scores())
 
     def estimate(self, case: str, estimator: str, repeat: int) -> Path:
         """The folder of a trial."""

@@ -10,8 +10,9 @@ from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.runner.frames import EXPOSURE_COLUMNS, EXPOSURES, GROUND_TRUTH, new_table
 from vobench.sequence import Sequence, read_truth
+from vobench.suite.case import Case
 from vobench.suite.source import RecordedCase
-from vobench.suite.suite import EXACT, Case, TruthNoise, Window
+from vobench.suite.suite_spec import EXACT, TruthNoise, Window
 from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 

@@ -9,8 +9,8 @@ from vobench.dataset.recording import NO_TRUTH, ReadOptions, Recording, Topics
 from vobench.errors import SuiteError
 from vobench.runner.ground_truth import is_known
 from vobench.runner.key import versions
+from vobench.suite.plan import Plan
 from vobench.suite.source import FILE_KEYS, RecordedCase
-from vobench.suite.suite import Plan
 from vobench.suite.yaml_file import plain
 
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "mcap", "rosbags")

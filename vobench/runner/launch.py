@@ -15,7 +15,7 @@ from vobench.runner.preflight import preflight
 from vobench.runner.progress import RunDisplay
 from vobench.runner.store import SILENT, Progress, Store, why_unwritable
 from vobench.runner.task import KINDS, Task, missing
-from vobench.suite.suite import Plan
+from vobench.suite.plan import Plan
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -74,7 +74,7 @@ def run_plan(
         display.begin(tasks, typical_seconds(store))
 
     executor = make_executor(jobs, scheduler, task_progress)
-    with stop.undone(executor.close), display:
+    with stop.cleanup_after(executor.close), display:
         return run_suite(
             planned,
             recordings,
@@ -130,7 +130,7 @@ def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | N
     store = cache_folder().resolve()
     kept = Store(store)
     executor = make_executor(jobs, None, SILENT)
-    with stop.undone(executor.close), display, kept.in_use(display.say):
+    with stop.cleanup_after(executor.close), display, kept.in_use(display.say):
         to_make = missing(tasks, store)
         if to_make:
             kept.require_writable()

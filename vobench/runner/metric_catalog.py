@@ -2,7 +2,7 @@
 
 from importlib.metadata import EntryPoint, entry_points
 
-from vobench.errors import InputError, UnknownNameError, unknown
+from vobench.errors import InputError, UnknownNameError, unknown_name_sentence
 from vobench.metric.comparison import MetricDefinition
 from vobench.metric.definitions import DEFINITIONS
 
@@ -40,4 +40,4 @@ def find_metric(name: str) -> MetricDefinition:
     for definition in known:
         if definition.id == name.lower() or definition.identity in (stem, without_statistic):
             return definition
-    raise UnknownNameError(unknown("metric", name, [definition.id for definition in known]))
+    raise UnknownNameError(unknown_name_sentence("metric", name, [definition.id for definition in known]))

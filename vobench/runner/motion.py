@@ -27,9 +27,11 @@ from vobench.motion.wheeled import Wheeled
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import Thing, Triangles, table
 from vobench.scene.scene import Scene
-from vobench.suite.suite import Case, Plan
+from vobench.suite.case import Case
+from vobench.suite.plan import Plan
 from vobench.suite.trajectory import TrajectorySpec
-from vobench.suite.yaml_file import Mistakes, checked
+from vobench.suite.yaml_file import checked
+from vobench.suite.yaml_source import Mistakes
 from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.kinematics import Kinematics, Motion
 from vobench.trajectory.trajectory import Stamps
@@ -178,9 +180,9 @@ def _fed_forward(motion: Motion, t_ns: Stamps, theta: Theta) -> Array:
     """References (N, 2) with which the robot of (18) has this motion at t_ns, the middles of its frames."""
     ideal = motion.at(t_ns)
     u = ideal.velocity_mps[:, 0]
-    omega = ideal.turn_radps[:, 2]
+    omega = ideal.angular_velocity_radps[:, 2]
     u_rate = ideal.acceleration_mps2[:, 0]
-    omega_rate = ideal.turn_rate_radps2[:, 2]
+    omega_rate = ideal.angular_acceleration_radps2[:, 2]
     return np.stack(feed_forward(u, omega, u_rate, omega_rate, theta=theta), -1)
 
 

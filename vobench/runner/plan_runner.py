@@ -3,7 +3,7 @@
 from typing import Protocol
 
 from vobench.runner.folder import RunFolder
-from vobench.suite.suite import Plan
+from vobench.suite.plan import Plan
 
 
 class PlanRunner(Protocol):

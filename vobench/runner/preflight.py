@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 from vobench.runner.key import cache_folder
 from vobench.runner.motion import BodyMotion, body_motions
 from vobench.runner.task import is_done, plan, sequence_tasks
+from vobench.suite.case import Case
+from vobench.suite.plan import Plan
 from vobench.suite.source import RecordedCase
-from vobench.suite.suite import Case, Plan
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording

@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Protocol, Self
 
 if TYPE_CHECKING:
-    from vobench.runner.executor import Event
+    from vobench.runner.executor import TaskEvent
     from vobench.runner.task import Task
 
 
@@ -26,7 +26,7 @@ class RunDisplay(Protocol):
     def begin(self, tasks: "Sequence[Task]", seconds: Mapping[str, float]) -> None:
         """Take the tasks that are to be performed, and the typical seconds of a task of each stage, where known."""
 
-    def hear(self, event: "Event") -> None:
+    def hear(self, event: "TaskEvent") -> None:
         """Take the news of one task."""
 
     def say(self, sentence: str) -> None:
@@ -51,7 +51,7 @@ class RunProgress:
         self._typical_s = typical_s
         self._taken_s: dict[str, list[float]] = defaultdict(list)
 
-    def count(self, event: "Event") -> None:
+    def count(self, event: "TaskEvent") -> None:
         """Take the news of one task. A failed task takes those that need it with it."""
         task = event.task
         if event.what == "done":

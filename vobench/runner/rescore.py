@@ -14,15 +14,15 @@ from pydantic import ValidationError
 from vobench import stop
 from vobench.errors import InputError, VobenchError
 from vobench.metric.score import Score
-from vobench.runner.consistency import COVARIANCE, Consistency, trial_consistency
-from vobench.runner.estimate import DROPPED, ESTIMATE, FINISHED, Outcome
+from vobench.runner.consistency import COVARIANCE, CovarianceConsistency, trial_consistency
+from vobench.runner.estimate import DROPPED, ESTIMATE, FINISHED, EstimatorOutcome
 from vobench.runner.folder import CASE, SURVIVED, RunFolder, TrialScore, read_tum
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, read_table
 from vobench.runner.ground_truth import scored_truth
 from vobench.runner.motion import body_motion
 from vobench.runner.score import drift_m, scale_of, score_estimate, score_revised, status_of, status_of_handed
 from vobench.runner.simulate import frames_of
-from vobench.suite.suite import Case
+from vobench.suite.case import Case
 from vobench.suite.yaml_file import checked
 from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Trajectory
@@ -52,7 +52,7 @@ class Rescored:
 
 
 @dataclass(frozen=True, slots=True)
-class Checked:
+class RescoredRun:
     """The trials of a run that may be ranked, rescored, those that only claim a score, and notes on differences."""
 
     scores: list[TrialScore]
@@ -60,7 +60,7 @@ class Checked:
     notes: list[str]
 
 
-def check(folder: RunFolder, wrong_truths: Mapping[str, str] = MappingProxyType({})) -> Checked:
+def check(folder: RunFolder, wrong_truths: Mapping[str, str] = MappingProxyType({})) -> RescoredRun:
     """Score a run again, as `rescored` does. Raises InputError if the folder is not a run, or nothing can be scored."""
     trials = list(rescored(folder, wrong_truths))
     claimed = [trial for trial in trials if trial.claimed]
@@ -73,7 +73,7 @@ def check(folder: RunFolder, wrong_truths: Mapping[str, str] = MappingProxyType(
     different = [trial for trial in trials if trial.differs]
     notes = [f"{_named(trial.score)}: another score than its run states: {trial.differs}" for trial in different]
     notes += [f"{_named(trial.score)}: claimed, not ranked: {trial.claimed}" for trial in claimed]
-    return Checked(ranked, claimed, notes)
+    return RescoredRun(ranked, claimed, notes)
 
 
 def _named(score: TrialScore) -> str:
@@ -157,12 +157,12 @@ def _status(
     dropped = [int(row["t_ns"]) for row in rows if row.get("status") == DROPPED]
     if dropped:
         return status_of_handed(est, gt, stated.claims, dropped)
-    return status_of(Outcome(kind=FINISHED, reason=""), scored, gt)
+    return status_of(EstimatorOutcome(kind=FINISHED, reason=""), scored, gt)
 
 
 def _consistency(
     trial: Path, gt: Trajectory, est: Trajectory, scored: Score | None, rows: list[dict[str, str]]
-) -> Consistency | None:
+) -> CovarianceConsistency | None:
     """The consistency of the covariances; the start is that of the frames, which a bundle has."""
     if not (trial / COVARIANCE).is_file():
         return None

@@ -14,7 +14,7 @@ from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import copy_files
 from vobench.runner.environment import environment, joined, read_origin
 from vobench.runner.estimate import ESTIMATE, LOG, REVISED, TRACKS
-from vobench.runner.executor import Done, Event, Executor, perform_all
+from vobench.runner.executor import Executor, TaskEvent, TaskOutcome, perform_all
 from vobench.runner.folder import (
     CASE,
     ENVIRONMENT,
@@ -26,7 +26,7 @@ from vobench.runner.folder import (
     RunFolder,
     TrialScore,
     TrialStatus,
-    Unmade,
+    UnavailableCases,
     make_run,
     read_score,
     write_hashes,
@@ -37,8 +37,10 @@ from vobench.runner.key import digest, folder_digest
 from vobench.runner.store import Store, Tell, write_json
 from vobench.runner.task import Task, missing, plan
 from vobench.sequence import read_import_notes
+from vobench.suite.case import Case
+from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.plan import Plan
 from vobench.suite.source import RecordedCase
-from vobench.suite.suite import Case, Entrant, Plan
 from vobench.suite.yaml_file import plain
 
 if TYPE_CHECKING:
@@ -70,7 +72,7 @@ def run_suite(
     is_fresh: bool = False,
     begin: Callable[[Sequence[Task]], object] = lambda _: None,
     require_all: bool = False,
-    heard: Callable[[Event], object] = lambda _: None,
+    heard: Callable[[TaskEvent], object] = lambda _: None,
     tell: Tell = lambda _: None,
 ) -> RunFolder:
     """Run every case, estimator and repeat; results that the store holds are reused.
@@ -113,7 +115,7 @@ def run_suite(
 class _Gathering:
     """The results of a run in the store, and how they are gathered in its folder."""
 
-    def __init__(self, suite: Plan, store: Path, scores: Sequence[Task], failures: Mapping[str, Done]) -> None:
+    def __init__(self, suite: Plan, store: Path, scores: Sequence[Task], failures: Mapping[str, TaskOutcome]) -> None:
         self._store = store
         self._scores = scores
         self._failures = failures
@@ -155,7 +157,7 @@ class _Failure:
     stack: str = ""
 
 
-def _unmade(scores: Iterable[Task], failures: Mapping[str, Done]) -> dict[str, _Failure]:
+def _unmade(scores: Iterable[Task], failures: Mapping[str, TaskOutcome]) -> dict[str, _Failure]:
     """The failure of each case whose sequence could not be made, by the case's name."""
     unmade = dict[str, _Failure]()
     for task in scores:
@@ -175,7 +177,7 @@ def _require_sequences(unmade: Mapping[str, _Failure], cases: Collection[str], *
     by_cause = dict[str, list[str]]()
     for case, failure in unmade.items():
         by_cause.setdefault(failure.reason, []).append(case)
-    causes = [f"{Unmade(cause, tuple(names)).names}: {cause}" for cause, names in by_cause.items()]
+    causes = [f"{UnavailableCases(cause, tuple(names)).names}: {cause}" for cause, names in by_cause.items()]
     count = "no case" if nothing_made else f"{len(unmade)} of {len(cases)} cases"
     negation = "" if nothing_made else " not"
     raise NoSequenceError(
@@ -246,7 +248,7 @@ def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> Non
     (target / SEQUENCE).symlink_to(sequence.resolve())
 
 
-def _entrant_facts(entrant: Entrant) -> dict[str, Any]:
+def _entrant_facts(entrant: EstimatorEntry) -> dict[str, Any]:
     manifest = entrant.manifest
     return {
         "label": entrant.label,

@@ -13,8 +13,8 @@ from vobench.errors import InputError, SettingError, require_known
 from vobench.geometry import se3
 from vobench.geometry.rig import PRESETS, looking
 from vobench.geometry.se3 import Array
-from vobench.rendering.renderer import Radiance, still
-from vobench.rendering.shot import Shot
+from vobench.rendering.renderer import Radiance, single_instant
+from vobench.rendering.shot import CameraShot
 from vobench.runner.key import cache_folder
 from vobench.runner.simulate import open_renderer
 from vobench.runner.store import SILENT, Progress
@@ -28,7 +28,7 @@ from vobench.setting import Triple
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
-from vobench.suite.suite import Rendering
+from vobench.suite.suite_spec import Rendering
 
 LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
 # Flow and occlusion are of one picture and the next.
@@ -111,14 +111,14 @@ def render_scene(
     if rendering.needs_bake:
         light = perform(bake_task(spec), cache_folder(), progress=progress)
     with closing(open_renderer(built, rendering, light, white_cd_m2=spec.white_cd_m2)) as renderer:
-        radiance = renderer.radiance(lens, still(lens, T_world_camera, t_ns=t_ns), weights=None)
+        radiance = renderer.radiance(lens, single_instant(lens, T_world_camera, t_ns=t_ns), weights=None)
     rgb = _exposed(radiance / np.float32(spec.white_cd_m2), CameraSettings(chip=chip, exposure_gain=gain))
 
     truth: dict[str, NDArray[Any]] = {}
     if with_truth:
         from vobench.rendering.truth import TruthCaster
 
-        truth = TruthCaster(built).frame(lens, Shot(T_world_camera, t_ns), STILL_CHANNELS).channels()
+        truth = TruthCaster(built).frame(lens, CameraShot(T_world_camera, t_ns), STILL_CHANNELS).channels()
     return ScenePicture(rgb, truth)
 
 

@@ -12,7 +12,7 @@ from vobench.metric.definitions import DEFINITIONS
 from vobench.metric.score import Score, score
 from vobench.metric.settings import ScoreSettings
 from vobench.runner.consistency import trial_consistency
-from vobench.runner.estimate import DROPPED, ESTIMATE, FINISHED, REVISED, Outcome, read_outcome
+from vobench.runner.estimate import DROPPED, ESTIMATE, FINISHED, REVISED, EstimatorOutcome, read_outcome
 from vobench.runner.folder import SCORE, SURVIVED, TrialScore, TrialStatus, read_tum
 from vobench.runner.frames import ANSWERS, EXPOSURES, GROUND_TRUTH, read_table, write_frames
 from vobench.runner.ground_truth import scored_truth
@@ -21,7 +21,7 @@ from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
-    from vobench.suite.suite import Trial
+    from vobench.suite.plan import Trial
 
 # The truth that a trial is scored against has one pose for each frame.
 SETTINGS = ScoreSettings(coverage_of="frames")
@@ -122,7 +122,7 @@ def score_estimate(est: Trajectory, gt: Trajectory, claims: Sequence[str]) -> Sc
     return score(gt, est, settings=NO_SCALE_SETTINGS, metrics=OF_NO_SCALE)
 
 
-def status_of(outcome: Outcome, scored: Score | None, gt: Trajectory) -> tuple[TrialStatus, str]:
+def status_of(outcome: EstimatorOutcome, scored: Score | None, gt: Trajectory) -> tuple[TrialStatus, str]:
     """The status of a trial and its reason, the worst first; a process that failed counts before its answers."""
     if outcome.kind != FINISHED:
         return outcome.kind, outcome.reason  # type: ignore[return-value]  # EstimatorFailure's kinds are statuses
@@ -151,7 +151,7 @@ def status_of_handed(
     is_sent = ~np.isin(gt.t_ns, dropped)
     sent = Trajectory(gt.t_ns[is_sent], gt.T_world_frame[is_sent])
     scored = score_estimate(est, sent, claims)
-    status, reason = status_of(Outcome(kind=FINISHED, reason=""), scored, sent)
+    status, reason = status_of(EstimatorOutcome(kind=FINISHED, reason=""), scored, sent)
     if status not in SURVIVED:
         return status, reason
     late = f"it was too late for {len(dropped)} of {len(gt)} frames"

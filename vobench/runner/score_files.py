@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 from vobench.errors import AlignmentError, InputError
 from vobench.metric.comparison import DEFAULTS, MetricDefinition
 from vobench.metric.definitions import DEFINITIONS
-from vobench.metric.score import Metric, Pooled, Score, pooled, score
+from vobench.metric.score import MetricResult, Pooled, Score, pooled, score
 from vobench.metric.settings import ScoreSettings
 from vobench.runner.data_frame import data_frame
 from vobench.runner.metric_catalog import all_metrics
 from vobench.runner.trajectory_pair import TrajectorySource, read_pair
 
 if TYPE_CHECKING:
-    from vobench.runner.consistency import Consistency
+    from vobench.runner.consistency import CovarianceConsistency
     from vobench.runner.data_frame import DataFrame
 
 ALL_TOGETHER = "pooled"  # what the rows of all sequences together are called
@@ -42,7 +42,7 @@ class ScoredPair:
 
     pair: FilePair
     score: Score
-    consistency: "Consistency | None" = None
+    consistency: "CovarianceConsistency | None" = None
     by_frame: str | None = None
     notes: tuple[str, ...] = ()
 
@@ -89,7 +89,7 @@ class ScoredFiles:
         """A pandas table with one row per sequence and metric, then one per metric of all sequences together."""
         return data_frame({"sequence": sequence, **metric.as_dict()} for sequence, metric in self._metrics())
 
-    def _metrics(self) -> Iterator[tuple[str, Metric]]:
+    def _metrics(self) -> Iterator[tuple[str, MetricResult]]:
         """Every metric, with the estimate that it is of."""
         for scored in self.pairs:
             for metric in scored.score.metrics:
@@ -139,12 +139,12 @@ def _score_pair(
         scored = score(gt, est, settings=settings, metrics=metrics)
         return ScoredPair(pair, scored, None, read.by_frame, read.notes)
 
-    from vobench.runner.consistency import Consistency, read_covariances
+    from vobench.runner.consistency import CovarianceConsistency, read_covariances
 
     covariance = read_covariances(pair.covariance, est.t_ns)
     scored = score(gt, est, settings=settings, metrics=metrics, covariance=covariance)
     nees = next(samples.errors for samples in scored.samples if samples.of.id == "nees_pose")
-    return ScoredPair(pair, scored, Consistency.of(nees), read.by_frame, read.notes)
+    return ScoredPair(pair, scored, CovarianceConsistency.of(nees), read.by_frame, read.notes)
 
 
 def read_pair_list(path: Path) -> list[tuple[Path, Path]]:

@@ -6,12 +6,12 @@ from typing import Any, get_args
 
 from vobench.errors import require_known
 from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, Side, Unit
-from vobench.trajectory.align import Kind
+from vobench.trajectory.align import AlignmentKind
 from vobench.trajectory.associate import Method
 
 # Settings that are one of a few names: what these are names of, and the names.
 NAMED = {
-    "alignment": ("alignment", get_args(Kind)),
+    "alignment": ("alignment", get_args(AlignmentKind)),
     "association": ("association", get_args(Method)),
     "rpe_unit": ("unit", get_args(Unit)),
     "rpe_pairs_from": ("side", get_args(Side)),

@@ -6,7 +6,7 @@ import numpy as np
 
 from vobench.geometry.rig import Side
 from vobench.motion.wheeled import ENCODERS, Wheeled, ticks
-from vobench.rendering.shot import Shot
+from vobench.rendering.shot import CameraShot
 from vobench.rendering.truth import TruthCaster
 from vobench.runner.motion import BodyMotion, generator
 from vobench.scene.scene import Scene
@@ -14,7 +14,7 @@ from vobench.sensor.exposure import row_stamps
 from vobench.sensor.imu import STREAMS, ImuBias, ImuReadings, measure
 from vobench.sensor.pixel_truth import TruthFrame, TruthNames
 from vobench.sequence import SequenceWriter
-from vobench.suite.suite import Case
+from vobench.suite.case import Case
 from vobench.trajectory.kinematics import Motion
 from vobench.trajectory.nanoseconds import NS_PER_MS
 from vobench.trajectory.trajectory import Stamps
@@ -127,11 +127,11 @@ class PixelTruth:
         later = None if next_t_ns is None else self._shot(side, next_t_ns)
         return self._caster.frame(camera, shot, self._channels, later=later)
 
-    def _shot(self, side: Side, t_ns: int) -> Shot:
+    def _shot(self, side: Side, t_ns: int) -> CameraShot:
         T_body_camera = self._rig.T_body_camera(side)
         if not self._readout_s:
             T_world_body = self._motion.at(np.array([t_ns])).T_world_body[0]
-            return Shot(T_world_body @ T_body_camera, t_ns)
+            return CameraShot(T_world_body @ T_body_camera, t_ns)
         stamps = row_stamps(self._rig.camera(side).height_px, self._readout_s, t_ns)
         T_world_body = self._motion.at(stamps).T_world_body
-        return Shot(T_world_body @ T_body_camera, stamps)
+        return CameraShot(T_world_body @ T_body_camera, stamps)

@@ -7,19 +7,20 @@ from typing import TYPE_CHECKING, Any
 from vobench.geometry.rig import SIDES
 from vobench.runner.key import canonical, versions
 from vobench.runner.motion import BodyMotion, body_motion, generator
-from vobench.suite.scene_file import content as scene_content
+from vobench.suite.scene_file import scene_content
 from vobench.suite.yaml_file import plain
 
 if TYPE_CHECKING:
     from vobench.rendering.renderer import Renderer
     from vobench.runner.sensors import PixelTruth, SensorFeed
-    from vobench.runner.stereo_camera import StereoCamera, StereoPair
+    from vobench.runner.stereo_camera import ExposedPair, StereoCamera
     from vobench.runner.store import Progress
     from vobench.scene.scene import Scene
     from vobench.sensor.timing import Schedule
     from vobench.sequence import SequenceWriter
+    from vobench.suite.case import Case
     from vobench.suite.scene_spec import SceneFile
-    from vobench.suite.suite import Case, Rendering
+    from vobench.suite.suite_spec import Rendering
 
 # Settings of a case that the simulation does not depend on: names, and the file of a replay's poses.
 UNSIMULATED: dict[str, Any] = {
@@ -121,7 +122,7 @@ def frames_of(case: "Case", travel: BodyMotion) -> "Schedule":
     return schedule(case.camera.timing, travel.t_ns, rngs, before=travel.first)
 
 
-def _pairs(camera: "StereoCamera", frames: "Schedule") -> "Iterator[StereoPair]":
+def _pairs(camera: "StereoCamera", frames: "Schedule") -> "Iterator[ExposedPair]":
     """The pictures of each frame; one that repeats has those before."""
     pair = None
     for left_ns, right_ns, is_repeated in zip(frames.left_ns, frames.right_ns, frames.repeats, strict=True):
@@ -153,7 +154,7 @@ def _write(
     frames: "Schedule",
     *,
     feed: "SensorFeed",
-    pairs: "Iterator[StereoPair]",
+    pairs: "Iterator[ExposedPair]",
     truth: "PixelTruth | None",
 ) -> None:
     body = travel.at_frames()

@@ -17,11 +17,11 @@ from vobench.rendering.renderer import Radiance, Renderer, View
 from vobench.runner.motion import generator
 from vobench.scene.light import Steady
 from vobench.scene.scene import Scene, triangles
-from vobench.sensor.exposure import Exposure, start, step, strips
+from vobench.sensor.exposure import Exposure, initial_exposures, next_exposures, strips
 from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose, fixed_pattern
-from vobench.sensor.lens import lens_maps, through_lens
+from vobench.sensor.lens import apply_lens, lens_maps
 from vobench.sensor.response import Grey
-from vobench.suite.suite import Case
+from vobench.suite.case import Case
 from vobench.trajectory.kinematics import Motion
 from vobench.trajectory.trajectory import Stamps
 
@@ -89,7 +89,7 @@ ROWS_UNDER_CHANGING_LIGHT = 4  # of a strip, so that it sees one phase of lamps 
 
 
 @dataclass(frozen=True, slots=True)
-class StereoPair:
+class ExposedPair:
     """A stereo pair, (H, W) or (H, W, 3) uint8 each, and the exposure that both had."""
 
     left: Grey
@@ -116,14 +116,14 @@ class StereoCamera:
         self._settings = case.camera
         first = case.camera.exposure
         loop = case.camera.auto_exposure
-        self._state = start(loop, first) if loop else (first,)
+        self._state = initial_exposures(loop, first) if loop else (first,)
 
     def skip(self, pictures: int) -> None:
         """Leave out the first pictures: the noise of others is as it would be, auto-exposure starts anew."""
         for camera in (self._left, self._right):
             camera.skip(pictures)
 
-    def shoot(self, t_ns: int, right_ns: int | None = None) -> StereoPair:
+    def shoot(self, t_ns: int, right_ns: int | None = None) -> ExposedPair:
         """The pictures with t_ns at the middle of their exposure, the right one with right_ns if that is given.
 
         Call it in order of time.
@@ -133,8 +133,8 @@ class StereoCamera:
         right = self._right.picture(t_ns if right_ns is None else right_ns, exposure)
         loop = self._settings.auto_exposure
         if loop:
-            self._state = step(loop, self._state, left, self._settings.chip.signal_of_grey)
-        return StereoPair(left, right, exposure)
+            self._state = next_exposures(loop, self._state, left, self._settings.chip.signal_of_grey)
+        return ExposedPair(left, right, exposure)
 
 
 class SimulatedCamera:
@@ -180,7 +180,7 @@ class SimulatedCamera:
 
     def exposed(self, light: Radiance, exposure: Exposure) -> Grey:
         """The values of a picture of that light."""
-        at_chip: Radiance = through_lens(light, self._lens)
+        at_chip: Radiance = apply_lens(light, self._lens)
         return expose(at_chip, self._settings, self._noise, pattern=self._pattern, exposure=exposure)
 
     def views(self, t_ns: int, exposure: Exposure) -> list[View]:

@@ -50,7 +50,7 @@ def unfinished(parent: Path) -> Iterator[Path]:
     parent.mkdir(parents=True, exist_ok=True)
     folder, lock = _locked_folder(parent)
     try:
-        with stop.undone(lambda: stop.remove(folder)):
+        with stop.cleanup_after(lambda: stop.remove(folder)):
             yield folder
     finally:
         os.close(lock)
@@ -90,7 +90,7 @@ def locked(path: Path, tell: Tell = lambda _: None) -> Iterator[None]:
     path.parent.mkdir(parents=True, exist_ok=True)
     lock = _awaited(path, tell)
     try:
-        with stop.undone(lambda: path.unlink(missing_ok=True)):
+        with stop.cleanup_after(lambda: path.unlink(missing_ok=True)):
             yield
     finally:
         os.close(lock)
@@ -148,7 +148,7 @@ def _holder(path: Path) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class StoreEntry:
     """Something in the store: when it was made and last used, in seconds since 1970; `is_damaged` was set aside."""
 
     kind: str
@@ -168,7 +168,7 @@ class Entry:
         return self.path.name.startswith(BAD)
 
 
-def _entry(path: Path) -> Entry:
+def _entry(path: Path) -> StoreEntry:
     used_s = path.stat().st_mtime
     files = [path]
     if path.is_dir():
@@ -176,7 +176,7 @@ def _entry(path: Path) -> Entry:
     stats = [file.stat() for file in files]
     size = sum(facts.st_size for facts in stats)
     made_s = max((facts.st_mtime for facts in stats), default=used_s)
-    return Entry(path.parent.name, path, size, made_s, used_s)
+    return StoreEntry(path.parent.name, path, size, made_s, used_s)
 
 
 LIMIT = "VOBENCH_CACHE_GB"
@@ -341,7 +341,7 @@ class Store:
             for path in self.root.glob(f"{STATE}/{name}/*"):
                 _unlink_if_free(path)
 
-    def entries(self) -> Iterator[Entry]:
+    def entries(self) -> Iterator[StoreEntry]:
         """All that lies in the store, what was set aside as damaged included."""
         for kind in self._kinds():
             for path in sorted(kind.iterdir()):
@@ -353,7 +353,7 @@ class Store:
         folders = [path for path in self.root.glob("*") if path.is_dir()]
         return sorted(path for path in folders if path.name != STATE)
 
-    def collect(self, *, keep_bytes: float = math.inf, older_s: float = math.inf) -> list[Entry]:
+    def collect(self, *, keep_bytes: float = math.inf, older_s: float = math.inf) -> list[StoreEntry]:
         """Remove what is unfinished or damaged, what was last used so long ago, and then the least recently used.
 
         What a process makes, or a run uses, stays. Returns what is removed.
@@ -365,7 +365,7 @@ class Store:
         first_run_s = min(starts_s, default=math.inf)
         entries = sorted(self.entries(), key=lambda entry: (not entry.is_damaged, entry.used_s))
         held = sum(entry.bytes for entry in entries)
-        removed = list[Entry]()
+        removed = list[StoreEntry]()
         for entry in entries:
             stop.check()
             is_old = now_s - entry.used_s > older_s
@@ -376,7 +376,7 @@ class Store:
                 removed.append(entry)
         return removed
 
-    def _removed(self, entry: Entry) -> bool:
+    def _removed(self, entry: StoreEntry) -> bool:
         """Whether an entry could be removed: nobody holds its lock."""
         self._lock(entry.key).parent.mkdir(parents=True, exist_ok=True)
         lock = _taken(self._lock(entry.key))

@@ -14,10 +14,13 @@ from vobench.runner.environment import MADE_ON, origin_here
 from vobench.runner.key import code_digest, digest, folder_digest, imported_by, library_versions
 from vobench.runner.simulate import content, libraries
 from vobench.runner.store import Progress, SilentProgress, Store, write_json
-from vobench.suite.scene_file import content as scene_content
+from vobench.suite.case import Case
+from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.plan import Plan, Trial
+from vobench.suite.scene_file import scene_content
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
-from vobench.suite.suite import EXACT, Case, Entrant, Plan, Trial
+from vobench.suite.suite_spec import EXACT
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
@@ -124,7 +127,7 @@ def _import_task(case: RecordedCase, recording: "Recording") -> Task:
     return Task("import", case, inputs, ())
 
 
-def estimator_code(entrant: Entrant) -> dict[str, str]:
+def estimator_code(entrant: EstimatorEntry) -> dict[str, str]:
     """Hashes of an estimator's folder, and of all code of vobench that runs it or that it imports."""
     code = code_digest(*ENTRIES["estimate"], *imported_by(entrant.folder))
     return {"estimator": folder_digest(entrant.folder), "code": code}

@@ -10,12 +10,19 @@ from typing import get_args
 import numpy as np
 
 from vobench.errors import InputError, TrajectoryError
-from vobench.trajectory.formats import Order, Parsed, Reading, Unit, parse_any, parse_times
-from vobench.trajectory.trajectory import Move, Trajectory, parse_move
+from vobench.trajectory.formats import (
+    ParsedTrajectory,
+    QuaternionOrder,
+    StampUnit,
+    TrajectoryReading,
+    parse_any,
+    parse_times,
+)
+from vobench.trajectory.trajectory import PoseConvention, Trajectory, parse_pose_convention
 
 NS_PER_S = 10**9
-UNITS: tuple[Unit, ...] = get_args(Unit)
-ORDERS: tuple[Order, ...] = get_args(Order)
+UNITS: tuple[StampUnit, ...] = get_args(StampUnit)
+ORDERS: tuple[QuaternionOrder, ...] = get_args(QuaternionOrder)
 TRUTH = "truth.mcap"
 SENSORS = "sensors.mcap"
 HEAD_BYTES = 4096  # enough to tell text from a recording
@@ -42,20 +49,20 @@ class TrajectorySource:
 class TrajectoryPair:
     """Ground truth and estimate, notes on how the files were read, and how they are paired if neither has stamps."""
 
-    gt: Reading
-    est: Reading
+    gt: TrajectoryReading
+    est: TrajectoryReading
     notes: tuple[str, ...] = ()
     by_frame: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class _Read:
-    parsed: Parsed
+    parsed: ParsedTrajectory
     path: Path
-    moves: tuple[Move, ...]
+    moves: tuple[PoseConvention, ...]
     says_truth: bool
-    unit: Unit | None = None  # as stated by the user, which overrides the file
-    order: Order | None = None
+    unit: StampUnit | None = None  # as stated by the user, which overrides the file
+    order: QuaternionOrder | None = None
 
 
 def read_pair(
@@ -117,7 +124,7 @@ def _notes(read: _Read) -> list[str]:
     return notes
 
 
-def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: bool = False) -> Reading:
+def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: bool = False) -> TrajectoryReading:
     """Read one alone; a file without stamps needs `times`. Raises InputError."""
     read = _read(source, any_unit=any_unit)
     if times:
@@ -127,13 +134,13 @@ def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: 
     return _reading(read)
 
 
-def _reading(read: _Read) -> Reading:
+def _reading(read: _Read) -> TrajectoryReading:
     parsed = read.parsed
     assert parsed.t_ns is not None
     T = parsed.T
     for move in read.moves:
         T = move.apply(T)
-    return Reading(
+    return TrajectoryReading(
         Trajectory(parsed.t_ns, T),
         parsed.unit,
         read.unit or parsed.form_unit,
@@ -200,11 +207,13 @@ def _read_recording(source: TrajectorySource) -> _Read:
     if unit or order:
         raise InputError(f"a recording states its stamps' unit and quaternions' order itself: {source.path}")
     trajectory = _recorded(source.path, source.topic)
-    parsed = Parsed(trajectory.t_ns, trajectory.T_world_frame, "ns", "ns")
+    parsed = ParsedTrajectory(trajectory.t_ns, trajectory.T_world_frame, "ns", "ns")
     return _Read(parsed, source.path, moves, says_truth=False)
 
 
-def _parse(text: str, name: str, unit: Unit | None, order: Order | None, *, any_unit: bool) -> Parsed:
+def _parse(
+    text: str, name: str, unit: StampUnit | None, order: QuaternionOrder | None, *, any_unit: bool
+) -> ParsedTrajectory:
     try:
         return parse_any(text, name=name, unit=unit, order=order)
     except TrajectoryError:
@@ -215,9 +224,9 @@ def _parse(text: str, name: str, unit: Unit | None, order: Order | None, *, any_
         raise
 
 
-def _words(words: Iterable[str]) -> tuple[Unit | None, Order | None, tuple[Move, ...]]:
-    unit: Unit | None = None
-    order: Order | None = None
+def _words(words: Iterable[str]) -> tuple[StampUnit | None, QuaternionOrder | None, tuple[PoseConvention, ...]]:
+    unit: StampUnit | None = None
+    order: QuaternionOrder | None = None
     moves = []
     for word in words:
         if word in UNITS:
@@ -225,7 +234,7 @@ def _words(words: Iterable[str]) -> tuple[Unit | None, Order | None, tuple[Move,
         elif word in ORDERS:
             order = word
         else:
-            moves.append(parse_move(word))
+            moves.append(parse_pose_convention(word))
     return unit, order, tuple(moves)
 
 

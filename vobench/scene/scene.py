@@ -12,13 +12,13 @@ from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, Triangles, moved, quad, table
 
 
-class Way(Protocol):
+class MoverMotion(Protocol):
     """The trajectory of a rigid thing."""
 
     def pose(self, t_ns: float) -> Array:
         """T_world_mover (4, 4) at an instant."""
 
-    def sized(self, by: float) -> "Way":
+    def sized(self, by: float) -> "MoverMotion":
         """The same with all lengths times `by`."""
 
 
@@ -78,7 +78,7 @@ def _periodic(phase: float, steps: Array, values: Array) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class Gait:
+class LimbMotion:
     """The trajectory of a limb of somebody who walks a path: it swings with the distance travelled.
 
     joints_m (J, 3) as in `jointed`; pitch_rad (K, J) and rise_m (K,), how high the body is, at K even steps of a
@@ -100,9 +100,9 @@ class Gait:
         T_ground_body = se3.transform(np.eye(3), [0, 0, rise])
         return self.path.pose(t_ns) @ T_ground_body @ jointed(self.joints_m, np.array(pitch))
 
-    def sized(self, by: float) -> "Gait":
+    def sized(self, by: float) -> "LimbMotion":
         """The same with all lengths times `by`."""
-        return Gait(self.path.sized(by), self.cycle_m * by, self.joints_m * by, self.pitch_rad, self.rise_m * by)
+        return LimbMotion(self.path.sized(by), self.cycle_m * by, self.joints_m * by, self.pitch_rad, self.rise_m * by)
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +111,7 @@ class Mover:
 
     name: str
     things: tuple[Thing, ...]
-    path: Way
+    path: MoverMotion
 
 
 @dataclass(frozen=True, slots=True)

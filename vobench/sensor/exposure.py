@@ -19,7 +19,7 @@ MS_PER_S = 1e3
 
 
 @dataclass(frozen=True, slots=True)
-class Strip:
+class RowStrip:
     """Rows that are exposed together, and the M parts of their exposure: [start_ns, end_ns), each (M,)."""
 
     rows: slice
@@ -41,7 +41,7 @@ def strips(
     *,
     row_strips: int,
     sub_frames: int,
-) -> list[Strip]:
+) -> list[RowStrip]:
     """The exposure of a picture, strip by strip from the top; t_ns is the middle of its middle row's exposure.
 
     `readout_s` is the time from the first row to the one that would follow the last, 0 for a global shutter.
@@ -64,7 +64,7 @@ def strips(
     for first, end in pairwise(borders):
         start_ns = t_ns + _delay_ns(first, end, height, readout_ns) - exposure_ns // 2
         edges_ns = start_ns + offsets_ns
-        all_strips.append(Strip(slice(first, end), edges_ns[:-1], edges_ns[1:]))
+        all_strips.append(RowStrip(slice(first, end), edges_ns[:-1], edges_ns[1:]))
     return all_strips
 
 
@@ -135,13 +135,13 @@ class AutoExposure:
 PendingExposures = tuple[Exposure, ...]
 
 
-def start(loop: AutoExposure, exposure: Exposure) -> PendingExposures:
+def initial_exposures(loop: AutoExposure, exposure: Exposure) -> PendingExposures:
     """The loop at rest on an exposure, clipped to its limits."""
     settled = _within(loop, _level(exposure))
     return (settled,) * loop.lag_frames
 
 
-def step(
+def next_exposures(
     loop: AutoExposure,
     pending: PendingExposures,
     grey: Grey,

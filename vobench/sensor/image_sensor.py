@@ -13,7 +13,7 @@ from vobench.geometry.se3 import Array
 from vobench.sensor.exposure import AutoExposure, Exposure
 from vobench.sensor.response import FULL_SCALE_DN, Grey, Response, linear_of_grey, quantise, response_of
 from vobench.sensor.timing import Timing
-from vobench.setting import Check, Like, NonNegative, Positive, Share, settings
+from vobench.setting import FromPreset, NonNegative, Positive, Share, ValueCheck, settings
 
 MS_PER_S = 1e3
 # From this mean on the expansion below is off by less than 6e-4 in total variation, 1e-4 in variance and 1e-5 in mean.
@@ -97,7 +97,7 @@ class CameraSensor:
     hot_share: Share = 0.0
     hot_e_per_s: NonNegative = 20_000.0
     adc_bits: Literal[8, 10, 12] | None = None
-    response: Annotated[str | float | tuple[float, ...], Check(response_of, first=True)] = "srgb"
+    response: Annotated[str | float | tuple[float, ...], ValueCheck(response_of, first=True)] = "srgb"
 
     @property
     def curve(self) -> Response:
@@ -177,7 +177,7 @@ CAMERAS = {
 
 
 # YAML names a sensor beside the rest of a camera, and says in `chip` what differs from it.
-SENSOR_PRESETS = Like("camera sensor", CAMERAS, key="sensor", section="chip")
+SENSOR_PRESETS = FromPreset("camera sensor", CAMERAS, key="sensor", section="chip")
 
 
 Colour = Literal["mono", "rgb", "bayer"]
@@ -193,7 +193,7 @@ Ghost = Annotated[float, Ge(0), Le(0.1)]
 
 
 @settings()
-class Eye:
+class CameraDifference:
     """What sets one eye apart: `gain` multiplies the light that its chip gets, the rest stands in place of both's."""
 
     gain: Positive = 1.0
@@ -206,11 +206,11 @@ class Eye:
 
 
 @settings()
-class Eyes:
+class CameraDifferences:
     """How the two cameras of a pair differ."""
 
-    left: Eye = Eye()
-    right: Eye = Eye()
+    left: CameraDifference = CameraDifference()
+    right: CameraDifference = CameraDifference()
 
 
 @settings()
@@ -246,7 +246,7 @@ class CameraSettings:
     flare: Flare = 0.0
     ghost: Ghost = 0.0
     jpeg_quality: Annotated[int, Ge(1), Le(100)] | None = None
-    unlike: Eyes = Eyes()
+    unlike: CameraDifferences = CameraDifferences()
     timing: Timing = Timing()
 
     def __post_init__(self) -> None:
@@ -259,7 +259,7 @@ class CameraSettings:
 
     def eye(self, side: Literal["left", "right"]) -> "CameraSettings":
         """The settings of one of the two cameras."""
-        eye: Eye = getattr(self.unlike, side)
+        eye: CameraDifference = getattr(self.unlike, side)
         settings_of_eye = asdict(eye)
         del settings_of_eye["gain"]
         overrides = {key: value for key, value in settings_of_eye.items() if value is not None}

@@ -45,12 +45,12 @@ class Triad:
 FLAWLESS = Triad()
 
 
-def started(triad: Triad, draw: Array) -> Array:
+def initial_bias(triad: Triad, draw: Array) -> Array:
     """The initial bias (3,) of one start, for standard normal numbers (3,)."""
     return np.asarray(triad.bias) + triad.bias_std * draw
 
 
-def walked(triad: Triad, draws: Array, *, step_s: float) -> Array:
+def random_walk(triad: Triad, draws: Array, *, step_s: float) -> Array:
     """The random walk of the bias (M, 3) for standard normal numbers (M, 3): exact for any step.
 
     Without a correlation time it begins at 0. With one it is stationary, with the standard deviation
@@ -71,7 +71,7 @@ def walked(triad: Triad, draws: Array, *, step_s: float) -> Array:
     return walk
 
 
-def read_out(
+def readings_of(
     triad: Triad,
     true: Array,
     bias: Array,
@@ -164,7 +164,7 @@ def _inertia(imu: Kinematics) -> Array:
     """Angular rate and specific force (2, K, 3): R'(a - g), which is upwards at rest."""
     up = imu.T_world_body[:, 2, :3]  # the world's z axis in the IMU's axes
     specific_force_mps2 = imu.acceleration_mps2 + STANDARD_GRAVITY_MPS2 * up
-    return np.stack([imu.turn_radps, specific_force_mps2])
+    return np.stack([imu.angular_velocity_radps, specific_force_mps2])
 
 
 # The random streams, one for each process: switching one off does not change the others.
@@ -244,11 +244,11 @@ def measure(
 
     gyro_bias = _bias("gyro", settings.gyro, gyro_start, count=count, step_s=step_s, rngs=rngs)
     gyro_white = _draws("gyro_white", count, settings.gyro.noise, rngs)
-    gyro_radps = read_out(settings.gyro, true_gyro, gyro_bias, gyro_white, step_s=step_s)
+    gyro_radps = readings_of(settings.gyro, true_gyro, gyro_bias, gyro_white, step_s=step_s)
 
     accel_bias = _bias("accel", settings.accel, accel_start, count=count, step_s=step_s, rngs=rngs)
     accel_white = _draws("accel_white", count, settings.accel.noise, rngs)
-    accel_mps2 = read_out(settings.accel, true_accel, accel_bias, accel_white, step_s=step_s)
+    accel_mps2 = readings_of(settings.accel, true_accel, accel_bias, accel_white, step_s=step_s)
 
     return ImuReadings(t_ns, gyro_radps, accel_mps2), ImuBias(t_ns, gyro_bias, accel_bias)
 
@@ -263,8 +263,8 @@ def _bias(
     rngs: Generators | None,
 ) -> Array:
     """The bias (count, 3) of gyroscopes or accelerometers, for standard normal numbers (3,) of the start."""
-    walk = walked(triad, _draws(f"{name}_walk", count, triad.walk, rngs), step_s=step_s)
-    return started(triad, start) + walk
+    walk = random_walk(triad, _draws(f"{name}_walk", count, triad.walk, rngs), step_s=step_s)
+    return initial_bias(triad, start) + walk
 
 
 def _draws(

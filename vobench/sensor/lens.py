@@ -63,13 +63,13 @@ def lens_maps(
     return LensMaps(_single(shade), _single(veil), transfer)
 
 
-def through_lens(radiance: Radiance, maps: LensMaps) -> Radiance:
+def apply_lens(radiance: Radiance, maps: LensMaps) -> Radiance:
     """Radiance (H, W), or (H, W, 3) in colour, as it reaches the chip behind dirt, vignetting, blur and flare.
 
     Source of the dirt's two terms: Gu, Ramamoorthi, Belhumeur and Nayar (2009), equation 3.
     """
     if radiance.ndim == 3:
-        channels = [through_lens(channel, maps) for channel in np.moveaxis(radiance, -1, 0)]
+        channels = [apply_lens(channel, maps) for channel in np.moveaxis(radiance, -1, 0)]
         return np.stack(channels, -1)
     transmitted = radiance if maps.shade is None else radiance * maps.shade
     if maps.veil is not None:

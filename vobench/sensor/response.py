@@ -8,7 +8,7 @@ from typing import TypeGuard
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.errors import SettingError, unknown
+from vobench.errors import SettingError, unknown_name_sentence
 from vobench.geometry.se3 import Array
 
 Grey = NDArray[np.uint8]
@@ -61,7 +61,7 @@ class Power:
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class ResponseTable:
     """A measured curve: the linear signals of equally spaced stored values, interpolated linearly.
 
     256 of them are the inverse response of a photometric calibration; the last one is full scale, in any unit.
@@ -101,7 +101,7 @@ class Table:
         return np.linspace(0, 1, len(self.inverse))
 
 
-Response = Srgb | Power | Table
+Response = Srgb | Power | ResponseTable
 SRGB = Srgb()
 LINEAR = Power(1.0)
 RESPONSES: dict[str, Response] = {"linear": LINEAR, "srgb": SRGB}
@@ -111,10 +111,10 @@ def response_of(value: str | float | tuple[float, ...]) -> Response:
     """The response of a name, a gamma or a table. Raises SettingError."""
     if isinstance(value, str):
         if value not in RESPONSES:
-            raise SettingError(unknown("response", value, list(RESPONSES)))
+            raise SettingError(unknown_name_sentence("response", value, list(RESPONSES)))
         return RESPONSES[value]
     if isinstance(value, list | tuple) and all(map(_is_number, value)):
-        return Table(tuple(map(float, value)))
+        return ResponseTable(tuple(map(float, value)))
     if _is_number(value):
         return Power(float(value))
     raise SettingError(f"should be linear, srgb, a gamma such as 2.2 or a list of rising signals (got {value!r})")

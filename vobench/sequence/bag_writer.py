@@ -43,7 +43,7 @@ LATCHED_QOS = """\
 def replacing(path: Path) -> Iterator[BinaryIO]:
     """A file to write that gets its name when the context ends without an error, and is removed after one."""
     part = part_of(path)
-    with stop.undone(lambda: part.unlink(missing_ok=True)):
+    with stop.cleanup_after(lambda: part.unlink(missing_ok=True)):
         with part.open("wb") as stream:
             yield stream
         part.replace(path)

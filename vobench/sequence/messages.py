@@ -389,13 +389,13 @@ def serialise(message: Any) -> bytes:
     return bytes(TYPES.serialize_cdr(message, message.__msgtype__, little_endian=True))
 
 
-def stamped(template: bytes, t_ns: int) -> bytes:
+def with_stamp(template: bytes, t_ns: int) -> bytes:
     """A serialised message that begins with a header, at another stamp."""
     stamp = STAMP.pack(*split_stamp(t_ns))
     return b"".join((template[:STAMP_BEGIN], stamp, template[STAMP_END:]))
 
 
-def pictured(template: bytes, t_ns: int, encoded: bytes) -> bytes:
+def with_picture(template: bytes, t_ns: int, encoded: bytes) -> bytes:
     """A serialised CompressedImage without a picture, given a stamp and a picture, which is its last field."""
     stamp = STAMP.pack(*split_stamp(t_ns))
     frame_and_format = template[STAMP_END : -LENGTH.size]

@@ -108,7 +108,7 @@ def opened(path: Path) -> Iterator[AnyReader]:
     # rosbags checks the size of a chunk after it has decompressed it: a few kB can become many GB.
     DECOMPRESSORS.update({name: partial(decompressed, name) for name in ("zstd", "lz4")})
     folder = Path(mkdtemp(prefix="vobench-bag-"))
-    with stop.undone(lambda: stop.remove(folder)):
+    with stop.cleanup_after(lambda: stop.remove(folder)):
         link = path
         if not path.is_dir():
             link = folder / f"recording{_suffix(path)}"

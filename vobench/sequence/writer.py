@@ -19,7 +19,7 @@ from vobench.sensor.pixel_truth import TruthFrame, TruthNames, check_channels
 from vobench.sequence import messages as ros
 from vobench.sequence.bag_writer import BagWriter
 from vobench.sequence.calibration import write_mounts
-from vobench.sequence.messages import pictured, serialise, stamped
+from vobench.sequence.messages import serialise, with_picture, with_stamp
 from vobench.sequence.picture import MONO, Image, encode, require_picture
 from vobench.sequence.pixel_truth import check_truth, names_to_json, truth_image, truth_topic, truth_topics
 
@@ -144,9 +144,9 @@ class SequenceWriter:
             blanks = [ros.image(0, name, b"", form, self._colour) for name in NAMES]
             self._blank = [serialise(blank) for blank in blanks]
         for topic, info in zip(ros.INFO_TOPICS, self._info, strict=False):
-            self._sensors.write(topic, t_ns, stamped(info, t_ns))
+            self._sensors.write(topic, t_ns, with_stamp(info, t_ns))
         for topic, blank, picture in zip(ros.IMAGE_TOPICS, self._blank, encoded, strict=False):
-            self._sensors.write(topic, t_ns, pictured(blank, t_ns, picture))
+            self._sensors.write(topic, t_ns, with_picture(blank, t_ns, picture))
 
     def write_exposure(self, t_ns: int, time_s: float, gain_db: float) -> None:
         """Add the exposure time and the gain of the pictures of a stamp."""

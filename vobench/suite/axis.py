@@ -7,10 +7,19 @@ from typing import Annotated, Any
 from annotated_types import Ge, Gt, Le
 
 from vobench.errors import InputError, SettingError
-from vobench.geometry.rig import PRESETS, RESIDUALS, CalibrationError, OwnPair, Rig, mounted, own_pair, resized
+from vobench.geometry.rig import (
+    PRESETS,
+    RESIDUALS,
+    CalibrationError,
+    CustomStereoPair,
+    Rig,
+    custom_stereo_pair,
+    mounted_rig,
+    resized,
+)
 from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
 from vobench.sensor.imu import IMUS, ImuSettings
-from vobench.setting import Like, OneOf, Positive, Short, settings
+from vobench.setting import FromPreset, OneOf, Positive, ShortForm, settings
 
 LENS_KEYS = ("own", "calib", "camchain")  # replace the preset
 EXACT_CALIBRATION = CalibrationError()
@@ -21,7 +30,7 @@ def _as_level(value: Any) -> Any:
     return {"level": value} if isinstance(value, str) else value
 
 
-Calibration = Annotated[CalibrationError, Short(_as_level, {"type": "string", "enum": ["none", *RESIDUALS]})]
+Calibration = Annotated[CalibrationError, ShortForm(_as_level, {"type": "string", "enum": ["none", *RESIDUALS]})]
 
 
 @settings()
@@ -33,7 +42,7 @@ class RigSettings:
     """
 
     lens: Annotated[str, OneOf("lens", PRESETS)] = "paper_blender"
-    own: OwnPair | None = None
+    own: CustomStereoPair | None = None
     calib: str | None = None
     size_px: tuple[Annotated[int, Gt(0)], Annotated[int, Gt(0)]] | None = None
     camchain: str | None = None
@@ -43,7 +52,7 @@ class RigSettings:
     forward_m: float = 0.25
     height_m: float = 0.4
     calibration_error: Calibration = EXACT_CALIBRATION
-    imu: Annotated[ImuSettings, Like("IMU", IMUS)] | None = None
+    imu: Annotated[ImuSettings, FromPreset("IMU", IMUS)] | None = None
 
     def __post_init__(self) -> None:
         given = [key for key in LENS_KEYS if getattr(self, key) is not None]
@@ -62,7 +71,7 @@ class RigSettings:
             pair = kitti.read_pair(folder / self.calib, self.size_px)
         else:
             pair = kalibr.read_pair(folder / str(self.camchain))
-        return replace(self, own=own_pair(pair), calib=None, size_px=None, camchain=None)
+        return replace(self, own=custom_stereo_pair(pair), calib=None, size_px=None, camchain=None)
 
     def build(self) -> Rig:
         """The sensors on the body with their nominal calibration. Raises InputError if `read` was not called."""
@@ -71,7 +80,7 @@ class RigSettings:
             raise InputError(f"the lenses are in a file that was not read: {unread_file}")
         preset = self.own.preset() if self.own else PRESETS[self.lens]
         T_left_right = preset.T_left_right if self.baseline_m is None else preset.at_baseline(self.baseline_m)
-        cameras = mounted(
+        cameras = mounted_rig(
             resized(preset.left, self.picture_scale),
             resized(preset.right, self.picture_scale),
             T_left_right,

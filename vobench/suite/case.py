@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vobench.geometry.rig import Rig, drawn, true_rig
+from vobench.geometry.rig import Rig, drawn_calibration_error, true_rig
 from vobench.motion.wheeled import Wheeled
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CameraSettings
@@ -61,4 +61,4 @@ class Case:
         """
         rig = self.build_rig()
         rng = np.random.default_rng([self.seed, CALIBRATION_STREAM])
-        return true_rig(rig, drawn(self.rig.calibration_error, rig, rng))
+        return true_rig(rig, drawn_calibration_error(self.rig.calibration_error, rig, rng))

@@ -10,7 +10,7 @@ from ruamel.yaml import YAML
 
 from vobench.motion.replay import Replay
 from vobench.suite.case import AXES, Case
-from vobench.suite.entrant import Entrant
+from vobench.suite.entrant import EstimatorEntry
 from vobench.suite.yaml_file import plain
 from vobench.suite.yaml_source import without_nothing
 
@@ -21,7 +21,7 @@ REPLAY_SOURCE_KEYS = ("file", "times", "recorded_hz", "axes")  # of a replayed t
 LINE_WIDTH = 120
 
 
-def write_case(case: Case, entrants: Sequence[Entrant], folder: Path, *, name: str, summary: str = "") -> Path:
+def write_case(case: Case, entrants: Sequence[EstimatorEntry], folder: Path, *, name: str, summary: str = "") -> Path:
     """Write the suite of one case with its scene, models and recorded poses; return the path of the suite's file.
 
     Estimators are written by name, so that a folder of that name can be put beside the suite.
@@ -75,7 +75,7 @@ def _write_trajectory_file(case: Case, folder: Path) -> Any:
     return without_nothing(trajectory)
 
 
-def _estimator(entrant: Entrant) -> Any:
+def _estimator(entrant: EstimatorEntry) -> Any:
     """The entry of an entrant in a suite, with those limits that are not its manifest's."""
     limits = dict[str, Any]()
     for key, value in plain(entrant.limits).items():

@@ -20,8 +20,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from vobench.asset import MODEL_SUFFIXES
-from vobench.errors import UnknownNameError, unknown
-from vobench.suite.file_kind import Kind, kind_in, shown
+from vobench.errors import UnknownNameError, unknown_name_sentence
+from vobench.suite.file_kind import Kind, display_path, kind_in
 
 KINDS: tuple[Kind, ...] = ("suite", "scenario", "scene", "estimator")
 # Paths below a folder of the kind; {} is the name.
@@ -85,7 +85,7 @@ def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
         return entry
     if name not in NOT_NAMES and path.is_dir():
         raise UnknownNameError(_about_folder(kind, path))
-    raise UnknownNameError(unknown(kind, name, _known_names(kind, suite)))
+    raise UnknownNameError(unknown_name_sentence(kind, name, _known_names(kind, suite)))
 
 
 def examples() -> list[Entry]:
@@ -100,9 +100,9 @@ def _about_folder(kind: Kind, folder: Path) -> str:
     if holds_scene or holds_estimator:
         return f"no {kind} named '{folder}'; to use the folder, write ./{folder}"
     inside = [entry for entry in _in_folder(kind, folder, "", None) if _is_of_kind(kind, entry.path)]
-    paths = ", ".join(shown(entry.path) for entry in inside)
+    paths = ", ".join(display_path(entry.path) for entry in inside)
     contents = f"it contains {paths}" if inside else f"it contains no {kind}"
-    return f"{shown(folder)} is a folder, and {WHAT_IT_IS[kind]}; {contents}"
+    return f"{display_path(folder)} is a folder, and {WHAT_IT_IS[kind]}; {contents}"
 
 
 def _is_of_kind(kind: Kind, path: Path) -> bool:

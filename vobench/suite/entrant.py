@@ -6,17 +6,17 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from vobench.errors import SuiteError, unknown
+from vobench.errors import SuiteError, unknown_name_sentence
 from vobench.estimator.manifest import USUAL, Limits, Manifest
 from vobench.setting import nearest_whole
 from vobench.suite.lookup import Lookup
 from vobench.suite.manifest import read_manifest
 from vobench.suite.suite_spec import EstimatorSettings, Mode, Suite
-from vobench.suite.yaml_file import Mistakes
+from vobench.suite.yaml_source import Mistakes
 
 
 @dataclass(frozen=True, slots=True)
-class Entrant:
+class EstimatorEntry:
     """An estimator as it takes part in a suite: its folder, manifest, parameters and limits.
 
     In mode `step` it receives the next frame when it has finished the previous one, in `real_time` when the camera
@@ -46,15 +46,15 @@ class EntrantReader:
     mistakes: Mistakes
     lookup: Lookup
 
-    def all(self) -> tuple[Entrant, ...]:
+    def all(self) -> tuple[EstimatorEntry, ...]:
         """Every estimator that the suite lists, in each of its modes."""
-        entrants = list[Entrant]()
+        entrants = list[EstimatorEntry]()
         for index, spec in enumerate(self._specs()):
             with self.mistakes.at("estimators", index):
                 entrants += self._in_each_mode(self._read(spec, index), entrants)
         return tuple(entrants)
 
-    def only(self, names: Sequence[str]) -> tuple[Entrant, ...]:
+    def only(self, names: Sequence[str]) -> tuple[EstimatorEntry, ...]:
         """The suite's estimators of these labels, which may be globs, or other estimators with their defaults.
 
         Raises UnknownNameError and SuiteError, because the mistake is not the suite's.
@@ -63,7 +63,7 @@ class EntrantReader:
         for index, spec in enumerate(self._specs()):
             index_by_label.setdefault(spec.label or spec.name, index)
 
-        entrants = list[Entrant]()
+        entrants = list[EstimatorEntry]()
         for label in self._labels_matching(names):
             index_in_suite = index_by_label.get(label)
             spec = EstimatorSettings(name=label) if index_in_suite is None else self._specs()[index_in_suite]
@@ -81,11 +81,11 @@ class EntrantReader:
             labels += fnmatch.filter(known_labels, name) or [name]
         return labels
 
-    def _in_each_mode(self, entrant: Entrant, earlier: Sequence[Entrant]) -> list[Entrant]:
+    def _in_each_mode(self, entrant: EstimatorEntry, earlier: Sequence[EstimatorEntry]) -> list[EstimatorEntry]:
         """The entrant in each mode of the suite; modes after the first are part of the label."""
         modes = tuple(dict.fromkeys(getattr(self.suite, "modes", ("step",))))
         taken_labels = [other.label for other in earlier]
-        entrants = list[Entrant]()
+        entrants = list[EstimatorEntry]()
         for mode in modes:
             label = entrant.label if mode == modes[0] else f"{entrant.label}.{mode}"
             if label in taken_labels:
@@ -93,7 +93,7 @@ class EntrantReader:
             entrants.append(replace(entrant, label=label, mode=mode))
         return entrants
 
-    def _read(self, spec: EstimatorSettings, index: int | None) -> Entrant:
+    def _read(self, spec: EstimatorSettings, index: int | None) -> EstimatorEntry:
         """The entrant with its manifest. Raises VobenchError if there is no such estimator."""
         folder = self.lookup.find("estimator", spec.name).path
         manifest = read_manifest(folder)
@@ -108,7 +108,7 @@ class EntrantReader:
                 limits = _with_limit(limits, key, value)
 
         params = {**manifest.params, **spec.params}
-        return Entrant(spec.label or manifest.name, folder, manifest, params, limits)
+        return EstimatorEntry(spec.label or manifest.name, folder, manifest, params, limits)
 
 
 def _with_limit(limits: Limits, key: str, value: float) -> Limits:
@@ -128,7 +128,7 @@ def _check_parameter(key: str, value: Any, defaults: Mapping[str, Any]) -> None:
     A whole number may replace a fraction, and the reverse. A default of None allows any type.
     """
     if key not in defaults:
-        raise SuiteError(unknown("parameter", key, list(defaults)))
+        raise SuiteError(unknown_name_sentence("parameter", key, list(defaults)))
     default = defaults[key]
     if default is not None and _parameter_type(default) is not _parameter_type(value):
         raise SuiteError(f"parameter '{key}' should be of the type of its default {default!r}, got {value!r}")

@@ -45,7 +45,7 @@ def kind_in(path: Path) -> Kind | None:
     return kind_of(TOP_LEVEL_KEY.findall(text))
 
 
-def mistaken_for(wanted: Kind, path: Path, keys: Collection[str]) -> str | None:
+def about_other_kind(wanted: Kind, path: Path, keys: Collection[str]) -> str | None:
     """The sentence about a file whose keys are those of another kind; None if it may be of the wanted kind."""
     if MARKS[wanted] & set(keys):
         return None
@@ -55,14 +55,14 @@ def mistaken_for(wanted: Kind, path: Path, keys: Collection[str]) -> str | None:
     return f"this is {NOUNS[actual]}, not {NOUNS[wanted]}; {_advice(actual, path)}"
 
 
-def model_mistaken_for(wanted: Kind, path: Path) -> str | None:
+def about_model(wanted: Kind, path: Path) -> str | None:
     """The sentence about a model's file that was given in place of a YAML file; None if it is not a model."""
     if path.suffix.lower() not in MODEL_SUFFIXES:
         return None
-    return f"this is a model, not {NOUNS[wanted]}; inspect it with `vobench scene {shown(path)}`"
+    return f"this is a model, not {NOUNS[wanted]}; inspect it with `vobench scene {display_path(path)}`"
 
 
-def shown(path: Path) -> str:
+def display_path(path: Path) -> str:
     """A path as a user would type it: relative if it is below the working directory."""
     absolute = path.resolve()
     working_folder = Path.cwd()
@@ -74,10 +74,10 @@ def shown(path: Path) -> str:
 def _advice(kind: Kind, path: Path) -> str:
     match kind:
         case "suite":
-            return f"run it with `vobench run {shown(path)}`"
+            return f"run it with `vobench run {display_path(path)}`"
         case "scene":
-            return f"render it with `vobench render {shown(path)}`"
+            return f"render it with `vobench render {display_path(path)}`"
         case "scenario":
             return f"add it to a suite, as in `scenarios: {{{path.stem}: [1, 3, 5]}}`"
         case "estimator":
-            return f"run it with `vobench run quickstart -e {shown(path.parent)}`"
+            return f"run it with `vobench run quickstart -e {display_path(path.parent)}`"

@@ -45,7 +45,7 @@ MOST_LAMPS = 4  # along one side
 
 
 @dataclass(frozen=True, slots=True)
-class Free:
+class FreeCircle:
     """The largest free circle on the floor: its centre (x, y), the floor's height and the radius, in metres."""
 
     x_m: float
@@ -64,7 +64,7 @@ class _FloorMap:
     floor_m: float
     cell_m: float
 
-    def largest_circle(self) -> Free | None:
+    def largest_circle(self) -> FreeCircle | None:
         """The largest circle around the centre of a cell that contains free cells only."""
         # Cells beyond the map count as occupied.
         padded = np.pad(self.free, 1)
@@ -75,10 +75,10 @@ class _FloorMap:
         radius_m = float((distance_cells[row, column] - 0.5) * self.cell_m)
         if radius_m <= 0:
             return None
-        return Free(float(self.x_m[column]), float(self.y_m[row]), self.floor_m, radius_m)
+        return FreeCircle(float(self.x_m[column]), float(self.y_m[row]), self.floor_m, radius_m)
 
 
-def free_circle(faces: Triangles, caster: RayCaster) -> Free | None:
+def largest_free_circle(faces: Triangles, caster: RayCaster) -> FreeCircle | None:
     """The largest circle on the floor with nothing above it that is lower than a body's height; None if there is none.
 
     The floor is the lowest height with much level area, because roofs and upper storeys may have more of it.
@@ -110,7 +110,7 @@ def _floor_map(faces: Triangles, caster: RayCaster) -> _FloorMap | None:
     # A cell is free if a ray from a body's height meets the floor first, and no wall is near.
     centres_m = np.stack(np.meshgrid(x_m, y_m), -1).reshape(-1, 2)  # (H * W, 2)
     starts_m = _at_height(centres_m, floor_m + BODY_M)
-    hits = caster.hits(starts_m, down(len(starts_m)))
+    hits = caster.hits(starts_m, downward_directions(len(starts_m)))
     meets_floor = np.abs(hits.distance - BODY_M) < FLOOR_STEP_M
     is_free = meets_floor & (faces.plane[hits.face, 2] > 0)
     is_free[is_free] = _away_from_walls(centres_m[is_free], floor_m, cell_m, faces, caster)
@@ -148,7 +148,7 @@ def _away_from_walls(centres_m: Array, floor_m: float, cell_m: float, faces: Tri
     return is_clear
 
 
-def down(count: int) -> Array:
+def downward_directions(count: int) -> Array:
     """Directions (N, 3) straight down."""
     return np.tile([0.0, 0.0, -1.0], (count, 1))
 
@@ -159,7 +159,7 @@ def circular_path(scene: Scene) -> PoseSpline:
     Raises SuiteError if the free circle is too small, or there is no floor.
     """
     faces = triangles(scene, t_ns=0)
-    free = free_circle(faces, RayCaster(faces))
+    free = largest_free_circle(faces, RayCaster(faces))
     if free is None:
         raise _no_path(scene, "it has no level floor; is another axis up?")
     if free.radius_m < LEAST_RADIUS_M:
@@ -176,7 +176,7 @@ def _no_path(scene: Scene, reason: str) -> SuiteError:
     return SuiteError(f"no free path was found in '{scene.name}' ({reason}); add trajectories to the suite")
 
 
-def _pose_on_circle(free: Free, radius_m: float, angle_rad: float) -> Pose:
+def _pose_on_circle(free: FreeCircle, radius_m: float, angle_rad: float) -> Pose:
     """The pose on a circle around the centre of the free circle, along its tangent."""
     x_m = free.x_m + radius_m * float(np.cos(angle_rad))
     y_m = free.y_m + radius_m * float(np.sin(angle_rad))
@@ -204,15 +204,15 @@ def ceiling_above(scene: Scene) -> tuple[float, list[tuple[float, float, float]]
     hit_faces = caster.nearest(np.tile(eye_m, (SKY_RAYS, 1)), _upward_directions())
     sky_share = float((hit_faces < 0).mean())
 
-    overhead = caster.hits(eye_m[None], -down(1))
+    overhead = caster.hits(eye_m[None], -downward_directions(1))
     height_m = float(overhead.distance[0]) if overhead.face[0] >= 0 else BODY_M
     places_m = _grid_places(floor, LAMP_SPACING * (BODY_M + height_m))
     starts_m = _at_height(places_m, eye_m[2]) if len(places_m) > 1 else eye_m[None]
 
     # Where no ceiling is above a place, the one above the circle counts.
-    ceiling = caster.hits(starts_m, -down(len(starts_m)))
+    ceiling = caster.hits(starts_m, -downward_directions(len(starts_m)))
     clearance_m = np.where(ceiling.face < 0, height_m, ceiling.distance)
-    lamps_m = starts_m - (1 - LAMP_BELOW) * clearance_m[:, None] * down(1)
+    lamps_m = starts_m - (1 - LAMP_BELOW) * clearance_m[:, None] * downward_directions(1)
     return sky_share, [(x, y, z) for x, y, z in lamps_m.tolist()]
 
 

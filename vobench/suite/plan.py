@@ -5,13 +5,13 @@ from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from vobench.errors import UnknownNameError, unknown
+from vobench.errors import UnknownNameError, unknown_name_sentence
 from vobench.suite.case import Case
 from vobench.suite.catalog import Entry
-from vobench.suite.entrant import Entrant
+from vobench.suite.entrant import EstimatorEntry
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite_spec import Suite
-from vobench.suite.yaml_file import Mistakes, YamlFile
+from vobench.suite.yaml_source import Mistakes, YamlFile
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class Trial:
     """One run of one entrant on one case; `repeat` counts from 0."""
 
     case: Case | RecordedCase
-    entrant: Entrant
+    entrant: EstimatorEntry
     repeat: int
 
     @property
@@ -38,7 +38,7 @@ class Plan:
     suite: Suite
     simulated: tuple[Case, ...]
     recorded: tuple[RecordedCase, ...]
-    entrants: tuple[Entrant, ...]
+    entrants: tuple[EstimatorEntry, ...]
     found: tuple[Entry, ...]
     source: YamlFile
 
@@ -68,7 +68,7 @@ class Plan:
 
     def limited(self, **limits: Any) -> "Plan":
         """The plan with these values in every entrant's Limits."""
-        entrants = list[Entrant]()
+        entrants = list[EstimatorEntry]()
         for entrant in self.entrants:
             entrants.append(replace(entrant, limits=replace(entrant.limits, **limits)))
         return replace(self, entrants=tuple(entrants))
@@ -92,4 +92,4 @@ def _require_matches(kind: str, patterns: Iterable[str], names: Iterable[str]) -
     known_names = sorted(set(names))
     for pattern in patterns:
         if not fnmatch.filter(known_names, pattern):
-            raise UnknownNameError(unknown(kind, pattern, known_names))
+            raise UnknownNameError(unknown_name_sentence(kind, pattern, known_names))

@@ -5,7 +5,7 @@ import shutil
 from pathlib import Path
 
 from vobench.asset import MODEL_SUFFIXES
-from vobench.errors import InputError, UnknownNameError, unknown
+from vobench.errors import InputError, UnknownNameError, unknown_name_sentence
 from vobench.suite import catalog
 from vobench.suite.catalog import Entry
 
@@ -87,7 +87,7 @@ def _suite_or_example(name: str) -> Entry:
             raise
     suite_names = {entry.name for entry in catalog.entries("suite")}
     known_names = sorted(suite_names | examples.keys())
-    raise UnknownNameError(unknown("suite or example", name, known_names))
+    raise UnknownNameError(unknown_name_sentence("suite or example", name, known_names))
 
 
 def _renamed(original: Path, name: str) -> str:

@@ -8,14 +8,14 @@ from annotated_types import MaxLen, MinLen
 
 from vobench.errors import Mistake, SuiteError
 from vobench.sensor.image_sensor import CameraSettings
-from vobench.setting import Name, over, settings
+from vobench.setting import Name, merged_over, settings
 from vobench.suite import yaml_file
 from vobench.suite.axis import Camera, RigSettings
 from vobench.suite.scene_lighting import Lighting
 from vobench.suite.trajectory import TrajectorySpec
 
 MOST_SEVERE = 5
-AXES = ("lighting", "rig", "trajectory", "camera")
+SETUP_AXES = ("lighting", "rig", "trajectory", "camera")
 NO_CAMERA = CameraSettings()
 
 
@@ -63,7 +63,7 @@ class Scenario:
     def variant(self, severity: int, scene: str) -> dict[str, str]:
         """The name on each axis: the scenario's, with the severity appended if that changes the axis."""
         setup = self.setups[severity]
-        names = {axis: self._name_on(axis, severity, self.name) for axis in AXES}
+        names = {axis: self._name_on(axis, severity, self.name) for axis in SETUP_AXES}
         if setup.scene_changes:
             scene = self._name_on("scene_changes", severity, f"{scene}.{self.name}")
         return {"scene": scene, **names}
@@ -84,7 +84,7 @@ def read_scenario(path: Path) -> Scenario:
     for severity, changes in enumerate(reading.model.severity):
         place = reading.source.place(("severity", severity))
         try:
-            setups.append(yaml_file.checked_section(Setup, over(base, changes), place))
+            setups.append(yaml_file.checked_section(Setup, merged_over(base, changes), place))
         except SuiteError as error:
             mistakes += error.mistakes
     if mistakes:

@@ -8,7 +8,7 @@ from typing import Any
 from vobench.errors import SuiteError
 from vobench.geometry.rig import Level
 from vobench.motion.replay import Replay
-from vobench.suite import scene_file
+from vobench.suite import scene_file, scene_lighting
 from vobench.suite.case import Case
 from vobench.suite.lookup import Lookup
 from vobench.suite.scenario import Scenario, Setup, read_scenario
@@ -16,7 +16,7 @@ from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_case import check_buildable, scene_lights, shared_settings
 from vobench.suite.suite_spec import Suite
 from vobench.suite.trajectory import read_replayed, read_times
-from vobench.suite.yaml_file import Mistakes
+from vobench.suite.yaml_source import Mistakes
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class ScenarioCases:
         scene_entry = self.lookup.find_for(scenario.path, setup.scene)
         scene = self._read_scene(scene_entry.path, setup.scene_changes)
         if setup.lighting:
-            scene_file.lit(scene_lights(scene, setup.lighting), setup.lighting)
+            scene_lighting.with_lighting(scene_lights(scene, setup.lighting), setup.lighting)
 
         replayed = _replayed_poses(setup, scenario.path.parent)
         variant = scenario.variant(severity, scene_entry.name)
@@ -89,7 +89,7 @@ class ScenarioCases:
         """The scene in a file with a scenario's changes. Raises SuiteError."""
         key = f"{path} {changes}"
         if key not in self.scenes:
-            self.scenes[key], scene_mistakes = scene_file.survey(path, changes)
+            self.scenes[key], scene_mistakes = scene_file.read_scene_with_mistakes(path, changes)
             scene_mistakes.require_none()
         return self.scenes[key]
 

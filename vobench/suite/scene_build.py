@@ -25,14 +25,16 @@ from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2
 from vobench.scene.mesh import Thing, areas_m2, corners, moved
 from vobench.scene.scene import Scene
 from vobench.suite.maker_message import MakerScene
-from vobench.suite.scene_file import SKY, SUN, Lighting, content, lit, materials_used
-from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile, SunSpec, hue
+from vobench.suite.scene_check import materials_used
+from vobench.suite.scene_file import scene_content
+from vobench.suite.scene_lighting import SKY, SUN, Lighting, with_lighting
+from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile, SunSpec, unit_luminance_colour
 
 
 def build(spec: SceneFile, lighting: Lighting) -> Scene:
     """The scene under a lighting. Raises SuiteError where the lighting names a light that is not there."""
     made = _made(spec)
-    return replace(made, lights=lit(made.lights, lighting))
+    return replace(made, lights=with_lighting(made.lights, lighting))
 
 
 KEPT_SCENES = 16
@@ -54,7 +56,7 @@ def _kept(last: OrderedDict[str, Made], most: int, key: str, make: Callable[[], 
 
 def _made(spec: SceneFile) -> Scene:
     """The scene in its own light; some take seconds to make."""
-    return _kept(_scenes, KEPT_SCENES, json.dumps(content(spec)), lambda: _make(spec))
+    return _kept(_scenes, KEPT_SCENES, json.dumps(scene_content(spec)), lambda: _make(spec))
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +188,7 @@ def listed_lights(spec: SceneFile) -> Iterator[Light]:
     if spec.sky:
         # A clear sky is brightest around where the sun stands at first, or overhead without a sun.
         toward = _sun(spec.sun).direction(0) if spec.sun else np.array([0.0, 0.0, 1.0])
-        colour = hue(spec.sky.colour)
+        colour = unit_luminance_colour(spec.sky.colour)
         level = spec.sky.level.build()
         yield Sky(SKY, spec.sky.illuminance_lx, spec.sky.kind, toward, level=level, colour=colour)
 
@@ -196,7 +198,15 @@ def _sun(sun: SunSpec) -> Sun:
     if sun.azimuth_deg is not None and sun.elevation_deg is not None:
         path = [(0.0, sun.azimuth_deg, sun.elevation_deg)]
     times_s, azimuth_deg, elevation_deg = zip(*path, strict=True)
-    return Sun(SUN, sun.illuminance_lx, times_s, azimuth_deg, elevation_deg, sun.level.build(), hue(sun.colour))
+    return Sun(
+        SUN,
+        sun.illuminance_lx,
+        times_s,
+        azimuth_deg,
+        elevation_deg,
+        sun.level.build(),
+        unit_luminance_colour(sun.colour),
+    )
 
 
 def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterator[AreaLight]:
@@ -240,6 +250,6 @@ def _walker(name: str, path: scripted.Path, seed: int) -> Contents:
     movers = []
     for nth, limb in enumerate(who.limbs):
         own = tuple(replace(thing, name=name) for thing in made if thing.name == f"{name}.{nth}")
-        gait = scripted.Gait(path, who.cycle_m, limb.joints_m, limb.pitch_rad, who.rise_m)
+        gait = scripted.LimbMotion(path, who.cycle_m, limb.joints_m, limb.pitch_rad, who.rise_m)
         movers.append(scripted.Mover(name, own, gait))
     return Contents(materials=materials, movers=tuple(movers))

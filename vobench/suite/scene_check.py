@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 
 from vobench.asset import FINISHES
-from vobench.errors import SuiteError, unknown
+from vobench.errors import SuiteError, unknown_name_sentence
 from vobench.setting import Triple
 from vobench.suite.scene_lighting import SKY, SUN
-from vobench.suite.scene_spec import Luminous, MoverSpec, RoomSpec, SceneFile, WindowSpec
+from vobench.suite.scene_spec import LuminousSpec, MoverSpec, RoomSpec, SceneFile, WindowSpec
 from vobench.suite.yaml_source import Keys, Mistakes, YamlFile
 
 WALLS = ("north", "east", "south", "west")
@@ -39,9 +39,9 @@ def _check_materials(spec: SceneFile, mistakes: Mistakes) -> None:
     for keys, name in materials_used(spec):
         with mistakes.at(*keys):
             if name not in known:
-                raise SuiteError(unknown("material", name, known))
+                raise SuiteError(unknown_name_sentence("material", name, known))
             material = getattr(spec, "materials", {}).get(name)
-            if keys[0] == "movers" and isinstance(material, Luminous):
+            if keys[0] == "movers" and isinstance(material, LuminousSpec):
                 raise SuiteError(f"'{name}' is luminous, but movers cannot emit light; use another kind of material")
 
 
@@ -69,7 +69,7 @@ def _require_light(spec: SceneFile) -> None:
     """Raise SuiteError if nothing in a scene can emit light. Makers, models and furniture may bring lights."""
     strengths = [lamp.power_lm for lamp in spec.lamps]
     strengths += [source.illuminance_lx for source in (spec.sun, spec.sky) if source]
-    has_luminous_material = any(isinstance(material, Luminous) for material in spec.materials.values())
+    has_luminous_material = any(isinstance(material, LuminousSpec) for material in spec.materials.values())
     may_bring_lights = bool(spec.maker or spec.meshes or spec.furniture)
     if any(strengths) or has_luminous_material or may_bring_lights:
         return

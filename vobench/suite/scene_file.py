@@ -12,32 +12,21 @@ from vobench.asset import MODEL_SUFFIXES
 from vobench.errors import SuiteError
 from vobench.suite import yaml_file
 from vobench.suite.bare_model import bare_model_scene
-from vobench.suite.scene_check import check_scene, materials_used
-from vobench.suite.scene_lighting import SKY, SUN, Lighting, lit, require_possible
+from vobench.suite.scene_check import check_scene
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile
 from vobench.suite.yaml_source import Mistakes, YamlFile
-
-__all__ = [
-    "SKY",
-    "SUN",
-    "Lighting",
-    "content",
-    "lit",
-    "materials_used",
-    "read_scene",
-    "require_possible",
-    "survey",
-]
 
 
 def read_scene(path: Path) -> SceneFile:
     """The scene in a file. Raises SuiteError with all mistakes, each with its place."""
-    spec, mistakes = survey(path)
+    spec, mistakes = read_scene_with_mistakes(path)
     mistakes.require_none()
     return spec
 
 
-def survey(path: Path, changes: Mapping[str, Any] = MappingProxyType({})) -> tuple[SceneFile, Mistakes]:
+def read_scene_with_mistakes(
+    path: Path, changes: Mapping[str, Any] = MappingProxyType({})
+) -> tuple[SceneFile, Mistakes]:
     """The scene in a file, and all mistakes; if there are any, the scene lacks sections and entries.
 
     `changes` are values that replace the file's; their keys are joined by dots.
@@ -77,7 +66,7 @@ def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> S
     return replace(spec, meshes=tuple(meshes), movers=tuple(movers), maker=maker)
 
 
-def content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
+def scene_content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
     """The scene as JSON can hold it. Files are identified by name and content, not by path."""
     scene: dict[str, Any] = yaml_file.plain(spec, exclude=exclude)
     for part in (*scene.get("meshes", ()), *scene.get("movers", ())):

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any
 
-from vobench.errors import SuiteError, unknown
+from vobench.errors import SuiteError, unknown_name_sentence
 from vobench.scene.light import Light, Sky, Sun, scaled
 from vobench.suite.scene_spec import LightOverride
 from vobench.suite.yaml_source import YamlFile
@@ -18,12 +18,12 @@ SKY = "sky"
 GENERATED_NAMES = ("box_", "board_", "window_", "wall_", "floor", "ceiling")
 
 
-def lit(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, ...]:
+def with_lighting(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, ...]:
     """The lights under a lighting. Raises SuiteError for an unknown light, or a value that a light cannot have."""
     names = list(dict.fromkeys(light.name for light in lights))
     for name in lighting:
         if name not in names:
-            raise SuiteError(f"lighting: {unknown('light', name, names)}")
+            raise SuiteError(f"lighting: {unknown_name_sentence('light', name, names)}")
     overridden = list[Light]()
     for light in lights:
         override = lighting.get(light.name)
@@ -58,7 +58,7 @@ def require_possible(name: str, scene: YamlFile) -> None:
     known_names = [*written_names, *daylight_names]
     thing_name = name.partition(".")[0]
     if thing_name not in known_names and not name.startswith(GENERATED_NAMES):
-        raise SuiteError(f"lighting: {unknown('light', name, known_names)}")
+        raise SuiteError(f"lighting: {unknown_name_sentence('light', name, known_names)}")
 
 
 def _written_names(tree: Any) -> Iterator[str]:

@@ -25,7 +25,7 @@ from vobench.scene.light import (
 )
 from vobench.scene.material import LUMINANCE, WHITE, Material, Rgb
 from vobench.scene.scene import ceiling_light
-from vobench.setting import ByKind, Check, Name, NonNegative, OneOf, Positive, Share, Triple, settings
+from vobench.setting import ByKind, Name, NonNegative, OneOf, Positive, Share, Triple, ValueCheck, settings
 
 
 @settings()
@@ -68,7 +68,7 @@ class LightOverride:
 Colour = tuple[Share, Share, Share]  # linear red, green and blue
 
 
-def hue(colour: Colour) -> Rgb:
+def unit_luminance_colour(colour: Colour) -> Rgb:
     """The colour scaled to luminance 1. Raises SettingError for black, which light cannot have."""
     luminance = float(np.array(colour) @ np.array(LUMINANCE))
     if not luminance:
@@ -77,7 +77,7 @@ def hue(colour: Colour) -> Rgb:
     return red, green, blue
 
 
-Hue = Annotated[Colour, Check(hue)]  # of a light; it does not change the power
+Hue = Annotated[Colour, ValueCheck(unit_luminance_colour)]  # of a light; it does not change the power
 
 
 # The light map of anything larger would not fit into memory.
@@ -87,7 +87,7 @@ Elevation = Annotated[float, Gt(0), Le(90)]
 
 
 @settings()
-class Luminous:
+class LuminousSpec:
     """A light-emitting material: its front emits diffusely, in the hue of a linear RGB `colour`."""
 
     kind: Literal["luminous"] = "luminous"
@@ -96,7 +96,7 @@ class Luminous:
 
     def build(self) -> Material:
         """The material."""
-        red, green, blue = (self.luminance_cd_m2 * channel for channel in hue(self.colour))
+        red, green, blue = (self.luminance_cd_m2 * channel for channel in unit_luminance_colour(self.colour))
         return Material(emission_cd_m2=(red, green, blue))
 
 
@@ -105,7 +105,7 @@ Roughness = Annotated[float, Ge(0), Le(0.5)]
 
 
 @settings(kw_only=False)
-class Matt(Procedural):
+class DiffuseSpec(Procedural):
     """A diffuse (Lambertian) material: its reflectance is its texture's times its linear RGB `colour`."""
 
     colour: Colour = WHITE
@@ -117,7 +117,7 @@ class Matt(Procedural):
 
 
 @settings(kw_only=False)
-class Polished(Procedural):
+class PolishedSpec(Procedural):
     """A diffuse material under a clear coat, such as waxed stone, which reflects more at grazing angles.
 
     `tint` scales the coat's reflection; `roughness` is the RMS slope of its facets (GGX alpha), 0 for a smooth coat.
@@ -135,7 +135,7 @@ class Polished(Procedural):
 
 
 @settings(kw_only=False)
-class Mirror:
+class MirrorSpec:
     """A metal that reflects the share `tint` of the light at every angle; `roughness` as in Polished."""
 
     tint: Share = 0.9
@@ -148,7 +148,7 @@ class Mirror:
 
 
 @settings(kw_only=False)
-class Glass:
+class GlassSpec:
     """A thin pane that reflects a little and transmits the rest without refraction; `tint` scales the transmission."""
 
     eta: Eta = 1.5
@@ -161,7 +161,9 @@ class Glass:
 
 
 Wall = Literal["north", "east", "south", "west"]
-MaterialSpec = Annotated[Matt | Polished | Mirror | Glass | Luminous, ByKind("material", default="matt")]
+MaterialSpec = Annotated[
+    DiffuseSpec | PolishedSpec | MirrorSpec | GlassSpec | LuminousSpec, ByKind("material", default="matt")
+]
 
 
 @settings()
@@ -267,7 +269,7 @@ class PanelLamp:
     def build(self) -> AreaLight:
         """The light."""
         panel = ceiling_light(self.name, np.asarray(self.center_m), self.size_m, power_lm=self.power_lm)
-        return replace(panel, level=self.level.build(), colour=hue(self.colour))
+        return replace(panel, level=self.level.build(), colour=unit_luminance_colour(self.colour))
 
 
 @settings()
@@ -283,7 +285,9 @@ class PointLamp:
 
     def build(self) -> PointLight:
         """The light."""
-        return PointLight(self.name, np.asarray(self.center_m), self.power_lm, self.level.build(), hue(self.colour))
+        return PointLight(
+            self.name, np.asarray(self.center_m), self.power_lm, self.level.build(), unit_luminance_colour(self.colour)
+        )
 
 
 @settings()
@@ -313,7 +317,14 @@ class SpotLamp:
         towards_target = np.asarray(self.target_m) - center
         direction: Array = towards_target / np.linalg.norm(towards_target)
         return SpotLight(
-            self.name, center, direction, self.power_lm, self.inner_deg, self.outer_deg, level, hue(self.colour)
+            self.name,
+            center,
+            direction,
+            self.power_lm,
+            self.inner_deg,
+            self.outer_deg,
+            level,
+            unit_luminance_colour(self.colour),
         )
 
 

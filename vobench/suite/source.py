@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 from vobench.errors import SuiteError
-from vobench.setting import Name, OneOf, Positive, Short, settings
+from vobench.setting import Name, OneOf, Positive, ShortForm, settings
 
 FILE_KEYS = ("calibration", "imu", "truth")
 TOPICS = ("left", "right", "left_info", "right_info", "truth", "imu")
@@ -59,7 +59,7 @@ def as_sources(value: Any) -> Any:
     return tuple({"path": entry} if isinstance(entry, str) else entry for entry in entries)
 
 
-SOURCES = Short(as_sources, {"anyOf": [{"type": "string"}, {"type": "object"}]})
+SOURCES = ShortForm(as_sources, {"anyOf": [{"type": "string"}, {"type": "object"}]})
 
 
 def recorded_cases(spec: Source, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:

@@ -9,30 +9,14 @@ from typing import Any
 from vobench.errors import SuiteError
 from vobench.setting import hints
 from vobench.suite import catalog, yaml_file
-from vobench.suite.case import AXES, Case
-from vobench.suite.entrant import Entrant, EntrantReader
+from vobench.suite.entrant import EntrantReader
 from vobench.suite.lookup import Lookup
-from vobench.suite.plan import Plan, Trial
+from vobench.suite.plan import Plan
 from vobench.suite.scenario_case import ScenarioCases
 from vobench.suite.source import RecordedCase, recorded_cases
 from vobench.suite.suite_case import AxisReader
-from vobench.suite.suite_spec import EXACT, Rendering, Suite, TruthNoise, Window, missing_axis
-from vobench.suite.yaml_file import Mistakes
-
-# What a suite consists of can be imported from here, too.
-__all__ = [
-    "AXES",
-    "EXACT",
-    "Case",
-    "Entrant",
-    "Plan",
-    "Rendering",
-    "Suite",
-    "Trial",
-    "TruthNoise",
-    "Window",
-    "read_plan",
-]
+from vobench.suite.suite_spec import Suite, missing_axis
+from vobench.suite.yaml_source import Mistakes
 
 
 def read_plan(

@@ -10,14 +10,14 @@ from vobench.errors import SuiteError
 from vobench.geometry.rig import true_rig
 from vobench.motion.replay import Replay
 from vobench.scene.light import Light
-from vobench.suite import scene_file
+from vobench.suite import scene_file, scene_lighting
 from vobench.suite.axis import RigSettings
 from vobench.suite.case import AXES, Case
 from vobench.suite.lookup import Lookup
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_spec import Suite
 from vobench.suite.trajectory import read_replayed, read_times
-from vobench.suite.yaml_file import Mistakes
+from vobench.suite.yaml_source import Mistakes
 
 USUAL_RIG = "ahead"  # name of the rig of suites that have none
 USUAL_PITCH_DEG = 10
@@ -56,7 +56,7 @@ class AxisReader:
                     raise SuiteError(
                         f"two scenes are called '{entry.name}'; list each once, from files with different names"
                     )
-                scenes[entry.name], scene_mistakes = scene_file.survey(entry.path)
+                scenes[entry.name], scene_mistakes = scene_file.read_scene_with_mistakes(entry.path)
                 self._check_lightings(scenes[entry.name], scene_mistakes)
                 scene_mistakes.require_none()
         return scenes
@@ -74,9 +74,9 @@ class AxisReader:
             for name, override in overrides.items():
                 with self.mistakes.at("lightings", lighting, name):
                     if is_scene_complete:
-                        scene_file.lit(lights, {name: override})
+                        scene_lighting.with_lighting(lights, {name: override})
                     else:
-                        scene_file.require_possible(name, scene_mistakes.source)
+                        scene_lighting.require_possible(name, scene_mistakes.source)
 
     def replayed_poses(self) -> dict[str, str]:
         """The poses of each replayed trajectory as TUM text, by the trajectory's name."""

@@ -11,7 +11,7 @@ from vobench.estimator.manifest import Limits
 from vobench.geometry.rig import Level
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.sensor.pixel_truth import CHANNELS
-from vobench.setting import Name, OneOf, Short, hints, settings
+from vobench.setting import Name, OneOf, ShortForm, hints, settings
 from vobench.suite.axis import Camera, RigSettings
 from vobench.suite.scenario import MOST_SEVERE
 from vobench.suite.scene_lighting import Lighting
@@ -75,7 +75,7 @@ def _as_tuple(value: Any) -> Any:
 
 
 Severity = Annotated[int, Ge(0), Le(MOST_SEVERE)]
-Severities = Annotated[tuple[Severity, ...], MinLen(1), Short(_as_tuple, {"type": "integer"})]
+Severities = Annotated[tuple[Severity, ...], MinLen(1), ShortForm(_as_tuple, {"type": "integer"})]
 
 
 def _at_all_severities(value: Any) -> Any:
@@ -91,7 +91,7 @@ def _at_all_severities(value: Any) -> Any:
 Calibrations = Annotated[
     dict[Level, Severities],
     MinLen(1),
-    Short(_at_all_severities, {"type": "array", "items": {"enum": get_args(Level)}, "minItems": 1}),
+    ShortForm(_at_all_severities, {"type": "array", "items": {"enum": get_args(Level)}, "minItems": 1}),
 ]
 
 
@@ -100,7 +100,7 @@ def _as_named(value: Any) -> Any:
 
 
 ChannelName = Annotated[str, OneOf("ground-truth channel", CHANNELS)]
-NamedEstimator = Annotated[EstimatorSettings, Short(_as_named, {"type": "string"})]
+NamedEstimator = Annotated[EstimatorSettings, ShortForm(_as_named, {"type": "string"})]
 Window = tuple[Annotated[int, Ge(0)], Annotated[int, Ge(2)]]
 Mode = Literal["step", "real_time"]
 

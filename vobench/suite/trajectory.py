@@ -17,7 +17,7 @@ from vobench.motion.replay import Replay
 from vobench.motion.spline import PoseSpline
 from vobench.motion.wheeled import MOVER_KEYS, Wheeled
 from vobench.setting import ByKind, hints
-from vobench.trajectory.formats import NS_PER_S, Parsed, format_tum, parse_any, parse_times
+from vobench.trajectory.formats import NS_PER_S, ParsedTrajectory, format_tum, parse_any, parse_times
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 Spatial = PoseSpline | Handheld | Rail | Quadrotor
@@ -93,7 +93,7 @@ def read_replayed(spec: Replay, folder: Path, times: Stamps | None) -> str:
     return format_tum(Trajectory(t_ns, se3.transform(rotations, T[:, :3, 3])))
 
 
-def _stamps(spec: Replay, times: Stamps | None, parsed: Parsed) -> Stamps:
+def _stamps(spec: Replay, times: Stamps | None, parsed: ParsedTrajectory) -> Stamps:
     """The stamps of poses without any: from a file, or from a constant rate. Raises VobenchError."""
     if times is not None:
         t_ns = parsed.stamped_by(times)

@@ -14,27 +14,13 @@ from typing import Any, Generic, TypeVar
 from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml.comments import CommentedMap
 
-from vobench.errors import Mistake, Place, SuiteError, VobenchError
+from vobench.errors import FilePlace, Mistake, SuiteError, VobenchError
 from vobench.setting import COMPLAINTS, hints, unit_of
 from vobench.suite import catalog, file_kind
 from vobench.suite.file_kind import Kind
 from vobench.suite.yaml_complaint import complaints, location
 from vobench.suite.yaml_parser import parse_file, parse_text
-from vobench.suite.yaml_source import Keys, Mistakes, YamlFile, line_of, plain_tree, without_nothing
-
-__all__ = [
-    "Keys",
-    "Mistakes",
-    "Reading",
-    "YamlFile",
-    "checked",
-    "checked_section",
-    "json_schema",
-    "plain",
-    "read",
-    "read_all",
-    "without_nothing",
-]
+from vobench.suite.yaml_source import Keys, YamlFile, line_of, plain_tree
 
 Model = TypeVar("Model")
 INCLUDE = "include"  # the key that names another file of the same kind
@@ -42,7 +28,7 @@ SET_OPTION = "--set"  # the option of `vobench run` that changes values of a fil
 
 
 @dataclass(frozen=True, slots=True)
-class Reading(Generic[Model]):
+class FileReading(Generic[Model]):
     """A file as `model`, or the mistakes in it.
 
     If there are mistakes, `model` holds only the entries without any, unchecked as a whole, and lacks sections that
@@ -67,7 +53,7 @@ def read_all(
     model: type[Model],
     changes: Mapping[str, str] = MappingProxyType({}),
     kind: Kind | None = None,
-) -> Reading[Model]:
+) -> FileReading[Model]:
     """The file as far as it can be read, and all mistakes in it. Raises SuiteError if it is not such a file at all.
 
     `changes` are values in YAML that replace the file's; their keys are joined by dots. A file that is obviously not
@@ -75,11 +61,11 @@ def read_all(
     without a kind, suites.
     """
     if kind:
-        _refuse(path, file_kind.model_mistaken_for(kind, path))
+        _refuse(path, file_kind.about_model(kind, path))
     has_include = INCLUDE in hints(model)
     source, duplicates = _read_with_included(path, kind or "suite", ()) if has_include else _read_mapping(path)
     if kind:
-        _refuse(path, file_kind.mistaken_for(kind, path, [*source.plain]))
+        _refuse(path, file_kind.about_other_kind(kind, path, [*source.plain]))
     if changes:
         source = _changed(source, changes)
     return _checked_reading(model, source, duplicates)
@@ -87,7 +73,7 @@ def read_all(
 
 def _refuse(path: Path, sentence: str | None) -> None:
     if sentence:
-        raise SuiteError(Mistake(sentence, (Place(file_kind.shown(path)),)))
+        raise SuiteError(Mistake(sentence, (FilePlace(file_kind.display_path(path)),)))
 
 
 def _read_mapping(path: Path) -> tuple[YamlFile, list[Mistake]]:
@@ -159,7 +145,7 @@ def _subsection(tree: Any, key: int | str) -> Any:
     return None
 
 
-def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistake]) -> Reading[Model]:
+def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistake]) -> FileReading[Model]:
     """The content of a file as `model`, or as much of it as is right."""
     unread = dict[Keys, str]()
     for file in source.files:
@@ -172,14 +158,14 @@ def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistak
     try:
         whole = checked(model, data)
         if not all_mistakes:
-            return Reading(whole, source)
+            return FileReading(whole, source)
     except ValidationError as error:
         wrong_places += [location(each) for each in error.errors()]
         all_mistakes += complaints(source, error, json_schema(model), unread)
 
     sections, kept = _intact_sections(model, data, wrong_places)
     partial = _partial_model(model, sections)
-    return Reading(partial, replace(source, kept=kept), tuple(sorted(all_mistakes, key=line_of)))
+    return FileReading(partial, replace(source, kept=kept), tuple(sorted(all_mistakes, key=line_of)))
 
 
 def _not_in_json(tree: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
@@ -242,7 +228,7 @@ def checked(kind: type[Model], data: Any) -> Model:
     return settings
 
 
-def checked_section(kind: type[Model], data: Any, at: Place) -> Model:
+def checked_section(kind: type[Model], data: Any, at: FilePlace) -> Model:
     """Data that was derived from the file at a place, as settings. Raises SuiteError with all mistakes."""
     try:
         return checked(kind, data)

@@ -10,7 +10,7 @@ from ruamel.yaml.constructor import ConstructorError, RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
-from vobench.errors import Mistake, Place, SuiteError
+from vobench.errors import FilePlace, Mistake, SuiteError
 
 # Limits far beyond what a person writes; a file beyond one of them is reported in one line.
 MOST_BYTES = 2 << 20
@@ -36,7 +36,7 @@ def parse_file(path: Path) -> ParsedYaml:
     try:
         return parse_text(path, _read_text(path))
     except RecursionError:
-        raise SuiteError(Mistake(TOO_DEEP, (Place(str(path)),))) from None
+        raise SuiteError(Mistake(TOO_DEEP, (FilePlace(str(path)),))) from None
 
 
 def _read_text(path: Path) -> str:
@@ -47,11 +47,11 @@ def _read_text(path: Path) -> str:
     except OSError as error:
         raise SuiteError(f"cannot read {path}: {error.strerror}") from None
     if len(content) > MOST_BYTES:
-        raise SuiteError(Mistake(f"should be text of at most {MOST_BYTES >> 20} MiB", (Place(str(path)),)))
+        raise SuiteError(Mistake(f"should be text of at most {MOST_BYTES >> 20} MiB", (FilePlace(str(path)),)))
     try:
         text = content.decode("utf-8")
     except UnicodeDecodeError:
-        raise SuiteError(Mistake("not a text file in UTF-8", (Place(str(path)),))) from None
+        raise SuiteError(Mistake("not a text file in UTF-8", (FilePlace(str(path)),))) from None
     return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
@@ -70,9 +70,9 @@ def parse_text(path: Path, text: str) -> ParsedYaml:
         problem = " ".join(str(error.problem).split())
         raise SuiteError(_mistake_at(path, error.problem_mark, problem)) from None
     except YAMLError as error:
-        raise SuiteError(Mistake(" ".join(str(error).split()), (Place(str(path)),))) from None
+        raise SuiteError(Mistake(" ".join(str(error).split()), (FilePlace(str(path)),))) from None
     except RecursionError:
-        raise SuiteError(Mistake(TOO_DEEP, (Place(str(path)),))) from None
+        raise SuiteError(Mistake(TOO_DEEP, (FilePlace(str(path)),))) from None
     except Exception as error:  # the library meets content that its authors did not expect
         problem = " ".join(str(error).split())
         sentence = f"not readable as YAML ({type(error).__name__}: {problem})"
@@ -83,7 +83,7 @@ def parse_text(path: Path, text: str) -> ParsedYaml:
 
 def _mistake_at(path: Path, mark: Any, sentence: str) -> Mistake:
     """A mistake at a mark of the parser, which may be None."""
-    place = Place(str(path), mark.line + 1, mark.column + 1) if mark else Place(str(path))
+    place = FilePlace(str(path), mark.line + 1, mark.column + 1) if mark else FilePlace(str(path))
     return Mistake(sentence, (place,))
 
 

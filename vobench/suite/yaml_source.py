@@ -6,8 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from vobench.errors import Mistake, Place, SuiteError, VobenchError
-from vobench.setting import over
+from vobench.errors import FilePlace, Mistake, SuiteError, VobenchError
+from vobench.setting import merged_over
 
 Keys = tuple[int | str, ...]
 
@@ -17,7 +17,7 @@ class _FoundPlace:
     """A place in a file, and how many of the requested keys lead to it."""
 
     depth: int
-    place: Place
+    place: FilePlace
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ class YamlFile:
         own = plain_tree(self.marked)
         if self.included is None:
             return own
-        return without_nothing(over(self.included.plain, own))
+        return without_nothing(merged_over(self.included.plain, own))
 
     @property
     def files(self) -> "tuple[YamlFile, ...]":
@@ -65,7 +65,7 @@ class YamlFile:
                 mistakes.append(mistake)
         return tuple(mistakes)
 
-    def place(self, keys: Keys) -> Place:
+    def place(self, keys: Keys) -> FilePlace:
         """The place of the last of these keys that the file, or one that it includes, has."""
         found_places = [file._find_place(keys) for file in self.files]
         return max(found_places, key=lambda found: found.depth).place
@@ -87,7 +87,7 @@ class YamlFile:
             else:
                 tree = None
         value = tree if isinstance(tree, str | bool | int | float) else None
-        return _FoundPlace(depth, Place(str(self.path), line, key=".".join(map(str, written_keys)), value=value))
+        return _FoundPlace(depth, FilePlace(str(self.path), line, key=".".join(map(str, written_keys)), value=value))
 
     def written(self, keys: Keys) -> Keys:
         """The keys with an entry's number as it is in the file."""

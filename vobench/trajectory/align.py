@@ -12,7 +12,7 @@ from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
-Kind = Literal["none", "origin", "se3", "sim3", "scale", "yaw"]
+AlignmentKind = Literal["none", "origin", "se3", "sim3", "scale", "yaw"]
 
 # A deviation from a line, or a motion relative to the other path, below this share of the extent is
 # rounding. Treating the path as a line moves no point by more than this share.
@@ -66,7 +66,7 @@ class Alignment:
     `unobservable` names what the positions do not determine: "rotation", "roll about the path", "scale".
     """
 
-    kind: Kind
+    kind: AlignmentKind
     rotation: Array
     translation: Array
     scale: float
@@ -105,7 +105,7 @@ def align(
     T_est: Array,
     T_gt: Array,
     *,
-    kind: Kind,
+    kind: AlignmentKind,
     first_n: int | None = None,
 ) -> Alignment:
     """Alignment of matched poses (K, 4, 4), fitted to the first `first_n` of them, or to all.
@@ -165,7 +165,7 @@ def align_positions(
     return Alignment(kind, rotation, translation, scale, _unobservable(shape, kind))
 
 
-def _unobservable(shape: _Shape, kind: Kind) -> tuple[str, ...]:
+def _unobservable(shape: _Shape, kind: AlignmentKind) -> tuple[str, ...]:
     """The parts of an alignment that paths of a shape do not determine."""
     if shape is _Shape.FULL:
         return ()
@@ -209,7 +209,7 @@ def align_yaw(
     return Alignment("yaw", rotation, translation, 1.0, unobservable)
 
 
-def turn(from_direction: ArrayLike, to_direction: ArrayLike) -> Array:
+def rotation_between(from_direction: ArrayLike, to_direction: ArrayLike) -> Array:
     """The smallest rotation (3, 3) from one direction (3,) to another, by Rodrigues' formula.
 
     Between opposite directions it turns about the perpendicular axis that is nearest to a coordinate axis.
@@ -235,7 +235,7 @@ def _rotation(covariance: Array, shape: _Shape, toward: Array) -> Array:
     if shape is _Shape.LINE:
         est_direction = toward @ Vt[0]
         gt_direction = U[:, 0]
-        return turn(est_direction, gt_direction) @ toward
+        return rotation_between(est_direction, gt_direction) @ toward
     handedness = np.sign(np.linalg.det(U) * np.linalg.det(Vt))
     rotation: Array = (U * np.array([1.0, 1.0, handedness])) @ Vt
     return rotation

@@ -15,12 +15,12 @@ from vobench.geometry.se3 import Array
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 Rows = NDArray[np.intp]
-Unit = Literal["s", "ms", "us", "ns"]
-Order = Literal["xyzw", "wxyz"]  # of a quaternion's four numbers
+StampUnit = Literal["s", "ms", "us", "ns"]
+QuaternionOrder = Literal["xyzw", "wxyz"]  # of a quaternion's four numbers
 
 NORM_TOLERANCE = 1e-3  # 4 printed digits change a norm by 1e-4; other units or another order by far more
-DIGITS: dict[Unit, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}  # decimals down to the nanosecond
-WORDS: dict[Unit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
+DIGITS: dict[StampUnit, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}  # decimals down to the nanosecond
+WORDS: dict[StampUnit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 MAX_NS = 2**63 - 1
 NS_PER_S = 10**9
 SCALAR_LAST = [1, 2, 3, 0]  # the places of x, y, z, w among w, x, y, z
@@ -33,7 +33,7 @@ EXACT = Context(prec=64, rounding=ROUND_HALF_EVEN)  # digits of seconds; int64 n
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class TrajectoryTable:
     """The numbers of a text, (N, columns), with the line number and the text of the first field of each row."""
 
     name: str
@@ -64,7 +64,7 @@ def read_table(
     columns: Sequence[str],
     separator: str | None = None,
     row: str = "a pose",
-) -> Table:
+) -> TrajectoryTable:
     """The numbers of `content`, one per column and line; with a `separator` more columns may follow.
 
     `row` is what a line stands for, for the error message.
@@ -76,17 +76,17 @@ def read_table(
     values = _read_fast(bodies, len(columns), separator)
     if values is None:
         values = _read_checked(rows, name, columns, separator, row)
-    return Table(name, numbers, first, values)
+    return TrajectoryTable(name, numbers, first, values)
 
 
-def stamps_ns(table: Table, unit: Unit) -> Stamps:
+def stamps_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
     """The first column, exact to the nanosecond. Raises TrajectoryError unless it increases within int64."""
     t_ns = _all_ns(table, unit)
     _require_rising(table, t_ns, "stamps must increase by 1 ns or more", least=1)
     return t_ns
 
 
-def first_of_equal(table: Table, numbers: Stamps, what: str) -> tuple[Stamps, Rows, tuple[str, ...]]:
+def first_of_equal(table: TrajectoryTable, numbers: Stamps, what: str) -> tuple[Stamps, Rows, tuple[str, ...]]:
     """The rows' numbers (N,), such as stamps, without repetitions; their rows (K,); and a note of those left out.
 
     Raises TrajectoryError for decreasing numbers.
@@ -104,7 +104,7 @@ def first_of_equal(table: Table, numbers: Stamps, what: str) -> tuple[Stamps, Ro
     return numbers[rows], rows, (note,)
 
 
-def rotations(table: Table, q: Array, order: Order) -> Array:
+def rotations(table: TrajectoryTable, q: Array, order: QuaternionOrder) -> Array:
     """Rotations (N, 3, 3) of the rows' quaternions (N, 4). Raises TrajectoryError for a norm other than 1."""
     with np.errstate(over="ignore"):
         norm = np.linalg.norm(q, axis=1)
@@ -122,14 +122,14 @@ def rotations(table: Table, q: Array, order: Order) -> Array:
     return se3.from_quaternion(q)
 
 
-def _all_ns(table: Table, unit: Unit) -> Stamps:
+def _all_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
     """The first column in ns."""
     stamps = [_ns(text, unit, table, row) for row, text in enumerate(table.first)]
     return np.array(stamps, np.int64)
 
 
 def _require_rising(
-    table: Table,
+    table: TrajectoryTable,
     numbers: Stamps,
     demand: str,
     *,
@@ -193,8 +193,8 @@ def _number(field: str, column: str, place: str) -> float:
 
 def _ns(
     text: str,
-    unit: Unit,
-    table: Table,
+    unit: StampUnit,
+    table: TrajectoryTable,
     row: int,
 ) -> int:
     """The stamp of a row in ns, rounded to even. Raises TrajectoryError beyond int64."""
@@ -265,7 +265,7 @@ IN_SECONDS = re.compile(r"\[\s*s(?:ec(?:onds?)?)?\s*\]")
 WORD = re.compile(r"[a-df-z]", re.IGNORECASE)  # an e may be an exponent's
 
 
-def csv_layout(text: str) -> tuple[list[tuple[int, str]], Unit, Order]:
+def csv_layout(text: str) -> tuple[list[tuple[int, str]], StampUnit, QuaternionOrder]:
     """The rows below a csv's header, the unit of its stamps and the order of its quaternions.
 
     They follow a header that names w last, or seconds; stamps with a decimal point are seconds.
@@ -281,7 +281,7 @@ def csv_layout(text: str) -> tuple[list[tuple[int, str]], Unit, Order]:
 
     quaternion_names = [cell.partition("[")[0].strip() for cell in header[4:8]]
     last_letters = [name[-1:] for name in quaternion_names]
-    order: Order = "xyzw" if last_letters == ["x", "y", "z", "w"] else "wxyz"
+    order: QuaternionOrder = "xyzw" if last_letters == ["x", "y", "z", "w"] else "wxyz"
     return rows, _unit(header[0], rows), order
 
 
@@ -307,7 +307,7 @@ def csv_rows(t_ns: Stamps, values: Array) -> str:
     return "".join(lines)
 
 
-def _unit(header: str, rows: list[tuple[int, str]]) -> Unit:
+def _unit(header: str, rows: list[tuple[int, str]]) -> StampUnit:
     """The unit of the stamps below a header."""
     if "[ns]" in header.replace(" ", ""):
         return "ns"
@@ -346,7 +346,7 @@ def parse_times(text: str, *, name: str) -> Stamps:
     return stamps_ns(table, "s")
 
 
-def _require_rotations(table: Table, R: Array) -> None:
+def _require_rotations(table: TrajectoryTable, R: Array) -> None:
     """Raise TrajectoryError for the first matrix (N, 3, 3) that is no rotation."""
     with np.errstate(over="ignore", invalid="ignore"):
         residual = se3.transposed(R) @ R - np.eye(3)
@@ -379,7 +379,7 @@ FORMS = (
 
 
 @dataclass(frozen=True, slots=True)
-class Parsed:
+class ParsedTrajectory:
     """Poses (N, 4, 4) and how they were read; stamps, unit and order are None for a format without them.
 
     `form_unit` is the unit of the format; `frames` (N,) are the frame numbers of poses in a file without stamps;
@@ -388,9 +388,9 @@ class Parsed:
 
     t_ns: Stamps | None
     T: Array
-    unit: Unit | None = None
-    form_unit: Unit | None = None
-    order: Order | None = None
+    unit: StampUnit | None = None
+    form_unit: StampUnit | None = None
+    order: QuaternionOrder | None = None
     frames: Stamps | None = None
     notes: tuple[str, ...] = ()
 
@@ -404,7 +404,7 @@ class Parsed:
 
 
 @dataclass(frozen=True, slots=True)
-class Reading:
+class TrajectoryReading:
     """A trajectory and how it was read: the unit of its stamps and the order of its quaternions, if they have one.
 
     `form_unit` is the unit of the format; `says_truth`, whether the file is named as ground truth;
@@ -412,9 +412,9 @@ class Reading:
     """
 
     trajectory: Trajectory
-    unit: Unit | None = "s"
-    form_unit: Unit | None = "s"
-    order: Order | None = "xyzw"
+    unit: StampUnit | None = "s"
+    form_unit: StampUnit | None = "s"
+    order: QuaternionOrder | None = "xyzw"
     says_truth: bool = False
     is_unit_told: bool = False
 
@@ -423,9 +423,9 @@ def parse_any(
     written: str,
     *,
     name: str,
-    unit: Unit | None = None,
-    order: Order | None = None,
-) -> Parsed:
+    unit: StampUnit | None = None,
+    order: QuaternionOrder | None = None,
+) -> ParsedTrajectory:
     """The poses in TUM, KITTI, TartanAir or EuRoC text.
 
     `unit` and `order` override those of the format for stamps and quaternions. Of rows that repeat a stamp the first
@@ -443,13 +443,13 @@ def parse_any(
     if columns is TARTANAIR_COLUMNS:
         R = rotations(table, table.values[:, 3:], order)
         T = se3.transform(R, table.values[:, :3])
-        return Parsed(None, T, order=order)
+        return ParsedTrajectory(None, T, order=order)
     if columns is COLUMNS:
         return _stamped(table, unit or "s", "s", order)
     return _matrices(table)
 
 
-def _matrices(table: Table) -> Parsed:
+def _matrices(table: TrajectoryTable) -> ParsedTrajectory:
     """KITTI's poses, the first three rows of each matrix, kept as given; the frame's number may come first."""
     frames = None
     rows = np.arange(len(table.values))
@@ -461,10 +461,10 @@ def _matrices(table: Table) -> Parsed:
     positions_m = matrices[:, :, 3]
     _require_rotations(table, R)
     T = se3.transform(R[rows], positions_m[rows])
-    return Parsed(None, T, frames=frames, notes=notes)
+    return ParsedTrajectory(None, T, frames=frames, notes=notes)
 
 
-def _frame_numbers(table: Table) -> Stamps:
+def _frame_numbers(table: TrajectoryTable) -> Stamps:
     """The first column (N,) as numbers of frames. Raises TrajectoryError for other numbers."""
     numbers = table.values[:, 0]
     is_whole = numbers == np.floor(numbers)
@@ -479,16 +479,16 @@ def _frame_numbers(table: Table) -> Stamps:
 
 
 def _stamped(
-    table: Table,
-    unit: Unit,
-    form_unit: Unit,
-    order: Order,
-) -> Parsed:
+    table: TrajectoryTable,
+    unit: StampUnit,
+    form_unit: StampUnit,
+    order: QuaternionOrder,
+) -> ParsedTrajectory:
     """The poses of rows with a stamp, a position and a quaternion."""
     t_ns, rows, notes = first_of_equal(table, _all_ns(table, unit), "stamp")
     R = rotations(table, table.values[:, 4:8], order)
     T = se3.transform(R, table.values[:, 1:4])
-    return Parsed(t_ns, T[rows], unit, form_unit, order, notes=notes)
+    return ParsedTrajectory(t_ns, T[rows], unit, form_unit, order, notes=notes)
 
 
 def _first_row(written: str, name: str) -> str:

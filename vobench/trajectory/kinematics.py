@@ -20,28 +20,28 @@ class Kinematics:
     """The motion of a body at K instants: of its origin relative to the world, in body axes.
 
     T_world_body (K, 4, 4); velocity_mps (K, 3) and acceleration_mps2 (K, 3): the first and second derivative
-    of its position in the world, turned into body axes (so without gravity); turn_radps (K, 3): angular
-    velocity, with R' = R [turn]x; turn_rate_radps2 (K, 3): its derivative.
+    of its position in the world, turned into body axes (so without gravity); angular_velocity_radps (K, 3): angular
+    velocity, with R' = R [turn]x; angular_acceleration_radps2 (K, 3): its derivative.
     """
 
     T_world_body: Array
     velocity_mps: Array
-    turn_radps: Array
+    angular_velocity_radps: Array
     acceleration_mps2: Array
-    turn_rate_radps2: Array
+    angular_acceleration_radps2: Array
 
     @property
     def twist(self) -> Array:
         """Velocities (K, 6): linear, then angular."""
-        return np.concatenate([self.velocity_mps, self.turn_radps], -1)
+        return np.concatenate([self.velocity_mps, self.angular_velocity_radps], -1)
 
     def of_mounted(self, T_body_sensor: Array) -> "Kinematics":
         """The kinematics of a sensor fixed to the body, in the sensor's frame, with the effect of the lever arm."""
         R_body_sensor = T_body_sensor[:3, :3]
         lever_m = T_body_sensor[:3, 3]
-        lever_mps = np.cross(self.turn_radps, lever_m)
-        euler_mps2 = np.cross(self.turn_rate_radps2, lever_m)
-        centripetal_mps2 = np.cross(self.turn_radps, lever_mps)
+        lever_mps = np.cross(self.angular_velocity_radps, lever_m)
+        euler_mps2 = np.cross(self.angular_acceleration_radps2, lever_m)
+        centripetal_mps2 = np.cross(self.angular_velocity_radps, lever_mps)
         lever_mps2 = euler_mps2 + centripetal_mps2
 
         def in_sensor(vectors: Array) -> Array:
@@ -50,9 +50,9 @@ class Kinematics:
         return Kinematics(
             T_world_body=self.T_world_body @ T_body_sensor,
             velocity_mps=in_sensor(self.velocity_mps + lever_mps),
-            turn_radps=in_sensor(self.turn_radps),
+            angular_velocity_radps=in_sensor(self.angular_velocity_radps),
             acceleration_mps2=in_sensor(self.acceleration_mps2 + lever_mps2),
-            turn_rate_radps2=in_sensor(self.turn_rate_radps2),
+            angular_acceleration_radps2=in_sensor(self.angular_acceleration_radps2),
         )
 
 
@@ -99,9 +99,9 @@ def along(
     return Kinematics(
         T_world_body,
         velocity_mps=np.stack([speed, zero, zero], -1),
-        turn_radps=np.stack([zero, zero, turn], -1),
+        angular_velocity_radps=np.stack([zero, zero, turn], -1),
         acceleration_mps2=np.stack([acceleration, centripetal, zero], -1),
-        turn_rate_radps2=np.stack([zero, zero, turn_rate], -1),
+        angular_acceleration_radps2=np.stack([zero, zero, turn_rate], -1),
     )
 
 
@@ -286,11 +286,11 @@ class CurveMotion:
         change = change[:, None]
         rate_squared = rate**2
         tangential_mps2 = by_progress.velocity_mps * change
-        angular_radps2 = by_progress.turn_radps * change
+        angular_radps2 = by_progress.angular_velocity_radps * change
         return Kinematics(
             T_world_body=self.T_world_start @ by_progress.T_world_body,
             velocity_mps=by_progress.velocity_mps * rate,
-            turn_radps=by_progress.turn_radps * rate,
+            angular_velocity_radps=by_progress.angular_velocity_radps * rate,
             acceleration_mps2=by_progress.acceleration_mps2 * rate_squared + tangential_mps2,
-            turn_rate_radps2=by_progress.turn_rate_radps2 * rate_squared + angular_radps2,
+            angular_acceleration_radps2=by_progress.angular_acceleration_radps2 * rate_squared + angular_radps2,
         )

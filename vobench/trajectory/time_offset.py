@@ -29,14 +29,14 @@ NO_VARIANCE = 1e-9  # of two standardised signals: below it either is constant w
 
 
 @dataclass(frozen=True, slots=True)
-class Offset:
+class TimeOffset:
     """The time to add to the estimate's stamps, and the correlation (-1..1) of both motions with it."""
 
     offset_ns: int
     correlation: float
 
 
-def estimate_offset(gt: Trajectory, est: Trajectory) -> Offset:
+def estimate_offset(gt: Trajectory, est: Trajectory) -> TimeOffset:
     """The offset of the estimate's clock that best correlates angular speeds, or else speeds.
 
     Neither depends on the frames, and correlation does not depend on the scale, so no alignment is needed.
@@ -54,17 +54,17 @@ def estimate_offset(gt: Trajectory, est: Trajectory) -> Offset:
         correlations = _correlations(gt_speed, est_speed)
         best = int(np.argmax(correlations))
         lag = best - len(est_speed) + 1
-        offsets.append(Offset(start_ns + lag * step_ns, float(correlations[best])))
+        offsets.append(TimeOffset(start_ns + lag * step_ns, float(correlations[best])))
 
     coarse = max(offsets, key=lambda offset: offset.correlation)
     if coarse.correlation <= 0:
         raise AlignmentError("a time offset needs motion, but the trajectories have no correlated motion")
     refined_ns = _refined(gt, est, coarse.offset_ns, step_ns)
     offset_ns = _snapped_to_stamps(gt, est, refined_ns, step_ns)
-    correlation = likeness(gt, est, offset_ns)
+    correlation = motion_correlation(gt, est, offset_ns)
     if correlation is None:
         raise AlignmentError("a time offset needs turns or changes of speed, but the trajectories share none")
-    return Offset(offset_ns, correlation)
+    return TimeOffset(offset_ns, correlation)
 
 
 def _grid_ns(trajectory: Trajectory, step_ns: int, window_ns: int) -> Stamps:
@@ -74,7 +74,7 @@ def _grid_ns(trajectory: Trajectory, step_ns: int, window_ns: int) -> Stamps:
     return np.arange(first, last, step_ns, dtype=np.int64)
 
 
-def likeness(gt: Trajectory, est: Trajectory, offset_ns: int) -> float | None:
+def motion_correlation(gt: Trajectory, est: Trajectory, offset_ns: int) -> float | None:
     """The correlation (-1..1) of both motions with the estimate's stamps shifted; None if it is undetermined."""
     step_ns = int(_step_ns(gt, est))
     correlations = _likeness(gt, est, np.array([offset_ns]), WINDOW_STEPS * step_ns)

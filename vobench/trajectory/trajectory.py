@@ -158,7 +158,7 @@ NORM_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
-class Move:
+class PoseConvention:
     """A change of the convention of poses: `matrix` is signed axes S (3, 3), or for a mount T_est_gt (4, 4).
 
     `axes`: the file uses other axes, T' = S T S⁻¹. `positions`: only its positions use other axes, p' = S p.
@@ -197,18 +197,18 @@ class Move:
         return f"{self.kind}:{','.join(axes)}"
 
 
-def parse_move(word: str) -> Move:
+def parse_pose_convention(word: str) -> PoseConvention:
     """The move in words such as `axes:z,-x,-y`, `inverse` or `mount:x,y,z,qx,qy,qz,qw`. Raises InputError."""
     if word in INVERSES:
-        return Move(INVERSES[word])
+        return PoseConvention(INVERSES[word])
     kind, _, arguments = word.partition(":")
     values = [part.strip() for part in arguments.split(",")]
     if kind == "mount":
-        return Move("mount", _mount(values, word))
+        return PoseConvention("mount", _mount(values, word))
     if kind == "axes":
-        return Move("axes", _axes(values, word))
+        return PoseConvention("axes", _axes(values, word))
     if kind == "positions":
-        return Move("positions", _axes(values, word))
+        return PoseConvention("positions", _axes(values, word))
     raise InputError(
         f"a file may be read as axes:…, positions:…, mount:…, inverse or rotations:inverse, but not as {word!r}"
     )
