@@ -27,7 +27,7 @@ from vobench.rendering.view import Box, PinholeView, pinhole_view
 from vobench.scene.light import Flicker, Sun
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, moved
-from vobench.scene.scene import Mover, Path, Scene
+from vobench.scene.scene import Mover, Scene, WaypointMotion
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
@@ -111,7 +111,7 @@ def _view(movers: int) -> tuple[PinholeView, Box]:
 def _walker(index: int) -> Mover:
     body = Thing(f"walker_{index}", moved(block((0.5, 0.3, 1.8), bevel_m=0), at(0, 0, 0.9)), "walker")
     positions = np.array([[-1.5 + index, -1.0, 0.0], [-1.5 + index, 4.0, 0.0]])
-    return Mover(f"walker_{index}", (body,), Path(np.array([0.0, 5.0]), positions, np.array([0.0, 90.0])))
+    return Mover(f"walker_{index}", (body,), WaypointMotion(np.array([0.0, 5.0]), positions, np.array([0.0, 90.0])))
 
 
 def _milliseconds(light: Illumination, views: Views | None, pictures: int) -> str:

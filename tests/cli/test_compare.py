@@ -3,12 +3,12 @@
 import pytest
 
 from vobench.cli import compare as cli_compare
-from vobench.report.compare import SAME, Change
+from vobench.report.compare import SAME, ScoreChange
 
 
 def change(case="", *, verdict="worse", **facts):
     defaults = {"old": "1.0", "new": "2.0", "ratio": 2.0, "interval": None, "p": 0.0123}
-    return Change(case=case, estimator="lk", verdict=verdict, **{**defaults, **facts})
+    return ScoreChange(case=case, estimator="lk", verdict=verdict, **{**defaults, **facts})
 
 
 @pytest.mark.parametrize(

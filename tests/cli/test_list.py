@@ -3,7 +3,7 @@
 import pytest
 
 from vobench.cli import list as listing
-from vobench.suite.catalog import KINDS, Entry, entries
+from vobench.suite.catalog import KINDS, CatalogEntry, entries
 
 MANIFEST = "name: mine\nversion: '1'\nclass: mine:Mine\npose_of: body\n"
 FORMS = [
@@ -40,7 +40,7 @@ WRONG = [
 
 @pytest.fixture
 def entry(tmp_path):
-    return Entry("estimator", "mine", tmp_path, "path")
+    return CatalogEntry("estimator", "mine", tmp_path, "path")
 
 
 @pytest.mark.parametrize("line", FORMS)

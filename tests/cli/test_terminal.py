@@ -6,7 +6,7 @@ import pytest
 from rich.console import Console
 
 from vobench.cli import terminal
-from vobench.suite.catalog import Entry, find
+from vobench.suite.catalog import CatalogEntry, find
 
 
 def test_no_text_of_others_steers_the_terminal():
@@ -21,7 +21,7 @@ def test_no_text_of_others_steers_the_terminal():
     [("./estimators", "stand_still", True), ("path", "stand_still", False), ("./estimators", "mine", False)],
 )
 def test_an_estimator_that_hides_a_built_in_one_is_said(tmp_path, capsys, origin, name, is_said):
-    terminal.warn_about_hidden([Entry("estimator", name, tmp_path / name, origin)])
+    terminal.warn_about_hidden([CatalogEntry("estimator", name, tmp_path / name, origin)])
     said = f"vobench: {name} is {tmp_path / name}, not the estimator included with vobench\n"
     assert capsys.readouterr() == ("", said if is_said else "")
 

@@ -12,7 +12,7 @@ from vobench.rendering.geometry import RayCaster, bounding_sphere, planar_patche
 from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material, pane_reflectance
 from vobench.scene.mesh import Thing, areas_m2, quad, table
-from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
+from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
 
 MATERIALS: dict[str, Material] = {
     "a": Material(texture=Procedural("plain", 0.5, 0.0, 1.0, 8, 0)),
@@ -21,7 +21,7 @@ MATERIALS: dict[str, Material] = {
 LAMP = ceiling_light("lamp", np.array([0.5, 0.5, 2.9]), (0.6, 0.6), power_lm=1)
 CRATE = box(np.array([2.0, -0.5, 0.4]), (0.8, 0.6, 0.8), yaw_deg=30, material="a")
 PANE = rectangle(np.array([-2.0, 0, 1]), np.array([0, 1.0, 0]), np.array([0, 0, 1.0]), "pane")
-WALK = Path(np.array([0.0, 2.0]), np.array([[0.0, 0, 0], [1.0, 0, 0]]), np.array([0.0, 90.0]))
+WALK = WaypointMotion(np.array([0.0, 2.0]), np.array([[0.0, 0, 0], [1.0, 0, 0]]), np.array([0.0, 90.0]))
 CART = Mover("cart", tuple(box(np.array([0, 0, 0.3]), (0.4, 0.2, 0.4), yaw_deg=0, material="a")), WALK)
 SCENE = Scene("test", (*room((8, 6, 3), floor="a", wall="a", ceiling="a"), *CRATE, PANE), MATERIALS, (LAMP,), (CART,))
 FACES = triangles(SCENE, t_ns=0)

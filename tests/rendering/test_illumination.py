@@ -14,7 +14,7 @@ from vobench.rendering.illumination import Illumination
 from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sky, Sun, Switched
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, moved, quad
-from vobench.scene.scene import Mover, Path, Scene, ceiling_light
+from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
 
 COARSE = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=0.3, indirect_rays=64, bounces=3)
 DIRECT = replace(COARSE, bounces=0)
@@ -160,7 +160,7 @@ def test_a_sun_that_ends_where_it_began_moves_meanwhile():
 
 def walk(*positions_m: tuple[float, float, float]) -> Mover:
     times = np.arange(len(positions_m), dtype=float)
-    return Mover("crate", (CRATE,), Path(times, np.array(positions_m), np.zeros(len(positions_m))))
+    return Mover("crate", (CRATE,), WaypointMotion(times, np.array(positions_m), np.zeros(len(positions_m))))
 
 
 DAY = Sky("sky", 5_000.0, "uniform")

@@ -22,7 +22,7 @@ from vobench.rendering.view import Box, PinholeView, pinhole_view
 from vobench.scene.light import PointLight, Sky
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, moved, quad, table
-from vobench.scene.scene import Mover, Path, Scene, ceiling_light
+from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
 
 PILLAR = moved(block((0.5, 0.3, 1.8), bevel_m=0), at(0.4, -0.2, 0.9, yaw=25))
 FLOOR = quad((-2, -2, 0), (4, 0, 0), (0, 4, 0))
@@ -75,7 +75,7 @@ def cell() -> BakedScene:
     """A pillar that moves in a cell with one wall of mirror and one of glass, before the sky."""
     kinds = {"wall_east": "mirror", "wall_north": "glass"}
     things = tuple(replace(thing, material=kinds.get(thing.name, "grey")) for thing in CELL)
-    way = Path(np.array([0.0, 1.0]), np.array([[-0.5, 0.4, 0.0], [0.1, 0.7, 0.0]]), np.array([0.0, 30.0]))
+    way = WaypointMotion(np.array([0.0, 1.0]), np.array([[-0.5, 0.4, 0.0], [0.1, 0.7, 0.0]]), np.array([0.0, 30.0]))
     pillar = Mover("pillar", (Thing("pillar", PILLAR, "grey"),), way)
     lights = (LAMP, PointLight("bulb", np.array([-1.0, 0.5, 2.0]), 500.0), Sky("sky", 2000.0, "uniform"))
     settings = BakeSettings(spacing_m=0.1, light_rays=4, indirect_spacing_m=0.3, indirect_rays=16, bounces=2)

@@ -13,10 +13,10 @@ from vobench.rendering.occlusion import Bodies, back_faces, dot
 from vobench.rendering.shot import CameraShot, shot_transforms
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, flipped, make_mesh, moved, quad, table, texture_coordinates, two_sided
-from vobench.scene.scene import Mover, Path, Scene
+from vobench.scene.scene import Mover, Scene, WaypointMotion
 
 MATERIALS = {"a": Material(), "glass": Material("pane", eta=1.5)}
-WALK = Path(np.array([0.0, 2.0]), np.array([[1.0, 0, 0], [2.0, 1.0, 0]]), np.array([0.0, 90.0]))
+WALK = WaypointMotion(np.array([0.0, 2.0]), np.array([[1.0, 0, 0], [2.0, 1.0, 0]]), np.array([0.0, 90.0]))
 CART = Mover("cart", tuple(box(np.array([0, 0, 0.3]), (0.4, 0.2, 0.6), yaw_deg=0, material="a")), WALK)
 PANE = rectangle(np.array([-1.5, 0, 1]), np.array([0, 1.0, 0]), np.array([0, 0, 1.0]), "glass")
 SIDES = room((6, 5, 3), floor="a", wall="a", ceiling="a")

@@ -19,7 +19,7 @@ from vobench.rendering.renderer import View, single_instant
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import LUMINANCE, Material, Picture, fresnel, linear, pane_reflectance, under_coat
 from vobench.scene.mesh import Thing, quad, two_sided, unit
-from vobench.scene.scene import Mover, Path, Scene, ceiling_light
+from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
 
 X, Y, Z = np.eye(3)
 SMALL = Pinhole(12, 8, 200.0, 200.0, 5.5, 3.5)
@@ -275,7 +275,7 @@ def test_a_light_counts_with_its_mean_level_over_the_exposure(trace, kind, level
 
 
 def test_one_renderer_shows_lights_suns_and_movers_as_they_are_at_each_time(trace):
-    way = Path(np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [4.0, 0, 0]]), np.array([0.0, 90.0]))
+    way = WaypointMotion(np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [4.0, 0, 0]]), np.array([0.0, 90.0]))
     box = Mover("lid", (rectangle(0.5 * Z, X, Y, "lid"),), way)
     sun = Sun("sun", 1000.0, (0.0, 1.0), (0.0, 0.0), (90.0, 30.0))
     scene = Scene(

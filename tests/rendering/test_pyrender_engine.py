@@ -19,7 +19,7 @@ from vobench.rendering.renderer import Radiance, View, single_instant
 from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import Thing, quad, two_sided
-from vobench.scene.scene import Mover, Path, Scene, ceiling_light
+from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
 
 X, Y, Z = np.eye(3)
 CAMERA = Pinhole(161, 121, 120.0, 118.0, 78.0, 62.5)
@@ -169,7 +169,7 @@ def test_lamps_that_are_off_give_no_light() -> None:
 
 def test_a_mover_is_where_its_path_has_it() -> None:
     tile = Thing("tile", quad((-0.03, -0.03, 0.002), 0.06 * X, 0.06 * Y), "tile")
-    path = Path(np.array([0.0, 1.0]), np.array([[-0.4, 0.2, 0], [0.4, 0.2, 0]]), np.zeros(2))
+    path = WaypointMotion(np.array([0.0, 1.0]), np.array([[-0.4, 0.2, 0], [0.4, 0.2, 0]]), np.zeros(2))
     materials = {"tile": Material(colour=(0, 0, 0), emission_cd_m2=(50.0, 50.0, 50.0))}
     moving = Scene("moving", (), materials, (), (Mover("tile", (tile,), path),))
     for t_s in (0.0, 0.5, 1.0):

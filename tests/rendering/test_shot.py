@@ -6,13 +6,13 @@ import pytest
 from tests.rendering.rectangles import box
 from vobench.geometry import se3
 from vobench.rendering.shot import CameraShot, at_rows, moved, of_rays, rays_in, shot_transforms, turn
-from vobench.scene.scene import Mover, Path
+from vobench.scene.scene import Mover, WaypointMotion
 
 RNG = np.random.default_rng(0)
 CART = Mover(
     "cart",
     tuple(box(np.zeros(3), (1, 1, 1), yaw_deg=0, material="a")),
-    Path(np.array([0.0, 2.0]), np.array([[0.0, 0, 0], [1.0, 2.0, 0]]), np.array([0.0, 90.0])),
+    WaypointMotion(np.array([0.0, 2.0]), np.array([[0.0, 0, 0], [1.0, 2.0, 0]]), np.array([0.0, 90.0])),
 )
 POSE = se3.transform(se3.rotation_z(0.3), [1.0, 2.0, 3.0])
 

@@ -17,7 +17,7 @@ from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import View, single_instant
 from vobench.scene.light import Dimmer, Flicker, Sky
 from vobench.scene.material import Material
-from vobench.scene.scene import Mover, Path, Scene
+from vobench.scene.scene import Mover, Scene, WaypointMotion
 
 PINHOLE = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 CAMERAS = {
@@ -35,7 +35,7 @@ MATERIALS = {
     "board": Material(texture=Procedural("checker", 0.5, 0.8, 0.5, 64, 0)),
 }
 SECOND_NS = 1_000_000_000
-PATH = Path(np.array([0.0, 2.0]), np.array([[1.0, -0.8, 0.3], [1.0, 0.8, 0.3]]), np.array([0.0, 60.0]))
+PATH = WaypointMotion(np.array([0.0, 2.0]), np.array([[1.0, -0.8, 0.3], [1.0, 0.8, 0.3]]), np.array([0.0, 60.0]))
 CART = Mover("cart", tuple(box(np.zeros(3), (0.5, 0.5, 0.5), yaw_deg=0, material="board")), PATH)
 SURFACES = (
     *(s for s in room((6, 5, 3), floor="wax", wall="wall", ceiling="wall") if s.name != "wall_east"),

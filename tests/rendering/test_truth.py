@@ -25,7 +25,7 @@ from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import Thing, Triangles, flat, flipped, joined, quad, two_sided, unit
-from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
+from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 
 PLAIN = ("plain", 0.5, 0.0, 1.0, 8, 0)
@@ -62,7 +62,7 @@ def shell(size_m, *, floor: str = "diffuse") -> list[Thing]:
     return [Thing(n, mesh, floor if n == "floor" else "diffuse") for n, mesh in zip(names, meshes, strict=True)]
 
 
-RIDE = Path(np.array([0.0, 2.0]), np.array([[1.5, -1.2, 0.3], [1.9, 1.0, 0.3]]), np.array([0.0, 50.0]))
+RIDE = WaypointMotion(np.array([0.0, 2.0]), np.array([[1.5, -1.2, 0.3], [1.9, 1.0, 0.3]]), np.array([0.0, 50.0]))
 CART = Mover("cart", (block("x", np.zeros(3), (0.5, 0.4, 0.6)),), RIDE)
 PANE = sheet("pane", [1.0, 0.4, 0.8], [0, 0.6, 0], [0, 0, 0.5], "glass")
 HALL = Scene(
@@ -405,7 +405,7 @@ def test_glass_casts_no_shadow_and_a_spot_none_outside_its_cone():
 
 
 def test_shadow_follows_a_mover():
-    path = Path(np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [0.4, 0, 0]]), np.zeros(2))
+    path = WaypointMotion(np.array([0.0, 1.0]), np.array([[0.0, 0, 0], [0.4, 0, 0]]), np.zeros(2))
     bulb = PointLight("bulb", np.array([0.0, 0, 1.0]), 100.0)
     caster = stage(bulb, movers=(Mover("kite", (plate(),), path),))
     for t_ns, x_m in ((0, 0.0), (SECOND_NS, 0.8)):
@@ -506,7 +506,7 @@ def shards(count: int, seed: int) -> Scene:
         )
         for n, c in enumerate(corners)
     ]
-    path = Path(np.array([0.0, 1.0]), np.array([[0.1, 0.2, 0.0], [0.3, 0.1, 0.1]]), np.array([5.0, 20.0]))
+    path = WaypointMotion(np.array([0.0, 1.0]), np.array([[0.1, 0.2, 0.0], [0.3, 0.1, 0.1]]), np.array([5.0, 20.0]))
     return Scene("shards", tuple(things), MATERIALS, (), (Mover("swarm", tuple(things[::4]), path),))
 
 
@@ -587,7 +587,7 @@ def test_what_is_seen_through_holes_is_what_is_behind_and_light_falls_through():
     floor = sheet("floor", np.zeros(3), [4.0, 0, 0], [0, 4.0, 0])
     bulb = PointLight("bulb", np.array([0.0, 0, 1.0]), 100.0)
     still = Scene("holes", (floor, Thing("paper", sheet_m, "paper")), holed(opacity), (bulb,))
-    path = Path(np.array([0.0]), np.zeros((1, 3)), np.zeros(1))
+    path = WaypointMotion(np.array([0.0]), np.zeros((1, 3)), np.zeros(1))
     moving = replace(still, things=(floor,), movers=(Mover("paper", still.things[1:], path),))
     place_m = (np.arange(201) - 100) / 100
     x, y = np.meshgrid(place_m, -place_m)

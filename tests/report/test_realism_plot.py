@@ -7,7 +7,7 @@ from vobench.analysis.realism import STATISTICS, Realism
 from vobench.analysis.stereo_fit import Matches, StereoFit, Uncertain
 from vobench.errors import InputError
 from vobench.report import realism_plot
-from vobench.report.realism_plot import COLOURS, SCALE_HIGH, SCALE_LOW, save_plot
+from vobench.report.realism_plot import COLOURS, SCALE_HIGH, SCALE_LOW, save_realism_plot
 
 
 def pair(row_mad_px=0.2):
@@ -46,14 +46,14 @@ def words(path):
 def test_recordings_are_named_and_the_same_file_twice(tmp_path):
     found = {"street": realism(fit=pair()), "twin": realism(0.2)}
     for name in ("a.svg", "b.svg"):
-        save_plot(tmp_path / name, found)
+        save_realism_plot(tmp_path / name, found)
     assert {"street", "twin", "low end", "high end", "grey values"} <= set(words(tmp_path / "a.svg"))
     assert words(tmp_path / "a.svg") == words(tmp_path / "b.svg")
 
 
 def test_another_ending_is_refused(tmp_path):
     with pytest.raises(InputError, match=r"should end in \.svg, \.png, \.pdf"):
-        save_plot(tmp_path / "a.gif", {"street": realism()})
+        save_realism_plot(tmp_path / "a.gif", {"street": realism()})
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ from vobench.report.rerun import save_trial
 from vobench.report.rerun_scene import SceneMesh, _baked_folder, scene_mesh
 from vobench.runner.folder import CASE, SEQUENCE, RunFolder
 from vobench.scene.material import Material, srgb
-from vobench.scene.scene import Path
+from vobench.scene.scene import WaypointMotion
 
 
 def rows(path, entity, *, static=False):
@@ -76,7 +76,7 @@ def test_a_case_without_a_scene_or_without_its_light_has_no_mesh(folder):
 
 def test_what_moves_is_a_mesh_of_its_own_that_goes_its_way(run_viewer, tmp_path):
     corners = np.arange(27.0).reshape(3, 3, 3)
-    way = Path(np.array([0.0, 1.0]), np.array([[1.0, 2, 3], [2, 0, 3]]), np.array([0.0, 90]))
+    way = WaypointMotion(np.array([0.0, 1.0]), np.array([[1.0, 2, 3], [2, 0, 3]]), np.array([0.0, 90]))
     tones, light = np.zeros((3, 3), np.uint8), np.zeros((4, 4, 3), np.uint8)
     scene = SceneMesh(corners, np.zeros((3, 3, 2)), light, tones, np.array([-1, 0, -1], np.int32), (way,))
     save_trial(tmp_path / "moves.rrd", replace(run_viewer, scene=scene))

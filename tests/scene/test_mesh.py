@@ -32,7 +32,7 @@ from vobench.scene.mesh import (
     unit,
     welded,
 )
-from vobench.scene.scene import Mover, Path, Scene, ceiling_light, triangles
+from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
 
 CORNER_M, U_M, V_M = np.array([1.0, 2.0, 0.5]), np.array([2.0, 0, 0]), np.array([0, 0, 3.0])
 T = se3.transform(se3.rotation_z(0.4), [0.3, -2.0, 1.0])
@@ -95,7 +95,7 @@ def test_joined_meshes_have_all_faces_of_all_and_nothing_else() -> None:
 def hall() -> Scene:
     crate = Thing("crate", block((1, 1, 1), bevel_m=0), "wood")
     lid = Thing("lid", quad([0, 0, 0.6], [1, 0, 0], [0, 1, 0]), "wood")
-    path = Path(np.array([0.0, 1.0]), np.array([[0.0, 0, 0.5], [1.0, 0, 0.5]]), np.array([0.0, 90.0]))
+    path = WaypointMotion(np.array([0.0, 1.0]), np.array([[0.0, 0, 0.5], [1.0, 0, 0.5]]), np.array([0.0, 90.0]))
     floor = Thing("floor", quad([-2, -3, 0], [4, 0, 0], [0, 6, 0]), "f")
     bulb = PointLight("bulb", np.zeros(3), 1.0)
     lamp = ceiling_light("lamp", np.array([0.0, 0.0, 2.9]), (0.5, 0.5), power_lm=1.0)

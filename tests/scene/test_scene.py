@@ -5,13 +5,15 @@ import pytest
 
 from vobench.asset.outdoors import walker
 from vobench.geometry import se3
-from vobench.scene.scene import LimbMotion, Path
+from vobench.scene.scene import LimbMotion, WaypointMotion
 
-PATH = Path(np.array([1.0, 3.0, 4.0]), np.array([[0.0, 0, 0], [2, 0, 0], [2, 3, 0.5]]), np.array([0.0, 0.0, 90.0]))
-AGAIN = Path(PATH.times_s, PATH.positions_m, PATH.yaw_deg, repeats=True)
+PATH = WaypointMotion(
+    np.array([1.0, 3.0, 4.0]), np.array([[0.0, 0, 0], [2, 0, 0], [2, 3, 0.5]]), np.array([0.0, 0.0, 90.0])
+)
+AGAIN = WaypointMotion(PATH.times_s, PATH.positions_m, PATH.yaw_deg, repeats=True)
 
 
-def at(path: Path, t_s: float) -> list[float]:
+def at(path: WaypointMotion, t_s: float) -> list[float]:
     return path.pose(t_s * 1e9)[:3, 3].tolist()
 
 
@@ -44,7 +46,7 @@ def test_a_way_that_repeats_goes_on_growing() -> None:
     assert [AGAIN.distance_m(t * 1e9) for t in (2, 5, 8)] == pytest.approx([1, 1 + length_m, 1 + 2 * length_m])
 
 
-def gaits(path: Path, by: float = 1.0) -> list[tuple[LimbMotion, np.ndarray]]:
+def gaits(path: WaypointMotion, by: float = 1.0) -> list[tuple[LimbMotion, np.ndarray]]:
     """The limbs of a walker, and the points of each."""
     who = walker(np.random.default_rng(0))
     ways = [LimbMotion(path, who.cycle_m, limb.joints_m, limb.pitch_rad, who.rise_m).sized(by) for limb in who.limbs]
@@ -52,7 +54,7 @@ def gaits(path: Path, by: float = 1.0) -> list[tuple[LimbMotion, np.ndarray]]:
     return list(zip(ways, points, strict=True))
 
 
-AHEAD = Path(np.array([0.0, 4.0]), np.array([[0.0, 0, 0], [5.0, 0, 0]]), np.zeros(2))
+AHEAD = WaypointMotion(np.array([0.0, 4.0]), np.array([[0.0, 0, 0], [5.0, 0, 0]]), np.zeros(2))
 
 
 def test_who_walks_neither_sinks_in_nor_floats_and_keeps_a_foot_where_it_stands() -> None:

@@ -60,7 +60,7 @@ def _checked_board(folder: RunFolder, path: Path) -> Board:
     return page.run_board(folder, checked.scores)
 
 
-def _print_changes(changes: Sequence[compare.Change], environment_differences: Sequence[str]) -> None:
+def _print_changes(changes: Sequence[compare.ScoreChange], environment_differences: Sequence[str]) -> None:
     """Print the totals, the cells that changed, and what the environments have not in common."""
     console = terminal.console()
     totals = [change for change in changes if not change.case]
@@ -83,12 +83,12 @@ def _print_same_count(same_count: int, cell_count: int, console: "Console") -> N
     console.print(f"{same_count} of {cell_count} cells are the same to the last digit; {explanation}")
 
 
-def _row(change: compare.Change) -> list[str]:
+def _row(change: compare.ScoreChange) -> list[str]:
     p_value = "" if change.p is None else f"{change.p:.2g}"
     return [change.estimator, change.verdict, change.old, change.new, _format_ratio(change), p_value]
 
 
-def _format_ratio(change: compare.Change) -> str:
+def _format_ratio(change: compare.ScoreChange) -> str:
     """The ratio of the losses with its interval, if they are known."""
     if change.ratio is None:
         return ""

@@ -9,7 +9,7 @@ import typer
 from vobench.cli import terminal
 from vobench.cli.option import Json, SuiteName, Trust
 from vobench.errors import InputError
-from vobench.report.drive_plot import ENDINGS, drive_log, save_plot
+from vobench.report.drive_plot import ENDINGS, drive_log, save_drive_plot
 from vobench.runner.drive import SuiteDrive, chosen_trajectories, drive_plan
 from vobench.suite.suite import read_plan
 
@@ -52,7 +52,7 @@ def drive_command(
 
     driven = drive_plan(plan, trajectory=trajectory)
     if out:
-        save_plot(out, [drive_log(drive) for drive in driven.drives])
+        save_drive_plot(out, [drive_log(drive) for drive in driven.drives])
     if tum:
         tum.write_text(driven.drives[0].tum(), encoding="utf-8")
     if csv:

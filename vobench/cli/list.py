@@ -10,7 +10,7 @@ from vobench.cli import terminal
 from vobench.cli.option import Json
 from vobench.errors import UnknownNameError, VobenchError, unknown_name_sentence
 from vobench.suite import catalog
-from vobench.suite.catalog import KINDS, Entry
+from vobench.suite.catalog import KINDS, CatalogEntry
 from vobench.suite.file_kind import Kind
 
 COLUMNS = ("kind", "name", "summary", "origin", "path")
@@ -69,7 +69,7 @@ def _cells(row: dict[str, Any]) -> list[str]:
     return [name if column == "name" else row[column] for column in COLUMNS]
 
 
-def _summary(entry: Entry) -> str:
+def _summary(entry: CatalogEntry) -> str:
     """The summary in an entry's file, or why the file cannot be read."""
     if entry.path.suffix in MODEL_SUFFIXES:
         return "a model; inspect it with vobench scene"
@@ -84,7 +84,7 @@ def _summary(entry: Entry) -> str:
         return f"unreadable: {error.mistakes[0]}{more}"
 
 
-def _text(entry: Entry) -> str:
+def _text(entry: CatalogEntry) -> str:
     """The text of an entry's file; empty if it cannot be read."""
     path = entry.path / "estimator.yaml" if entry.kind == "estimator" else entry.path
     try:
@@ -93,7 +93,7 @@ def _text(entry: Entry) -> str:
         return ""
 
 
-def _parsed_summary(entry: Entry) -> str:
+def _parsed_summary(entry: CatalogEntry) -> str:
     """The summary in an entry's file, which is parsed and checked as a whole. Raises VobenchError."""
     from vobench.suite import yaml_file
     from vobench.suite.manifest import read_manifest

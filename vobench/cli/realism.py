@@ -40,12 +40,12 @@ def realism_command(
 
 
 def _save_plot(file: Path, report: RealismReport) -> None:
-    from vobench.report.realism_plot import save_plot
+    from vobench.report.realism_plot import save_realism_plot
 
     realism_by_name = {report.path.name: report.found}
     if report.against_path and report.against:
         realism_by_name[report.against_path.name] = report.against
-    save_plot(file, realism_by_name)
+    save_realism_plot(file, realism_by_name)
 
 
 def _print(report: RealismReport) -> None:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from vobench.suite.catalog import Entry
+    from vobench.suite.catalog import CatalogEntry
 
 REDIRECTED_WIDTH = 200  # columns, where standard output is not a terminal
 LEFT_ALIGNED = {
@@ -37,7 +37,7 @@ def warn(sentence: str) -> None:
     print(printable(f"vobench: {sentence}"), file=sys.stderr)
 
 
-def warn_about_hidden(entries: "Iterable[Entry]") -> None:
+def warn_about_hidden(entries: "Iterable[CatalogEntry]") -> None:
     """Warn about each estimator that hides one of the same name included with vobench.
 
     An estimator that was given by its path hides none.

@@ -34,7 +34,7 @@ from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import messages as ros
 from vobench.sequence.mcap_file import MAGIC
-from vobench.sequence.recording import MAGICS, METADATA, opened, read_first_poses
+from vobench.sequence.recording import MAGICS, METADATA, open_bag, read_first_poses
 from vobench.trajectory.trajectory import Stamps
 
 BASE = "base_link"
@@ -62,7 +62,7 @@ def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
     refuse_lfs_pointers(path)
     if form == "mcap":
         _require_ros2(path)
-    with opened(path) as reader:
+    with open_bag(path) as reader:
         non_empty = [connection for connection in reader.connections if connection.msgcount]
         types = {connection.topic: connection.msgtype for connection in non_empty}
         chosen = choose(types, options.topics, str(path))
@@ -243,7 +243,7 @@ def _read_pictures(
     """The frames in order; a picture is held until its partner comes, and a limited number of them at once."""
     waiting: dict[int, dict[str, EncodedPicture]] = {}  # pictures by topic, by the frame's index
     due = 0
-    with opened(path) as reader:
+    with open_bag(path) as reader:
         connections = [connection for connection in reader.connections if connection.topic in indices]
         for connection, _, raw in reader.messages(connections):
             topic = connection.topic

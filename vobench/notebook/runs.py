@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
     from matplotlib.figure import Figure
 
-    from vobench.report.compare import Change
+    from vobench.report.compare import ScoreChange
     from vobench.report.leaderboard import Board
 
 Names = str | Iterable[str]
@@ -380,7 +380,7 @@ def run_path(given: Run | Path | str) -> Path:
     return given.path if isinstance(given, Run) else Path(given)
 
 
-def _change_row(change: "Change") -> dict[str, Any]:
+def _change_row(change: "ScoreChange") -> dict[str, Any]:
     low, high = change.interval or (None, None)
     return {
         "case": change.case or "all",

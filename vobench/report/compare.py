@@ -31,7 +31,7 @@ CellKey = tuple[str, str]
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class ScoreChange:
     """The change of an estimator on a case, or over all cases if `case` is empty.
 
     `ratio` is the new loss relative to the old one, with the confidence `interval` if there are enough trials. `p` is
@@ -62,7 +62,7 @@ class CellPair:
         return has_same_losses and self.old.failures == self.new.failures
 
 
-def compare(old: Board, new: Board, *, at_most: float | None = None) -> list[Change]:
+def compare(old: Board, new: Board, *, at_most: float | None = None) -> list[ScoreChange]:
     """The change of every estimator, then of every cell; a ratio above `at_most` is worse, decided or not.
 
     Raises InputError if the two boards have no cell in common.
@@ -155,13 +155,13 @@ def _summary(cell: Cell | None) -> str:
     return ", ".join(parts) or cell.status
 
 
-def _unpaired_change(case: str, estimator: str, old: Cell | None, new: Cell | None) -> Change:
+def _unpaired_change(case: str, estimator: str, old: Cell | None, new: Cell | None) -> ScoreChange:
     """The change of a cell that one run lacks."""
     verdict = NEW if new else GONE
-    return Change(case, estimator, verdict, _summary(old), _summary(new))
+    return ScoreChange(case, estimator, verdict, _summary(old), _summary(new))
 
 
-def _cell_change(pair: CellPair, p: float, at_most: float | None) -> Change:
+def _cell_change(pair: CellPair, p: float, at_most: float | None) -> ScoreChange:
     old_losses = [loss for loss in pair.old.losses if not isnan(loss)]
     new_losses = [loss for loss in pair.new.losses if not isnan(loss)]
     ratio = None
@@ -174,7 +174,7 @@ def _cell_change(pair: CellPair, p: float, at_most: float | None) -> Change:
     fewest_trials = min(len(old_losses), len(new_losses))
     if verdict != SAME and fewest_trials >= ranking.MIN_TRIALS:
         interval = _ratio_interval(old_losses, new_losses)
-    return Change(
+    return ScoreChange(
         pair.old.case,
         pair.old.estimator,
         verdict,
@@ -228,7 +228,7 @@ def _resampled_log_means(losses: Sequence[float], rng: np.random.Generator) -> A
     return means
 
 
-def _total_change(name: str, pairs: Sequence[CellPair], at_most: float | None) -> Change:
+def _total_change(name: str, pairs: Sequence[CellPair], at_most: float | None) -> ScoreChange:
     """The change of an estimator over all cases: the old and the new one are ranked as two estimators of a board."""
     losses, failures = _trial_arrays(pairs)
     first, second = ranking.rank(losses, failures)
@@ -248,7 +248,7 @@ def _total_change(name: str, pairs: Sequence[CellPair], at_most: float | None) -
         low, high = sorted(exp(sign * log(end)) for end in second.ratio_interval)
         interval = low, high
     score_of = {standing.index: f"{1 - standing.loss:.4f}" for standing in (first, second)}
-    return Change("", name, verdict, score_of[0], score_of[1], ratio, interval, second.p_above)
+    return ScoreChange("", name, verdict, score_of[0], score_of[1], ratio, interval, second.p_above)
 
 
 def _trial_arrays(pairs: Sequence[CellPair]) -> tuple[Array, Array]:

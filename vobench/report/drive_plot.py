@@ -109,7 +109,7 @@ def drive_log(drive: TrajectoryDrive) -> DriveLog:
     )
 
 
-def save_plot(path: Path, logs: Sequence[DriveLog]) -> None:
+def save_drive_plot(path: Path, logs: Sequence[DriveLog]) -> None:
     """Draw one row per log, as SVG, PNG or PDF by the ending of the path. Raises InputError for another ending."""
     check_ending(path)
     import matplotlib as mpl

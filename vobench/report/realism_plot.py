@@ -28,7 +28,7 @@ LINE_SAMPLES = 30
 LEAST_REACH_PX = 0.3
 
 
-def save_plot(path: Path, recordings: Mapping[str, Realism]) -> None:
+def save_realism_plot(path: Path, recordings: Mapping[str, Realism]) -> None:
     """Plot recordings by their names side by side, as SVG, PNG or PDF. Raises InputError for another ending."""
     check_ending(path)
     import matplotlib as mpl

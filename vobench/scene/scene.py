@@ -23,7 +23,7 @@ class MoverMotion(Protocol):
 
 
 @dataclass(frozen=True, slots=True)
-class Path:
+class WaypointMotion:
     """A trajectory linear between positions_m (K, 3) and yaw_deg (K,) at increasing times_s (K,).
 
     Before the first and after the last time the mover rests, or starts again where `repeats`.
@@ -56,7 +56,7 @@ class Path:
         within_round = np.interp(t_s - rounds * duration_s, self.times_s, distance_m)
         return float(rounds * distance_m[-1] + within_round)
 
-    def sized(self, by: float) -> "Path":
+    def sized(self, by: float) -> "WaypointMotion":
         """The same with all lengths times `by`."""
         return replace(self, positions_m=self.positions_m * by)
 
@@ -85,7 +85,7 @@ class LimbMotion:
     cycle of cycle_m.
     """
 
-    path: Path
+    path: WaypointMotion
     cycle_m: float
     joints_m: Array
     pitch_rad: Array

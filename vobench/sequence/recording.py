@@ -73,7 +73,7 @@ def read_first_poses(path: Path, topic: str | None) -> tuple[Trajectory, int]:
 
 def _read(path: Path, topic: str | None) -> tuple[Stamps, Array]:
     """Stamps (N,) and `pose_fields` (N, 7) of a topic, unchecked."""
-    with opened(path) as reader:
+    with open_bag(path) as reader:
         rows = list(_rows(reader, path, topic))
     if not rows:
         raise SequenceError(f"no pose on {topic or 'its topic'} in {path}")
@@ -100,7 +100,7 @@ def _suffix(path: Path) -> str | None:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[AnyReader]:
+def open_bag(path: Path) -> Iterator[AnyReader]:
     """A reader of any recording, whose errors become SequenceError.
 
     rosbags recognises files by their suffixes, so the file gets a link with the right one.
@@ -231,7 +231,7 @@ class TopicFacts:
 def topic_facts(path: Path) -> tuple[TopicFacts, ...]:
     """All topics of a bag of any origin, by name; no message is decoded. Raises SequenceError where it is torn."""
     stamps: dict[tuple[str, str], list[int]] = {}
-    with opened(path) as reader:
+    with open_bag(path) as reader:
         for connection in reader.connections:
             stamps[connection.topic, connection.msgtype] = []
         for connection, t_ns, _ in reader.messages():

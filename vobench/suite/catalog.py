@@ -44,7 +44,7 @@ OTHER_KEY = re.compile(rb"^(estimators|severity|include)\s*:", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class CatalogEntry:
     """A named scene, suite, scenario or estimator, its path, and the step of the search order that found it.
 
     `path` is the file of a scene, suite or scenario, and the folder of an estimator.
@@ -63,15 +63,15 @@ def builtin_root() -> Path:
     return in_wheel if in_wheel.is_dir() else package.parent
 
 
-def entries(kind: Kind) -> list[Entry]:
+def entries(kind: Kind) -> list[CatalogEntry]:
     """All entries of a kind, sorted by name. If a name occurs twice, the one that wins comes first."""
-    by_path: dict[Path, Entry] = {}
+    by_path: dict[Path, CatalogEntry] = {}
     for entry in _search(kind):
         by_path.setdefault(entry.path, entry)
     return sorted(by_path.values(), key=lambda entry: entry.name)
 
 
-def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
+def find(kind: Kind, name: str, *, suite: Path | None = None) -> CatalogEntry:
     """The entry with a name, or at a path: a name with a slash or a suffix is a path.
 
     `suite` is the file that names it; names and relative paths are looked up beside it first. Raises UnknownNameError
@@ -88,7 +88,7 @@ def find(kind: Kind, name: str, *, suite: Path | None = None) -> Entry:
     raise UnknownNameError(unknown_name_sentence(kind, name, _known_names(kind, suite)))
 
 
-def examples() -> list[Entry]:
+def examples() -> list[CatalogEntry]:
     """The example suites included with vobench, which `vobench new suite` copies; `find` does not find them."""
     return [*_in_folder("suite", builtin_root() / "examples", "example", None)]
 
@@ -112,7 +112,7 @@ def _is_of_kind(kind: Kind, path: Path) -> bool:
     return kind_in(path) == kind
 
 
-def _entry_at(kind: Kind, path: Path, suite: Path | None) -> Entry:
+def _entry_at(kind: Kind, path: Path, suite: Path | None) -> CatalogEntry:
     """The entry at a path. Raises UnknownNameError."""
     path = _entry_path(kind, path, suite)
     if path.is_dir() and kind != "estimator":
@@ -122,7 +122,7 @@ def _entry_at(kind: Kind, path: Path, suite: Path | None) -> Entry:
         known = ", ".join(_known_names(kind, suite)) or "none"
         raise UnknownNameError(f"no {kind} file at {file}. Known by name: {known}")
     resolved = path.resolve()
-    return Entry(kind, _name_of(kind, resolved), resolved, "path")
+    return CatalogEntry(kind, _name_of(kind, resolved), resolved, "path")
 
 
 def _entry_path(kind: Kind, written: Path, suite: Path | None) -> Path:
@@ -141,7 +141,7 @@ def _known_names(kind: Kind, suite: Path | None) -> list[str]:
     return sorted({entry.name for entry in _search(kind, suite)})
 
 
-def _search(kind: Kind, suite: Path | None = None, *, name: str | None = None) -> Iterator[Entry]:
+def _search(kind: Kind, suite: Path | None = None, *, name: str | None = None) -> Iterator[CatalogEntry]:
     """Every entry of a kind, or those of one name, in the search order."""
     kind_folder = "suites/scenarios" if kind == "scenario" else f"{kind}s"
     if suite:
@@ -156,7 +156,7 @@ def _search(kind: Kind, suite: Path | None = None, *, name: str | None = None) -
     yield from _in_folder(kind, builtin_root() / kind_folder, "built in", name)
 
 
-def _beside(kind: Kind, folder: Path, name: str | None) -> Iterator[Entry]:
+def _beside(kind: Kind, folder: Path, name: str | None) -> Iterator[CatalogEntry]:
     """The entries in the folder of a suite. A suite or a scenario may have the name of its scene."""
     yield from _in_folder(kind, folder / f"{kind}s", BESIDE_SUITE, name)
     if kind == "scenario":
@@ -170,7 +170,7 @@ def _is_suite_or_scenario(path: Path) -> bool:
     return path.is_file() and OTHER_KEY.search(path.read_bytes()) is not None
 
 
-def _installed(kind: Kind) -> Iterator[Entry]:
+def _installed(kind: Kind) -> Iterator[CatalogEntry]:
     """The entries that installed distributions offer: the package that an entry point names holds the files."""
     for point in entry_points(group=f"vobench.{kind}s"):
         spec = find_spec(point.value)
@@ -178,7 +178,7 @@ def _installed(kind: Kind) -> Iterator[Entry]:
         for folder in package_folders:
             path = Path(folder) if kind == "estimator" else _installed_file(kind, Path(folder), point.name)
             distribution = point.dist.name if point.dist else point.value
-            yield Entry(kind, point.name, path, f"installed: {distribution}")
+            yield CatalogEntry(kind, point.name, path, f"installed: {distribution}")
 
 
 def _installed_file(kind: Kind, folder: Path, name: str) -> Path:
@@ -191,7 +191,7 @@ def _installed_file(kind: Kind, folder: Path, name: str) -> Path:
     return candidates[0]
 
 
-def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Iterator[Entry]:
+def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Iterator[CatalogEntry]:
     """The entries of a kind in a folder, or those of one name."""
     if name in NOT_NAMES:
         return
@@ -199,7 +199,7 @@ def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Itera
     for form in FORMS[kind]:
         for file in sorted(folder.glob(form.format(pattern))):
             path = file.parent if kind == "estimator" else file
-            yield Entry(kind, _name_of(kind, path), path.resolve(), origin)
+            yield CatalogEntry(kind, _name_of(kind, path), path.resolve(), origin)
 
 
 def _name_of(kind: Kind, path: Path) -> str:

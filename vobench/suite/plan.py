@@ -7,7 +7,7 @@ from typing import Any
 
 from vobench.errors import UnknownNameError, unknown_name_sentence
 from vobench.suite.case import Case
-from vobench.suite.catalog import Entry
+from vobench.suite.catalog import CatalogEntry
 from vobench.suite.entrant import EstimatorEntry
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite_spec import Suite
@@ -39,7 +39,7 @@ class Plan:
     simulated: tuple[Case, ...]
     recorded: tuple[RecordedCase, ...]
     entrants: tuple[EstimatorEntry, ...]
-    found: tuple[Entry, ...]
+    found: tuple[CatalogEntry, ...]
     source: YamlFile
 
     @property

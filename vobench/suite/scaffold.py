@@ -7,7 +7,7 @@ from pathlib import Path
 from vobench.asset import MODEL_SUFFIXES
 from vobench.errors import InputError, UnknownNameError, unknown_name_sentence
 from vobench.suite import catalog
-from vobench.suite.catalog import Entry
+from vobench.suite.catalog import CatalogEntry
 
 TEMPLATES = Path(__file__).parent / "templates"
 NAME_LINE = re.compile(r"^name\s*:\s*[^\s#]+", re.MULTILINE)
@@ -75,7 +75,7 @@ def new_scene(name: str, *, out: Path = Path("scenes"), source: str | None = Non
     return file
 
 
-def _suite_or_example(name: str) -> Entry:
+def _suite_or_example(name: str) -> CatalogEntry:
     """The example with this name, or else the suite. Raises UnknownNameError."""
     examples = {entry.name: entry for entry in catalog.examples()}
     if name in examples:

@@ -227,7 +227,7 @@ def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterato
 def _mover(mover: MoverSpec, spec: SceneFile) -> Contents:
     columns = zip(*((key.t_s, key.position_m, key.yaw_deg) for key in mover.path), strict=True)
     times_s, positions_m, yaw_deg = (np.array(column, float) for column in columns)
-    path = scripted.Path(times_s, positions_m, yaw_deg, mover.repeats)
+    path = scripted.WaypointMotion(times_s, positions_m, yaw_deg, mover.repeats)
     if mover.kind == "person":
         return _walker(mover.name, path, spec.seed)
     if mover.file:
@@ -243,7 +243,7 @@ def _mover(mover: MoverSpec, spec: SceneFile) -> Contents:
     return Contents(materials=own.materials, movers=(scripted.Mover(mover.name, moving, path),))
 
 
-def _walker(name: str, path: scripted.Path, seed: int) -> Contents:
+def _walker(name: str, path: scripted.WaypointMotion, seed: int) -> Contents:
     """Somebody who walks a path: a mover for each of their limbs, all of one name."""
     who = walker(Piece("person", name, (0.0, 0.0, 0.0)).rng(seed))
     made, materials = things([(f"{name}.{nth}", limb.parts) for nth, limb in enumerate(who.limbs)])
