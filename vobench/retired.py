@@ -15,6 +15,10 @@ ADVICE = "import from vobench.plugin what plugins may use (docs/estimators.md)"
 # Old module: name: the name that replaces it, in the same form. Cache keys read this table without importing it
 # (`runner/key.py`), so it must stay a literal.
 MOVED = {
+    "vobench.asset.picture": {
+        "Unpainted": "vobench.asset.picture.LazyTexture",
+        "some": "vobench.asset.picture.one_of",
+    },
     "vobench.geometry.rectify": {
         "Rectification": "vobench.plugin.Rectification",
         "rectification": "vobench.plugin.rectification",

@@ -768,3 +768,10 @@ def sign(text: str, colour: str = PAPER) -> Picture:
     draw.rectangle([8, 8, 471, 231], outline=ink, width=5)
     _text(draw, (240, 120), text, 90, ink, anchor="mm")
     return Picture(np.asarray(image))
+
+
+def __getattr__(name: str) -> object:
+    """A name that this module had in the last release."""
+    from vobench import retired
+
+    return retired.lookup(__name__, name)
