@@ -49,16 +49,18 @@ def cache_command(
 
 
 def _collect(store: Store, keep_gb: float | None, older_days: float | None) -> list[StoreEntry]:
-    """Remove entries; return those that were removed."""
+    """Remove the entries that exceed the limits; return those that were removed."""
     keep_bytes = math.inf if keep_gb is None else keep_gb * GB
     older_s = math.inf if older_days is None else older_days * DAY_S
     return store.collect(keep_bytes=keep_bytes, older_s=older_s)
 
 
 def _list(store: Store, removed: Sequence[StoreEntry] | None, *, as_json: bool) -> None:
-    """Print the entries of each kind, and what was removed before, if anything was to be."""
-    kinds = [_facts(kind, list(entries)) for kind, entries in groupby(store.entries(), key=lambda entry: entry.kind)]
+    """Print the entries of each kind, and the entries that gc removed; `removed` is None without gc."""
+    entries_by_kind = groupby(store.entries(), key=lambda entry: entry.kind)
+    kinds = [_facts(kind, list(entries)) for kind, entries in entries_by_kind]
     removed_bytes = sum(entry.bytes for entry in removed or ())
+
     if as_json:
         content: dict[str, Any] = {"path": str(store.root)}
         if removed is not None:
@@ -66,6 +68,7 @@ def _list(store: Store, removed: Sequence[StoreEntry] | None, *, as_json: bool) 
         content["kinds"] = kinds
         terminal.print_json(content)
         return
+
     rows = [_cells(facts) for facts in kinds]
     terminal.console().print(terminal.table(str(store.root), HEADINGS, rows))
     if removed is not None:
@@ -73,18 +76,22 @@ def _list(store: Store, removed: Sequence[StoreEntry] | None, *, as_json: bool) 
 
 
 def _facts(kind: str, entries: Sequence[StoreEntry]) -> dict[str, Any]:
+    """Number, size and age of the entries of one kind."""
     now_s = time.time()
+    oldest_s = min(entry.made_s for entry in entries)
+    last_used_s = max(entry.used_s for entry in entries)
     return {
         "kind": kind,
         "count": len(entries),
         "damaged": sum(entry.is_damaged for entry in entries),
         "bytes": sum(entry.bytes for entry in entries),
-        "oldest_days": (now_s - min(entry.made_s for entry in entries)) / DAY_S,
-        "used_days": (now_s - max(entry.used_s for entry in entries)) / DAY_S,
+        "oldest_days": (now_s - oldest_s) / DAY_S,
+        "used_days": (now_s - last_used_s) / DAY_S,
     }
 
 
 def _cells(facts: dict[str, Any]) -> list[str]:
+    """A row of the table, in the order of HEADINGS."""
     counts = [str(facts[name]) for name in ("kind", "count", "damaged")]
     size = f"{facts['bytes'] / GB:.3g}"
     ages = [f"{facts[name]:.1f}" for name in ("oldest_days", "used_days")]
@@ -94,18 +101,19 @@ def _cells(facts: dict[str, Any]) -> list[str]:
 def _verify(store: Store, *, as_json: bool) -> None:
     """Hash every file of the complete entries; exit code 1 if one differs from its manifest."""
     entries = [entry for entry in store.entries() if entry.path.is_dir() and not entry.is_damaged]
-    wrong = list[dict[str, str]]()
+    faults = list[dict[str, str]]()
     for entry in entries:
         stop.check()
         fault = store.fault(entry.key, anew=True)
         if fault:
-            wrong.append({"path": str(entry.path), "wrong": fault})
+            faults.append({"path": str(entry.path), "wrong": fault})
 
     if as_json:
-        terminal.print_json({"path": str(store.root), "entries": len(entries), "wrong": wrong})
+        terminal.print_json({"path": str(store.root), "entries": len(entries), "wrong": faults})
     else:
-        for each in wrong:
-            print(f"{each['wrong']}: {each['path']}")
-        print(f"{len(entries) - len(wrong)} of {len(entries)} entries unchanged: {store.root}")
-    if wrong:
+        for fault_facts in faults:
+            print(f"{fault_facts['wrong']}: {fault_facts['path']}")
+        unchanged = len(entries) - len(faults)
+        print(f"{unchanged} of {len(entries)} entries unchanged: {store.root}")
+    if faults:
         raise typer.Exit(1)
