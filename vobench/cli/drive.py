@@ -48,7 +48,8 @@ def drive_command(
     del trust  # its callback has the effect
     plan = read_plan(suite)
     names = chosen_trajectories(plan, trajectory=trajectory)
-    _check_files(out, [path for path in (tum, csv) if path], names)
+    exports = [path for path in (tum, csv) if path]
+    _check_files(out, exports, names)
 
     driven = drive_plan(plan, trajectory=trajectory)
     if out:
