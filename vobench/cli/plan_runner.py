@@ -1,4 +1,4 @@
-"""Runs variants of a case or a twin as `vobench run` does."""
+"""Runs the plans of `vobench twin`, `explain` and `shrink` with the display of `vobench run`."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
