@@ -51,15 +51,18 @@ def _save_plot(file: Path, report: RealismReport) -> None:
 def _print(report: RealismReport) -> None:
     realism = report.found
     console = terminal.console()
+
     band_count = f"{realism.inside} of {len(realism.values)} statistics in their bands"
     title = f"{report.path}: {band_count}, measured on {realism.pictures} images"
     reference = "against" if report.against else "real ones"
     headings = ["statistic", "value", "unit", reference, "is", "changed by"]
-    console.print(terminal.table(title, headings, [_row(row) for row in report.rows()]))
+    rows = [_row(row) for row in report.rows()]
+    console.print(terminal.table(title, headings, rows))
     for line in _other_measurements(realism):
         console.print(line)
     for sentence in report.sentences():
         console.print(sentence)
+
     error = residual(realism.pair) if realism.pair else {}
     if error:
         entries = ", ".join(f"{name}: {value:g}" for name, value in error.items())
