@@ -1,4 +1,4 @@
-"""Shows a run of many tasks on standard error, and logs its events to a file."""
+"""Display of a run on standard error: progress bars, finished tasks and failures; and a log of its events."""
 
 import json as json_module
 import time
@@ -19,9 +19,9 @@ BAR_WIDTH = 24
 class TerminalDisplay:
     """Shows a run on standard error, and logs its events to the file `events`, if any.
 
-    On a terminal there is one bar with the share that is done and the time left, and a line for each running task.
-    Elsewhere, or with `is_verbose`, there is a line for each finished task. With `is_quiet` only failures are printed.
-    A serial run has no bars here, since its tasks draw bars of their own.
+    On a terminal, one bar shows the completed share and the remaining time, and each running task has a line below it.
+    Elsewhere, or with `is_verbose`, each finished task is printed as a line. With `is_quiet`, only failures are
+    printed. A serial run has no bars here, because its tasks draw their own.
     """
 
     def __init__(
@@ -32,8 +32,10 @@ class TerminalDisplay:
 
         console = Console(stderr=True, markup=False)
         self._draws_bars = console.is_terminal and not is_serial and not is_quiet
-        self._prints_finished = is_verbose or not (self._draws_bars or is_serial or is_quiet)
+        shows_progress = self._draws_bars or is_serial  # by a bar, here or in the task
+        self._prints_finished = is_verbose or not (shows_progress or is_quiet)
         self._log = None if events is None else events.open("w", encoding="utf-8")
+
         columns = (
             TextColumn("{task.description}"),
             BarColumn(bar_width=BAR_WIDTH),
@@ -54,20 +56,24 @@ class TerminalDisplay:
             self._overall_bar = self._bars.add_task("all", total=1.0, status=self._progress.describe(0.0))
 
     def hear(self, event: "TaskEvent") -> None:
-        """Show and log one event."""
+        """Log and show one event."""
         if self._log:
-            print(json_module.dumps(_logged(event), ensure_ascii=False), file=self._log, flush=True)
+            line = json_module.dumps(_logged(event), ensure_ascii=False)
+            print(line, file=self._log, flush=True)
         if event.what == "told":
             self.say(event.told)
             return
+
         self._progress.count(event)
         self._update_overall_bar()
         if event.what == "started":
             self._add_bar(event)
-            return
-        if event.what in ("done", "failed"):
+        elif event.what == "done":
             self._remove_bar(event)
-        self._print_result(event)
+            self._print_finished(event)
+        elif event.what == "failed":
+            self._remove_bar(event)
+            self._print(f"{_task_name(event)}: failed: {event.reason}")
 
     def _update_overall_bar(self) -> None:
         if self._overall_bar is None:
@@ -84,16 +90,15 @@ class TerminalDisplay:
         if bar is not None:
             self._bars.remove_task(bar)
 
-    def _print_result(self, event: "TaskEvent") -> None:
-        if event.what == "failed":
-            self._print(f"{_task_name(event)}: failed: {event.reason}")
-        elif event.what == "done" and self._prints_finished:
-            planned = self._progress.planned
-            position = f"[{self._progress.finished}/{planned}] " if planned else ""
-            self._print(f"{position}{_task_name(event)}: {event.wall_s:.1f} s")
+    def _print_finished(self, event: "TaskEvent") -> None:
+        if not self._prints_finished:
+            return
+        planned = self._progress.planned
+        counter = f"[{self._progress.finished}/{planned}] " if planned else ""
+        self._print(f"{counter}{_task_name(event)}: {event.wall_s:.1f} s")
 
     def say(self, sentence: str) -> None:
-        """Print a line of its own above the bars."""
+        """Print a sentence as one line above the bars."""
         self._print(f"vobench: {sentence}")
 
     def _print(self, line: str) -> None:
@@ -114,7 +119,7 @@ def _task_name(event: "TaskEvent") -> str:
 
 
 def _logged(event: "TaskEvent") -> dict[str, Any]:
-    """An event as a line of the log."""
+    """An event as an object of the log, which has one in each line."""
     return {
         "t_s": round(time.time(), 3),
         "event": event.what,
