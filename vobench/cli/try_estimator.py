@@ -30,10 +30,20 @@ def try_command(
     for clause in contract(folder):
         clauses.append(clause)
         if not json:
-            verdict = clause.verdict.upper() if clause.verdict is Verdict.BROKEN else clause.verdict
-            print(f"{verdict:{VERDICT_WIDTH}} {clause.name}: {clause.seen}", flush=True)
+            _print_clause(clause)
+
     is_fulfilled = all(clause.verdict is not Verdict.BROKEN for clause in clauses)
     if json:
         rows = [asdict(clause) for clause in clauses]
         terminal.print_json({"path": str(folder), "kept": is_fulfilled, "clauses": rows})
     raise SystemExit(0 if is_fulfilled else 1)
+
+
+def _print_clause(clause: "Clause") -> None:
+    """Print the result of one check as soon as it is known; a broken clause is in capital letters."""
+    from vobench.report.contract import Verdict
+
+    verdict = clause.verdict.value
+    if clause.verdict is Verdict.BROKEN:
+        verdict = verdict.upper()
+    print(f"{verdict:{VERDICT_WIDTH}} {clause.name}: {clause.seen}", flush=True)
