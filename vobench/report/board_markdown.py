@@ -9,7 +9,7 @@ from vobench.report.markdown_table import escaped, markdown_table
 
 
 def markdown(board: Board, metric: str = DEFAULT_METRIC) -> str:
-    """The matrix of a metric, the totals, and sentences on both."""
+    """The matrix of a metric, the totals of each calibration group, and remarks, as Markdown."""
     rows = [_escaped_row(["case", *board.estimators])]
     for case, cells in matrix(board, metric):
         rows.append(_escaped_row([case, *map(str, cells)]))
