@@ -56,11 +56,13 @@ def _ate_percent(trial: TrialScore) -> float | None:
 
 
 def lost_aware(trial: TrialScore) -> float | None:
-    """The lost-aware score of a trial, below 1/2 if it failed; None if the ground truth does not move."""
+    """The lost-aware score of a trial, below 1/2 if it failed; None if the ground truth is stationary."""
     if trial.drift_m is not None:
         return None
+
     survived = trial.status in SURVIVED
-    failure = (trial.score or {}).get("failure") or {}
+    trial_score = trial.score or {}
+    failure = trial_score.get("failure") or {}
     score = failure.get("lost_aware")
     if score is None:
         score = _lost_aware_from_ate(trial, survived=survived)
@@ -68,7 +70,7 @@ def lost_aware(trial: TrialScore) -> float | None:
 
 
 def _lost_aware_from_ate(trial: TrialScore, *, survived: bool) -> float | None:
-    """The lost-aware score of a trial whose RMSE of position alone is known."""
+    """The lost-aware score of a trial of whose errors only the position RMSE is known."""
     ate_m = trial.value("ate_trans", "rmse")
     if ate_m is None:
         return None
