@@ -1,4 +1,4 @@
-"""A board as people read it: the matrix of a metric, the totals, and sentences, each as plain text."""
+"""The tables of a board as plain text: the matrix of a metric, the totals, and remarks on both."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -15,6 +15,9 @@ NO_VALUE = "–"
 DEFAULT_METRIC = "ate"
 SIGNIFICANT_DIGITS = 3
 MOST_DECIMALS = 5
+LEAST_SCORE_DECIMALS = 3
+MOST_SCORE_DECIMALS = 7
+LEAST_MAGNITUDE = 1e-9  # smaller numbers are printed like this one, as log10(0) does not exist
 LEGEND = (
     "* best of its case; ~ not decided against the best, which takes at least four trials per cell. With several "
     "trials: median and range. ATE: RMSE of position after SE(3) alignment, or Sim(3) alignment where marked. Totals "
@@ -26,7 +29,11 @@ LEGEND = (
 
 @dataclass(frozen=True, slots=True)
 class ShownCell:
-    """A cell as people read it: its number or how it failed, the range of its trials, and its mark."""
+    """The text of a cell.
+
+    text: the median of its trials, or the status if all of them failed. range: lowest and highest value, and how many
+    trials failed. mark: `*` or `~`, see LEGEND.
+    """
 
     text: str
     range: str = ""
@@ -39,7 +46,7 @@ class ShownCell:
 
 
 def matrix(board: Board, metric: str) -> list[tuple[str, list[ShownCell]]]:
-    """Each case with its cells, one per estimator, the best estimator first."""
+    """Each case with its cells, one per estimator; the best estimator comes first."""
     marked = marks(board, metric)
     rows = []
     for case in board.cases:
@@ -54,20 +61,23 @@ def matrix(board: Board, metric: str) -> list[tuple[str, list[ShownCell]]]:
 
 def _shown(cell: Cell, metric: str, mark: str) -> ShownCell:
     failures = f"{cell.failed}/{cell.trials} {cell.status}"
-    if cell.failed == cell.trials and metric not in COSTS:
-        return ShownCell(cell.status if cell.trials == 1 else failures, failed=True)
+    all_failed = cell.failed == cell.trials
+    if all_failed and metric not in COSTS:
+        text = cell.status if cell.trials == 1 else failures
+        return ShownCell(text, failed=True)
+
     spread = cell.spread(metric)
     if spread is None:
         return ShownCell(NO_VALUE)
 
-    write = _score_text if METRICS[metric].higher_is_better else number
-    median, lowest, highest = (write(value) for value in spread)
-    spread_parts = []
+    format_value = _score_text if METRICS[metric].higher_is_better else number
+    median, lowest, highest = (format_value(value) for value in spread)
+    remarks_in_brackets = []
     if lowest != highest:
-        spread_parts.append(f"{lowest}–{highest}")
+        remarks_in_brackets.append(f"{lowest}–{highest}")
     if cell.failed:
-        spread_parts.append(failures)
-    return ShownCell(median, ", ".join(spread_parts), mark, failed=cell.failed > 0)
+        remarks_in_brackets.append(failures)
+    return ShownCell(median, ", ".join(remarks_in_brackets), mark, failed=cell.failed > 0)
 
 
 def _score_text(value: float) -> str:
@@ -80,27 +90,31 @@ def number(value: float | None) -> str:
         return NO_VALUE
     if value == 0:
         return "0"
-    exponent = floor(log10(max(abs(value), 1e-9)))
-    decimals = min(max(SIGNIFICANT_DIGITS - 1 - exponent, 0), MOST_DECIMALS)
+    decimals = min(max(SIGNIFICANT_DIGITS - 1 - _exponent(value), 0), MOST_DECIMALS)
     return f"{value:.{decimals}f}"
 
 
 def named(estimator: str, claims: Sequence[str]) -> str:
-    """The name of an estimator with what its manifest claims."""
+    """The name of an estimator, with the claims of its manifest in brackets."""
     return f"{estimator} [{', '.join(claims)}]" if claims else estimator
 
 
 def place(total: Total) -> str:
-    """The rank of an estimator, with its interval where that is wider than one rank."""
+    """The rank of an estimator, with its interval if that is wider than one rank."""
     low, high = total.places
     return f"{total.place}" if low == high else f"{total.place} ({low}–{high})"
 
 
 def total_score(total: Total) -> str:
     """The score of an estimator, with as many decimals as its loss needs for two digits."""
-    exponent = floor(log10(max(1 - total.score, 1e-9)))
-    decimals = min(max(1 - exponent, 3), 7)
+    loss = 1 - total.score
+    decimals = min(max(1 - _exponent(loss), LEAST_SCORE_DECIMALS), MOST_SCORE_DECIMALS)
     return f"{total.score:.{decimals}f}"
+
+
+def _exponent(value: float) -> int:
+    """The decimal exponent of a number's magnitude, -2 of 0.05."""
+    return floor(log10(max(abs(value), LEAST_MAGNITUDE)))
 
 
 def _name(total: Total) -> str:
@@ -160,7 +174,7 @@ HEADINGS = tuple(COLUMNS)
 
 
 def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
-    """Each calibration group as text, with the headings and cells of its totals.
+    """The title of each calibration group, with a row of headings and the rows of its estimators.
 
     The columns of costs are left out if no cost is known.
     """
@@ -186,17 +200,18 @@ def _counted(count: int, noun: str) -> str:
 
 
 def remarks(board: Board) -> list[str]:
-    """Sentences on the totals: what they cover, what would decide an undecided order, and breakdowns."""
+    """Sentences on the totals: what they cover, how undecided orders could be decided, and breakdowns."""
     sentences = list(board.remarks)
     for above, total in zip(board.totals, board.totals[1:], strict=False):
+        is_same_group = above.group == total.group
         has_several_trials = total.trials > 1
-        if above.group == total.group and has_several_trials and not total.decided_above:
+        if is_same_group and has_several_trials and not total.decided_above:
             sentences.append(_undecided(above, total))
     return sentences + [curve.sentence for curve in board.curves]
 
 
 def _undecided(above: Total, total: Total) -> str:
-    """What would decide the order of two neighbours."""
+    """How many more trials would decide the order of two neighbours."""
     order = f"The order of {above.estimator} and {total.estimator} is not decided (p = {total.p_above or 1:.2g})"
     if total.repeats:
         return f"{order}; {total.repeats} repeats of each case would detect a difference of 10 %"
@@ -204,13 +219,14 @@ def _undecided(above: Total, total: Total) -> str:
 
 
 def cell_notes(board: Board) -> list[str]:
-    """The notes on all cells, each once; with its first case in front if the board has several cases."""
+    """The notes on all cells without duplicates; each names its first case if the board has several cases."""
     cases_of = dict[str, list[str]]()
     for cell in board.cells:
         for note in notes(cell):
             cases_of.setdefault(note, []).append(cell.case)
     if len(board.cases) == 1:
         return list(cases_of)
+
     sentences = []
     for note, cases in cases_of.items():
         others = f" and {len(cases) - 1} more" if len(cases) > 1 else ""
@@ -219,6 +235,6 @@ def cell_notes(board: Board) -> list[str]:
 
 
 def origin(board: Board) -> str:
-    """Processor, driver and versions that the numbers come from, in one line; empty if they are not known."""
+    """The processor, driver and versions of the run in one line; empty if they are unknown."""
     line = board.environment.line() if board.environment else ""
     return f"Made on {line}" if line else ""
