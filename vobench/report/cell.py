@@ -16,7 +16,7 @@ ONLY_ITS_OWN = "only its own files"
 
 @dataclass(frozen=True, slots=True)
 class CaseFacts:
-    """What the file of a case states: calibration group, scenario with its severity, and the ground truth's noise."""
+    """Facts from the file of a case: calibration group, scenario, its severity, and noise of the ground truth."""
 
     group: str = ""
     scenario: str = ""
@@ -28,9 +28,13 @@ class CaseFacts:
 class Cell:
     """All trials of one estimator on one case.
 
-    `values` holds each metric of every trial: infinite if the trial failed, None if it has no such value. `status` and
-    `reason` are those of the gravest trial. `consistency`, `revised_…` and `scale_drift_…` are of the trials that
-    survived. `saw` states what the estimator could access.
+    failures: whether each trial failed.
+    status, reason, claims: of the trial with the most severe status.
+    values: each metric by name, with a value per trial: infinite if the trial failed, None if it has no such value.
+    losses: 1 minus the lost-aware score of each trial; NaN if it has none.
+    answered: statistics of the frames of all trials.
+    consistency, scale_gap, revised_…, scale_drift_…: from the trials that did not fail.
+    saw: which files the estimator could access.
     """
 
     case: str
@@ -74,21 +78,21 @@ def make_cell(trials: Sequence[TrialScore], answered: EstimatorStatistics, facts
     """The cell of the trials of one estimator on one case."""
     survivors = [trial for trial in trials if trial.status in SURVIVED]
     moving = [trial for trial in survivors if trial.drift_m is None]
-    gravest = max(trials, key=lambda trial: STATUSES.index(trial.status))
+    most_severe = max(trials, key=lambda trial: STATUSES.index(trial.status))
     drifts_mm = [MM_PER_M * trial.drift_m for trial in trials if trial.drift_m is not None]
     saw = {seen_by(trial) or ONLY_ITS_OWN for trial in trials}
     consistency = _median_consistency(survivors)
     return Cell(
-        case=gravest.case,
-        estimator=gravest.estimator,
+        case=most_severe.case,
+        estimator=most_severe.estimator,
         facts=facts,
         failures=tuple(trial.status not in SURVIVED for trial in trials),
-        status=gravest.status,
-        reason=gravest.reason,
+        status=most_severe.status,
+        reason=most_severe.reason,
         values=_values(trials, answered),
         losses=tuple(_loss(trial) for trial in trials),
         answered=answered,
-        claims=gravest.claims,
+        claims=most_severe.claims,
         drift_mm=max(drifts_mm, default=None),
         scale_gap=consistency.scale_gap if consistency else None,
         consistency=consistency.sentence if consistency else "",
@@ -112,24 +116,31 @@ def _values(trials: Sequence[TrialScore], answered: EstimatorStatistics) -> dict
 def _loss(trial: TrialScore) -> float:
     """The loss of a trial, 1 minus its lost-aware score; NaN if it has none."""
     score = lost_aware(trial)
-    return nan if score is None else max(1.0 - score, ranking.MIN_LOSS)
+    if score is None:
+        return nan
+    return max(1.0 - score, ranking.MIN_LOSS)
 
 
 def _median_consistency(trials: Sequence[TrialScore]) -> CovarianceConsistency | None:
-    """The consistency of the covariances of the median trial, as the errors of one path are correlated."""
+    """The covariance consistency of the trial with the median scale gap.
+
+    Trials are not pooled: errors along one path are correlated.
+    """
     known = [trial.consistency for trial in trials if trial.consistency]
     if not known:
         return None
-    return sorted(known, key=lambda consistency: consistency.scale_gap)[len(known) // 2]
+    by_gap = sorted(known, key=lambda consistency: consistency.scale_gap)
+    return by_gap[len(by_gap) // 2]
 
 
 def _mean(
     trials: Sequence[TrialScore], metric: str, statistic: str, scale: float, *, is_revised: bool = False
 ) -> float | None:
-    """The mean of a statistic over trials, times `scale`; of the revised estimates if asked for."""
+    """The mean of a statistic over the trials that have it, times `scale`; None if no trial has it."""
     values = []
     for trial in trials:
-        value = value_of(trial.revised if is_revised else trial.score, metric, statistic)
+        score = trial.revised if is_revised else trial.score
+        value = value_of(score, metric, statistic)
         if value is not None:
             values.append(value)
     return scale * fmean(values) if values else None
