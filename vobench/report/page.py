@@ -25,13 +25,13 @@ from vobench.runner.frames import TIMES, FrameRow, new_table, read_frames
 TEMPLATES = Path(__file__).parent / "templates"
 STEM = "leaderboard"
 COST_COLUMNS = ("case", "estimator", "wall_ms", "cpu_ms", "memory_mib")
-MOST_RIGS = 4  # that the page shows the first picture of
+MOST_RIGS = 4  # of which the page shows a picture
 RIG_WIDTH_PX = 256
 
 
 @dataclass(frozen=True, slots=True)
 class CellFrames:
-    """What the frames of an estimator on a case amount to: its statistics, and its costs as text."""
+    """The frame statistics of an estimator on a case, and its mean costs per frame as text."""
 
     case: str
     estimator: str
@@ -40,7 +40,7 @@ class CellFrames:
 
 
 def run_board(folder: RunFolder, scores: list[TrialScore]) -> Board:
-    """The board of a run, with the cost of frames and the estimators' reasons."""
+    """The board of a run, with costs per frame and the reasons that estimators report."""
     return _board(folder, scores, _answered(_cell_frames(folder, scores)))
 
 
@@ -52,7 +52,7 @@ def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> B
 
 
 def _answered(frames: Iterator[CellFrames] | list[CellFrames]) -> Answered:
-    return {(each.case, each.estimator): each.statistics for each in frames}
+    return {(cell.case, cell.estimator): cell.statistics for cell in frames}
 
 
 def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
@@ -60,19 +60,26 @@ def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
 
     Costs and dates differ between equal runs, so the first three leave them out.
     """
-    frames = list(_cell_frames(folder, scores))
-    answered = _answered(frames)
-    without_costs = {key: replace(each, ms_per_frame=None, memory_mib=None) for key, each in answered.items()}
+    cells = list(_cell_frames(folder, scores))
+    answered = _answered(cells)
+    without_costs = {key: _costless(statistics) for key, statistics in answered.items()}
     repeatable = _undated(_board(folder, scores, without_costs))
     for suffix in ("md", "json", "csv"):
         stop.check()
         text = FORMATS[suffix](repeatable, board_table.DEFAULT_METRIC)
         (folder.path / f"{STEM}.{suffix}").write_text(text, encoding="utf-8")
+
     with new_table(folder.path / TIMES, COST_COLUMNS) as table:
-        for each in frames:
-            table.writerow({"case": each.case, "estimator": each.estimator, **each.costs})
+        for cell in cells:
+            table.writerow({"case": cell.case, "estimator": cell.estimator, **cell.costs})
+
     board = _board(folder, scores, answered)
-    (folder.path / PAGE).write_text(board_page(folder, scores, board, folder.path), encoding="utf-8")
+    page = board_page(folder, scores, board, folder.path)
+    (folder.path / PAGE).write_text(page, encoding="utf-8")
+
+
+def _costless(statistics: EstimatorStatistics) -> EstimatorStatistics:
+    return replace(statistics, ms_per_frame=None, memory_mib=None)
 
 
 def _undated(board: Board) -> Board:
@@ -82,7 +89,7 @@ def _undated(board: Board) -> Board:
 
 
 def _cell_frames(folder: RunFolder, scores: list[TrialScore]) -> Iterator[CellFrames]:
-    """The statistics and costs of each case and estimator, with the frames of one cell in memory at a time."""
+    """The statistics and costs of each case and estimator; only the frames of one cell are in memory."""
 
     def cell_key(trial: TrialScore) -> tuple[str, str]:
         return trial.case, trial.estimator
@@ -96,7 +103,7 @@ def _cell_frames(folder: RunFolder, scores: list[TrialScore]) -> Iterator[CellFr
 
 
 def _costs(rows: Sequence[FrameRow]) -> dict[str, str]:
-    """The mean times of a frame and the maximum memory; empty text for what is not known of any frame."""
+    """The mean times per frame and the maximum memory; empty text for a cost that no frame has."""
     wall_ms = [row.wall_ms for row in rows if row.wall_ms is not None]
     cpu_ms = [row.cpu_ms for row in rows if row.cpu_ms is not None]
     memory_mib = [row.memory_mib for row in rows if row.memory_mib is not None]
@@ -108,7 +115,7 @@ def _costs(rows: Sequence[FrameRow]) -> dict[str, str]:
 
 
 def board_page(folder: RunFolder, scores: list[TrialScore], board: Board, beside: Path) -> str:
-    """The page of a board, with links relative to the folder `beside`, where the page will be."""
+    """The page of a board; its links are relative to `beside`, the folder where the page will be."""
     from jinja2 import Environment as Templates
     from jinja2 import FileSystemLoader
 
@@ -116,10 +123,14 @@ def board_page(folder: RunFolder, scores: list[TrialScore], board: Board, beside
     matrices = {name: board_table.matrix(board, name) for name in board.metrics}
     if not matrices:
         matrices = {board_table.DEFAULT_METRIC: []}
-    first_metric = next(iter(matrices))
-    metric = board_table.DEFAULT_METRIC if board_table.DEFAULT_METRIC in matrices else first_metric
+    metric = board_table.DEFAULT_METRIC
+    if metric not in matrices:
+        metric = next(iter(matrices))
+
+    # The pictures of rigs come first: thumbnails stop at a limit of bytes for the whole page.
     thumbnails = Thumbnails(folder)
-    rigs = _rigs(folder, board, thumbnails)  # before the details, which share the budget of bytes
+    rigs = _rigs(folder, board, thumbnails)
+    data = page_data(folder, scores, board, matrices, thumbnails=thumbnails, beside=beside)
     return templates.get_template("leaderboard.html").render(
         title=board.title,
         header=_header(folder, scores),
@@ -133,27 +144,29 @@ def board_page(folder: RunFolder, scores: list[TrialScore], board: Board, beside
         totals=board_table.totals(board),
         remarks=board_table.remarks(board),
         legend=board_table.LEGEND,
-        data=_script_json(page_data(folder, scores, board, matrices, thumbnails=thumbnails, beside=beside)),
+        data=_script_json(data),
     )
 
 
 def _script_json(data: Any) -> str:
-    """JSON that may stand in a script: nothing in it ends the script or begins a comment."""
+    """JSON that is safe inside a script element: it cannot end the script or begin a comment."""
     text = json.dumps(data, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
     return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def _header(folder: RunFolder, scores: list[TrialScore]) -> dict[str, Any]:
-    """What was run, when and on which machine, as far as the files of the run state it."""
+    """What was run, when and on which machine; facts that the files of the run lack are left out."""
     suite = read_object(folder.path / SUITE)
     environment = read_environment(folder) or Environment()
     facts = {**_suite_facts(suite, scores), **_machine_facts(environment, scores)}
+    known_facts = {name: value for name, value in facts.items() if value not in (None, "")}
+
     libraries = dict(environment.libraries)
     if environment.python:
         libraries = {"Python": environment.python, **libraries}
     return {
         "summary": suite.get("summary", ""),
-        "facts": {name: value for name, value in facts.items() if value not in (None, "")},
+        "facts": known_facts,
         "libraries": libraries,
     }
 
@@ -169,7 +182,7 @@ def _suite_facts(suite: dict[str, Any], scores: list[TrialScore]) -> dict[str, A
 
 
 def _machine_facts(environment: Environment, scores: list[TrialScore]) -> dict[str, Any]:
-    """Date, versions and hardware; None for what is not known."""
+    """Date, versions and hardware; None for an unknown fact."""
     return {
         "date": environment.date,
         "vobench": environment.release if environment.vobench else None,
@@ -184,15 +197,17 @@ def _machine_facts(environment: Environment, scores: list[TrialScore]) -> dict[s
 
 
 def _rigs(folder: RunFolder, board: Board, thumbnails: Thumbnails) -> list[tuple[str, str]]:
-    """The first rigs of a board by name, with the first picture of the first case of each as a data URI."""
+    """The names of the first rigs of a board, each with the first picture of its first case as a data URI."""
     pictures = dict[str, str]()
     for case in board.cases:
         if len(pictures) == MOST_RIGS:
             break
-        variant = read_object(folder.case(case) / CASE).get("variant") or {}
+        description = read_object(folder.case(case) / CASE)
+        variant = description.get("variant") or {}
         rig = str(variant.get("rig", ""))
         if not rig or rig in pictures:
             continue
+
         picture = thumbnails.get(case, 0, RIG_WIDTH_PX)
         if picture:
             pictures[rig] = picture
