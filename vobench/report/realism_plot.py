@@ -20,26 +20,30 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73")  # Okabe and Ito (2008)
 BAND = "#c9e4d3"
 SIZE_INCHES = (11, 6.6)
 MOST_DOTS = 3000
-# The part of each statistic's scale that is shown, from the low end of its band (0) to the high end (1).
+# Limits of the axis that all statistics share: 0 is the low end of a statistic's band, 1 the high end.
 SCALE_LOW = -2.0
 SCALE_HIGH = 3.0
 RECORDING_SPACING = 0.28  # between recordings on the row of a statistic
 LINE_SAMPLES = 30
 LEAST_REACH_PX = 0.3
+FIT_QUANTILES = (0.005, 0.995)  # of the matches' positions, between which the fit is drawn
+MADS_SHOWN = 4  # median absolute deviations of the row errors, up and down
 
 
 def save_realism_plot(path: Path, recordings: Mapping[str, Realism]) -> None:
-    """Plot recordings by their names side by side, as SVG, PNG or PDF. Raises InputError for another ending."""
+    """Plot recordings, by name, in the same panels, as SVG, PNG or PDF. Raises InputError for another ending."""
     check_ending(path)
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
     with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=SIZE_INCHES, layout="constrained")
-        panels = figure.subplot_mosaic(
-            [["bands", "rows", "side"], ["bands", "spectrum", "gradient"], ["bands", "tracks", "grey"]],
-            width_ratios=[1.25, 1, 1],
-        )
+        layout = [
+            ["bands", "rows", "side"],
+            ["bands", "spectrum", "gradient"],
+            ["bands", "tracks", "grey"],
+        ]
+        panels = figure.subplot_mosaic(layout, width_ratios=[1.25, 1, 1])
         _bands(panels["bands"], recordings)
         _rows(panels["rows"], panels["side"], recordings)
         _curves(panels, recordings)
@@ -47,7 +51,7 @@ def save_realism_plot(path: Path, recordings: Mapping[str, Realism]) -> None:
 
 
 def _bands(axes: "Axes", recordings: Mapping[str, Realism]) -> None:
-    """Each statistic on a scale of its own, from the low end of its band (0) to the high end (1)."""
+    """Each statistic on a row of its own, scaled so that its band of real pictures lies between 0 and 1."""
     axes.axvspan(0, 1, color=BAND, lw=0)
     for index, (name, colour) in enumerate(zip(recordings, COLOURS, strict=False)):
         axes.plot([], [], "o", color=colour, ms=6, label=name)
@@ -56,27 +60,33 @@ def _bands(axes: "Axes", recordings: Mapping[str, Realism]) -> None:
             value = recordings[name].values.get(statistic.name)
             if value is not None:
                 _band_marker(axes, statistic, value, row + offset, colour)
-    labels = [f"{each.title}\n{each.low:g} … {each.high:g} {each.unit}".rstrip() for each in STATISTICS]
-    axes.set_yticks(range(len(STATISTICS)), labels)
+
+    axes.set_yticks(range(len(STATISTICS)), [_band_label(statistic) for statistic in STATISTICS])
     axes.set(ylim=(len(STATISTICS) - 0.4, -0.6), xlim=(SCALE_LOW - 0.3, SCALE_HIGH + 0.3))
     axes.set_title("statistics in the bands of real pictures")
     axes.set_xticks([0, 1], ["low end", "high end"])
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.09), ncols=len(recordings), frameon=False)
 
 
+def _band_label(statistic: Statistic) -> str:
+    band = f"{statistic.low:g} … {statistic.high:g} {statistic.unit}"
+    return f"{statistic.title}\n{band}".rstrip()
+
+
 def _band_marker(axes: "Axes", statistic: Statistic, value: float, y: float, colour: str) -> None:
-    """The marker of a value: a dot, or an arrow at the edge if the value is outside of the scale."""
-    place = (value - statistic.low) / (statistic.high - statistic.low)
-    shown = float(np.clip(place, SCALE_LOW, SCALE_HIGH))
+    """Draw a value as a dot, or as an arrow at the edge if the axis does not reach that far."""
+    x = (value - statistic.low) / (statistic.high - statistic.low)
+    x_shown = float(np.clip(x, SCALE_LOW, SCALE_HIGH))
     marker = "o"
-    if place < SCALE_LOW:
+    if x < SCALE_LOW:
         marker = "<"
-    elif place > SCALE_HIGH:
+    elif x > SCALE_HIGH:
         marker = ">"
-    axes.plot([shown], [y], marker, color=colour, ms=6)
+
+    axes.plot([x_shown], [y], marker, color=colour, ms=6)
     axes.annotate(
         f"{value:.2f}",
-        (shown, y),
+        (x_shown, y),
         xytext=(0, -13),
         textcoords="offset points",
         ha="center",
@@ -96,43 +106,55 @@ def _rows(across: "Axes", down: "Axes", recordings: Mapping[str, Realism]) -> No
 
 
 def _row_errors(axes: "Axes", pair: StereoFit, axis: int, colour: str) -> None:
-    """The row errors of a pair along one axis of the picture, and their fit through the picture's centre."""
+    """Plot the row errors of a pair along one axis of the picture, and the fit along its middle line."""
     matches = pair.matches
     count = len(matches.row_px)
-    dots = np.linspace(0, count - 1, min(MOST_DOTS, count)).astype(int)
-    axes.plot(matches.place[dots, axis], matches.row_px[dots], ".", color=colour, ms=1.5, alpha=0.3)
-    low, high = np.quantile(matches.place[:, axis], [0.005, 0.995]).tolist()
-    coordinates = np.linspace(low, high, LINE_SAMPLES)
-    places = np.zeros((LINE_SAMPLES, 2))
-    places[:, axis] = coordinates
-    axes.plot(coordinates, row_error(pair.coefficients, places), color=colour, lw=2)
+    sample = np.linspace(0, count - 1, min(MOST_DOTS, count)).astype(int)
+    axes.plot(matches.place[sample, axis], matches.row_px[sample], ".", color=colour, ms=1.5, alpha=0.3)
 
-    # The range of both recordings, not only of this one.
+    low, high = np.quantile(matches.place[:, axis], FIT_QUANTILES).tolist()
+    coordinates = np.linspace(low, high, LINE_SAMPLES)
+    fit_places = np.zeros((LINE_SAMPLES, 2))
+    fit_places[:, axis] = coordinates
+    fitted_px = row_error(pair.coefficients, fit_places)
+    axes.plot(coordinates, fitted_px, color=colour, lw=2)
+
+    # The y axis covers all recordings that are plotted so far.
     is_first = len(axes.lines) == 2
     earlier_reach = 0.0 if is_first else float(axes.get_ylim()[1])
-    reach = max(4 * pair.row_mad_px, LEAST_REACH_PX, earlier_reach)
+    reach = max(MADS_SHOWN * pair.row_mad_px, LEAST_REACH_PX, earlier_reach)
     axes.set_ylim(-reach, reach)
 
 
 def _curves(panels: "Mapping[str, Axes]", recordings: Mapping[str, Realism]) -> None:
+    """Plot the spectra, gradients, track survival and grey values of all recordings."""
     for realism, colour in zip(recordings.values(), COLOURS, strict=False):
         _spectrum(panels["spectrum"], realism.curves["power"], colour)
-        gradient = realism.curves["gradient"]
-        panels["gradient"].semilogy(gradient / gradient.sum(), color=colour, lw=1.2, drawstyle="steps-mid")
-        panels["tracks"].plot(100 * realism.curves["alive"], "o-", color=colour, ms=3, lw=1.2)
+        _gradients(panels["gradient"], realism.curves["gradient"], colour)
+        _track_survival(panels["tracks"], realism.curves["alive"], colour)
         _grey_values(panels["grey"], realism.curves["grey"], colour)
+
     for cycles in CYCLES:
         panels["spectrum"].axvline(cycles, color="black", lw=0.6, ls=":")
+    panels["grey"].axvline(SATURATED_DN, color="black", lw=0.6, ls=":")
+
     panels["spectrum"].set(title="power spectrum, slope between the dotted lines", xlabel="cycles in 256 px")
     panels["gradient"].set(title="gradients", xlabel="DN per pixel", ylabel="share of pixels")
     panels["tracks"].set(title="tracks alive", xlabel="pictures later", ylabel="%", ylim=(0, 103))
-    panels["grey"].axvline(SATURATED_DN, color="black", lw=0.6, ls=":")
     panels["grey"].set(title="grey values", xlabel="DN", ylabel="% of pixels")
 
 
 def _spectrum(axes: "Axes", log_power: Array, colour: str) -> None:
     cycles = np.arange(1, len(log_power))
     axes.loglog(cycles, 10 ** log_power[1:], color=colour, lw=1.2)
+
+
+def _gradients(axes: "Axes", counts: Array, colour: str) -> None:
+    axes.semilogy(counts / counts.sum(), color=colour, lw=1.2, drawstyle="steps-mid")
+
+
+def _track_survival(axes: "Axes", surviving: Array, colour: str) -> None:
+    axes.plot(100 * surviving, "o-", color=colour, ms=3, lw=1.2)
 
 
 def _grey_values(axes: "Axes", counts: Array, colour: str) -> None:
