@@ -21,7 +21,7 @@ class Thumbnails:
         self._open_sequence: Any = None
 
     def get(self, case: str, frame: int, width_px: int) -> str | None:
-        """A frame of a case as a data URI, None if there is no such frame or no space left."""
+        """A frame of a case as a data URI; None if there is no such frame or the limit is reached."""
         key = case, frame, width_px
         if key not in self._uris and self._bytes < MOST_BYTES:
             try:
