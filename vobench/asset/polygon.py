@@ -3,31 +3,33 @@
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry.se3 import Array
 
 
 def oriented(ring_m: ArrayLike, *, counter_clockwise: bool) -> Array:
-    """A closed polygon (N, 2) in the given orientation, reversed where it has the other one."""
+    """A closed polygon (N, 2) in the given orientation; its corners are reversed if they run the other way."""
     ring = np.asarray(ring_m, float)
     is_counter_clockwise = _signed_area(ring) > 0
     return ring if is_counter_clockwise == counter_clockwise else ring[::-1]
 
 
 def triangulated(rings: Sequence[Array]) -> Array:
-    """Triangles (F, 3, 2) of a counter-clockwise polygon, less holes that are clockwise, by ear clipping."""
+    """Triangles (F, 3, 2) of a polygon with holes, by ear clipping.
+
+    rings: the counter-clockwise outline first, then the clockwise holes.
+    """
     outline = _bridged(rings)
-    corners = list(range(len(outline)))
+    remaining = list(range(len(outline)))  # corners of the outline that are not yet cut off
     ears = []
+    while len(remaining) > 3:
+        tip = _first_ear(outline, remaining)
+        ears.append(_neighbours(remaining, tip))
+        del remaining[tip]
 
-    while len(corners) > 3:
-        convex = (k for k in range(len(corners)) if _is_ear(outline, corners, k))
-        tip = next(convex, 0)
-        ears.append(_neighbours(corners, tip))
-        del corners[tip]
-
-    triangles = outline[np.array([*ears, corners])]
+    # Ears along a bridge can be flat; they are left out.
+    triangles = outline[np.array([*ears, remaining])]
     a = triangles[:, 0]
     b = triangles[:, 1]
     c = triangles[:, 2]
@@ -35,21 +37,34 @@ def triangulated(rings: Sequence[Array]) -> Array:
     return np.asarray(triangles[has_area])
 
 
+def _first_ear(outline: Array, remaining: list[int]) -> int:
+    """The place in `remaining` of the first corner that is an ear; 0 if rounding leaves none."""
+    for k in range(len(remaining)):
+        if _is_ear(outline, remaining, k):
+            return k
+    return 0
+
+
 def _bridged(rings: Sequence[Array]) -> Array:
-    """One outline (N, 2) that visits every hole along a bridge and comes back along it, rightmost holes first."""
+    """One outline (N, 2) without holes: a bridge joins each hole to it, and is passed in both directions.
+
+    The rightmost holes come first. A bridge ends at the nearest corner that is visible from its hole.
+    """
     outline = rings[0]
     holes = sorted(rings[1:], key=lambda ring: -float(ring[:, 0].max()))
 
     for hole in holes:
         start = int(hole[:, 0].argmax())
         distance_m = np.linalg.norm(outline - hole[start], axis=1)
-        edges = np.concatenate([_edges(ring) for ring in (outline, *rings[1:])])
         nearest_first = np.argsort(distance_m, kind="stable")
+        edges = np.concatenate([_edges(ring) for ring in (outline, *rings[1:])])
         visible = (int(k) for k in nearest_first if not _crosses(outline[k], hole[start], edges))
-        bridge = next(visible)
+        bridge_end = next(visible)
 
-        round_trip = np.roll(hole, -start, axis=0)
-        outline = np.concatenate([outline[: bridge + 1], round_trip, hole[[start]], outline[bridge:]])
+        before = outline[: bridge_end + 1]
+        around_hole = np.roll(hole, -start, axis=0)
+        after = outline[bridge_end:]
+        outline = np.concatenate([before, around_hole, hole[[start]], after])
     return outline
 
 
@@ -59,41 +74,52 @@ def _edges(ring: Array) -> Array:
 
 
 def _signed_area(ring: Array) -> float:
-    """The area of a polygon, negative where it is clockwise (shoelace formula)."""
+    """The area of a polygon by the shoelace formula, negative if it is clockwise."""
     following = np.roll(ring, -1, axis=0)
     return float(np.sum(_cross(ring, following))) / 2
 
 
 def _cross(a: Array, b: Array) -> Array:
     """The z component (...) of the cross product of vectors (..., 2)."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+    xy = a[..., 0] * b[..., 1]
+    yx = a[..., 1] * b[..., 0]
+    return np.asarray(xy - yx)
 
 
 def _crosses(a: Array, b: Array, edges: Array) -> bool:
-    """Whether the segment from a to b properly crosses one of some edges (E, 2, 2)."""
+    """Whether the segment from a to b properly crosses any of the edges (E, 2, 2)."""
     p = edges[:, 0]
     q = edges[:, 1]
-    separates_edge = _cross(b - a, p - a) * _cross(b - a, q - a) < 0
-    separates_segment = _cross(q - p, a - p) * _cross(q - p, b - p) < 0
-    return bool(np.any(separates_edge & separates_segment))
+    segment = b - a
+    edge = q - p
+    edge_is_cut = _cross(segment, p - a) * _cross(segment, q - a) < 0
+    segment_is_cut = _cross(edge, a - p) * _cross(edge, b - p) < 0
+    return bool(np.any(edge_is_cut & segment_is_cut))
 
 
 def _neighbours(corners: list[int], k: int) -> list[int]:
-    """The corner before the kth one, that one and the one after it."""
-    return [corners[k - 1], corners[k], corners[(k + 1) % len(corners)]]
+    """The kth corner between the one before it and the one after it."""
+    following = (k + 1) % len(corners)
+    return [corners[k - 1], corners[k], corners[following]]
 
 
 def _is_ear(outline: Array, corners: list[int], k: int) -> bool:
-    """Whether the triangle at the kth corner is convex and has no other corner in it."""
+    """Whether the triangle at the kth corner is convex and contains no other corner."""
     triangle = outline[_neighbours(corners, k)]
-    if _cross(triangle[1] - triangle[0], triangle[2] - triangle[0]) <= 0:
+    before, tip, after = triangle
+    is_convex = _cross(tip - before, after - before) > 0
+    if not is_convex:
         return False
 
-    others = outline[corners]
-    differs = (others[:, None] != triangle).any(axis=2)
-    others = others[differs.all(axis=1)]
+    # A bridge passes through its ends twice, so that other corners may coincide with those of the triangle.
+    points = outline[corners]
+    differs = (points[:, None] != triangle).any(axis=2)
+    others = points[differs.all(axis=1)]
 
-    # Corners are inside where they are to the left of all three sides.
-    left_of_side = [_cross(triangle[i - 2] - triangle[i], others - triangle[i]) >= 0 for i in range(3)]
-    is_inside = np.all(left_of_side, axis=0)
+    is_inside = _is_left(others, before, tip) & _is_left(others, tip, after) & _is_left(others, after, before)
     return not is_inside.any()
+
+
+def _is_left(points: Array, start: Array, end: Array) -> NDArray[np.bool_]:
+    """Whether each point (N, 2) is to the left of a directed line, or on it."""
+    return _cross(end - start, points - start) >= 0
