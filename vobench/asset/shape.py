@@ -26,14 +26,22 @@ from vobench.scene.mesh import (
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-SMOOTH_DEG = 40.0  # a profile that bends by less is shaded as round there
-LEAST_AREA_M2 = 1e-12  # twice the area below which a face of a grid is left out
+SMOOTH_DEG = 40.0  # a corner of a profile that turns by less is shaded as round
+LEAST_AREA_M2 = 1e-12  # faces of a grid are left out if twice their area is smaller
 WHOLE_PICTURE: Hole = (0.0, 1.0, 0.0, 1.0)
-LARGEST_BEVEL = 0.45  # of half the shortest side of a block
+LARGEST_BEVEL = 0.45  # as a share of half the shortest side of a block
+BEVEL_OF_CUBE = 0.1  # of the unit bevelled cube; its normals and uv axes do not depend on it
+LEVEL_COSINE = 0.9  # faces of a lathe whose normals are closer to z have the texture of a disc
 
 
 def at(
-    x_m: float = 0.0, y_m: float = 0.0, z_m: float = 0.0, *, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0
+    x_m: float = 0.0,
+    y_m: float = 0.0,
+    z_m: float = 0.0,
+    *,
+    yaw: float = 0.0,
+    pitch: float = 0.0,
+    roll: float = 0.0,
 ) -> Array:
     """The pose (4, 4) at a position, rotated by Rz(yaw) Ry(pitch) Rx(roll) in degrees."""
     angles_rad = np.deg2rad([yaw, pitch, roll])
@@ -54,7 +62,7 @@ def block(
 ) -> "Trimesh":
     """A box around the origin with bevelled edges, shaded as round; u runs along the longer side of each face.
 
-    uv_m: where its texture begins; transform: the pose (4, 4) that it is moved to, if any.
+    uv_m: the texture coordinates at its centre. transform: the pose (4, 4) of the box; the identity by default.
     """
     arrays = block_arrays(size_m, bevel_m=bevel_m, uv_m=uv_m)
     return arrays.mesh() if transform is None else arrays.moved(transform).mesh()
@@ -72,7 +80,10 @@ def block_arrays(size_m: ArrayLike, *, bevel_m: float = 0.003, uv_m: ArrayLike =
         vertices_m = cube.signs * half_m
 
     corners_m = vertices_m[cube.faces]
-    normals = cube.normals if half_m.all() else _flat_normals(corners_m)  # those of a plate's rim are 0
+    has_thickness = half_m.all()
+    # The rim of a plate without thickness has no area, so that its normals are 0.
+    normals = cube.normals if has_thickness else _flat_normals(corners_m)
+
     longest_first = tuple(np.argsort(-half_m, kind="stable").tolist())
     uv = corners_m[cube.uv_index(longest_first)] + np.asarray(uv_m, float)
     return MeshArrays(
@@ -84,40 +95,50 @@ def block_arrays(size_m: ArrayLike, *, bevel_m: float = 0.003, uv_m: ArrayLike =
 
 
 def _flat_normals(corners_m: Array) -> Array:
-    """The normal of each face at its three corners (F, 3, 3)."""
+    """The normal of each face, repeated for its three corners (F, 3, 3)."""
     return np.repeat(face_normals(corners_m)[:, None], 3, axis=1)
 
 
 def _uv_axes(corners_m: Array, order: Sequence[int]) -> NDArray[np.int64]:
-    """The two axes (F, 2) along which the texture of each face (F, 3, 3) runs.
+    """The axes (F, 2) of u and v of each face (F, 3, 3), for a texture that is projected along x, y or z.
 
-    They are those of the axis that the face faces most; u is along the first in `order` that is not this one.
+    The axis of projection is the one closest to the normal of the face. u and v run along the other two, in `order`.
     """
-    prefers_x = np.array([2e-6, 1e-6, 0])  # so that faces at 45° have one axis on every machine
-    facing = np.argmax(np.abs(face_normals(corners_m)) + prefers_x, axis=1)
-    axes_across = np.array([_others(order, normal) for normal in range(3)])
-    return np.asarray(axes_across[facing])
+    prefers_x = np.array([2e-6, 1e-6, 0])  # so that faces at 45° have the same axis on every machine
+    alignment = np.abs(face_normals(corners_m)) + prefers_x
+    projection_axis = np.argmax(alignment, axis=1)
+    uv_axes = np.array([_without(order, axis) for axis in range(3)])
+    return np.asarray(uv_axes[projection_axis])
 
 
-def _others(order: Sequence[int], normal: int) -> list[int]:
-    """The axes in `order` but one."""
-    return [axis for axis in order if axis != normal]
+def _without(axes: Sequence[int], excluded: int) -> list[int]:
+    """All axes but the excluded one, in the same order."""
+    return [axis for axis in axes if axis != excluded]
 
 
 class _Cube:
-    """The faces of a cube around the origin, whose size does not matter to its normals and directions."""
+    """A cube around the origin, from which the vertices, normals and texture axes of a block of any size follow."""
 
     def __init__(self, signs: Array, faces: Faces, sides: Array) -> None:
-        """Signs (V, 3) of its corners, faces (F, 3), and the axis (V, 3) of the side that each vertex is on, or 0."""
+        """Make a cube, bevelled if `sides` are not 0.
+
+        signs: octant (V, 3) of each vertex, ±1. faces: (F, 3). sides: unit vector (V, 3) along the axis of the side
+        that the vertex lies on.
+        """
         self.signs = signs
         self.faces = faces
         self.sides = sides
-        self._corners = (signs * (1 - 0.1 * (1 - sides)))[faces] if sides.any() else signs[faces]
-        self.normals = (signs * sides)[faces] if sides.any() else _flat_normals(self._corners)
+        is_bevelled = sides.any()
+        if is_bevelled:
+            self._corners = _bevelled_vertices(signs, sides)[faces]
+            self.normals = (signs * sides)[faces]
+        else:
+            self._corners = signs[faces]
+            self.normals = _flat_normals(self._corners)
         self._uv_indices: dict[tuple[int, ...], tuple[NDArray[np.int64], ...]] = {}
 
     def uv_index(self, order: tuple[int, ...]) -> tuple[NDArray[np.int64], ...]:
-        """The index of u and v (F, 3, 2) in corners (F, 3, 3), as `_uv_axes` has them."""
+        """The index that selects u and v (F, 3, 2) from the corners (F, 3, 3) of a block, by `_uv_axes`."""
         if order not in self._uv_indices:
             axes = _uv_axes(self._corners, order)
             face = np.arange(len(self.faces))[:, None, None]
@@ -128,12 +149,17 @@ class _Cube:
 
 @cache
 def _bevelled_cube() -> _Cube:
-    """A cube of 24 vertices, each of its corners three times, and 44 faces; vertex 3 c + a is on the side of axis a."""
+    """A cube of 24 vertices, three at each corner, and 44 faces; vertex 3 c + a is on the side of axis a."""
     signs = np.repeat(_cube().signs, 3, axis=0)
     sides = np.eye(3)[np.arange(24) % 3]
-    vertices = signs * (1 - 0.1 * (1 - sides))
+    vertices = _bevelled_vertices(signs, sides)
     hull = scipy.spatial.ConvexHull(vertices)
     return _Cube(signs, _outward(vertices, hull.simplices), sides)
+
+
+def _bevelled_vertices(signs: Array, sides: Array) -> Array:
+    """Vertices (V, 3) of a bevelled cube from -1 to 1."""
+    return np.asarray(signs * (1 - BEVEL_OF_CUBE * (1 - sides)))
 
 
 @cache
@@ -157,16 +183,22 @@ def _cube() -> _Cube:
 
 
 def _outward(vertices: Array, faces: Faces) -> Faces:
-    """The faces of a convex body around the origin, counter-clockwise from outside."""
+    """The faces of a convex body around the origin, turned so that they are counter-clockwise from outside."""
     corners = vertices[faces]
     a = corners[:, 0]
-    area_vectors = cross(corners[:, 1] - a, corners[:, 2] - a)
+    b = corners[:, 1]
+    c = corners[:, 2]
+    area_vectors = cross(b - a, c - a)
     is_inward = np.einsum("fk,fk->f", area_vectors, a) < 0
-    return np.where(is_inward[:, None], faces[:, ::-1], faces).astype(np.int64)
+    turned = faces[:, ::-1]
+    return np.where(is_inward[:, None], turned, faces).astype(np.int64)
 
 
 def _grids(points_m: Array, normals: Array, uv: Array) -> MeshArrays:
-    """Grids (B, R, C, 3) of vertices, seen from the side of columns × rows, without faces that have no area."""
+    """Two faces per cell of B grids of vertices (B, R, C, 3), without those that have no area.
+
+    The faces are seen from the side of the cross product of the column and the row direction.
+    """
     grids, rows, columns = points_m.shape[:3]
     index = np.arange(grids * rows * columns).reshape(grids, rows, columns)
     a = index[:, :-1, :-1].ravel()
@@ -179,12 +211,13 @@ def _grids(points_m: Array, normals: Array, uv: Array) -> MeshArrays:
     p = vertices_m[faces[:, 0]]
     q = vertices_m[faces[:, 1]]
     r = vertices_m[faces[:, 2]]
-    has_area = np.linalg.norm(cross(q - p, r - p), axis=1) > LEAST_AREA_M2
+    double_area_m2 = np.linalg.norm(cross(q - p, r - p), axis=1)
+    has_area = double_area_m2 > LEAST_AREA_M2
     return MeshArrays(vertices_m, faces[has_area], uv.reshape(-1, 2), normals.reshape(-1, 3))
 
 
 def _circle(sections: int) -> tuple[Array, Array]:
-    """Angles (sections + 1,) of a full turn and points (sections + 1, 2) of the unit circle, the last as the first."""
+    """Angles (sections + 1,) of a full turn and points (sections + 1, 2) of the unit circle; the last is the first."""
     angle_rad = np.linspace(0, 2 * np.pi, sections + 1)
     points = np.stack([np.cos(angle_rad), np.sin(angle_rad)], axis=-1)
     points[-1] = points[0]
@@ -192,56 +225,75 @@ def _circle(sections: int) -> tuple[Array, Array]:
 
 
 def _arc_length_m(steps_m: Array) -> Array:
-    """Distances (N + 1,) along a polyline of N steps (N, K) from its start."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps_m, axis=1))])
+    """Distances (N + 1,) of the vertices of a polyline from its start; its segments are steps_m (N, K)."""
+    lengths_m = np.linalg.norm(steps_m, axis=1)
+    return np.concatenate([[0.0], np.cumsum(lengths_m)])
 
 
 def lathe(profile_m: ArrayLike, *, sections: int = 24) -> "Trimesh":
-    """A solid of revolution about z; its profile (K, 2) of radius and height runs from the axis below to that above."""
+    """A solid of revolution about z.
+
+    profile_m: (K, 2) of radius and height, from the bottom on the axis, along the outside, to the top on the axis.
+    """
     profile = np.asarray(profile_m, float)
     segments = np.stack([profile[:-1], profile[1:]], axis=1)  # (K - 1, 2, 2), both ends of each
     steps = np.diff(profile, axis=0)
-    outward = unit(np.stack([steps[:, 1], -steps[:, 0]], axis=1))  # (K - 1, 2)
+    outward = unit(np.stack([steps[:, 1], -steps[:, 0]], axis=1))  # (K - 1, 2), normals of the segments
 
     angle_rad, circle = _circle(sections)
     points = _revolved(segments, circle)
     normals = _revolved(_profile_normals(outward), circle)
 
-    length = _arc_length_m(steps)
-    ends = np.stack([length[:-1], length[1:]], axis=1)
-    along = np.broadcast_to(ends[..., None], points.shape[:3])
+    # The texture is wrapped around the solid, except on level faces, where it is seen from above.
+    distance_m = _arc_length_m(steps)
+    segment_distances_m = np.stack([distance_m[:-1], distance_m[1:]], axis=1)
+    along = np.broadcast_to(segment_distances_m[..., None], points.shape[:3])
     around = np.broadcast_to(angle_rad * profile[:, 0].max(), along.shape)
-    is_level = (np.abs(outward[:, 1]) > 0.9)[:, None, None, None]
-    wrapped = np.stack([around, along], axis=-1)
-    uv = np.where(is_level, points[..., :2], wrapped)
+    wrapped_uv = np.stack([around, along], axis=-1)
+    level_uv = points[..., :2]
+    is_level = np.abs(outward[:, 1]) > LEVEL_COSINE
+    uv = np.where(is_level[:, None, None, None], level_uv, wrapped_uv)
     return _grids(points, normals, uv).mesh()
 
 
 def _profile_normals(outward: Array) -> Array:
-    """Normals (K, 2, 2) at both ends of a profile's segments, the mean of both segments' where it is smooth."""
+    """Normals (K, 2, 2) at both ends of each of the K segments of a profile, whose own normals are given (K, 2).
+
+    At a smooth corner both segments have the mean of their normals.
+    """
     normals = np.stack([outward, outward], axis=1)
     cosine = np.einsum("kj,kj->k", outward[:-1], outward[1:])
     is_smooth = cosine > np.cos(np.deg2rad(SMOOTH_DEG))
     mean = unit(outward[:-1] + outward[1:])[is_smooth]
-    normals[1:, 0][is_smooth] = mean
-    normals[:-1, 1][is_smooth] = mean
+    segment_starts = normals[1:, 0]
+    segment_ends = normals[:-1, 1]
+    segment_starts[is_smooth] = mean
+    segment_ends[is_smooth] = mean
     return normals
 
 
-def _revolved(pairs: Array, circle: Array) -> Array:
-    """Vectors (K, 2, 2) of radius and height, at every point of a circle (C, 2): (K, 2, C, 3)."""
-    level = pairs[..., None, :1] * circle
-    height = np.broadcast_to(pairs[..., None, 1:], (*level.shape[:-1], 1))
-    return np.concatenate([level, height], axis=-1)
+def _revolved(vectors: Array, circle: Array) -> Array:
+    """Vectors (K, 2, C, 3) that result if vectors (K, 2, 2) of radius and height are turned around z.
+
+    circle: the C directions (C, 2) of the radius.
+    """
+    radius = vectors[..., None, :1]
+    height = vectors[..., None, 1:]
+    xy = radius * circle
+    z = np.broadcast_to(height, (*xy.shape[:-1], 1))
+    return np.concatenate([xy, z], axis=-1)
 
 
 def spline(points_m: ArrayLike, count: int = 16) -> Array:
-    """Points (count, 3) of a smooth curve through the given ones, which are evenly spaced in its parameter."""
+    """Points (count, 3) of a cubic spline through the given ones (N, 3), which are evenly spaced in its parameter."""
     points = np.asarray(points_m, float)
     t = np.linspace(0, 1, count)
     if len(points) == 3:
-        # A parabola, for which the spline would call a solver of dense systems.
-        weights = np.stack([(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)], axis=1)
+        # The spline is a parabola. Its Lagrange form avoids the dense solver that scipy would use.
+        first = (1 - t) * (1 - 2 * t)
+        middle = 4 * t * (1 - t)
+        last = t * (2 * t - 1)
+        weights = np.stack([first, middle, last], axis=1)
         return np.asarray(weights @ points)
     knots = np.linspace(0, 1, len(points))
     return np.asarray(scipy.interpolate.CubicSpline(knots, points)(t))
@@ -262,49 +314,56 @@ def tube_arrays(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> Mes
     angle_rad, circle = _circle(sections)
     normals = np.einsum("cj,njk->nck", circle, axes)
     rings = path[:, None] + radius_m * normals  # (N, C, 3)
-    along, around = np.broadcast_arrays(_arc_length_m(steps)[:, None], angle_rad * radius_m)
+    distance_m = _arc_length_m(steps)
+    along, around = np.broadcast_arrays(distance_m[:, None], angle_rad * radius_m)
     uv = np.stack([along, around], axis=-1)
 
-    end_uv = circle * radius_m
-    return joined_arrays(
-        [
-            _grids(rings[None], normals[None], uv[None]),
-            _disc(path[0], rings[0], -tangents[0], end_uv),
-            _disc(path[-1], rings[-1], tangents[-1], end_uv),
-        ]
-    )
+    disc_uv = circle * radius_m
+    rod = _grids(rings[None], normals[None], uv[None])
+    first_end = _disc(path[0], rings[0], -tangents[0], disc_uv)
+    last_end = _disc(path[-1], rings[-1], tangents[-1], disc_uv)
+    return joined_arrays([rod, first_end, last_end])
 
 
 def _tangents(directions: Array) -> Array:
-    """Unit tangents (N, 3) at the vertices of a polyline with segments along (N - 1, 3)."""
+    """Unit tangents (N, 3) at the vertices of a polyline; the directions (N - 1, 3) are those of its segments."""
     inner = directions[:-1] + directions[1:]
     return unit(np.concatenate([directions[:1], inner, directions[-1:]]))
 
 
 def _cross_section_axes(tangents: Array) -> Array:
-    """Two axes (N, 2, 3) across each of the tangents (N, 3) that twist as little as they can from one to the next."""
+    """Two unit axes (N, 2, 3) perpendicular to each tangent (N, 3), with the least twist from one to the next."""
     least_aligned = np.abs(tangents[0]).argmin()
-    axes = [unit(cross(tangents[0], np.eye(3)[least_aligned]))]
+    start = unit(cross(tangents[0], np.eye(3)[least_aligned]))
+    axes = [start]
     for tangent in tangents[1:]:
-        along = tangent * (axes[-1] @ tangent)
-        axes.append(unit(axes[-1] - along))
-    first = np.array(axes)
-    return np.stack([first, cross(tangents, first)], axis=1)
+        previous = axes[-1]
+        along_tangent = tangent * (previous @ tangent)
+        axes.append(unit(previous - along_tangent))
+    first_axes = np.array(axes)
+    second_axes = cross(tangents, first_axes)
+    return np.stack([first_axes, second_axes], axis=1)
 
 
 def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> MeshArrays:
-    """The flat end of a tube within a ring (C, 3) of vertices, seen from the side of its normal."""
+    """A disc that fills a ring (C, 3) of vertices, seen from the side of the normal; uv (C, 2) are the ring's."""
     rows = np.stack([np.broadcast_to(center_m, ring_m.shape), ring_m])
-    places = np.stack([0 * uv, uv])
-    if cross(ring_m[1] - ring_m[0], ring_m[0] - center_m) @ normal < 0:
+    rows_uv = np.stack([0 * uv, uv])
+    area_vector = cross(ring_m[1] - ring_m[0], ring_m[0] - center_m)
+    is_seen_from_behind = area_vector @ normal < 0
+    if is_seen_from_behind:
         rows = rows[::-1]
-        places = places[::-1]
+        rows_uv = rows_uv[::-1]
     normals = np.broadcast_to(normal, (1, *rows.shape))
-    return _grids(rows[None], normals, places[None])
+    return _grids(rows[None], normals, rows_uv[None])
 
 
 def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimesh":
-    """A superellipsoid around the origin: |x/a|^p + |y/b|^p + |z/c|^p = 1; 2 is an ellipsoid, more is boxier."""
+    """A superellipsoid around the origin: |x/a|^p + |y/b|^p + |z/c|^p = 1.
+
+    power: p; 2 gives an ellipsoid, a larger value a shape closer to a box. cells: per edge of the cube that is
+    projected onto it.
+    """
     half_m = np.asarray(size_m, float) / 2
     steps = np.linspace(-1, 1, cells + 1)
     v, u = np.meshgrid(steps, steps, indexing="ij")
@@ -316,17 +375,21 @@ def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimes
             sides.append(np.roll(side, axis, axis=-1))
     cube = np.stack(sides)  # (6, R, C, 3)
 
-    # The cube's points, projected onto the superellipsoid from its centre; normals are the equation's gradient.
+    # The points of the cube are projected from the centre; the normal is the gradient of the equation.
     radius = np.linalg.norm(cube, ord=power, axis=-1, keepdims=True)
     points = cube / radius
     gradient = np.sign(points) * np.abs(points) ** (power - 1) / half_m
     points_m = points * half_m
-    uv = [np.roll(points_m[k], -(k // 2), axis=-1)[..., :2] for k in range(6)]
+
+    uv = []
+    for k, side_m in enumerate(points_m):
+        axis = k // 2
+        uv.append(np.roll(side_m, -axis, axis=-1)[..., :2])
     return _grids(points_m, unit(gradient), np.stack(uv)).mesh()
 
 
 def sheet(points_m: ArrayLike) -> "Trimesh":
-    """A smooth surface through a grid (R, C, 3), seen from the side of columns × rows."""
+    """A smooth surface through a grid of points (R, C, 3), seen from the side of column × row direction."""
     return sheet_arrays(points_m).mesh()
 
 
@@ -341,14 +404,18 @@ def sheet_arrays(points_m: ArrayLike) -> MeshArrays:
 
 
 def _grid_length_m(points_m: Array, axis: int) -> Array:
-    """Distances (R, C) along the lines of a grid (R, C, 3) that run along an axis, from its border."""
+    """Distances (R, C) of the points of a grid (R, C, 3) from its border, along the grid lines of an axis."""
     border = np.take(points_m, [0], axis)
     steps = np.diff(points_m, axis=axis, prepend=border)
-    return np.cumsum(np.linalg.norm(steps, axis=2), axis=axis)
+    lengths_m = np.linalg.norm(steps, axis=2)
+    return np.cumsum(lengths_m, axis=axis)
 
 
 def card(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> "Trimesh":
-    """An upright rectangle around the origin that faces x and shows a cell of a picture, in shares of its sides."""
+    """An upright rectangle around the origin that faces x and shows a cell of a picture.
+
+    cell: first and last u, first and last v, as shares of the picture.
+    """
     return card_arrays(size_m, cell=cell).mesh()
 
 
@@ -362,7 +429,7 @@ def card_arrays(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> M
 
 
 def cards(sizes_m: ArrayLike, poses: ArrayLike) -> "Trimesh":
-    """Rectangles as of `card`, of sizes (N, 2) and at rigid poses (N, 4, 4), seen from both sides, as one mesh."""
+    """Rectangles like those of `card`, seen from both sides, as one mesh; sizes (N, 2), rigid poses (N, 4, 4)."""
     return cards_arrays(sizes_m, poses).mesh()
 
 
@@ -371,29 +438,33 @@ def cards_arrays(sizes_m: ArrayLike, poses: ArrayLike) -> MeshArrays:
     sizes = np.asarray(sizes_m, float).reshape(-1, 2)
     T = np.asarray(poses, float).reshape(-1, 4, 4)
     R = T[:, :3, :3]
-    one = card_arrays((1.0, 1.0))
+    unit_card = card_arrays((1.0, 1.0))
     width = sizes[:, 0, None]
     height = sizes[:, 1, None]
     y = -width / 2 + [0.0, 1.0, 1.0, 0.0] * width
     z = -height / 2 + [0.0, 0.0, 1.0, 1.0] * height
     corners_m = np.stack([0 * y, y, z], axis=-1)  # (N, 4, 3)
 
-    front = corners_m @ R.swapaxes(1, 2) + T[:, None, :3, 3]
-    normals = unit(one.normals @ np.linalg.inv(R))
-    vertices_m = np.stack([front, front], axis=1)  # (N, 2, 4, 3), front and back
-    both_normals = np.stack([normals, -normals], axis=1)
-    faces = np.concatenate([one.faces, one.faces[:, ::-1] + 4])
+    moved_m = corners_m @ R.swapaxes(1, 2) + T[:, None, :3, 3]
+    front_normals = unit(unit_card.normals @ np.linalg.inv(R))
+    vertices_m = np.stack([moved_m, moved_m], axis=1)  # (N, 2, 4, 3), front and back
+    normals = np.stack([front_normals, -front_normals], axis=1)
+
+    front_faces = unit_card.faces
+    back_faces = front_faces[:, ::-1] + 4
+    faces_of_card = np.concatenate([front_faces, back_faces])
     first_vertex = 8 * np.arange(len(sizes))
+    faces = first_vertex[:, None, None] + faces_of_card
     return MeshArrays(
         vertices_m.reshape(-1, 3),
-        (first_vertex[:, None, None] + faces).reshape(-1, 3),
-        np.tile(one.uv, (2 * len(sizes), 1)),
-        both_normals.reshape(-1, 3),
+        faces.reshape(-1, 3),
+        np.tile(unit_card.uv, (2 * len(sizes), 1)),
+        normals.reshape(-1, 3),
     )
 
 
 def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayLike] = ()) -> "Trimesh":
-    """A prism between z = 0 and height_m over a polygon (N, 2) less holes within it, in any orientation."""
+    """A prism from z = 0 to height_m over a polygon (N, 2) with holes, each in either orientation."""
     outline = oriented(polygon_m, counter_clockwise=True)
     holes = [oriented(hole, counter_clockwise=False) for hole in holes_m]
     rings = [outline, *holes]
@@ -406,13 +477,15 @@ def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayL
     parts = [_cap(top), _cap(bottom)]
     for ring in rings:
         for start, end in pairwise([*ring, ring[0]]):
-            parts.append(quad_arrays((*start, 0), (*(end - start), 0), (0, 0, height_m)))
+            edge = end - start
+            parts.append(quad_arrays((*start, 0), (*edge, 0), (0, 0, height_m)))
     return joined_arrays(parts).mesh()
 
 
 def _cap(corners_m: Array) -> MeshArrays:
-    """Level faces (F, 3, 3), textured in x and y."""
-    uv = np.take_along_axis(corners_m, _uv_axes(corners_m, range(3))[:, None, :], axis=2)
+    """Level faces (F, 3, 3), whose texture coordinates are x and y."""
+    axes = _uv_axes(corners_m, range(3))
+    uv = np.take_along_axis(corners_m, axes[:, None, :], axis=2)
     return MeshArrays(
         corners_m.reshape(-1, 3),
         np.arange(3 * len(corners_m)).reshape(-1, 3),
