@@ -1,4 +1,4 @@
-"""Walls: rectangles with rectangular holes, and the reveals of these holes."""
+"""Walls: rectangles with rectangular holes, and the reveals of the holes."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -20,9 +20,9 @@ Hole = tuple[float, float, float, float]  # first and last u, first and last v, 
 
 
 def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes: Sequence[Hole] = ()) -> "Trimesh":
-    """A rectangle less rectangular holes, cut into a grid along their edges, with laps behind its four borders.
+    """A rectangle with rectangular holes, divided into a grid along their edges, with laps behind its four borders.
 
-    The laps stop the light that would pass where two walls only touch.
+    The laps block the light that would otherwise leak through where two walls only touch.
     """
     corner = np.asarray(corner_m, float)
     u = np.asarray(edge_u_m, float)
@@ -30,51 +30,65 @@ def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes
     width_m = float(np.linalg.norm(u))
     height_m = float(np.linalg.norm(v))
 
+    rectangles = [_rectangle(corner, u, v, cell) for cell in _solid_cells(width_m, height_m, holes)]
     behind = -LAP_BEHIND_M * unit(cross(u, v))
-    cells = [_rectangle(corner, u, v, cell) for cell in _solid_cells(width_m, height_m, holes)]
-    laps = [_rectangle(corner + behind, u, v, lap) for lap in _laps(width_m, height_m)]
-    return joined_arrays(cells + laps).mesh()
+    laps = [_rectangle(corner + behind, u, v, cell) for cell in _lap_cells(width_m, height_m)]
+    return joined_arrays(rectangles + laps).mesh()
 
 
 def _solid_cells(width_m: float, height_m: float, holes: Sequence[Hole]) -> list[Hole]:
-    """The cells of the grid through all edges of the holes that lie in no hole."""
-    edges_u = [edge for hole in holes for edge in hole[:2]]
-    edges_v = [edge for hole in holes for edge in hole[2:]]
-    lines_u = np.unique([0, width_m, *edges_u])
-    lines_v = np.unique([0, height_m, *edges_v])
+    """The cells outside of all holes, in the grid of lines through the edges of the holes."""
+    lines_u = [0, width_m]
+    lines_v = [0, height_m]
+    for u0, u1, v0, v1 in holes:
+        lines_u += [u0, u1]
+        lines_v += [v0, v1]
+
+    sorted_u = np.unique(lines_u)
+    sorted_v = np.unique(lines_v)
 
     cells = []
-    for u0, u1 in pairwise(lines_u):
-        for v0, v1 in pairwise(lines_v):
-            if not _is_in_hole((u0 + u1) / 2, (v0 + v1) / 2, holes):
+    for u0, u1 in pairwise(sorted_u):
+        for v0, v1 in pairwise(sorted_v):
+            middle_u = (u0 + u1) / 2
+            middle_v = (v0 + v1) / 2
+            if not _is_in_hole(middle_u, middle_v, holes):
                 cells.append((u0, u1, v0, v1))
     return cells
 
 
 def _is_in_hole(u: float, v: float, holes: Sequence[Hole]) -> bool:
-    return any(u0 < u < u1 and v0 < v < v1 for u0, u1, v0, v1 in holes)
+    for u0, u1, v0, v1 in holes:
+        if u0 < u < u1 and v0 < v < v1:
+            return True
+    return False
 
 
-def _laps(width_m: float, height_m: float) -> list[Hole]:
-    """Strips along the four borders of a rectangle, as cells of it."""
-    inner = -LAP_M
-    outer = LAP_M
-    along_u = [(inner, width_m - inner, edge + inner, edge + outer) for edge in (0, height_m)]
-    along_v = [(edge + inner, edge + outer, inner, height_m - inner) for edge in (0, width_m)]
-    return along_u + along_v
+def _lap_cells(width_m: float, height_m: float) -> list[Hole]:
+    """A strip along each of the four borders: bottom, top, left and right."""
+    full_u = (-LAP_M, width_m + LAP_M)
+    full_v = (-LAP_M, height_m + LAP_M)
+    return [
+        (*full_u, -LAP_M, LAP_M),
+        (*full_u, height_m - LAP_M, height_m + LAP_M),
+        (-LAP_M, LAP_M, *full_v),
+        (width_m - LAP_M, width_m + LAP_M, *full_v),
+    ]
 
 
 def _rectangle(corner: Array, u: Array, v: Array, cell: Hole) -> MeshArrays:
-    """A cell of a wall, whose texture continues that of its neighbours."""
+    """A cell of a wall; its texture continues that of the neighbouring cells."""
     u0, u1, v0, v1 = cell
     axis_u = unit(u)
     axis_v = unit(v)
     cell_corner = corner + u0 * axis_u + v0 * axis_v
-    return quad_arrays(cell_corner, (u1 - u0) * axis_u, (v1 - v0) * axis_v, (u0, v0))
+    edge_u = (u1 - u0) * axis_u
+    edge_v = (v1 - v0) * axis_v
+    return quad_arrays(cell_corner, edge_u, edge_v, (u0, v0))
 
 
 def reveal(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, hole: Hole, depth_m: float) -> "Trimesh":
-    """The four sides of a rectangle's hole, down to depth_m behind its face."""
+    """The four inner sides of a hole in a wall, down to depth_m behind the face of the wall."""
     u = unit(edge_u_m)
     v = unit(edge_v_m)
     u0, u1, v0, v1 = hole
