@@ -1,4 +1,4 @@
-"""Fittings of rooms: doors, windows, pictures, pipes and lamps, on a wall at x = 0 that faces x, or hung from z = 0."""
+"""Fittings: doors, windows, pictures, pipes and lamps; on a wall at x = 0 that faces x, or below z = 0."""
 
 from typing import TYPE_CHECKING
 
@@ -43,7 +43,7 @@ def bars(
     *,
     bevel_m: float = 0.003,
 ) -> "Trimesh":
-    """Four bars around a rectangle around the origin."""
+    """A frame of four bars around a rectangle that is centred at the origin."""
     upright = block((deep_m, thick_m, height_m + 2 * thick_m), bevel_m=bevel_m)
     level = block((deep_m, width_m, thick_m), bevel_m=bevel_m)
     y = (width_m + thick_m) / 2
@@ -65,7 +65,7 @@ def door(
     label: str = "2.14",
     tones: str = "beech",
 ) -> list[Part]:
-    """A leaf in its frame, with a handle, hinges and a plate."""
+    """A door leaf in its frame, with a handle, hinges and a sign."""
     w = width_m
     h = height_m
     jamb = block((0.07, 0.07, h), bevel_m=0.006)
@@ -102,7 +102,7 @@ def window_frame(
     height_m: float = 1.5,
     depth_m: float = 0.15,
 ) -> list[Part]:
-    """Frame, mullion, transom and handle in a hole around the origin, depth_m before its pane, and a sill."""
+    """Frame, mullion, transom, handle and sill for a hole centred at the origin, with the pane depth_m behind x = 0."""
     x = 0.035 - depth_m
     w = width_m
     h = height_m
@@ -125,7 +125,7 @@ def blind(
     drop_m: float = 0.7,
     slat_deg: float = 40.0,
 ) -> list[Part]:
-    """Slats that hang drop_m from a rail, and their cords."""
+    """A blind: a rail with slats down to drop_m below it, and two cords."""
     slat = block((0.05, width_m - 0.02, 0.0025), bevel_m=0)
     depths_m = 0.05 + 0.042 * np.arange(int(drop_m / 0.042))
     slats = []
@@ -151,7 +151,7 @@ def curtain(
     height_m: float = 1.9,
     colour: str = SAND,
 ) -> list[Part]:
-    """Cloth in folds that hangs down."""
+    """A curtain that hangs in folds from z = 0."""
     u, v = np.meshgrid(np.linspace(0, 1, 41), np.linspace(1, 0, 6))
     unevenness = 0.15 * np.sin(5 * u + rng.uniform(0, 6))
     phase = 2 * np.pi * (u * width_m / 0.11 + unevenness)
@@ -163,7 +163,7 @@ def curtain(
 
 
 def radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]:
-    """Columns between two headers, a valve and a pipe into the floor."""
+    """A radiator: columns between two headers, a valve and a pipe into the floor."""
     w = width_m / 2
     bottom = 0.14
     top = 0.1 + height_m
@@ -188,7 +188,7 @@ def radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]
 
 
 def socket(_: Rng, count: int = 2) -> list[Part]:
-    """Outlets in a plate."""
+    """A plate with `count` socket outlets side by side."""
     well = lathe(mm("0 0, 21 0, 21 2, 0 2"), sections=20)
     pin = lathe(mm("0 0, 3 0, 0 2"), sections=8)
     plate = block((0.012, 0.072 * count + 0.012, 0.082), bevel_m=0.004)
@@ -201,7 +201,7 @@ def socket(_: Rng, count: int = 2) -> list[Part]:
 
 
 def skirting(_: Rng, length_m: float = 1.0, height_m: float = 0.08) -> list[Part]:
-    """A board along the foot of a wall."""
+    """A skirting board along the base of a wall."""
     return [stood((0.014, length_m, height_m), WHITE, 0.007, bevel=0.004)]
 
 
@@ -223,7 +223,7 @@ def framed(
 
 
 def _framed_face(style: str, width_m: float, height_m: float, seed: int) -> Material:
-    """What a frame shows."""
+    """The material of the picture in a frame."""
     if style == "mirror":
         return MIRROR
     if style == "whiteboard":
@@ -235,7 +235,7 @@ def _framed_face(style: str, width_m: float, height_m: float, seed: int) -> Mate
 
 
 def noticeboard(rng: Rng, width_m: float = 1.2, height_m: float = 0.9) -> list[Part]:
-    """Cork with sheets pinned to it."""
+    """A cork board with sheets of paper pinned to it."""
     cork = matt(texture=picture.ground("cork", tile_m=1.0))
     pin = lathe(mm("0 0, 5 0, 5 8, 0 9"), sections=8)
     free_m = [width_m - 0.3, height_m - 0.36]
@@ -260,7 +260,7 @@ def noticeboard(rng: Rng, width_m: float = 1.2, height_m: float = 0.9) -> list[P
 
 
 def glass_wall(_: Rng, width_m: float = 1.6, height_m: float = 2.2) -> list[Part]:
-    """A pane on the floor in a slender frame of steel."""
+    """A pane of glass on the floor in a narrow steel frame."""
     pane_m = (width_m, height_m - 0.06)
     frame = bars(*pane_m, 0.03, 0.03)
     middle = height_m / 2
@@ -282,7 +282,7 @@ def pipe(
 
 
 def lamp_housing(_: Rng, size_m: tuple[float, float] = (1.2, 0.3), hang_m: float = 0.1) -> list[Part]:
-    """What is above a level panel that shines down at z = 0 and hangs hang_m below its ceiling."""
+    """The housing above a light panel at z = 0 that faces down, and the rods to the ceiling hang_m above it."""
     length, width = size_m
     tray_m = (length + 0.03, width + 0.03, 0.035)
     rods = []
@@ -296,6 +296,6 @@ def lamp_housing(_: Rng, size_m: tuple[float, float] = (1.2, 0.3), hang_m: float
 
 
 def spot_housing(_: Rng) -> list[Part]:
-    """A can behind a bulb at the origin that shines along x."""
+    """A cylindrical housing behind a spot light at the origin that shines along x."""
     can = lathe(mm("0 -160, 30 -160, 45 -140, 45 -4, 0 -4"))
     return [put(can, BLACK, pitch=90)]
