@@ -1,4 +1,4 @@
-"""Furniture and what lies on it: parts on z = 0 around the origin, their front towards x, their width along y."""
+"""Furniture and objects on it: they stand on z = 0 at the origin, face x, and their width is along y."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 class Part:
     """Faces of one material.
 
-    geometry: a mesh, or the arrays of one, which are far quicker to move.
+    geometry: a mesh, or the arrays of one; arrays are much faster to move.
     """
 
     geometry: "Trimesh | MeshArrays"
@@ -43,12 +43,12 @@ class Part:
 
     @property
     def arrays(self) -> MeshArrays:
-        """The arrays of its mesh."""
+        """The geometry as arrays."""
         return self.geometry if isinstance(self.geometry, MeshArrays) else arrays(self.geometry)
 
     @property
     def mesh(self) -> "Trimesh":
-        """Its mesh."""
+        """The geometry as a mesh."""
         return self.geometry.mesh() if isinstance(self.geometry, MeshArrays) else self.geometry
 
     def moved(self, T_a_b: Array) -> "Part":
@@ -57,14 +57,14 @@ class Part:
 
 
 def matt(colour: str = "#ffffff", texture: Texture | None = None) -> Material:
-    """A surface of #rrggbb (times a texture) without gloss."""
+    """A diffuse material of colour #rrggbb; a texture is multiplied by the colour."""
     srgb = np.array(picture.rgb(colour), np.uint8)
     red, green, blue = linear(srgb).tolist()
     return Material(colour=(red, green, blue), texture=texture)
 
 
 def coated(colour: str = "#ffffff", texture: Texture | None = None, roughness: float = 0.3) -> Material:
-    """Lacquer, plastic or glaze over a surface."""
+    """A diffuse material under a clear coat, such as lacquer, plastic or glaze."""
     return replace(matt(colour, texture), eta=1.5, roughness=roughness)
 
 
@@ -79,7 +79,7 @@ PAGE = matt("#e9e4d8")
 
 
 def wood(kind: str) -> Material:
-    """Lacquered wood of one of the pictures' tones."""
+    """Lacquered wood; kind: one of the woods in `picture.TONES`."""
     return coated(texture=picture.boards(kind), roughness=0.28)
 
 
@@ -89,8 +89,8 @@ def cloth(colour: str) -> Material:
 
 
 def mm(places: str) -> Array:
-    """Places (N, K) in metres of a text like "0 0, 34 0, 40 8" in millimetres."""
-    rows = [place.split() for place in places.split(",")]
+    """Points (N, K) in metres, from a text in millimetres such as "0 0, 34 0, 40 8"."""
+    rows = [point.split() for point in places.split(",")]
     return np.array(rows, float) / 1000
 
 
@@ -102,7 +102,7 @@ def put(
     z: float = 0,
     **turn: float,
 ) -> Part:
-    """A part at a position in metres; turn: yaw, pitch and roll in degrees."""
+    """A part at a position in metres; turn: yaw, pitch and roll in degrees, as of `at`."""
     T = at(x, y, z, **turn)
     return Part(mesh, material).moved(T)
 
@@ -117,7 +117,7 @@ def stood(
     bevel: float = 0.003,
     u: float = 0,
 ) -> Part:
-    """A block whose underside is at z; its texture begins at u."""
+    """A block whose bottom face is at z; u shifts its texture, so that equal blocks look different."""
     height = float(np.asarray(size_m)[2])
     mesh = block_arrays(size_m, bevel_m=bevel, uv_m=(u, 1.7 * u))
     return put(mesh, material, x, y, z + height / 2)
@@ -134,8 +134,8 @@ def desk(
     leg_y = width_m / 2 - 0.12
     d = depth_m
     h = height_m
-    top = stood((d, width_m, 0.026), wood(tones), 0, 0, h - 0.026, bevel=0.004, u=rng.uniform(0, 2))
-    parts = [top]
+    top_m = (d, width_m, 0.026)
+    parts = [stood(top_m, wood(tones), 0, 0, h - 0.026, bevel=0.004, u=rng.uniform(0, 2))]
 
     foot_m = (d - 0.08, 0.06, 0.03)
     post_m = (0.06, 0.08, h - 0.08)
@@ -151,8 +151,9 @@ def desk(
     parts.append(stood(rail_m, BLACK, 0, 0, h - 0.08))
     parts.append(put(tray, DARK, 0.06 - d / 2, 0.7 * leg_y, h - 0.16, roll=90))
 
+    pedestal_m = (d - 0.22, 0.4, 0.54)
     pedestal_y = (leg_y - 0.26) * rng.choice([-1, 1])
-    parts.append(stood((d - 0.22, 0.4, 0.54), GREY, -0.02, pedestal_y, 0.06))
+    parts.append(stood(pedestal_m, GREY, -0.02, pedestal_y, 0.06))
     grip_path = spline(mm("0 -70 0, 28 -55 0, 28 55 0, 0 70 0"), 12)
     grip = tube(grip_path, 0.005)
     front_m = (0.016, 0.385, 0.165)
@@ -163,7 +164,7 @@ def desk(
 
 
 def chair(rng: Rng, colour: str = NAVY) -> list[Part]:
-    """A swivel chair on five castors; who sits on it looks along x."""
+    """A swivel chair on five castors; a person on it looks along x."""
     turn_deg = rng.uniform(0, 72)
     column = lathe(mm("0 70, 40 70, 35 120, 30 220, 18 230, 18 420, 0 420"))
     parts = [put(column, BLACK)]
@@ -196,15 +197,19 @@ def chair(rng: Rng, colour: str = NAVY) -> list[Part]:
 
 
 def _book(spines: Spines, k: int, depth_m: float) -> MeshArrays:
-    """A closed book, its spine towards x: spine and covers from its cell of the picture, pages from the last row."""
+    """A closed book with its spine towards x.
+
+    The texture of spine and covers is from the book's cell of the picture; pages are the colour of the lowest row.
+    """
     u0, u1, v0, v1 = spines.cells[k]
     thickness, height = spines.sizes_m[k]
     closed = block_arrays((depth_m, thickness, height), bevel_m=0)
     mesh = closed.moved(at(0, 0, height / 2))
 
-    share = mesh.vertices_m / [1, thickness, height]
-    spine_u = u0 + (share[:, 1] + 0.5) * (u1 - u0)
-    spine_v = v1 - share[:, 2] * (v1 - v0)
+    share_y = mesh.vertices_m[:, 1] / thickness + 0.5
+    share_z = mesh.vertices_m[:, 2] / height
+    spine_u = u0 + share_y * (u1 - u0)
+    spine_v = v1 - share_z * (v1 - v0)
     spine_uv = np.stack([spine_u, spine_v], axis=-1)
     middle_u = (u0 + u1) / 2
     cover_uv = [middle_u, v0 + 0.993 * (v1 - v0)]
@@ -212,13 +217,16 @@ def _book(spines: Spines, k: int, depth_m: float) -> MeshArrays:
 
     is_spine = mesh.normals[:, :1] > 0.5
     is_cover = np.abs(mesh.normals[:, 1:2]) > 0.5
-    uv = np.where(is_spine, spine_uv, np.where(is_cover, cover_uv, paper_uv))
-    return replace(mesh, uv=uv)
+    cover_or_paper_uv = np.where(is_cover, cover_uv, paper_uv)
+    return replace(mesh, uv=np.where(is_spine, spine_uv, cover_or_paper_uv))
 
 
 def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> MeshArrays:
-    """A row of books between ±width_m / 2, in runs of neighbours, some leaning, and a pile in what is left."""
-    fitting = [k for k, (_, high) in enumerate(spines.sizes_m) if high < height_m - 0.01]
+    """A row of books between ±width_m / 2, and a pile if there is space left.
+
+    Books that are neighbours in the picture mostly stand side by side, and a few lean.
+    """
+    fitting = [k for k, (_, book_height) in enumerate(spines.sizes_m) if book_height < height_m - 0.01]
     y = -width_m / 2
     end = width_m / 2 - rng.choice([0.0, 0.05, 0.3])
     meshes = []
@@ -234,7 +242,9 @@ def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> MeshArr
         step = thickness + 0.0012 + overhang
         if y + step > end:
             break
-        depth = 0.24 if height > 0.3 else 0.72 * height
+
+        is_binder = height > 0.3
+        depth = 0.24 if is_binder else 0.72 * height
         book = _book(spines, fitting[k], depth)
         x = -depth / 2 - rng.uniform(0, 0.025)
         meshes.append(book.moved(at(x, y + step / 2, 0, roll=lean_deg)))
@@ -247,7 +257,7 @@ def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> MeshArr
 
 
 def _pile(rng: Rng, spines: Spines, count: int) -> MeshArrays:
-    """Books that lie on one another, each turned a little."""
+    """A stack of books, each rotated a little."""
     books = [k for k, (_, height) in enumerate(spines.sizes_m) if height < 0.3]
     z = 0.0
     meshes = []
@@ -261,7 +271,7 @@ def _pile(rng: Rng, spines: Spines, count: int) -> MeshArrays:
 
 
 def book_stack(rng: Rng, count: int = 4, seed: int = 0) -> list[Part]:
-    """Books that lie on one another."""
+    """A stack of books."""
     spines = picture.spines(seed)
     pile = _pile(rng, spines, count)
     return [Part(pile, matt(texture=spines.picture))]
@@ -276,7 +286,7 @@ def shelf(
     tones: str = "walnut",
     seed: int = 0,
 ) -> list[Part]:
-    """An open bookcase of bays at most 1.1 m wide with books, binders and boxes."""
+    """An open bookcase with books, binders and boxes; its bays are at most 1.1 m wide."""
     board = wood(tones)
     rows = max(2, round(height_m / 0.37))
     bays = int(np.ceil(width_m / 1.1))
@@ -315,13 +325,15 @@ def shelf(
 
 
 def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> list[Part]:
-    """Sheets of A4 that lie over one another, a corner of each lifted."""
+    """Overlapping sheets of A4 paper, each with one raised corner."""
     u, v = np.meshgrid(np.linspace(0, 1, 6), np.linspace(1, 0, 7))
     corner = np.clip(u + v - 1.3, 0, 1) ** 2
+    page_x = 0.297 * (v - 0.5)
+    page_y = 0.21 * (u - 0.5)
     sheets = []
     for k in range(count):
-        lift = 0.0006 * (k + 1) + 0.012 * rng.random() * corner
-        points_m = np.stack([0.297 * (v - 0.5), 0.21 * (u - 0.5), lift], axis=-1)
+        page_z = 0.0006 * (k + 1) + 0.012 * rng.random() * corner
+        points_m = np.stack([page_x, page_y, page_z], axis=-1)
         column = rng.integers(3)
         row = rng.integers(2)
         cells = np.stack([column + u, row + v], axis=-1).reshape(-1, 2)
@@ -332,7 +344,7 @@ def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> l
 
 
 def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
-    """A display on a foot, switched on, tilted a little."""
+    """A display on a foot; it is switched on and slightly tilted."""
     h = width_m * 0.58
     tilt = rng.uniform(-4, 0)
     glow = replace(
@@ -342,7 +354,9 @@ def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
         emission_texture=picture.screen(seed),
     )
     z = 0.066 + h / 2
-    stand = lathe(mm(f"0 0, 115 0, 115 6, 30 12, 18 20, 18 {1000 * z}, 0 {1000 * z}"), sections=32)
+    stand_mm = 1000 * z
+    stand_profile = mm(f"0 0, 115 0, 115 6, 30 12, 18 20, 18 {stand_mm}, 0 {stand_mm}")
+    stand = lathe(stand_profile, sections=32)
     bezel = block((0.022, width_m, h), bevel_m=0.004)
     mount = block((0.03, 0.3, 0.2), bevel_m=0.012)
     screen = moved(card((width_m - 0.014, h - 0.018)), at(0.0115))
@@ -355,7 +369,7 @@ def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
 
 
 def keyboard(_: Rng) -> list[Part]:
-    """Five rows of keys, the digits apart from the letters, on a board."""
+    """A keyboard of five rows, with a gap before the number pad."""
     key = block_arrays((0.016, 0.016, 0.008), bevel_m=0)
     space_bar = block_arrays((0.016, 0.111, 0.008), bevel_m=0)
     keys = []
@@ -415,7 +429,7 @@ def desk_lamp(rng: Rng, colour: str = TEAL) -> list[Part]:
 
 
 def cables(rng: Rng, length_m: float = 1.2, height_m: float = 0.7) -> list[Part]:
-    """Leads that sag from a desk at height_m to a socket on the wall length_m behind it."""
+    """Cables that hang from a desk of height_m and run to a socket on the wall length_m behind it."""
     radius_m = 0.0045
     lowest = [-9, -9, 0.006]  # so that cables lie on the floor
     x = length_m * np.array([0, -0.02, -0.3, -0.8, -1])
@@ -435,24 +449,31 @@ def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
     blades = []
     t = np.linspace(0, 1, 8)[:, None]
     for _ in range(leaves):
-        turned = at(yaw=rng.uniform(0, 360))
+        T_plant_leaf = at(yaw=rng.uniform(0, 360))
         rise = rng.uniform(0.4, 0.95) * height_m
         shares = rng.uniform([0.05, 0.14, 0.1], [0.3, 0.26, 0.9])
         reach, length, drop = shares * [height_m, height_m, 1]
 
-        bend = spline([[0, 0, 0.85 * pot_m], [0.3 * reach, 0, 0.6 * rise], [reach, 0, rise]], 6)
-        stem = tube_arrays(bend, 0.0035 * height_m, sections=5)
-        stems.append(stem.moved(turned))
+        stem_start = [0, 0, 0.85 * pot_m]
+        stem_middle = [0.3 * reach, 0, 0.6 * rise]
+        stem_end = [reach, 0, rise]
+        stem_path = spline([stem_start, stem_middle, stem_end], 6)
+        stem = tube_arrays(stem_path, 0.0035 * height_m, sections=5)
+        stems.append(stem.moved(T_plant_leaf))
 
+        # t runs along the blade, from the stem to the tip.
         half_width = 0.26 * length * np.sin(np.pi * t**0.75) + 0.0005
         y = half_width * np.array([1, 0.5, 0, -0.5, -1])
         arch = length * (0.35 * t - drop * t**2)
-        z = rise + arch + 0.25 * np.abs(y) + 0.006 * np.sin(9 * t)
+        fold = 0.25 * np.abs(y)
+        ripple = 0.006 * np.sin(9 * t)
+        z = rise + arch + fold + ripple
         x = reach + length * (t + 0 * y)
         blade = sheet_arrays(np.stack([x, y, z], axis=-1))
-        blades.append(blade.moved(turned).two_sided())
+        blades.append(blade.moved(T_plant_leaf).two_sided())
 
-    pot = lathe(mm("0 0, 360 0, 480 920, 520 930, 520 1000, 460 1000, 440 850, 0 860") * pot_m, sections=32)
+    pot_profile = mm("0 0, 360 0, 480 920, 520 930, 520 1000, 460 1000, 440 850, 0 860")
+    pot = lathe(pot_profile * pot_m, sections=32)
     soil = lathe(mm("0 800, 450 870, 0 900") * pot_m)
     clay = matt(texture=picture.ground("clay", 0, 512, 0.6))
     leaf = coated("#e8f0d8", picture.ground("leaf", 0, 512, 0.4), roughness=0.35)
@@ -465,7 +486,7 @@ def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
 
 
 def carton(_: Rng, size_m: tuple[float, float, float] = (0.36, 0.46, 0.3), seed: int = 0) -> list[Part]:
-    """A cardboard box, taped and labelled."""
+    """A cardboard box with tape and a label."""
     tile_m = max(size_m)
     box = block(size_m, bevel_m=0.002, uv_m=(tile_m / 2, tile_m / 2))
     standing = moved(box, at(0, 0, size_m[2] / 2))
@@ -473,7 +494,7 @@ def carton(_: Rng, size_m: tuple[float, float, float] = (0.36, 0.46, 0.3), seed:
 
 
 def crate(rng: Rng, size_m: tuple[float, float, float] = (0.8, 0.8, 1.2)) -> list[Part]:
-    """A box of rough planks on posts, with a plate."""
+    """A box of rough planks with corner posts and a label."""
     x, y, z = size_m
     rough = matt(texture=picture.boards("beech", 5, rows=6))
     core_m = (x - 0.06, y - 0.06, z - 0.01)
@@ -506,6 +527,7 @@ def crate(rng: Rng, size_m: tuple[float, float, float] = (0.8, 0.8, 1.2)) -> lis
     for k in range(5):
         board_x = (k - 2) * x / 5
         parts.append(stood(lid_m, rough, board_x, 0, z - 0.01, u=0.3 * k))
+
     plate = matt(texture=picture.sign("M-12", SAND))
     face_x = x / 2 - 0.0185
     parts.append(put(card((0.36, 0.18)), plate, face_x, 0, 0.6 * z))
@@ -519,7 +541,7 @@ def sofa(
     height_m: float = 0.7,
     colour: str = SAGE,
 ) -> list[Part]:
-    """A sofa of three seats on short legs with two loose cushions."""
+    """A three-seat sofa on short legs, with two loose cushions."""
     cover = cloth(colour)
     seat_m = (width_m - 0.36) / 3
     d = depth_m / 2
@@ -571,7 +593,7 @@ def cabinet(
     height_m: float = 1.2,
     colour: str = "#8b9493",
 ) -> list[Part]:
-    """A steel cupboard with two doors on a plinth."""
+    """A steel cabinet with two doors, on a plinth."""
     paint = coated(colour, roughness=0.35)
     w = width_m
     d = depth_m
