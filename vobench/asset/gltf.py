@@ -1,7 +1,7 @@
-"""glTF 2.0 files, .glb and .gltf: nodes, faces, materials, pictures and lights. Source: Khronos, glTF 2.0.
+"""glTF 2.0 files, .glb and .gltf: nodes, faces, materials, textures and lights. Source: Khronos, glTF 2.0.
 
-trimesh 5.2 reads zeros where an accessor is sparse or compressed, and leaves out fans, normalised integers, second
-texture coordinates, lights, strengths of emission and instances; hence this reader.
+This reader exists because trimesh 5.2 reads sparse and compressed accessors as zeros, and ignores triangle fans,
+normalised integers, second texture coordinates, lights, emission strengths and instances.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -24,7 +24,10 @@ from vobench.scene.mesh import MeshArrays, unit
 ModelLight = PointLight | SpotLight | Sun
 MOST_INSTANCES = 100_000
 MOST_NESTED = 256
-# Modes of a primitive; the others are points and lines.
+JOINTS_PER_VERTEX = 4
+LEAST_WEIGHT = 1e-9  # of all joints of a vertex together
+LEAST_CONE_DEG = 0.1
+# Modes of a primitive; the other modes are points and lines.
 TRIANGLES = 4
 STRIP = 5
 FAN = 6
@@ -32,9 +35,10 @@ FAN = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
-    """A node, with the names, roles by their extras and T_model_node (4, 4) of its ancestors and, last, its own.
+    """A node of the scene, or one instance of it if it has EXT_mesh_gpu_instancing.
 
-    Every instance of EXT_mesh_gpu_instancing has one. index: its number; source: its JSON.
+    names, roles, poses: those of its ancestors from the root on, and its own last. A role is the value of `vobench` in
+    a node's extras, and a pose is T_model_node (4, 4). index: its number in the file. source: its JSON.
     """
 
     names: tuple[str, ...]
@@ -49,9 +53,10 @@ class Node:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Primitive:
-    """Faces of one look at a node, T_model_mesh (4, 4) of their frame, and linear colours (V, 3) of their vertices.
+    """Faces of a node that share one look.
 
-    Normals are 0 where the file has none; `dropped` faces had no area.
+    mesh: its normals are 0 if the file has none. T_model_mesh: the pose (4, 4) of its frame. colours: linear colours
+    (V, 3) of the vertices. dropped: the number of faces without area that were removed.
     """
 
     node: Node
@@ -64,16 +69,16 @@ class Primitive:
 
 
 def read_gltf(data: bytes, folder: Path, *, has_srgb_vertices: bool = False) -> "Gltf":
-    """A file that is in a folder. Raises ModelError where it is incomplete or requires an unknown extension."""
+    """The file in a folder. Raises ModelError if it is incomplete or requires an unknown extension."""
     file = read_gltf_file(data, folder)
     return Gltf(file, MaterialReader(file), has_srgb_vertices)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gltf:
-    """Nodes, primitives and lights of a file.
+    """A reader of the nodes, primitives and lights of a file.
 
-    has_srgb_vertices: whether colours by vertex are sRGB, as in PLY, not linear.
+    has_srgb_vertices: whether vertex colours are sRGB, as in PLY files, instead of linear.
     """
 
     file: GltfFile
@@ -83,24 +88,28 @@ class Gltf:
     def nodes(self, T_model_file: Array) -> Iterator[Node]:
         """Every node of the scene, parents before children."""
         root = Node((), (), (T_model_file,))
-        waiting = [(index, root) for index in reversed(self._roots())]
+        stack = [(index, root) for index in reversed(self._roots())]
         visited: set[int] = set()
-        while waiting:
-            index, parent = waiting.pop()
+        while stack:
+            index, parent = stack.pop()
             source = self.file.entry("nodes", index)
             node = _child(parent, index, source)
             with located(str(node)):
-                if index in visited or len(node.names) > MOST_NESTED:
+                is_too_deep = len(node.names) > MOST_NESTED
+                if index in visited or is_too_deep:
                     raise ModelError("is in the tree twice or too deep; export it again")
                 visited.add(index)
+
                 T_model_node = parent.poses[-1] @ _local(source)
                 for T_model_instance in T_model_node @ self._instances(source):
                     yield replace(node, poses=(*parent.poses, T_model_instance))
+
                 node = replace(node, poses=(*parent.poses, T_model_node))
-                waiting += [(child, node) for child in reversed(source.get("children", []))]
+                children = source.get("children", [])
+                stack += [(child, node) for child in reversed(children)]
 
     def _roots(self) -> Sequence[int]:
-        """The nodes of the scene that is shown, else all that are no children."""
+        """The root nodes of the default scene; without scenes, all nodes that are not children of others."""
         tree = self.file.tree
         if tree.get("scenes"):
             scene = self.file.entry("scenes", tree.get("scene", 0))
@@ -110,17 +119,19 @@ class Gltf:
         return [index for index in range(len(nodes)) if index not in children]
 
     def _instances(self, source: Json) -> Array:
-        """T_node_instance (N, 4, 4) of a node's mesh."""
+        """T_node_instance (N, 4, 4) of the instances of a node's mesh."""
         extension = source.get("extensions", {}).get("EXT_mesh_gpu_instancing", {})
         attributes = extension.get("attributes")
         if not attributes:
             return np.eye(4)[None]
-        if max(map(self.file.rows, attributes.values())) > MOST_INSTANCES:
+        count = max(self.file.rows(index) for index in attributes.values())
+        if count > MOST_INSTANCES:
             raise ModelError(f"has more than {MOST_INSTANCES:,} instances; export fewer")
-        return _transforms({name: self.file.accessor(index) for name, index in attributes.items()})
+        parts = {name: self.file.accessor(index) for name, index in attributes.items()}
+        return _transforms(parts)
 
     def require_few(self, nodes: Sequence[Node]) -> None:
-        """Refuse too many faces, or vertices for as many, before any is read."""
+        """Raise ModelError for too many faces, or for vertices of as many, before any of them is read."""
         faces = 0
         for node in nodes:
             for source in self._primitives(node):
@@ -129,40 +140,41 @@ class Gltf:
             raise ModelError(f"has {faces:,} faces, more than {MOST_FACES:,}; gltf-transform simplify in.glb out.glb")
 
     def _most_faces(self, source: Json) -> int:
-        """The most faces that a primitive may have, by the rows of its accessors."""
+        """An upper limit of the number of faces of a primitive, from the number of rows of its accessors."""
         vertices = self.file.rows(source["attributes"]["POSITION"])
         corners = self.file.rows(source["indices"]) if "indices" in source else vertices
         corners_per_face = 3 if source.get("mode", TRIANGLES) == TRIANGLES else 1
         return max(corners // corners_per_face, vertices // 3)
 
     def _primitives(self, node: Node) -> list[Json]:
+        """The JSON of the primitives of a node's mesh."""
         if "mesh" not in node.source:
             return []
         mesh = self.file.entry("meshes", node.source["mesh"])
         return list(mesh["primitives"])
 
     def primitives(self, node: Node, poses: Mapping[int, Array]) -> list[Primitive]:
-        """The primitives of a node's mesh; poses: T_model_node of every node, for skins."""
+        """The primitives of a node's mesh; poses: T_model_node of every node by its index, for skins."""
         return [self._primitive(node, source, poses) for source in self._primitives(node)]
 
     def _primitive(self, node: Node, source: Json, poses: Mapping[int, Array]) -> Primitive:
         attributes = source["attributes"]
         mode = source.get("mode", TRIANGLES)
-        vertices = self.file.accessor(attributes["POSITION"]).astype(float)
-        count = len(vertices)
-        is_bare = source.get("material") is None and "COLOR_0" not in attributes
-        look = BARE if is_bare else self.materials.look(source.get("material"))
-        faces = self._faces(source, mode, count)
-        normals = np.zeros((count, 3))
-        if "NORMAL" in attributes:
-            normals = self.file.accessor(attributes["NORMAL"], count).astype(float)
-
         notes = []
         if mode not in (TRIANGLES, STRIP, FAN):
             notes.append("points and lines left out")
         if source.get("targets"):
             notes.append("morph targets left out")
 
+        vertices = self.file.accessor(attributes["POSITION"]).astype(float)
+        count = len(vertices)
+        look = self._look(source)
+        faces = self._faces(source, mode, count)
+        normals = np.zeros((count, 3))
+        if "NORMAL" in attributes:
+            normals = self.file.accessor(attributes["NORMAL"], count).astype(float)
+
+        # The vertices of a skin are moved by its joints, in the frame of the model.
         T_model_mesh = node.poses[-1]
         if "skin" in node.source and "JOINTS_0" in attributes:
             blend = self._blend(node.source["skin"], attributes, poses, count)
@@ -181,56 +193,74 @@ class Gltf:
             notes=tuple(f"{node}: {note}" for note in notes),
         )
 
+    def _look(self, source: Json) -> Look:
+        """The look of a primitive; BARE if it has neither a material nor vertex colours."""
+        material = source.get("material")
+        is_bare = material is None and "COLOR_0" not in source["attributes"]
+        return BARE if is_bare else self.materials.look(material)
+
     def _faces(self, source: Json, mode: int, count: int) -> NDArray[np.int64]:
-        """Faces (F, 3) of a primitive with that many vertices."""
-        index = np.arange(count)
+        """Faces (F, 3) of a primitive with `count` vertices."""
+        vertices = np.arange(count)
         if "indices" in source:
-            index = self.file.accessor(source["indices"])[:, 0].astype(np.int64)
-        faces = _triangles(index, mode)
+            vertices = self.file.accessor(source["indices"])[:, 0].astype(np.int64)
+        faces = _triangles(vertices, mode)
         if faces.size and not 0 <= faces.min() <= faces.max() < count:
             raise ModelError(f"a face has vertex {faces.max():,} of {count:,}; export it again")
         return faces
 
     def _uv(self, attributes: Json, look: Look, count: int) -> Array:
-        """Texture coordinates (V, 2) as a look uses them, 0 where there are none."""
+        """Texture coordinates (V, 2) with the texture transform of the look; 0 if the file has none."""
         name = f"TEXCOORD_{look.uv_set}"
         if name not in attributes:
             return np.zeros((count, 2))
         coordinates = self.file.accessor(attributes[name], count)
-        return np.asarray(coordinates @ look.T_uv[:, :2].T + look.T_uv[:, 2])
+        scale_and_rotation = look.T_uv[:, :2]
+        offset = look.T_uv[:, 2]
+        return np.asarray(coordinates @ scale_and_rotation.T + offset)
 
     def _colours(self, attributes: Json, count: int) -> Array | None:
-        """Linear colours (V, 3)."""
+        """Linear colours (V, 3) of the vertices, if the file has any."""
         if "COLOR_0" not in attributes:
             return None
-        colours = np.clip(self.file.accessor(attributes["COLOR_0"], count)[:, :3], 0, 1)
-        return linear(colours).astype(float) if self.has_srgb_vertices else colours
+        rgba = self.file.accessor(attributes["COLOR_0"], count)
+        colours = np.clip(rgba[:, :3], 0, 1)
+        if self.has_srgb_vertices:
+            return linear(colours).astype(float)
+        return colours
 
     def _blend(self, index: Any, attributes: Json, poses: Mapping[int, Array], count: int) -> Array:
-        """T_model_vertex (V, 4, 4) of a skin's vertices, the weighted sums over the joints that move them."""
+        """T_model_vertex (V, 4, 4) of a skin's vertices: linear blend skinning, a weighted sum over four joints."""
         skin = self.file.entry("skins", index)
-        joints = np.stack([poses[joint] for joint in skin["joints"]])
+        T_joints = np.stack([poses[node] for node in skin["joints"]])
         if "inverseBindMatrices" in skin:
-            binds = self.file.accessor(skin["inverseBindMatrices"], len(joints))
-            joints = joints @ binds.reshape(-1, 4, 4).swapaxes(1, 2)
+            columns = self.file.accessor(skin["inverseBindMatrices"], len(T_joints))
+            T_joints = T_joints @ columns.reshape(-1, 4, 4).swapaxes(1, 2)
 
         weights = self.file.accessor(attributes["WEIGHTS_0"], count).astype(float)
-        joint = self.file.accessor(attributes["JOINTS_0"], count)
-        weights = weights / np.maximum(weights.sum(1, keepdims=True), 1e-9)
-        weighted = (weights[:, n, None, None] * joints[joint[:, n]] for n in range(4))
+        joints = self.file.accessor(attributes["JOINTS_0"], count)
+        weights = weights / np.maximum(weights.sum(1, keepdims=True), LEAST_WEIGHT)
+        weighted = []
+        for n in range(JOINTS_PER_VERTEX):
+            T_vertices = T_joints[joints[:, n]]
+            weighted.append(weights[:, n, None, None] * T_vertices)
         return np.asarray(sum(weighted))
 
     def lights(self, node: Node) -> list[ModelLight]:
-        """The light of KHR_lights_punctual at a node; a spot falls linearly in the angle from one cone to the other."""
+        """The light of KHR_lights_punctual at a node, if any.
+
+        The intensity of a spot light decreases linearly with the angle between its inner and outer cone.
+        """
         extension = node.source.get("extensions", {}).get("KHR_lights_punctual")
         if not extension:
             return []
         lights = self.file.tree["extensions"]["KHR_lights_punctual"]["lights"]
-        return [_light(node, lights[extension["light"]])]
+        source = lights[extension["light"]]
+        return [_light(node, source)]
 
 
 def _child(parent: Node, index: int, source: Json) -> Node:
-    """A node below another, still without poses."""
+    """A child of a node, without its poses."""
     extras = source.get("extras")
     role = str(extras.get("vobench", "")) if isinstance(extras, dict) else ""
     name = str(source.get("name") or f"node_{index}")
@@ -239,10 +269,10 @@ def _child(parent: Node, index: int, source: Json) -> Node:
 
 def _light(node: Node, source: Json) -> ModelLight:
     """A light that shines along the -z axis of its node."""
-    T = node.poses[-1]
+    T_model_node = node.poses[-1]
     name = node.names[-1]
-    position_m = T[:3, 3]
-    backwards = unit(T[:3, 2])
+    position_m = T_model_node[:3, 3]
+    backwards = unit(T_model_node[:3, 2])
     intensity = max(float(numbers(source.get("intensity", 1.0))), 0.0)
     red, green, blue = np.clip(numbers(source.get("color", WHITE), 3), 0, None).tolist()
     colour = (red, green, blue)
@@ -256,45 +286,55 @@ def _light(node: Node, source: Json) -> ModelLight:
     if source["type"] != "spot":
         raise ModelError(f"has a light of type '{source['type']}', which glTF does not know")
 
-    cone = source.get("spot", {})
-    outer_deg = np.rad2deg(numbers(cone.get("outerConeAngle", np.pi / 4)))
-    inner_deg = np.rad2deg(numbers(cone.get("innerConeAngle", 0.0)))
-    outer = float(np.clip(outer_deg, 0.1, 90))
-    inner = float(np.clip(inner_deg, 0, outer))
-    of_one_lumen = SpotLight(name, position_m, -backwards, 1.0, inner, outer, colour=colour)
-    return replace(of_one_lumen, power_lm=intensity / of_one_lumen.peak_cd)
+    cones = source.get("spot", {})
+    outer_rad = numbers(cones.get("outerConeAngle", np.pi / 4))
+    inner_rad = numbers(cones.get("innerConeAngle", 0.0))
+    outer_deg = float(np.clip(np.rad2deg(outer_rad), LEAST_CONE_DEG, 90))
+    inner_deg = float(np.clip(np.rad2deg(inner_rad), 0, outer_deg))
+    one_lumen = SpotLight(name, position_m, -backwards, 1.0, inner_deg, outer_deg, colour=colour)
+    return replace(one_lumen, power_lm=intensity / one_lumen.peak_cd)
 
 
 def _applied(T: Array, vectors: Array) -> Array:
     """Vectors (N, 3), each transformed by the linear part of its own T (N, 4, 4)."""
-    return np.asarray((T[:, :3, :3] @ vectors[..., None])[..., 0])
+    columns = T[:, :3, :3] @ vectors[..., None]
+    return np.asarray(columns[..., 0])
 
 
 def _local(source: Json) -> Array:
-    """T_parent_node (4, 4)."""
+    """T_parent_node (4, 4) of a node, from its matrix or from its translation, rotation and scale."""
     if "matrix" in source:
-        return numbers(source["matrix"], 16).reshape(4, 4).T
+        by_column = numbers(source["matrix"], 16).reshape(4, 4)
+        return by_column.T
+
     widths = {"translation": 3, "rotation": 4, "scale": 3}
     parts = {key.upper(): numbers(source[key], width) for key, width in widths.items() if key in source}
     return numbers(_transforms(parts), 4, 4)
 
 
 def _transforms(parts: Mapping[str, Array]) -> Array:
-    """Transforms (..., 4, 4) of translations (..., 3), quaternions (..., 4), scalar last, and scales (..., 3)."""
+    """Transforms (..., 4, 4) of TRANSLATION (..., 3), ROTATION (..., 4), scalar last, and SCALE (..., 3)."""
     quaternion = np.asarray(parts.get("ROTATION", (0, 0, 0, 1)), float)
-    R = se3.from_quaternion(quaternion / np.linalg.norm(quaternion, axis=-1, keepdims=True))
+    norm = np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    R = se3.from_quaternion(quaternion / norm)
     scale = np.asarray(parts.get("SCALE", (1, 1, 1)), float)
-    return se3.transform(R * scale[..., None, :], parts.get("TRANSLATION", (0, 0, 0)))
+    translation = parts.get("TRANSLATION", (0, 0, 0))
+    return se3.transform(R * scale[..., None, :], translation)
 
 
-def _triangles(index: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
-    """Triangles (F, 3) of a list, strip or fan of vertices, none of points and lines. Source: section 3.7.2.1."""
+def _triangles(vertices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+    """Triangles (F, 3) of a list, strip or fan of vertices; none for points and lines. Source: section 3.7.2.1."""
     if mode == TRIANGLES:
-        return index[: len(index) // 3 * 3].reshape(-1, 3)
+        complete = len(vertices) // 3 * 3
+        return vertices[:complete].reshape(-1, 3)
     if mode not in (STRIP, FAN):
-        return index[:0].reshape(0, 3)
-    n = np.arange(max(len(index) - 2, 0))
+        return np.zeros((0, 3), np.int64)
+
+    n = np.arange(max(len(vertices) - 2, 0))
     if mode == FAN:
-        return np.asarray(index[np.stack([n + 1, n + 2, 0 * n], 1)])
-    is_odd = n % 2
-    return np.asarray(index[np.stack([n, n + 1 + is_odd, n + 2 - is_odd], 1)])
+        corners = np.stack([n + 1, n + 2, 0 * n], axis=1)
+    else:
+        # Every other triangle of a strip runs the other way round.
+        is_odd = n % 2
+        corners = np.stack([n, n + 1 + is_odd, n + 2 - is_odd], axis=1)
+    return np.asarray(vertices[corners])
