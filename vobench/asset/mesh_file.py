@@ -1,4 +1,4 @@
-"""OBJ, STL and PLY files as the .glb that trimesh makes of them."""
+"""OBJ, STL and PLY files, converted to .glb by trimesh."""
 
 import re
 from collections.abc import Iterator
@@ -9,9 +9,9 @@ from vobench.errors import ModelError
 
 
 def read_as_glb(path: Path) -> bytes:
-    """The .glb of a file, all its materials diffuse or coated, never metal, and pictures in their own colours.
+    """The file converted to .glb. No material is a metal, and textures are not tinted.
 
-    Raises ModelError where trimesh cannot read it, where it has too many faces, or needs a file that is missing.
+    Raises ModelError if trimesh cannot read the file, if it has too many faces, or if a file that it needs is missing.
     """
     import trimesh
 
@@ -27,7 +27,7 @@ def read_as_glb(path: Path) -> bytes:
 
 
 def _without_metal(visual: object) -> None:
-    """Replace a visual's material by one of glTF that is no metal, whose texture is not tinted."""
+    """Replace the material of a visual by a physically based one that is not a metal; a texture is not tinted."""
     material = visual.material  # type: ignore[attr-defined]
     physical = material.to_pbr()
     physical.name = getattr(material, "name", None)
@@ -38,7 +38,7 @@ def _without_metal(visual: object) -> None:
 
 
 def _require_readable(path: Path) -> None:
-    """Refuse too many faces before trimesh reads any, and an OBJ whose materials or pictures are lost."""
+    """Raise ModelError for too many faces, before trimesh reads any, and for an OBJ with missing files."""
     data = path.read_bytes()
     kind = path.suffix.lower()
     if kind == ".obj":
@@ -58,14 +58,14 @@ def _require_readable(path: Path) -> None:
 
 
 def _require_beside(folder: Path, obj: bytes) -> None:
-    """Refuse an OBJ whose material files, or the pictures of these, are missing."""
+    """Raise ModelError for an OBJ if one of its material files or pictures is missing."""
     for name in _files_needed(folder, obj):
         if not (folder / name).is_file():
             raise ModelError(f"needs '{name}', which is not beside it; put it there, or export one .glb")
 
 
 def _files_needed(folder: Path, obj: bytes) -> Iterator[str]:
-    """The material files of an OBJ, then the pictures of each."""
+    """The names of the material files of an OBJ, then of the pictures that each of them uses."""
     libraries = [_text(name) for name in re.findall(rb"^mtllib\s+(.+?)\s*$", obj, re.M)]
     yield from libraries
     for library in libraries:
