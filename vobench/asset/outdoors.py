@@ -1,8 +1,7 @@
-"""What stands and moves outdoors: cars, people, trees, street lamps; parts on z = 0, their front towards x."""
+"""Objects for outdoor scenes: cars, people, plants, street furniture; they stand on z = 0 and face x."""
 
 from dataclasses import dataclass, replace
 from functools import cache
-from itertools import product
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -32,10 +31,10 @@ if TYPE_CHECKING:
 
 PAINTS = ("#8d1f1c", "#20334e", "#d9dad7", "#5d6468", "#2f3a34", "#b7bcc0", "#17191b", "#3f6c87")
 GLASS = coated("#12161a", roughness=0.12)
-# A car's body from tail to nose: x, the height of its underside, that of its waist, half its width.
+# Cross sections of a car's body from tail to nose, in mm: x, height of the underside, height of the waist, half width.
 BODY = """-2100 420 840 740, -2050 320 920 830, -1850 250 950 870, -1300 220 945 890, -400 210 930 900,
  500 210 910 900, 1000 220 880 890, 1500 240 830 865, 1850 280 740 820, 2050 340 650 740, 2110 410 580 660"""
-# The cabin on it: x, half its width at the roof, its height.
+# Cross sections of the cabin, in mm: x, half width at the roof, height of the roof.
 CABIN = "-1800 680 930, -1560 610 1240, -1200 590 1400, -650 585 1450, 0 585 1435, 400 600 1290, 980 700 900"
 
 
@@ -50,24 +49,24 @@ class _Outline:
 
 
 def _outline(points_m: Array) -> _Outline:
-    """The columns of a table of BODY's form."""
+    """The columns of a table (K, 4) like BODY."""
     return _Outline(*points_m.T)
 
 
 def car(rng: Rng, colour: str = "") -> list[Part]:
-    """A hatchback 4.2 m long with wheels, lamps, plates and mirrors, its windows dark."""
+    """A hatchback, 4.2 m long, with wheels, lamps, number plates, mirrors and dark windows."""
     paint = coated(colour or one_of(rng, *PAINTS), roughness=0.12)
     parts = [Part(_body(), paint), *_cabin(paint)]
     for side in (-1, 1):
         parts += _wheels(side)
         parts += _side_fittings(side, paint)
     letters = "".join(rng.choice([*"ABCDEFGHKLMNPRSTVX"], 2))
-    number = f"{letters} {rng.integers(100, 999)}"
-    return parts + _plates_and_bumpers(number)
+    digits = rng.integers(100, 999)
+    return parts + _plates_and_bumpers(f"{letters} {digits}")
 
 
 def _wheels(side: int) -> list[Part]:
-    """The front and rear wheel of one side (-1 right, 1 left), each in its arch."""
+    """The front and rear wheel of one side (-1 right, 1 left), each in its wheel arch."""
     arch = lathe(mm("0 0, 350 0, 350 6, 0 6"), sections=18)
     roll = -90 * side
     parts = []
@@ -79,7 +78,7 @@ def _wheels(side: int) -> list[Part]:
 
 
 def _side_fittings(side: int, paint: Material) -> list[Part]:
-    """Head and tail lamp, mirror, door handle and the gaps of a door on one side."""
+    """Headlamp, tail lamp, mirror, door handle and door gaps of one side (-1 right, 1 left)."""
     lamp = cushion((0.2, 0.36, 0.14), power=3, cells=5)
     mirror = cushion((0.13, 0.2, 0.13), power=3, cells=4)
     handle = block((0.14, 0.012, 0.022), bevel_m=0.005)
@@ -97,7 +96,7 @@ def _side_fittings(side: int, paint: Material) -> list[Part]:
 
 
 def _plates_and_bumpers(number: str) -> list[Part]:
-    """A plate and a bumper at both ends."""
+    """A number plate and a bumper at both ends."""
     plate = card((0.46, 0.11))
     bumper = block((0.08, 1.1, 0.16), bevel_m=0.03)
     look = matt(texture=picture.sign(number))
@@ -109,28 +108,30 @@ def _plates_and_bumpers(number: str) -> list[Part]:
 
 
 def _body() -> "Trimesh":
-    """The body of a car, rounded at waist and sill."""
+    """The body of a car below its waist, each cross section a superellipse."""
     outline = _outline(spline(mm(BODY), 30))
-    turn = np.linspace(0, 2 * np.pi, 29)
-    y = _superellipse(np.cos(turn), 0.35)
-    z = _superellipse(np.sin(turn), 0.5)
+    angle_rad = np.linspace(0, 2 * np.pi, 29)
+    unit_y = _signed_power(np.cos(angle_rad), 0.35)
+    unit_z = _signed_power(np.sin(angle_rad), 0.5)
 
-    low = outline.low_m
-    high = outline.high_m
-    height = (low + high)[:, None] / 2 + (high - low)[:, None] / 2 * z
-    across = outline.half_width_m[:, None] * y
-    along = np.broadcast_to(outline.x_m[:, None], height.shape)
-    grid = np.stack([along, across, height], axis=-1)  # (sections, points around, 3)
+    low = outline.low_m[:, None]
+    high = outline.high_m[:, None]
+    middle = (low + high) / 2
+    half_height = (high - low) / 2
+    z = middle + half_height * unit_z
+    y = outline.half_width_m[:, None] * unit_y
+    x = np.broadcast_to(outline.x_m[:, None], z.shape)
+    grid = np.stack([x, y, z], axis=-1)  # (sections, points around, 3)
     return joined([_outward(sheet(grid)), _cap(grid[0], -1.0), _cap(grid[-1], 1.0)])
 
 
-def _superellipse(share: Array, power: float) -> Array:
-    """A sine or cosine to a power, with its sign."""
-    return np.sign(share) * np.abs(share) ** power
+def _signed_power(values: Array, power: float) -> Array:
+    """Magnitudes to a power, with the signs of the values."""
+    return np.sign(values) * np.abs(values) ** power
 
 
 def _cap(ring_m: Array, side: float) -> "Trimesh":
-    """The flat end of a body within a ring (C, 3) of vertices, towards x times side."""
+    """The flat end of a body within a ring (C, 3) of vertices; it faces x (side 1) or -x (side -1)."""
     center = np.broadcast_to(ring_m.mean(axis=0), ring_m.shape)
     mesh = _outward(sheet(np.stack([center, ring_m])))
     normals = np.tile([side, 0.0, 0.0], (len(mesh.vertices), 1))
@@ -138,44 +139,55 @@ def _cap(ring_m: Array, side: float) -> "Trimesh":
 
 
 def _outward(mesh: "Trimesh") -> "Trimesh":
-    """The mesh seen from outside of what it lies around."""
+    """The mesh with its front towards the outside, away from the centre of the car."""
     corners_m = corners(mesh)
     from_center = corners_m.mean(axis=1) - [0, 0, 0.6]
     a, b, c = corners_m.swapaxes(0, 1)
-    is_outward = (np.cross(b - a, c - a) * from_center).sum() > 0
+    area_vectors = np.cross(b - a, c - a)
+    is_outward = (area_vectors * from_center).sum() > 0
     return mesh if is_outward else flipped(mesh)
 
 
 def _cabin(paint: Material) -> list[Part]:
-    """Glass all around below a roof and pillars in the body's paint."""
-    x, roof_half, roof = spline(mm(CABIN), 30).T
-    body = _outline(mm(BODY))
-    waist = np.interp(x, body.x_m, body.high_m) - 0.04
-    waist_half = np.interp(x, body.x_m, body.half_width_m) - 0.05
-
-    # From the right waist over the roof to the left one.
-    t = np.linspace(-1, 1, 25)
-    up = np.minimum(1, 2.2 * (1 - np.abs(t))) ** 0.9
-    is_on_roof = np.abs(t) < 0.55
-    side = np.sign(t) * np.where(is_on_roof, np.abs(t) / 0.55, 1)
-    across = side * (roof_half[:, None] * up + waist_half[:, None] * (1 - up))
-    camber = 0.04 * np.abs(side) ** 2
-    height = waist[:, None] + (roof - waist)[:, None] * (up - camber)
-    along = np.broadcast_to(x[:, None], across.shape)
-    grid = np.stack([along, across, height], axis=-1)
-
+    """Windows on all sides, and a roof and pillars in the paint of the body."""
+    grid = _cabin_grid()
     glass = _outward(sheet(grid))
-    top = _outward(sheet(grid[7:22, 5:20] + [0, 0, 0.008]))
+    roof = _outward(sheet(grid[7:22, 5:20] + [0, 0, 0.008]))
+
     pillars = []
-    for section, points in product((6, 14, 22), (slice(1, 7), slice(18, 24))):
-        path = grid[section, points] + [0, 0, 0.002]
-        pillars.append(tube(path, 0.024, sections=6))
-    return [Part(glass, GLASS), Part(top, paint), Part(joined(pillars), paint)]
+    pillar_sections = (6, 14, 22)
+    right_side = slice(1, 7)
+    left_side = slice(18, 24)
+    for section in pillar_sections:
+        for points in (right_side, left_side):
+            path = grid[section, points] + [0, 0, 0.002]
+            pillars.append(tube(path, 0.024, sections=6))
+    return [Part(glass, GLASS), Part(roof, paint), Part(joined(pillars), paint)]
+
+
+def _cabin_grid() -> Array:
+    """Points (sections, points across, 3) of the cabin; each section runs from the right waist over the roof."""
+    x, roof_half_width, roof_z = spline(mm(CABIN), 30).T
+    body = _outline(mm(BODY))
+    waist_z = np.interp(x, body.x_m, body.high_m) - 0.04
+    waist_half_width = np.interp(x, body.x_m, body.half_width_m) - 0.05
+
+    t = np.linspace(-1, 1, 25)  # from the right waist to the left one
+    roof_t = 0.55  # on the roof, t is between ± this
+    rise = np.minimum(1, 2.2 * (1 - np.abs(t))) ** 0.9  # 0 at the waist, 1 on the roof
+    is_on_roof = np.abs(t) < roof_t
+    side = np.sign(t) * np.where(is_on_roof, np.abs(t) / roof_t, 1)
+    camber = 0.04 * np.abs(side) ** 2
+
+    half_width = roof_half_width[:, None] * rise + waist_half_width[:, None] * (1 - rise)
+    y = side * half_width
+    z = waist_z[:, None] + (roof_z - waist_z)[:, None] * (rise - camber)
+    return np.stack([np.broadcast_to(x[:, None], y.shape), y, z], axis=-1)
 
 
 @cache
 def _wheel() -> tuple[Part, ...]:
-    """A wheel around z, its outer side up."""
+    """A wheel whose axis is z, with its outer side up."""
     tyre_profile = mm("0 -90, 200 -90, 290 -80, 310 -60, 310 60, 290 85, 205 90, 200 70, 0 70")
     rim_profile = mm("0 0, 195 0, 195 14, 160 6, 50 10, 40 22, 0 22")
     tyre = lathe(tyre_profile, sections=18)
@@ -198,18 +210,19 @@ SKINS = ("#8d5a3f", "#b98263", "#d0a285", "#5c3a28")
 HAIR = ("#1d1613", "#3b2a1e", "#6b4d30", "#8b8580")
 COATS = (NAVY, TEAL, BRICK, PLUM, OCHRE, SAGE, INK, SAND)
 TROUSERS = ("#2b3442", "#3c3a38", "#5a5142")
-# A trunk from the hips up: height, half its depth, half its width.
+# Cross sections of a trunk from the hips up, in mm: height, half depth, half width.
 TRUNK = "830 105 165, 930 118 172, 1050 105 150, 1200 118 172, 1340 118 198, 1420 88 165, 1470 60 80, 1500 50 52"
-STEPS = 24  # of a cycle
+STEPS = 24  # poses per gait cycle, which is two steps of a person
 LEG_M = 0.9  # from the hip to the sole
-NOMINAL_HEIGHT_M = 1.74  # of the person that TRUNK and the joints are of
+STANCE_KNEE_RAD = 0.07  # bend of the knee while the foot is on the ground
+NOMINAL_HEIGHT_M = 1.74  # of a person with TRUNK and the joint positions below
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limb:
-    """Parts that move together, as they are when somebody stands upright, and their rotation over a cycle.
+    """Parts that move together, in upright posture, and their rotation over a gait cycle.
 
-    joints_m (J, 3) from the body on and pitch_rad (K, J) are those of a `Gait`.
+    joints_m: (J, 3), from the body outwards. pitch_rad: (K, J), at each of the K steps of the cycle; see `Gait`.
     """
 
     parts: list[Part]
@@ -222,7 +235,7 @@ class Limb:
         return [part.moved(T_body_limb) for part in self.parts]
 
     def scaled(self, factor: float) -> "Limb":
-        """The limb of somebody `factor` times as tall."""
+        """The limb of a person who is `factor` times as tall."""
         T = np.diag([factor, factor, factor, 1.0])
         return Limb([part.moved(T) for part in self.parts], factor * self.joints_m, self.pitch_rad)
 
@@ -240,7 +253,7 @@ def _lowest_z_m(points_m: Array, T_a_b: Array) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Walker:
-    """The limbs of somebody, the length of two of their steps, and how high their body is (K,) within these."""
+    """A walking person: limbs, distance per gait cycle, and height of the body (K,) over the cycle."""
 
     limbs: list[Limb]
     cycle_m: float
@@ -258,7 +271,7 @@ class _Clothes:
 
 
 def walker(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.0) -> Walker:
-    """Somebody who walks along x, in trousers and a coat or a jumper; their feet do not slip."""
+    """A person who walks along x without slipping; stride_deg is the largest angle of a thigh."""
     coat = one_of(rng, *COATS)
     trousers = one_of(rng, *TROUSERS)
     skin = matt(one_of(rng, *SKINS))
@@ -269,18 +282,20 @@ def walker(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.
     trunk = Limb(_trunk(clothes.coat, skin, hair), np.zeros((0, 3)), np.zeros((STEPS, 0)))
     limbs = [trunk]
     for side in (-1, 1):
-        delay = 0 if side > 0 else STEPS // 2
-        hip = np.roll(hip_rad, delay)
-        knee = np.roll(knee_rad, delay)
-        limbs += _leg(side, clothes, hip, knee)
-        limbs.append(_arm(side, clothes, hip))
+        delay = 0 if side > 0 else STEPS // 2  # the right leg is half a cycle behind
+        side_hip_rad = np.roll(hip_rad, delay)
+        side_knee_rad = np.roll(knee_rad, delay)
+        limbs += _leg(side, clothes, side_hip_rad, side_knee_rad)
+        limbs.append(_arm(side, clothes, side_hip_rad))
 
+    # The body is raised so that the lowest foot touches the ground at every step.
     scale = height_m / NOMINAL_HEIGHT_M
+    lowest_m = np.array([_lowest_m(limbs, step) for step in range(STEPS)])
     reach = np.sin(np.deg2rad(stride_deg))
     return Walker(
         limbs=[limb.scaled(scale) for limb in limbs],
         cycle_m=4 * scale * LEG_M * reach,
-        rise_m=-scale * np.array([_lowest_m(limbs, step) for step in range(STEPS)]),
+        rise_m=-scale * lowest_m,
     )
 
 
@@ -290,9 +305,10 @@ def _lowest_m(limbs: list[Limb], step: int) -> float:
 
 
 def _leg_angles(stride_deg: float) -> tuple[Array, Array]:
-    """Pitch (STEPS,) of the left thigh and bend (STEPS,) of its knee in radians, over a cycle.
+    """Pitch (STEPS,) of the left thigh and bend (STEPS,) of the left knee in radians, over a gait cycle.
 
-    In the first half the foot is on the ground and moves back evenly; in the second the leg swings forward.
+    In the first half the foot is on the ground and moves backwards at a constant speed. In the second half the leg
+    swings forward.
     """
     half = STEPS // 2
     reach = np.sin(np.deg2rad(stride_deg))
@@ -301,13 +317,15 @@ def _leg_angles(stride_deg: float) -> tuple[Array, Array]:
     swing = -np.cos(np.pi * swing_share)
     hip_rad = np.arcsin(reach * np.concatenate([stance, swing]))
 
-    lift = 2.6 * reach * np.sin(np.pi * swing_share) * (1 - 0.3 * swing_share)
-    knee_rad = np.concatenate([np.full(half, 0.07), 0.07 + lift])
+    fades = 1 - 0.3 * swing_share
+    swing_bend_rad = 2.6 * reach * np.sin(np.pi * swing_share) * fades
+    stance_knee_rad = np.full(half, STANCE_KNEE_RAD)
+    knee_rad = np.concatenate([stance_knee_rad, STANCE_KNEE_RAD + swing_bend_rad])
     return hip_rad, knee_rad
 
 
 def _leg(side: int, clothes: _Clothes, hip_rad: Array, knee_rad: Array) -> list[Limb]:
-    """The thigh, and the shin with its shoe, of one side."""
+    """The thigh, and the shin with its shoe, of one side (-1 right, 1 left)."""
     hip = np.array([0, side * 0.095, 0.88])
     knee = hip - [0, 0, 0.43]
     ankle = hip - [0, 0, 0.84]
@@ -324,10 +342,12 @@ def _leg(side: int, clothes: _Clothes, hip_rad: Array, knee_rad: Array) -> list[
 
 
 def _arm(side: int, clothes: _Clothes, hip_rad: Array) -> Limb:
-    """An arm, bent at its elbow, that swings against the leg of its side."""
+    """An arm, bent at the elbow, that swings opposite to the leg of the same side."""
     shoulder = np.array([0, side * 0.178, 1.375])
     elbow = shoulder + 0.3 * np.array([0, side * 0.12, -1])
-    wrist = elbow + 0.26 * np.array([np.sin(0.35), 0.0, -np.cos(0.35)])
+    bend_rad = 0.35
+    forearm = np.array([np.sin(bend_rad), 0.0, -np.cos(bend_rad)])
+    wrist = elbow + 0.26 * forearm
     palm = wrist - [-0.01, 0, 0.06]
     hand = cushion((0.09, 0.04, 0.16), power=2.5, cells=4)
     parts = [
@@ -339,15 +359,17 @@ def _arm(side: int, clothes: _Clothes, hip_rad: Array) -> Limb:
 
 
 def _trunk(coat: Material, skin: Material, hair: Material) -> list[Part]:
-    """A body from the hips up with its head."""
-    z, depth, width = spline(mm(TRUNK), 20).T
-    turn = np.linspace(0, 2 * np.pi, 25)
-    rings_x = depth[:, None] * np.cos(turn)
-    rings_y = width[:, None] * np.sin(turn)
-    rings_z = z[:, None] + 0 * turn
+    """A trunk from the hips up, with neck and head."""
+    z, half_depth, half_width = spline(mm(TRUNK), 20).T
+    angle_rad = np.linspace(0, 2 * np.pi, 25)
+    rings_x = half_depth[:, None] * np.cos(angle_rad)
+    rings_y = half_width[:, None] * np.sin(angle_rad)
+    rings_z = z[:, None] + 0 * angle_rad
     trunk = sheet(np.stack([rings_x, rings_y, rings_z], axis=-1))
-    outward = [*trunk.vertices[30][:2], 0]
-    looks_outward = trunk.vertex_normals[30] @ outward > 0
+
+    some_vertex = 30
+    outward = [*trunk.vertices[some_vertex][:2], 0]
+    looks_outward = trunk.vertex_normals[some_vertex] @ outward > 0
 
     head = cushion((0.2, 0.155, 0.235), power=2.2, cells=7)
     mop = cushion((0.205, 0.17, 0.17), power=2.2, cells=7)
@@ -366,7 +388,7 @@ def _trunk(coat: Material, skin: Material, hair: Material) -> list[Part]:
 
 
 def person(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.0) -> list[Part]:
-    """Somebody in the middle of a step along x."""
+    """A person in the middle of a step along x."""
     who = walker(rng, height_m, stride_deg)
     step = int(rng.choice([0, STEPS // 2]))
     T_ground_body = at(z_m=who.rise_m[step])
@@ -374,7 +396,7 @@ def person(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.
 
 
 def _limb(start_m: Array, end_m: Array, first_radius_m: float, last_radius_m: float, material: Material) -> Part:
-    """A round limb between two joints, thinner at its end."""
+    """A round limb between two joints, with rounded ends."""
     direction = end_m - start_m
     length = float(np.linalg.norm(direction))
     quarter_circle = np.array([[0, 1], [0.7, 0.7], [1, 0]])
@@ -382,35 +404,41 @@ def _limb(start_m: Array, end_m: Array, first_radius_m: float, last_radius_m: fl
     last_end = last_radius_m * quarter_circle[::-1] + [0, length]
     profile = np.concatenate([first_end, last_end])
 
-    across = unit(np.cross(direction, [0.0, 1.0, 0.0]))
-    along = direction / length
+    # The limb is turned around z, which T moves to the direction from start to end.
+    x_axis = unit(np.cross(direction, [0.0, 1.0, 0.0]))
+    z_axis = direction / length
+    y_axis = np.cross(z_axis, x_axis)
     T = np.eye(4)
-    T[:3, :3] = np.stack([across, np.cross(along, across), along], axis=1)
+    T[:3, :3] = np.stack([x_axis, y_axis, z_axis], axis=1)
     T[:3, 3] = start_m
-    return Part(moved(lathe(profile, sections=14), T), material)
+    upright = lathe(profile, sections=14)
+    return Part(moved(upright, T), material)
 
 
 @picture.painted
 def foliage(seed: int = 0, px: int = 512) -> Picture:
-    """Twigs with leaves before nothing, from dark ones behind to light ones in front."""
+    """Leaves on a transparent ground, from dark ones at the back to light ones at the front."""
     rng = np.random.default_rng(seed)
     image = Image.new("RGBA", (px, px), (96, 124, 58, 0))
     draw = ImageDraw.Draw(image)
-    turn = np.linspace(0, 2 * np.pi, 14)[:, None]
+    angle_rad = np.linspace(0, 2 * np.pi, 14)[:, None]
     leaves = 260
     for k in range(leaves):
         radius = px * 0.42 * np.sqrt(rng.random())
-        angle = rng.uniform(0, 7)
-        direction = np.array([np.cos(angle), np.sin(angle)])
+        position_rad = rng.uniform(0, 7)
+        direction = np.array([np.cos(position_rad), np.sin(position_rad)])
         x, y = px / 2 + radius * direction
 
-        heading = rng.uniform(0, 7)
+        # An ellipse that is wider at its stalk than at its tip.
+        heading_rad = rng.uniform(0, 7)
         length = px * rng.uniform(0.035, 0.06)
         tone = 0.55 + 0.45 * k / leaves + rng.normal(0, 0.06)
-        ahead = np.array([np.cos(heading), np.sin(heading)])
-        side = np.array([-np.sin(heading), np.cos(heading)])
-        taper = 1 - 0.3 * np.cos(turn)
-        outline = np.array([x, y]) + length * np.cos(turn) * ahead + 0.45 * length * np.sin(turn) * taper * side
+        ahead = np.array([np.cos(heading_rad), np.sin(heading_rad)])
+        side = np.array([-np.sin(heading_rad), np.cos(heading_rad)])
+        taper = 1 - 0.3 * np.cos(angle_rad)
+        along = length * np.cos(angle_rad) * ahead
+        across = 0.45 * length * np.sin(angle_rad) * taper * side
+        outline = np.array([x, y]) + along + across
 
         colour = (128 + rng.normal(0, 14), 160, 78)
         ink = tuple(int(np.clip(channel * tone, 0, 255)) for channel in colour)
@@ -422,13 +450,13 @@ def foliage(seed: int = 0, px: int = 512) -> Picture:
 
 
 def _leaves(rng: Rng, colours: tuple[str, ...], seed: int) -> Material:
-    """Leaves cut out of foliage, in one of some tones."""
+    """Leaves cut out of a picture of foliage, in one of the colours."""
     material = matt(one_of(rng, *colours), foliage(seed))
     return replace(material, cutout=0.5)
 
 
 def _facing(direction: Array, yaw_spread_deg: float, rng: Rng) -> float:
-    """The yaw in degrees of what looks along a direction, more or less."""
+    """The yaw in degrees of a direction, with normal noise of yaw_spread_deg."""
     yaw_deg = np.rad2deg(np.arctan2(direction[1], direction[0]))
     return float(yaw_deg + rng.normal(0, yaw_spread_deg))
 
@@ -444,8 +472,11 @@ def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
     for _ in range(9):
         angle = rng.uniform(0, 2 * np.pi)
         z = rng.uniform(0.34, 0.6) * h
-        end = rng.uniform(0.14, 0.24) * h * np.array([np.cos(angle), np.sin(angle)])
-        path = spline([[0, 0, z], [*(0.5 * end), z + 0.1 * h], [*end, z + 0.24 * h]], 6)
+        end_xy = rng.uniform(0.14, 0.24) * h * np.array([np.cos(angle), np.sin(angle)])
+        start = [0, 0, z]
+        middle = [*(0.5 * end_xy), z + 0.1 * h]
+        end = [*end_xy, z + 0.24 * h]
+        path = spline([start, middle, end], 6)
         boughs.append(tube(path, 0.006 * h, sections=6))
 
     crown_m = np.array([*sway, 0.67 * h])
@@ -467,13 +498,16 @@ def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
 
 
 def street_lamp(_: Rng, height_m: float = 5.0, reach_m: float = 1.2) -> list[Part]:
-    """A steel mast with an arm along x; its lamp would shine at (reach_m, 0, height_m)."""
+    """A steel mast with an arm along x; the place for its light is (reach_m, 0, height_m)."""
     iron = coated("#2d3532", roughness=0.35)
     h = height_m
     top = h - 0.3
     mast_profile = np.array([[0, 0], [0.1, 0], [0.1, 0.5], [0.06, 0.6], [0.04, top], [0, top]])
     mast = lathe(mast_profile, sections=16)
-    arm_path = spline([[0, 0, h - 0.32], [0.25 * reach_m, 0, h + 0.05], [reach_m, 0, h + 0.07]], 10)
+    arm_start = [0, 0, h - 0.32]
+    arm_middle = [0.25 * reach_m, 0, h + 0.05]
+    arm_end = [reach_m, 0, h + 0.07]
+    arm_path = spline([arm_start, arm_middle, arm_end], 10)
     head_m = (0.62, 0.2, 0.09)
     return [
         put(mast, iron),
@@ -513,7 +547,7 @@ def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
 
 
 def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
-    """A boulder, broken and worn, a third of it in the ground."""
+    """A boulder with flat breaks, a third of it in the ground."""
     extent_m = size_m * rng.uniform([0.8, 0.6, 0.5], [1.2, 1.0, 0.8])
     mesh = cushion(extent_m, power=2.4, cells=9)
     points_m = arrays(mesh).vertices_m
@@ -538,7 +572,7 @@ def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
     return [put(boulder, stone, z=0.12 * size_m, yaw=rng.uniform(0, 360))]
 
 
-# Slats of a park bench: x and z of the middle in metres, pitch in degrees.
+# Slats of a park bench: x and z of their centre in metres, pitch in degrees.
 SLATS = (
     (0.19, 0.45, 0),
     (0.08, 0.445, 0),
@@ -551,7 +585,7 @@ SLATS = (
 
 
 def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
-    """Slats of wood on two feet of cast iron; who sits on it looks along x."""
+    """Wooden slats on two cast-iron feet; a person on the bench looks along x."""
     iron = coated("#23282a", roughness=0.35)
     foot_path = spline(mm("240 0 0, 200 0 250, 230 0 420, 0 0 410, -200 0 430, -280 0 860"), 24)
     leg_path = spline(mm("-200 0 430, -230 0 200, -290 0 0"), 8)
@@ -574,7 +608,7 @@ def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
 
 
 def park_lamp(_: Rng, height_m: float = 3.4) -> list[Part]:
-    """A post with a lantern under a hat; its globe would be at height_m, 0.3 m wide."""
+    """A post with the cage and hat of a lantern; the place for its globe, 0.3 m wide, is at height_m."""
     iron = coated("#27302d", roughness=0.35)
     h = height_m
     post = mm("0 0, 130 0, 130 50, 80 120, 70 700, 45 780, 35 1000, 100 1000, 0 1000")
