@@ -1,4 +1,4 @@
-"""Interiors: a shell of walls with windows, its finishes, and pieces of furniture that stand in it."""
+"""Interiors: walls with windows, their finishes, and pieces of furniture."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -20,7 +20,7 @@ Instance = tuple[str, Sequence[Part]]
 Wall = Literal["east", "north", "west", "south"]
 OUTWARD: dict[Wall, tuple[float, float]] = {"east": (1, 0), "north": (0, 1), "west": (-1, 0), "south": (0, -1)}
 
-# Modules with the functions that make furniture, and the names of these.
+# The modules with functions that make furniture, and the names of the functions.
 _MODULES: dict[ModuleType, str] = {
     furniture: """
         desk chair shelf book_stack papers monitor keyboard mouse mug pens desk_lamp cables plant carton
@@ -33,10 +33,12 @@ _MODULES: dict[ModuleType, str] = {
     household: "dining_chair floor_lamp fruit_bowl low_board pendant rug table television",
     outdoors: "bollard bush car park_bench park_lamp person rock street_lamp tree",
 }
-KINDS: dict[str, Callable[..., list[Part]]] = {
-    name: getattr(module, name) for module, names in _MODULES.items() for name in names.split()
-}
-# Materials that scenes may name.
+KINDS: dict[str, Callable[..., list[Part]]] = {}
+for _module, _names in _MODULES.items():
+    for _name in _names.split():
+        KINDS[_name] = getattr(_module, _name)
+
+# The materials that a scene can refer to by name.
 FINISHES: dict[str, Callable[[], Material]] = {
     "terrazzo": lambda: Material(texture=picture.terrazzo(), eta=1.5),
     "oak_floor": lambda: matt(texture=picture.boards("oak", 1, 2048, 2.0, rows=14, joint_m=0.002)),
@@ -55,7 +57,7 @@ FINISHES: dict[str, Callable[[], Material]] = {
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One of KINDS at a position; its random choices depend on the scene's seed and this name alone."""
+    """One of KINDS at a position. Its random choices depend on its name and on the seed of the scene only."""
 
     kind: str
     name: str
@@ -65,7 +67,7 @@ class Piece:
     size: Mapping[str, Any] = field(default_factory=dict)
 
     def rng(self, seed: int = 0) -> np.random.Generator:
-        """The generator of its random choices."""
+        """The random generator of the piece."""
         name_hash = crc32(self.name.encode())
         return np.random.default_rng(np.random.SeedSequence([seed, name_hash]))
 
@@ -73,16 +75,16 @@ class Piece:
         """Its name and its parts in the scene's frame."""
         make = KINDS[self.kind]
         T_world_piece = at(*self.at_m, yaw=self.yaw_deg, pitch=self.pitch_deg)
-        parts = [part.moved(T_world_piece) for part in make(self.rng(seed), **self.size)]
-        return self.name, parts
+        parts = make(self.rng(seed), **self.size)
+        return self.name, [part.moved(T_world_piece) for part in parts]
 
 
 def things(
     instances: Iterable[Instance], known: Mapping[str, Material] = {}
 ) -> tuple[tuple[Thing, ...], dict[str, Material]]:
-    """The parts of instances as things, one per material of an instance, and the materials by name.
+    """The things of all instances, one per material of an instance, and the materials by name.
 
-    A material that is not known by a name already is named after the instance that has it first.
+    A material without a name in `known` is named after the first instance that has it.
     """
     names = {material: name for name, material in known.items()}
     result = []
@@ -102,7 +104,10 @@ def _by_material(parts: Sequence[Part]) -> dict[Material, list[MeshArrays]]:
 
 @dataclass(frozen=True, slots=True)
 class Opening:
-    """A window: its center along the wall (world x or y) and above the floor, and how far behind it the pane is."""
+    """A window.
+
+    center_m: along the wall (world x or y), and above the floor. depth_m: of its pane behind the face of the wall.
+    """
 
     wall: Wall
     center_m: tuple[float, float]
@@ -120,7 +125,11 @@ def shell(
     frame: Material = furniture.WHITE,
     pane: Material = fitting.PANE,
 ) -> Iterator[Instance]:
-    """`floor`, `ceiling`, `wall_east` ... around the origin, and `window_0` ..., each of its reveals and its pane."""
+    """Floor, ceiling, walls and windows of a room whose floor is centred at the origin.
+
+    The instances are `floor`, `ceiling`, `wall_east` and so on, and `window_0` and so on; a window is its reveals and
+    its pane.
+    """
     x, y, z = size_m
     floor_mesh = pierced((-x / 2, -y / 2, 0), (x, 0, 0), (0, y, 0))
     ceiling_mesh = pierced((-x / 2, -y / 2, z), (0, y, 0), (x, 0, 0))
@@ -134,19 +143,21 @@ def shell(
         edge = right * [x, y, 0]
         up = (0.0, 0.0, z)
         holes = {k: _hole(opening, edge) for k, opening in enumerate(openings) if opening.wall == name}
-        yield f"wall_{name}", [Part(pierced(corner, edge, up, list(holes.values())), walls[name])]
+        wall_mesh = pierced(corner, edge, up, list(holes.values()))
+        yield f"wall_{name}", [Part(wall_mesh, walls[name])]
 
         for k, hole in holes.items():
             u0, u1, v0, v1 = hole
             depth = openings[k].depth_m
             pane_corner = corner + right * u0 + [0, 0, v0] + outward * depth
-            glass = quad_arrays(pane_corner, right * (u1 - u0), (0, 0, v1 - v0))
-            sides = reveal(corner, edge, up, hole, depth)
-            yield f"window_{k}", [Part(sides, frame), Part(glass, pane)]
+            pane_edge = right * (u1 - u0)
+            pane_mesh = quad_arrays(pane_corner, pane_edge, (0, 0, v1 - v0))
+            reveal_mesh = reveal(corner, edge, up, hole, depth)
+            yield f"window_{k}", [Part(reveal_mesh, frame), Part(pane_mesh, pane)]
 
 
 def _hole(opening: Opening, edge_m: Array) -> Hole:
-    """The hole of an opening in a wall whose lower edge is edge_m, around the origin."""
+    """The hole of an opening in a wall whose lower edge is the vector edge_m, centred at x = 0 or y = 0."""
     along, up = opening.center_m
     width, height = opening.size_m
     half_length = np.abs(edge_m).sum() / 2
