@@ -60,7 +60,7 @@ class _Patch:
         self.last = last
 
     def drawn(self, colours: Map) -> NDArray[np.uint8]:
-        """sRGB squares (N, size, size, 3) of linear colours (N, 3, 1, 1, 3) at three corners: corner, right, below."""
+        """Squares (N, size, size, 3) in sRGB of linear colours (N, 3, 1, 1, 3) at the corner, right of and below it."""
         corner, right, below = np.moveaxis(colours, 1, 0)
         length = self.last - self.first
         texel = np.arange(self.size, dtype=np.float32)[:, None]
