@@ -58,10 +58,7 @@ def _solid_cells(width_m: float, height_m: float, holes: Sequence[Hole]) -> list
 
 
 def _is_in_hole(u: float, v: float, holes: Sequence[Hole]) -> bool:
-    for u0, u1, v0, v1 in holes:
-        if u0 < u < u1 and v0 < v < v1:
-            return True
-    return False
+    return any(u0 < u < u1 and v0 < v < v1 for u0, u1, v0, v1 in holes)
 
 
 def _lap_cells(width_m: float, height_m: float) -> list[Hole]:
