@@ -1,4 +1,4 @@
-"""Pictures in colour: woods, stones, cloths and printed matter, from palettes, with detail down to a millimetre."""
+"""Procedural colour textures: wood, stone, cloth and printed matter, with detail down to a millimetre."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ Bytes = NDArray[np.uint8]
 Draw = ImageDraw.ImageDraw
 Box = tuple[float, float, float, float]
 
-# From dark to light.
+# Colours of each palette from dark to light.
 TONES = {
     "oak": ("#6b4a2c", "#a87d50", "#c9a271", "#dcbd8f"),
     "walnut": ("#33231a", "#573c29", "#77543a", "#8f6b4d"),
@@ -42,7 +42,11 @@ TONES = {
 
 @dataclass(frozen=True, slots=True)
 class Octave:
-    """A band of noise: lowest and highest frequency per tile, slope of the spectrum, amount in shares of the tones."""
+    """A band of noise.
+
+    low, high: frequencies in cycles per tile. slope: of the spectrum, f^-slope. amount: standard deviation, where 1 is
+    the whole palette.
+    """
 
     low: float
     high: float
@@ -52,7 +56,10 @@ class Octave:
 
 @dataclass(frozen=True, slots=True)
 class Pits:
-    """Spots where noise between two frequencies per tile exceeds a threshold; a negative depth is darker."""
+    """Spots where a band of noise exceeds a threshold.
+
+    low, high: frequencies in cycles per tile. depth: change of the tone in a spot; a negative one is darker.
+    """
 
     low: float
     high: float
@@ -62,7 +69,7 @@ class Pits:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """An even surface: noise in several bands, and pits."""
+    """A uniform surface: noise in several bands, and pits."""
 
     octaves: tuple[Octave, ...]
     pits: Pits
@@ -103,7 +110,7 @@ CEMENT = "#aaa49a"
 MORTAR = "#b9b2a6"
 BRASS = (122, 104, 70)
 SPINE_PX_PER_M = 1300.0
-# What things are printed, woven and painted in.
+# Colours of prints, cloths and paints.
 NAVY = "#27445c"
 TEAL = "#3d7a7c"
 SKY = "#8fb3c7"
@@ -124,16 +131,17 @@ WORDS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LazyTexture:
-    """A texture whose pixels are painted when they are first asked for."""
+    """A texture whose pixels are computed when they are first needed."""
 
     pixels: Callable[[], NDArray[Any]]
     tile_m: float
 
 
 def painted(paint: Callable[..., Picture]) -> Callable[..., Texture]:
-    """A function that paints pictures, made lazy: one texture for equal arguments, painted when first looked at.
+    """A decorator: the function returns a lazy texture, the same one for equal arguments.
 
-    Most that a scene is built for, such as paths through it, looks at none. A parameter `tile_m` is the texture's.
+    The picture is painted when its pixels are first needed; many uses of a scene, such as planning a path, need none.
+    The parameter `tile_m` of the function becomes that of the texture.
     """
     parameters = signature(paint)
 
@@ -142,7 +150,8 @@ def painted(paint: Callable[..., Picture]) -> Callable[..., Texture]:
         call = parameters.bind(*args, **kwargs)
         call.apply_defaults()
         tile_m = call.arguments.get("tile_m", 1.0)
-        return LazyTexture(cache(lambda: paint(*args, **kwargs).values), tile_m)
+        pixels = cache(lambda: paint(*args, **kwargs).values)
+        return LazyTexture(pixels, tile_m)
 
     return wraps(paint)(texture)
 
@@ -156,7 +165,7 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 
 def _ramp(values: ArrayLike, tones: str) -> Bytes:
-    """Colours (..., 3) of values from 0, the first tone, to 1, the last."""
+    """Colours (..., 3) of values (...) from 0, the darkest tone of a palette, to 1, the lightest."""
     colours = np.array([rgb(tone) for tone in TONES[tones]])
     stops = np.linspace(0, 1, len(colours))
     levels = np.linspace(0, 1, 256)
@@ -168,7 +177,7 @@ def _ramp(values: ArrayLike, tones: str) -> Bytes:
 
 
 def _scaled(picture: ArrayLike | Image.Image, factor: ArrayLike) -> Bytes:
-    """A picture times a factor, as bytes."""
+    """A picture multiplied by a factor, as bytes."""
     scaled = np.asarray(picture) * np.asarray(factor, np.float32)
     return np.asarray(np.clip(scaled, 0, 255).astype(np.uint8))
 
@@ -182,9 +191,10 @@ def noise(
     slope: float = 1.0,
     stretch: float = 1.0,
 ) -> Map:
-    """Periodic noise (px, px) of unit variance between two frequencies per tile, `stretch` times as long along u.
+    """Periodic noise (px, px) of unit variance between two frequencies per tile.
 
-    Above 1024 pixels it repeats within the tile where its lowest frequency allows that.
+    stretch: the features are this many times as long along u. Above 1024 pixels the noise repeats within the tile if
+    its lowest frequency allows that.
     """
     repeats = max(1, min(px // 1024, int(low) // 16))
     n = px // repeats
@@ -195,10 +205,12 @@ def noise(
     f_v = scipy.fft.fftfreq(n)[:, None] * n
     f = np.hypot(f_u, f_v).astype(np.float32)
     is_in_band = (f >= low) & (f <= high)
-    shape = np.where(is_in_band, np.maximum(f, 1) ** -slope, 0).astype(np.float32)
+    gain = np.maximum(f, 1) ** -slope
+    shape = np.where(is_in_band, gain, 0).astype(np.float32)
 
     white = rng.standard_normal((n, n), dtype=np.float32)
-    values = scipy.fft.irfft2(scipy.fft.rfft2(white) * shape, s=(n, n))
+    spectrum = scipy.fft.rfft2(white)
+    values = scipy.fft.irfft2(spectrum * shape, s=(n, n))
     unit_variance = values / (values.std() or 1)
     return np.tile(unit_variance, (repeats, repeats)).astype(np.float32)
 
@@ -210,7 +222,10 @@ def _polygons(
     *,
     is_open: bool = False,
 ) -> Map:
-    """The image with polygons (N, K, 2) in pixels that run on across its borders, drawn in order, as an array."""
+    """An image as an array, after polygons (N, K, 2) in pixels are drawn on it in order.
+
+    A polygon across a border continues at the opposite border. is_open: draw polylines instead.
+    """
     draw = ImageDraw.Draw(image)
     draw_shape = draw.line if is_open else draw.polygon
     px = image.width
@@ -225,7 +240,7 @@ def _polygons(
 
 
 def _repeats(low: float, high: float, px: int) -> list[int]:
-    """The shifts at which what covers [low, high] is seen in a tile of [0, px]."""
+    """The shifts at which a shape that covers [low, high] appears in a tile of [0, px]."""
     shifts = [0]
     if low < 0:
         shifts.append(px)
@@ -235,18 +250,23 @@ def _repeats(low: float, high: float, px: int) -> list[int]:
 
 
 def _scratches(rng: Rng, px: int, count: int) -> Map:
-    """Thin bent lines (px, px) in [0, 1]."""
+    """An image (px, px) in [0, 1] of thin, slightly bent lines."""
     start = rng.uniform(0, px, (count, 1, 2))
     step = rng.normal(0, 0.03 * px, (count, 1, 2))
     bend = rng.normal(0, 0.004 * px, (count, 1, 2))
-    lines = np.concatenate([start, start + step / 2 + bend, start + step], axis=1)
+    middle = start + step / 2 + bend
+    end = start + step
+    lines = np.concatenate([start, middle, end], axis=1)
     tones = rng.integers(30, 255, count)
     blank = Image.new("L", (px, px))
     return _polygons(blank, lines, tones, is_open=True) / np.float32(255)
 
 
 def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
-    """The cell (px, px) and its distance in pixels to the next joint, in rows cut at `cuts` (rows, K) of a row."""
+    """The index (px, px) of the cell at each pixel, and the distance in pixels to the nearest joint.
+
+    cuts: where each row is cut, as shares of its length, (rows, K).
+    """
     rows, count = cuts.shape
     x = np.arange(px)
     row = x * rows // px
@@ -255,10 +275,12 @@ def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
     columns = [np.searchsorted(np.sort(cut * px), x) % count for cut in cuts]
     cell = np.stack(columns) + np.arange(rows)[:, None] * count
 
+    # Distances along a row are periodic: from -px / 2 to px / 2.
     to_cut = (x - cuts[..., None] * px + px / 2) % px - px / 2
-    along = np.abs(to_cut).min(axis=1)
-    across = np.minimum(x % row_px, row_px - x % row_px)
-    to_joint = np.minimum(along[row], across[:, None])
+    to_nearest_cut = np.abs(to_cut).min(axis=1)
+    below = x % row_px
+    to_row_border = np.minimum(below, row_px - below)
+    to_joint = np.minimum(to_nearest_cut[row], to_row_border[:, None])
     return cell[row], to_joint.astype(np.float32)
 
 
@@ -272,24 +294,27 @@ def boards(
     rows: int = 8,
     joint_m: float = 0,
 ) -> Picture:
-    """Planks along u: rings cut lengthwise, pores, fibres, each plank in a tone of its own, and scratches."""
+    """Planks along u with growth rings, pores, fibres and scratches; each plank has its own tone."""
     rng = np.random.default_rng(seed)
     cuts = 2 if joint_m else 1
     variety = 0.08 if joint_m else 0.05
     planks = rows * cuts
     cell, to_joint = _cells(px, rng.uniform(0, 1, (rows, cuts)))
 
-    # Each plank is cut at some depth beside the heart of its trunk; late wood is the dark end of each ring.
+    # Each plank is cut lengthwise at some depth beside the heart of its trunk. Late wood is the dark end of a ring.
     row_share = (np.arange(px) / px * rows) % 1
     v = row_share[:, None] * tile_m / rows
     heart = rng.uniform(-0.05, 0.15, planks)
     depth = rng.uniform(0.01, 0.07, planks)
     phase = rng.uniform(0, 7, planks)
-    wave = np.sin(2 * np.pi * np.arange(px) / px + phase[cell]) * 0.02
+    angle_u = 2 * np.pi * np.arange(px) / px
+    wave = np.sin(angle_u + phase[cell]) * 0.02
     bend = noise(rng, px, 1, 12, slope=1.6, stretch=3) * 0.004
-    radius = np.hypot(v - heart[cell] + bend, depth[cell] + wave)
+    across = v - heart[cell] + bend
+    radius = np.hypot(across, depth[cell] + wave)
     ring_m = rng.uniform(0.005, 0.009, planks)
-    late_wood = ((radius / ring_m[cell] % 1) ** 3).astype(np.float32)
+    place_in_ring = radius / ring_m[cell] % 1
+    late_wood = (place_in_ring**3).astype(np.float32)
 
     fibre = noise(rng, px, 30, 500, slope=0.4, stretch=30)
     pores = noise(rng, px, 60, 500, slope=0.0, stretch=12) > 1.9
@@ -300,11 +325,11 @@ def boards(
     scratches = _scratches(rng, px, px // 4)
     wear = 1 + 0.03 * stains + 0.12 * scratches
     hue = 1 + rng.normal(0, 0.15 * variety, (planks, 3)).astype(np.float32)
-    joint = np.float32(1)
+    joint_shade = np.float32(1)
     if joint_m:
         joint_px = joint_m / tile_m * px
-        joint = np.minimum(0.3 + 0.7 * to_joint / joint_px, 1)
-    light = hue[cell] * (wear * joint)[..., None]
+        joint_shade = np.minimum(0.3 + 0.7 * to_joint / joint_px, 1)
+    light = hue[cell] * (wear * joint_shade)[..., None]
     return Picture(_scaled(_ramp(tone, tones), light), tile_m)
 
 
@@ -319,14 +344,16 @@ def masonry(
     columns: int = 8,
     bond: float = 0.5,
 ) -> Picture:
-    """Bricks, slabs or tiles in courses, each shifted by `bond` of a length against the one before."""
+    """Bricks, slabs or tiles in courses; every other course is shifted by `bond` of their length."""
     rng = np.random.default_rng(seed)
     variety = 0.14 if columns > 3 else 0.05
     shift = bond * (np.arange(rows) % 2)[:, None]
     cuts = (np.arange(columns) + shift + 1e-3) / columns
     cell, to_joint = _cells(px, cuts)
 
-    rough = noise(rng, px, 4, 60, slope=0.6) * 0.6 + noise(rng, px, 60, 400, slope=0.2)
+    coarse = noise(rng, px, 4, 60, slope=0.6)
+    fine = noise(rng, px, 60, 400, slope=0.2)
+    rough = coarse * 0.6 + fine
     pits = noise(rng, px, 40, 200, slope=0.2) > 2.3
     brick_tone = rng.normal(0, variety, rows * columns)
     tone = 0.5 + brick_tone[cell] + variety * 0.5 * rough - 0.2 * pits
@@ -342,14 +369,18 @@ def masonry(
 
 @painted
 def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Picture:
-    """An even surface of GROUNDS: blotches, grain, pits and scratches."""
+    """A uniform surface, one of GROUNDS: blotches, grain, pits and scratches."""
     rng = np.random.default_rng(seed)
     surface = GROUNDS[kind]
-    bands = (band.amount * noise(rng, px, band.low, band.high, slope=band.slope) for band in surface.octaves)
+    bands = []
+    for octave in surface.octaves:
+        band = noise(rng, px, octave.low, octave.high, slope=octave.slope)
+        bands.append(octave.amount * band)
     tone = 0.6 + sum(bands)
 
     pits = surface.pits
-    excess = (noise(rng, px, pits.low, pits.high, slope=0.3) - pits.threshold) / 0.3
+    pit_noise = noise(rng, px, pits.low, pits.high, slope=0.3)
+    excess = (pit_noise - pits.threshold) / 0.3
     tone = tone + pits.depth * np.clip(excess, 0, 1)
     scratched = tone - 0.2 * _scratches(rng, px, px // 20)
     return Picture(_ramp(scratched, kind), tile_m)
@@ -357,24 +388,27 @@ def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Pic
 
 @painted
 def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
-    """A plain weave of threads in slightly different greys, to be coloured by its material."""
+    """A plain weave of threads in slightly different greys; its material gives it a colour."""
     rng = np.random.default_rng(seed)
     thread = np.arange(px) // 4
     bulge = np.abs(np.sin(np.arange(px) * np.pi / 4 + 0.4))
-    warp = 0.5 + 0.14 * rng.standard_normal(px // 4)[thread] + 0.3 * bulge
-    weft = 0.5 + 0.14 * rng.standard_normal(px // 4)[thread] + 0.3 * bulge
+    warp_greys = 0.14 * rng.standard_normal(px // 4)
+    weft_greys = 0.14 * rng.standard_normal(px // 4)
+    warp = 0.5 + warp_greys[thread] + 0.3 * bulge
+    weft = 0.5 + weft_greys[thread] + 0.3 * bulge
 
     is_warp_above = (thread[:, None] + thread) % 2 == 0
     warp_tone = warp * (0.7 + 0.3 * bulge[:, None])
     weft_tone = weft[:, None] * (0.7 + 0.3 * bulge)
     tone = np.where(is_warp_above, warp_tone, weft_tone)
-    tone = tone + 0.06 * noise(rng, px, 1, 12) + 0.1 * noise(rng, px, 40, 250, slope=0.0)
+    tone = tone + 0.06 * noise(rng, px, 1, 12)
+    tone = tone + 0.1 * noise(rng, px, 40, 250, slope=0.0)
     return Picture(_ramp(tone, "cloth"), tile_m)
 
 
 @painted
 def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
-    """Broken stones of all sizes ground flush with their cement, between strips of brass, with stains and scratches."""
+    """Stone chips of all sizes in cement, with brass strips, stains and scratches."""
     rng = np.random.default_rng(seed)
     chips, stone_colours = _stone_chips(rng, px, tile_m)
     grain = 0.045 * noise(rng, px, 20, 1500, slope=0.6) + 0.02 * noise(rng, px, 3, 12)
@@ -388,13 +422,15 @@ def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
 
 
 def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
-    """The stone (px, px) that is seen at each pixel, 0 for cement, and the colours (stones + 1, 3) of all."""
+    """The index (px, px) of the stone at each pixel, 0 for cement, and the colours (stones + 1, 3) by index."""
     count = round(11700 * tile_m**2)
-    size_m = np.sort(0.0016 * rng.uniform(0, 1, count) ** -0.55)[::-1].clip(max=0.014)
+    random_size_m = 0.0016 * rng.uniform(0, 1, count) ** -0.55
+    size_m = np.sort(random_size_m)[::-1].clip(max=0.014)
     radius_px = size_m / tile_m * px
     angle = np.sort(rng.uniform(0, 2 * np.pi, (count, 6)), axis=1)
     circle = np.stack([np.cos(angle), np.sin(angle)], -1)
-    shapes = circle * radius_px[:, None, None] + rng.uniform(0, px, (count, 1, 2))
+    center_px = rng.uniform(0, px, (count, 1, 2))
+    shapes = circle * radius_px[:, None, None] + center_px
 
     shades = 6  # of each stone
     stones = rng.integers(1, shades * len(STONES) + 1, count)
@@ -405,7 +441,7 @@ def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
     return chips.astype(np.uint8), shaded.clip(0, 255).astype(np.uint8)
 
 
-# Printed matter: a picture fills [0, 1]², to be cut into cells.
+# Printed matter: a picture fills the texture coordinates from 0 to 1, and cells of it can be shown.
 def _canvas(width: int, height: int, colour: str) -> tuple[Image.Image, Draw]:
     image = Image.new("RGB", (width, height), colour)
     return image, ImageDraw.Draw(image)
@@ -425,7 +461,7 @@ def _text(
     *,
     anchor: str = "lt",
 ) -> None:
-    """Draw a line of text whose anchor is at a place; sizes below 6 pixels cannot be read."""
+    """Draw a line of text with its anchor at a place; it is at least 6 pixels high, so that it can be read."""
     font = _font(max(6, round(size)))
     draw.text(place, text, font=font, fill=colour, anchor=anchor)
 
@@ -435,7 +471,7 @@ def _words(rng: Rng, count: int) -> str:
 
 
 def _on(colour: str) -> str:
-    """The ink that can be read on a colour."""
+    """The colour of text on a background: light on dark, else dark."""
     is_dark = sum(rgb(colour)) < 380
     return PAPER if is_dark else INK
 
@@ -446,7 +482,7 @@ def one_of(rng: Rng, *colours: str) -> str:
 
 
 def _chart(draw: Draw, rng: Rng, box: Box) -> None:
-    """Axes with bars or curves."""
+    """Draw axes with bars or curves into a box."""
     x0, y0, x1, y1 = box
     draw.line([x0, y0, x0, y1, x1, y1], fill="#777777")
     xs = np.linspace(x0, x1, int(rng.integers(8, 16)))[1:-1]
@@ -476,7 +512,7 @@ def _curve(draw: Draw, xs: Array, ys: Array, ink: str) -> None:
 
 
 def _column(draw: Draw, rng: Rng, box: Box, size: float) -> None:
-    """Paragraphs of text, with a chart now and then, that fill a box."""
+    """Fill a box with paragraphs of text, and a chart now and then."""
     x0, y, x1, y1 = box
     characters = (x1 - x0) / (0.52 * size)
     while y < y1 - size:
@@ -503,7 +539,7 @@ def pages(seed: int = 0) -> Picture:
 
 
 def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
-    """A sheet with its upper left corner at x, y: a title over one or two columns."""
+    """Draw a sheet with its upper left corner at x, y: a title above one or two columns."""
     band = one_of(rng, PAPER, PAPER, *INKS)
     split = rng.choice([220, 440])
     paper = one_of(rng, "#f4f2ec", PAPER, "#ebe8df")
@@ -517,7 +553,10 @@ def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spines:
-    """A picture of books' spines, each with its cell, thickness and height in metres; the lowest row is paper."""
+    """A picture of the spines of books; its lowest row has the colour of paper.
+
+    cells: of each book in the picture. sizes_m: thickness and height of each book.
+    """
 
     picture: Picture
     cells: tuple[Hole, ...]
@@ -526,14 +565,14 @@ class Spines:
 
 @cache
 def spines(seed: int = 0, count: int = 52) -> Spines:
-    """Books of several publishers, volumes of series among them, and ring binders."""
+    """The spines of books, of series of books, and of ring binders."""
     rng = np.random.default_rng(seed)
     drawn: list[Image.Image] = []
     while len(drawn) < count:
         has_binders = rng.random() < 0.14
         drawn += _binders(rng) if has_binders else _series(rng)
 
-    # Spines are drawn lying, and stand beside one another in the picture.
+    # Spines are drawn horizontally; in the picture they stand side by side.
     ends = np.cumsum([0, *(spine.height for spine in drawn)])
     height = round(0.325 * SPINE_PX_PER_M)
     image = Image.new("RGB", (int(ends[-1]), height), PAPER)
@@ -551,7 +590,7 @@ def spines(seed: int = 0, count: int = 52) -> Spines:
 
 
 def _binders(rng: Rng) -> list[Image.Image]:
-    """Ring binders of one owner, lying on their side as books are."""
+    """The spines of an owner's ring binders, drawn horizontally."""
     colour = one_of(rng, NAVY, INK, BRICK, "#8a8d8f")
     owner = _words(rng, 1).upper()
     w = round(0.07 * SPINE_PX_PER_M)
@@ -569,7 +608,7 @@ def _binders(rng: Rng) -> list[Image.Image]:
 
 
 def _series(rng: Rng) -> list[Image.Image]:
-    """A book, or the volumes of one, each lying on its side: as wide as the book is high."""
+    """The spine of a book, or of each volume of a series, drawn horizontally."""
     volumes = int(rng.choice([1, 1, 1, 1, 2, 5]))
     w = round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
     height_m = float(rng.choice([0.178, 0.2, 0.216, 0.235, 0.24, 0.28]))
@@ -580,7 +619,7 @@ def _series(rng: Rng) -> list[Image.Image]:
     author = _words(rng, 1).upper()
 
     image, draw = _canvas(h, w, colour)
-    title_band = rng.uniform(-0.6, 0.6)  # its length, where it is positive
+    title_band = rng.uniform(-0.6, 0.6)  # the length of the band; no band if negative
     thin_bands = [(start, 0.012) for start in rng.choice([0.05, 0.09, 0.84], 2)]
     for start, length in ((0.13, max(title_band, 0)), *thin_bands):
         draw.rectangle([start * h, 0, (start + length) * h, w], fill=accent)
@@ -600,7 +639,7 @@ def _series(rng: Rng) -> list[Image.Image]:
 
 @painted
 def screen(seed: int = 0) -> Picture:
-    """A display (1280 × 720) with files, an editor, a chart, a log and a bar of icons."""
+    """A display (1280 × 720) with a list of files, an editor, a chart, a log and a bar of icons."""
     rng = np.random.default_rng(seed)
     is_dark = rng.random() < 0.7
     background = "#1f252b" if is_dark else "#f2f1ec"
@@ -635,16 +674,17 @@ def screen(seed: int = 0) -> Picture:
 
 @painted
 def poster(style: str, seed: int = 0, width: int = 700, height: int = 1000) -> Picture:
-    """A print in one of POSTERS' styles."""
+    """A poster in one of the styles of POSTERS."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(width, height, PAPER)
     POSTERS[style](draw, rng, width, height)
-    paint = 1 + 0.03 * noise(rng, 1024, 10, 500, slope=0.5, stretch=2)[:height, :width]
-    return Picture(_scaled(image, paint[..., None]))
+    grain = noise(rng, 1024, 10, 500, slope=0.5, stretch=2)
+    light = 1 + 0.03 * grain[:height, :width]
+    return Picture(_scaled(image, light[..., None]))
 
 
 def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
-    """Ridges in the haze below a sun."""
+    """Draw ridges of hills in the haze below a sun."""
     sky_tones = np.linspace(rgb(SKY), rgb(PAPER), 40).astype(int)
     for k, tone in enumerate(sky_tones.tolist()):
         draw.rectangle([0, k * h / 40, w, h], fill=tuple(tone))
@@ -659,12 +699,13 @@ def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
         slope = np.linspace(0, 1, 160) * rng.normal(0, 6)
         walk = np.cumsum(steps) - slope
         trees = rng.normal(0, 1, 160)
-        ridge = h * (0.3 + 0.08 * k + 0.012 * walk + 0.0009 * k * trees)
-        draw.polygon([(0, h), *zip(x, ridge, strict=True), (w, h)], fill=tuple(tone))
+        share = 0.3 + 0.08 * k + 0.012 * walk + 0.0009 * k * trees
+        ridge = zip(x, h * share, strict=True)
+        draw.polygon([(0, h), *ridge, (w, h)], fill=tuple(tone))
 
 
 def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
-    """Quarters and halves of circles in squares."""
+    """Draw a grid of squares with quarters and halves of circles."""
     side = w // 5
     for y, x in product(range(0, h, side), range(0, w, side)):
         background = one_of(rng, *INKS[:6], PAPER)
@@ -688,7 +729,7 @@ def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
 
 
 def _talk(draw: Draw, rng: Rng, w: int, h: int) -> None:
-    """A title over three columns of text and charts."""
+    """Draw a title above three columns of text and charts."""
     banner = one_of(rng, NAVY, TEAL, PLUM)
     draw.rectangle([0, 0, w, 0.12 * h], fill=banner)
     _text(draw, (0.04 * w, 0.03 * h), _words(rng, 4).title(), 0.04 * h, PAPER)
@@ -713,7 +754,7 @@ POSTERS: dict[str, Callable[[Draw, Rng, int, int], None]] = {
 
 @painted
 def whiteboard(seed: int = 0) -> Picture:
-    """A board (1440 × 900) with diagrams in four inks, and what is left of wiped ones."""
+    """A whiteboard (1440 × 900) with diagrams in four inks, and traces of wiped ones."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(1440, 900, "#e9e9e5")
     wiped_diagrams = 8
@@ -730,13 +771,14 @@ def whiteboard(seed: int = 0) -> Picture:
             _chart(draw, rng, (x, y + 90, x + 240, y + 220))
 
     soft = image.filter(ImageFilter.GaussianBlur(0.8))
-    smears = 1 - 0.015 * noise(rng, 1440, 2, 60, stretch=2)[:900]
-    return Picture(_scaled(soft, smears[..., None]))
+    smears = noise(rng, 1440, 2, 60, stretch=2)[:900]
+    light = 1 - 0.015 * smears
+    return Picture(_scaled(soft, light[..., None]))
 
 
 @painted
 def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
-    """Brown board (768 × 768 px) with tape, a label with bars and text, and printed marks."""
+    """Cardboard (768 × 768 px) with tape, a label with a bar code and text, and printed arrows."""
     rng = np.random.default_rng(seed)
     image = Image.fromarray(ground("kraft", 0, 768).pixels())
     draw = ImageDraw.Draw(image)
@@ -762,7 +804,7 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
 
 @painted
 def sign(text: str, colour: str = PAPER) -> Picture:
-    """A plate (480 × 240) with a word in a border."""
+    """A sign (480 × 240) with a word inside a border."""
     ink = _on(colour)
     image, draw = _canvas(480, 240, colour)
     draw.rectangle([8, 8, 471, 231], outline=ink, width=5)
