@@ -226,7 +226,7 @@ class Gltf:
         rgba = self.file.accessor(attributes["COLOR_0"], count)
         colours = np.clip(rgba[:, :3], 0, 1)
         if self.has_srgb_vertices:
-            return linear(colours).astype(float)
+            return np.asarray(linear(colours), float)
         return colours
 
     def _blend(self, index: Any, attributes: Json, poses: Mapping[int, Array], count: int) -> Array:
