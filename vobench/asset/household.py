@@ -1,4 +1,4 @@
-"""What stands and hangs in homes and halls; parts on z = 0 around the origin, their front towards x."""
+"""Furniture and lamps for homes and halls; they stand on z = 0 at the origin and face x."""
 
 from itertools import product
 from typing import TYPE_CHECKING
@@ -46,7 +46,7 @@ def table(
 
 
 def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
-    """A wooden chair with a cushion; who sits on it looks along x."""
+    """A wooden chair with a cushion; a person on it looks along x."""
     look = wood(tones)
     legs = []
     for side in (-1, 1):
@@ -73,7 +73,7 @@ def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
 
 @picture.painted
 def _weave(seed: int, px: int = 1024) -> Picture:
-    """Bands of lozenges in few colours within a border, woven."""
+    """A woven pattern: rows of lozenges in a few colours, inside a border."""
     rng = np.random.default_rng(seed)
     inks = rng.permutation([NAVY, BRICK, OCHRE, SAGE, INK, "#7d6a58"]).tolist()
     image = Image.new("RGB", (px, px), SAND)
@@ -144,7 +144,7 @@ def television(_: Rng, width_m: float = 1.2, seed: int = 0) -> list[Part]:
 
 
 def _shade(colour: str, width_m: float, height_m: float) -> list[Part]:
-    """A cone of cloth, open at both ends, from z = 0 up, white within."""
+    """A conical lampshade of cloth on z = 0, open at both ends and white inside."""
     angle = np.linspace(0, 2 * np.pi, 33)
     share = np.array([0.0, 1.0])[:, None]
     radius = width_m / 2 * (1 - 0.35 * share)
@@ -160,7 +160,7 @@ def _shade(colour: str, width_m: float, height_m: float) -> list[Part]:
 
 
 def bulb(x_m: float, y_m: float, z_m: float, width_m: float = 0.07) -> "Trimesh":
-    """A round bulb, to be the mesh of a lamp."""
+    """A round bulb, for the mesh of a lamp."""
     ball = cushion((width_m, width_m, width_m), power=2, cells=3)
     return moved(ball, at(x_m, y_m, z_m))
 
@@ -171,7 +171,7 @@ def floor_lamp(
     colour: str = SAND,
     wide_m: float = 0.42,
 ) -> list[Part]:
-    """A lamp on a foot with a shade of cloth; its bulb would be at height_m less 0.15."""
+    """A floor lamp with a cloth shade; the place for its bulb is 0.15 m below height_m."""
     foot_profile = mm("0 0, 130 0, 130 12, 40 22, 12 30, 0 30") * [1, 1]
     foot = lathe(foot_profile * (0.6 + 0.25 * height_m))
     stem = tube(np.array([[0, 0, 0.01], [0, 0, height_m - 0.2]]), 0.011)
@@ -186,7 +186,7 @@ def pendant(
     colour: str = "",
     wide_m: float = 0.4,
 ) -> list[Part]:
-    """A lamp that hangs from z = 0 by a cord; its shade ends drop_m below, its bulb would be 0.08 higher."""
+    """A pendant lamp: its shade ends drop_m below z = 0, and the place for its bulb is 0.08 m higher."""
     scale = wide_m / 0.4
     profile = mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232") * [scale, scale]
     shade = lathe(profile, sections=36)
