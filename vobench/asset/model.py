@@ -1,4 +1,4 @@
-"""Models from files: the contents of a glTF, OBJ, STL or PLY file as things, materials, lights and movers."""
+"""Reads glTF, OBJ, STL and PLY files as things, materials, lights and movers of a scene."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,24 +24,24 @@ Key = TypeVar("Key")
 ROLES = ("mirror", "pane", "lamp", "mover", "ignored")
 GLTF_SUFFIXES = (".glb", ".gltf")
 Z_UP_SUFFIXES = (".stl", ".ply")  # by custom: these formats do not define an axis
-SILVER_TINT = 0.9  # of a mirror whose material is no metal
-LEAST_M2 = 1e-12  # faces smaller have no area
-# No camera gets into a closed body this small: its backs are never seen.
+SILVER_TINT = 0.9  # of a mirror whose material is not a metal
+LEAST_M2 = 1e-12  # smaller faces count as faces without area
+# A camera cannot enter a closed body of at most this size, so that the backs of its faces are never seen.
 CLOSED_M = 1.0
-# Beyond these a model is likely in another unit, or damaged; most are about TYPICAL_M across.
+# A model outside of these limits is probably in another unit, or damaged. Most models are about TYPICAL_M across.
 SMALLEST_M = 0.05
 PLACE_M = 3.0
 TYPICAL_M = 5.0
 LARGEST_M = 500.0
 FARTHEST_M = 1e7
-LYING = 2.0  # times as much area that faces along the other axis as up and down
-FLAT = 0.5  # a place is likely less high than this share of its length and of its width
+LYING = 2.0  # ratio of the areas that face along the other axis and up or down, above which a model lies
+FLAT = 0.5  # the height of a place is usually less than this share of its length and of its width
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # T_model_file of a file with y up
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Moving:
-    """Things that move as one, in axes like the model's whose origin is at at_m (3,), that of their node."""
+    """Things that move together. Their frame has the axes of the model and its origin at at_m (3,), their node."""
 
     name: str
     at_m: Array
@@ -50,9 +50,10 @@ class Moving:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """The contents of a file, in metres, z up. Of its things, those named in `lamps` are to shine as lamps do.
+    """The contents of a file in metres, with z up.
 
-    dropped: how many faces had no area; notes: what differs from the file, or is in doubt.
+    lamps: names of the things that are lamps. notes: differences from the file, and doubts about it. dropped: the
+    number of faces without area that were removed.
     """
 
     things: tuple[Thing, ...]
@@ -65,7 +66,7 @@ class Model:
 
     @property
     def everything(self) -> list[Thing]:
-        """Every thing where it is in the file, movers' too."""
+        """All things at their positions in the file, including those of movers."""
         moving = [_shifted(thing, mover.at_m) for mover in self.movers for thing in mover.things]
         return [*self.things, *moving]
 
@@ -79,9 +80,10 @@ def read_model(
 ) -> Model:
     """The contents of a glTF, OBJ, STL or PLY file whose unit is `scale` metres.
 
-    roles: by glob of node names, before the roles that nodes have in the file (extras: {"vobench": "mirror"}); nodes
-    have the role of their nearest ancestor with one. up: "y" or "z", else as the format has it. Emission of 1 is
-    1 cd/m² and lights are in cd and lx, as in glTF, whatever the scale. Raises ModelError with file, node and advice.
+    roles: by globs of node names. They override the roles in the file, which are extras: {"vobench": "mirror"}. A node
+    has the role of its nearest ancestor with one. up: "y" or "z"; by default that of the format. As in glTF, an
+    emission of 1 is 1 cd/m², and lights are in cd and lx; the scale does not change them. Raises ModelError with file,
+    node and advice.
     """
     path = Path(path)
     with located(str(path)), np.errstate(all="ignore"):
@@ -117,7 +119,7 @@ def read_model(
 
 
 def _notes_of_file(file: Gltf, primitives: Sequence[Primitive]) -> list[str]:
-    """What of a file is read otherwise than it has it."""
+    """Notes on what is read differently from the file."""
     notes = []
     reduced = len(file.materials.reduced)
     if reduced:
@@ -136,7 +138,7 @@ def _require_file(path: Path) -> None:
 
 
 def _require_matched(roles: Roles, nodes: Sequence[Node]) -> None:
-    """Refuse a glob of roles that matches no node."""
+    """Raise ModelError for a glob in `roles` that matches no node."""
     names = sorted({name for node in nodes for name in node.names})
     for glob in roles:
         if not any(fnmatchcase(name, glob) for name in names):
@@ -144,7 +146,7 @@ def _require_matched(roles: Roles, nodes: Sequence[Node]) -> None:
 
 
 def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles: Roles) -> Model:
-    """Things, materials and lights with names that differ, in their roles, movers apart from what is stationary."""
+    """A model with unique names; things have the materials of their roles, and movers are separate."""
     solid = [primitive for primitive in primitives if len(primitive.mesh.faces)]
     if not solid:
         raise ModelError("has no faces to see: are its nodes empty, of points or lines, without area, or ignored?")
@@ -178,13 +180,13 @@ def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles:
 
 
 def _renamed(lights: Sequence[ModelLight]) -> tuple[ModelLight, ...]:
-    """Lights with names that differ."""
+    """The lights with unique names."""
     names = _unique_names({nth: light.name for nth, light in enumerate(lights)})
     return tuple(replace(light, name=names[nth]) for nth, light in enumerate(lights))
 
 
 def _lamps(lamps: Sequence[Node], bright: Mapping[Node, str]) -> tuple[str, ...]:
-    """The names of the things of lamps that emit light. Raises ModelError where there are lamps but none of these."""
+    """The names of the things of lamps that emit light. Raises ModelError if there are lamps, but none emits."""
     shining = tuple(bright[node] for node in lamps if node in bright)
     if lamps and not shining:
         raise ModelError(f"{lamps[0]}: is a lamp without light; set its emissiveFactor and emissiveStrength (cd/m²)")
@@ -192,7 +194,7 @@ def _lamps(lamps: Sequence[Node], bright: Mapping[Node, str]) -> tuple[str, ...]
 
 
 def _movers(moving: Sequence[tuple[Node, int, Thing]]) -> tuple[Moving, ...]:
-    """Things gathered by the ancestor, given as its place in the node's names, that moves each."""
+    """Things grouped by the ancestor that moves them, which is given by its place in the names of the node."""
     gathered: dict[tuple[tuple[float, ...], tuple[str, ...]], list[Thing]] = {}
     for node, nth, thing in moving:
         origin_m = node.poses[nth + 1][:3, 3]
@@ -209,7 +211,7 @@ def _shifted(thing: Thing, by_m: Array) -> Thing:
 
 
 def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:
-    """Names that differ: a second 'chair' is 'chair_2'."""
+    """Unique names: a second 'chair' becomes 'chair_2'."""
     taken = set(wanted.values())
     names: dict[str, Key] = {}
     for key, name in wanted.items():
@@ -220,21 +222,21 @@ def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:
 
 
 def _free_names(name: str, taken: set[str]) -> Iterator[str]:
-    """name_2, name_3 and so on, as far as they are not taken."""
+    """name_2, name_3 and so on, without the taken ones."""
     numbered = (f"{name}_{n}" for n in count(2))
     return (candidate for candidate in numbered if candidate not in taken)
 
 
 @dataclass(frozen=True, slots=True)
 class _Role:
-    """The role of a node; mover: the place in its names of the ancestor that moves it."""
+    """The role of a node. mover: the place, in the names of the node, of the ancestor that moves it."""
 
     name: str
     mover: int | None
 
 
 def _role(node: Node, roles: Roles) -> _Role:
-    """The role of a node, which is that of its nearest ancestor with one; `ignored` and `mover` hold for all below."""
+    """The role of a node: that of its nearest ancestor with one. `ignored` and `mover` apply to all descendants."""
     names = [_own_role(name, in_file, roles) for name, in_file in zip(node.names, node.roles, strict=True)]
     for name in names:
         if name and name not in ROLES:
@@ -247,13 +249,13 @@ def _role(node: Node, roles: Roles) -> _Role:
 
 
 def _own_role(node_name: str, role_in_file: str, roles: Roles) -> str:
-    """The role of the first glob that matches a node's name, else the one in the file."""
+    """The role of the first glob that matches the name of a node; without one, the role in the file."""
     matching = (role for glob, role in roles.items() if fnmatchcase(node_name, glob))
     return next(matching, role_in_file)
 
 
 def _in_role(look: Look, role: str) -> tuple[str, Material]:
-    """The name and material that a role makes of one; a mirror is in its metal's tone, or of silver."""
+    """The name and material of a look in a role; a mirror keeps the tone of a metal, or is silver."""
     material = look.material
     if role == "mirror":
         is_metal = material.metal > 0.5
@@ -265,9 +267,9 @@ def _in_role(look: Look, role: str) -> tuple[str, Material]:
 
 
 def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
-    """Whether a model is likely a place that lies on its side, with its floor as a wall, as it is read with `axis` up.
+    """A note if a model, read with `axis` up, is probably a place that lies on its side, with its floor as a wall.
 
-    Either most of its faces look along the other axis, or it is flat along that axis, as rooms are in height.
+    Either most of its area faces along the other axis, or it is flat along that axis, as places are in height.
     """
     corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
     width_m, depth_m, height_m = np.ptp(corners_m, axis=(0, 1))
@@ -286,7 +288,7 @@ def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
 
 
 def _doubt_of_unit(model: Model) -> list[str]:
-    """Whether a model is likely of another unit than metres."""
+    """A note if the unit of a model is probably not the metre."""
     corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
     span = float(np.ptp(corners_m, axis=(0, 1)).max())
     if SMALLEST_M <= span <= LARGEST_M:
@@ -297,7 +299,7 @@ def _doubt_of_unit(model: Model) -> list[str]:
 
 
 def _sound(primitive: Primitive) -> Primitive:
-    """Separate faces with an area and normals, in the model's frame, with backs where these are seen."""
+    """A primitive of separate faces in the frame of the model, with area and normals, and with visible backs."""
     mesh = primitive.mesh
     T_model_mesh = primitive.T_model_mesh
     if not np.isfinite(mesh.vertices_m).all():
@@ -328,7 +330,7 @@ def _sound(primitive: Primitive) -> Primitive:
 
 
 def _separate_faces(mesh: MeshArrays, faces: Faces) -> MeshArrays:
-    """Faces (F, 3) of a mesh with vertices of their own, and the flat face's normal where a vertex has none."""
+    """Faces (F, 3) of a mesh without shared vertices; a vertex without a normal has that of its face."""
     normals = np.nan_to_num(mesh.normals)[faces]
     flat_normals = face_normals(mesh.vertices_m[faces])[:, None]
     has_normal = np.linalg.norm(normals, axis=2, keepdims=True) > 0.5
@@ -343,6 +345,6 @@ def _separate_faces(mesh: MeshArrays, faces: Faces) -> MeshArrays:
 
 
 def _is_small_and_closed(mesh: MeshArrays) -> bool:
-    """Whether a mesh is a body seen from outside that is too small for a camera to be in it."""
+    """Whether a mesh is a closed body that is too small for a camera to be inside."""
     extent_m = np.ptp(mesh.vertices_m, axis=0).max(initial=0)
     return bool(extent_m <= CLOSED_M) and is_closed_body(mesh)
