@@ -398,8 +398,9 @@ def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
     weft = 0.5 + weft_greys[thread] + 0.3 * bulge
 
     is_warp_above = (thread[:, None] + thread) % 2 == 0
-    warp_tone = warp * (0.7 + 0.3 * bulge[:, None])
-    weft_tone = weft[:, None] * (0.7 + 0.3 * bulge)
+    shade = 0.7 + 0.3 * bulge
+    warp_tone = warp * shade[:, None]
+    weft_tone = weft[:, None] * shade
     tone = np.where(is_warp_above, warp_tone, weft_tone)
     tone = tone + 0.06 * noise(rng, px, 1, 12)
     tone = tone + 0.1 * noise(rng, px, 40, 250, slope=0.0)
@@ -411,9 +412,11 @@ def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
     """Stone chips of all sizes in cement, with brass strips, stains and scratches."""
     rng = np.random.default_rng(seed)
     chips, stone_colours = _stone_chips(rng, px, tile_m)
-    grain = 0.045 * noise(rng, px, 20, 1500, slope=0.6) + 0.02 * noise(rng, px, 3, 12)
+    grain = 0.045 * noise(rng, px, 20, 1500, slope=0.6)
+    grain = grain + 0.02 * noise(rng, px, 3, 12)
     grain -= 0.1 * _scratches(rng, px, px // 6)
-    pixels = _scaled(stone_colours[chips], (1 + grain)[..., None])
+    light = 1 + grain
+    pixels = _scaled(stone_colours[chips], light[..., None])
 
     strip = slice(round(0.004 / tile_m * px))
     pixels[strip] = BRASS
@@ -584,8 +587,14 @@ def spines(seed: int = 0, count: int = 52) -> Spines:
     pixels = _scaled(image, repeated[:height, : image.width, None])
 
     u = (ends / image.width).tolist()
-    cells = [(u[k], u[k + 1], 0.0, spine.width / height) for k, spine in enumerate(drawn)]
-    sizes_m = [(spine.height / SPINE_PX_PER_M, spine.width / SPINE_PX_PER_M) for spine in drawn]
+    cells = []
+    sizes_m = []
+    for k, spine in enumerate(drawn):
+        last_v = spine.width / height
+        cells.append((u[k], u[k + 1], 0.0, last_v))
+        thickness_m = spine.height / SPINE_PX_PER_M
+        height_m = spine.width / SPINE_PX_PER_M
+        sizes_m.append((thickness_m, height_m))
     return Spines(Picture(pixels), tuple(cells), tuple(sizes_m))
 
 
@@ -599,9 +608,11 @@ def _binders(rng: Rng) -> list[Image.Image]:
     for volume in range(int(rng.integers(2, 5))):
         image, draw = _canvas(h, w, colour)
         label = [0.12 * h, 0.14 * w, 0.55 * h, 0.86 * w]
-        hole = [0.79 * h, 0.28 * w, 0.79 * h + 0.44 * w, 0.72 * w]
+        hole_x = 0.79 * h
+        hole = [hole_x, 0.28 * w, hole_x + 0.44 * w, 0.72 * w]
         draw.rectangle(label, fill=PAPER)
-        _text(draw, (0.15 * h, 0.5 * w), f"{owner} {2019 + volume}", 0.34 * w, INK, anchor="lm")
+        text = f"{owner} {2019 + volume}"
+        _text(draw, (0.15 * h, 0.5 * w), text, 0.34 * w, INK, anchor="lm")
         draw.ellipse(hole, fill="#0c0d0e", outline="#b9bcbe", width=5)
         binders.append(image)
     return binders
@@ -622,7 +633,8 @@ def _series(rng: Rng) -> list[Image.Image]:
     title_band = rng.uniform(-0.6, 0.6)  # the length of the band; no band if negative
     thin_bands = [(start, 0.012) for start in rng.choice([0.05, 0.09, 0.84], 2)]
     for start, length in ((0.13, max(title_band, 0)), *thin_bands):
-        draw.rectangle([start * h, 0, (start + length) * h, w], fill=accent)
+        end = start + length
+        draw.rectangle([start * h, 0, end * h, w], fill=accent)
     title_ink = _on(accent if title_band > 0 else colour)
     title_size = min(0.6 * w, 0.075 * h, 1.25 * h / len(title))
     _text(draw, (0.15 * h, 0.5 * w), title, title_size, title_ink, anchor="lm")
@@ -655,8 +667,11 @@ def screen(seed: int = 0) -> Picture:
 
     for row in range(38):
         file_name = _words(rng, 2)[:18]
-        _text(draw, (14 + 14 * (row % 3), 40 + 17 * row), file_name, 13, "#8d979d")
-        indent = 26 * abs((3 * row) % 8 - 4) * (row % 5 > 0)
+        file_x = 14 + 14 * (row % 3)
+        _text(draw, (file_x, 40 + 17 * row), file_name, 13, "#8d979d")
+
+        starts_block = row % 5 == 0
+        indent = 0 if starts_block else 26 * abs((3 * row) % 8 - 4)
         x = 240.0 + indent
         for word in _words(rng, int(rng.integers(1, 7))).split():
             colour = one_of(rng, ink, ink, TEAL, OCHRE, SKY, SAGE)
@@ -689,7 +704,8 @@ def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
     for k, tone in enumerate(sky_tones.tolist()):
         draw.rectangle([0, k * h / 40, w, h], fill=tuple(tone))
 
-    sun = [0.62 * w, 0.12 * h, 0.62 * w + 0.16 * h, 0.28 * h]
+    sun_x = 0.62 * w
+    sun = [sun_x, 0.12 * h, sun_x + 0.16 * h, 0.28 * h]
     draw.ellipse(sun, fill=OCHRE)
 
     x = np.linspace(0, w, 160)
@@ -790,7 +806,8 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
 
     for bar in np.cumsum(rng.integers(3, 8, 34)):
         left = x + 12 + bar
-        draw.rectangle([left, y + 84, left + rng.integers(1, 4), y + 136], fill=INK)
+        right = left + rng.integers(1, 4)
+        draw.rectangle([left, y + 84, right, y + 136], fill=INK)
     for k in range(3):
         line = _words(rng, 3).title()
         _text(draw, (x + 12, y + 10 + 22 * k), line, 19 - 2 * k, INK)
