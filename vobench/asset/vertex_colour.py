@@ -23,7 +23,8 @@ def painted(mesh: MeshArrays, colours: Array, look: Look) -> tuple[MeshArrays, L
     linearly between the corners. If the material has a texture already, only the mean of the colours is used.
     """
     material = look.material
-    is_even = np.ptp(colours, axis=(0, 1)).max() < EVEN
+    largest_difference = np.ptp(colours, axis=(0, 1)).max()
+    is_even = largest_difference < EVEN
     if material.texture or is_even:
         return mesh, _with_mean(look, colours)
 
@@ -31,7 +32,8 @@ def painted(mesh: MeshArrays, colours: Array, look: Look) -> tuple[MeshArrays, L
     patch_levels, patch_index = np.unique(face_levels, axis=0, return_inverse=True)
     patch_colours = (patch_levels / LEVELS).astype(np.float32)
     patch = LARGE_PATCH if len(patch_levels) < MOST_LARGE_PATCHES else SMALL_PATCH
-    columns = int(np.ceil(np.sqrt(len(patch_levels))))
+    side = np.sqrt(len(patch_levels))
+    columns = int(np.ceil(side))
 
     picture = _atlas(patch_colours, patch, columns)
     textured = replace(material, texture=Picture(picture))
@@ -66,7 +68,9 @@ class _Patch:
         texel = np.arange(self.size, dtype=np.float32)[:, None]
         u = (texel - self.first) / length
         v = u[:, None]
-        interpolated = corner + u * (right - corner) + v * (below - corner)
+        along_u = right - corner
+        along_v = below - corner
+        interpolated = corner + u * along_u + v * along_v
 
         # Texels beyond the triangle are only seen from far away, where the texture is averaged.
         mean = (corner + right + below) / 3
@@ -80,7 +84,8 @@ SMALL_PATCH = _Patch(size=4, first=0, last=3)
 
 def _atlas(patch_colours: Map, patch: _Patch, columns: int) -> NDArray[np.uint8]:
     """A square picture with a patch, row by row, for each of the colours (N, 9) of three corners."""
-    chunks = np.array_split(patch_colours, len(patch_colours) // FACES_AT_ONCE + 1)
+    chunk_count = len(patch_colours) // FACES_AT_ONCE + 1
+    chunks = np.array_split(patch_colours, chunk_count)
     drawn = [patch.drawn(chunk.reshape(-1, 3, 1, 1, 3)) for chunk in chunks]
     patches = np.concatenate(drawn)
     grid = np.resize(patches, (columns, columns, patch.size, patch.size, 3))
@@ -91,7 +96,8 @@ def _atlas(patch_colours: Map, patch: _Patch, columns: int) -> NDArray[np.uint8]
 def _patch_uv(patch_index: NDArray[np.int64], patch: _Patch, columns: int) -> Array:
     """Texture coordinates (F, 3, 2) of the corners of each face in its patch (F,)."""
     row, column = np.divmod(patch_index, columns)
-    corner_px = np.stack([column, row], axis=1)[:, None] * patch.size + 0.5
+    cell = np.stack([column, row], axis=1)
+    first_texel_px = cell[:, None] * patch.size + 0.5
     triangle_px = np.array(
         [
             [patch.first, patch.first],
@@ -100,4 +106,4 @@ def _patch_uv(patch_index: NDArray[np.int64], patch: _Patch, columns: int) -> Ar
         ]
     )
     side_px = columns * patch.size
-    return np.asarray((corner_px + triangle_px) / side_px)
+    return np.asarray((first_texel_px + triangle_px) / side_px)
