@@ -38,12 +38,14 @@ def save_realism_plot(path: Path, recordings: Mapping[str, Realism]) -> None:
 
     with mpl.rc_context(SETTINGS):
         figure = Figure(figsize=SIZE_INCHES, layout="constrained")
-        layout = [
-            ["bands", "rows", "side"],
-            ["bands", "spectrum", "gradient"],
-            ["bands", "tracks", "grey"],
-        ]
-        panels = figure.subplot_mosaic(layout, width_ratios=[1.25, 1, 1])
+        panels = figure.subplot_mosaic(
+            [
+                ["bands", "rows", "side"],
+                ["bands", "spectrum", "gradient"],
+                ["bands", "tracks", "grey"],
+            ],
+            width_ratios=[1.25, 1, 1],
+        )
         _bands(panels["bands"], recordings)
         _rows(panels["rows"], panels["side"], recordings)
         _curves(panels, recordings)
