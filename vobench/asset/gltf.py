@@ -227,7 +227,7 @@ class Gltf:
         colours = np.clip(rgba[:, :3], 0, 1)
         if self.has_srgb_vertices:
             return np.asarray(linear(colours), float)
-        return colours
+        return np.asarray(colours)
 
     def _blend(self, index: Any, attributes: Json, poses: Mapping[int, Array], count: int) -> Array:
         """T_model_vertex (V, 4, 4) of a skin's vertices: linear blend skinning, a weighted sum over four joints."""
