@@ -20,11 +20,12 @@ from vobench.geometry.camera import (
 )
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.lamp import lamp_of
 from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Thing, Triangles, flat, flipped, joined, quad, two_sided, unit
+from vobench.scene.mesh import Thing, Triangles, flat, flipped, joined, quad, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 

@@ -10,6 +10,7 @@ from trimesh import Trimesh
 
 from vobench.asset.shape import block
 from vobench.geometry import se3
+from vobench.geometry.vector import unit
 from vobench.scene.light import PointLight
 from vobench.scene.mesh import (
     WELD_M,
@@ -29,7 +30,6 @@ from vobench.scene.mesh import (
     table,
     textured,
     two_sided,
-    unit,
     welded,
 )
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vobench.geometry.vector import unit
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture
-from vobench.scene.mesh import Triangles, distinct, open_edges, unit, welded
+from vobench.scene.mesh import Triangles, distinct, open_edges, welded
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_way import FreeCircle, largest_free_circle
 

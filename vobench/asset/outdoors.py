@@ -13,18 +13,9 @@ from vobench.asset.furniture import BLACK, CHROME, DARK, GREY, STEEL, Part, clot
 from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PLUM, SAGE, SAND, TEAL, Rng, one_of
 from vobench.asset.shape import at, block, card, cards_arrays, cushion, lathe, sheet, spline, tube
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import (
-    arrays,
-    corners,
-    flat,
-    flipped,
-    joined,
-    make_mesh,
-    moved,
-    texture_coordinates,
-    unit,
-)
+from vobench.scene.mesh import arrays, corners, flat, flipped, joined, make_mesh, moved, texture_coordinates
 from vobench.scene.scene import jointed
 
 if TYPE_CHECKING:

@@ -13,15 +13,8 @@ from vobench.asset.polygon import oriented, triangulated
 from vobench.asset.wall import Hole
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import (
-    Faces,
-    MeshArrays,
-    cross,
-    face_normals,
-    joined_arrays,
-    quad_arrays,
-    unit,
-)
+from vobench.geometry.vector import cross, unit
+from vobench.scene.mesh import Faces, MeshArrays, face_normals, joined_arrays, quad_arrays
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

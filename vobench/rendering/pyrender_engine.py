@@ -16,6 +16,7 @@ from vobench.errors import MissingDependencyError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import cross, unit
 from vobench.rendering.context import create_context
 from vobench.rendering.pyrender_ambient import MeanLight, mean_light
 from vobench.rendering.pyrender_material import (
@@ -30,18 +31,7 @@ from vobench.rendering.view import NEAR_M, T_CV_GL, Box
 from vobench.rendering.warp import warp
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Rgb
-from vobench.scene.mesh import (
-    MeshArrays,
-    Thing,
-    areas_m2,
-    arrays,
-    corners,
-    cross,
-    distinct,
-    face_normals,
-    joined_arrays,
-    unit,
-)
+from vobench.scene.mesh import MeshArrays, Thing, areas_m2, arrays, corners, distinct, face_normals, joined_arrays
 from vobench.scene.scene import Scene
 
 GAMMA = 2.2  # pyrender stores linear ** (1 / 2.2)

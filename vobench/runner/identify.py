@@ -17,8 +17,9 @@ from vobench.motion.pioneer import Theta
 from vobench.runner.data_frame import data_frame
 from vobench.runner.drive import REFERENCE_COLUMNS, RIM_COLUMNS
 from vobench.runner.folder import SEQUENCE, open_run
-from vobench.runner.motion import NS_PER_S, recorded_drive
+from vobench.runner.motion import recorded_drive
 from vobench.sequence import Sequence, read_truth
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
 if TYPE_CHECKING:

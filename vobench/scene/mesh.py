@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import cross, unit
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -27,22 +28,6 @@ Faces = NDArray[np.int64]
 Index = NDArray[np.int32]
 # Vertices nearer than this are one, here and in all rooms above: float32 resolves 1e-6 m at 10 m.
 WELD_M = 1e-5
-
-
-def unit(vectors: ArrayLike) -> Array:
-    """Vectors (..., 3) at length 1; 0 stays 0."""
-    v = np.asarray(vectors, float)
-    length = np.sqrt((v * v).sum(-1, keepdims=True))
-    return np.asarray(v / np.where(length > 0, length, 1))
-
-
-NEXT = np.array([1, 2, 0])
-LAST = np.array([2, 0, 1])
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Products (..., 3), to the last bit those of np.cross, whose checks take longer than small meshes do."""
-    return np.asarray(a[..., NEXT] * b[..., LAST] - a[..., LAST] * b[..., NEXT])
 
 
 def face_normals(corners_m: Array) -> Array:

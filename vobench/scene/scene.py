@@ -7,9 +7,10 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.light import NS_PER_S, AreaLight, Light, PointLight, SpotLight
+from vobench.scene.light import AreaLight, Light, PointLight, SpotLight
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, Triangles, moved, quad, table
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 
 class MoverMotion(Protocol):
