@@ -14,14 +14,12 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.rendering.view import Box, PinholeView, Plane
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Triangles, distinct, unit
+from vobench.scene.mesh import WELD_M, Triangles, distinct, unit
 
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float32]
 
-# Corners nearer than this are one: float32 resolves 1e-6 m at 10 m.
-WELD_M = 1e-5
 PIECE_M = 0.25  # of long edges, so that few corners are looked at for each
 
 

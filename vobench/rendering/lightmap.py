@@ -17,13 +17,12 @@ from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
 from vobench.rendering.geometry import Floats, Indices, Mask, RayCaster, Visibility, face_materials, lengths, off, take
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Triangles, areas_m2, distinct, unit
+from vobench.scene.mesh import WELD_M, Triangles, areas_m2, distinct, unit
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
 Places = NDArray[np.int64]
-WELD_M = 1e-5  # corners nearer than this are one
 TEXELS = 16_000_000  # at most in one map: some 100 bytes each, and 4 more for each light
 FINENESS = 4096  # steps a texel: places that are meant to be amid texels are so to the last bit
 PADDING = 1  # texels around a chart, besides those that interpolation within it reads
