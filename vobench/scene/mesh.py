@@ -128,16 +128,20 @@ def _no_material() -> "SimpleMaterial":
 
 
 def make_mesh(vertices_m: ArrayLike, faces: ArrayLike, uv: ArrayLike, normals: ArrayLike) -> "Trimesh":
-    """A mesh of vertices (V, 3), faces (F, 3), texture coordinates (V, 2) and normals (V, 3), in this order."""
+    """A mesh of copies of vertices (V, 3), faces (F, 3), texture coordinates (V, 2) and normals (V, 3), in this order.
+
+    It casts rays without embree, whose set-up takes longer than all else.
+    """
     from trimesh import Trimesh
     from trimesh.visual import TextureVisuals
 
-    visual = TextureVisuals(uv=uv, material=_no_material())  # type: ignore[no-untyped-call]
-    is_empty = not len(np.asarray(vertices_m))
+    vertices = np.array(vertices_m, float)
+    is_empty = not len(vertices)  # trimesh refuses normals of no vertices
+    visual = TextureVisuals(uv=np.array(uv, float), material=_no_material())  # type: ignore[no-untyped-call]
     return Trimesh(
-        np.asarray(vertices_m, float),
-        np.asarray(faces, np.int64),
-        vertex_normals=None if is_empty else normals,
+        vertices,
+        np.array(faces, np.int64),
+        vertex_normals=None if is_empty else np.array(normals, float),
         visual=visual,
         process=False,
         use_embree=False,
