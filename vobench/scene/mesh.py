@@ -127,7 +127,12 @@ def _no_material() -> "SimpleMaterial":
     return SimpleMaterial()  # type: ignore[no-untyped-call]
 
 
-def make_mesh(vertices_m: ArrayLike, faces: ArrayLike, uv: ArrayLike, normals: ArrayLike) -> "Trimesh":
+def make_mesh(
+    vertices_m: ArrayLike,
+    faces: ArrayLike,
+    uv: ArrayLike,
+    normals: ArrayLike,
+) -> "Trimesh":
     """A mesh of copies of vertices (V, 3), faces (F, 3), texture coordinates (V, 2) and normals (V, 3), in this order.
 
     It casts rays without embree, whose set-up takes longer than all else.
@@ -226,7 +231,10 @@ QUAD_FACES = np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def quad_arrays(
-    corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, uv_m: ArrayLike = (0.0, 0.0)
+    corner_m: ArrayLike,
+    edge_u_m: ArrayLike,
+    edge_v_m: ArrayLike,
+    uv_m: ArrayLike = (0.0, 0.0),
 ) -> MeshArrays:
     """The arrays of `quad`."""
     corner = np.asarray(corner_m, float)
@@ -344,7 +352,11 @@ class Triangles:
         return replace(self, corners_m=corners, normals=normals, plane=plane)
 
 
-def table(things: Sequence[Thing], mover: Sequence[int], lamp: Sequence[int]) -> Triangles:
+def table(
+    things: Sequence[Thing],
+    mover: Sequence[int],
+    lamp: Sequence[int],
+) -> Triangles:
     """The faces of things whose mover and lamp are given, -1 for none, each in its own frame."""
     parts = [arrays(thing.mesh) for thing in things]
     counts = [len(part.faces) for part in parts]
