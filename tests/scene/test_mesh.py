@@ -154,6 +154,9 @@ def test_nothing_changes_the_mesh_that_it_is_given() -> None:
     for change in (flipped, two_sided, lambda m: moved(m, T), lambda m: textured(m, m.visual.uv + 1)):
         other = change(mesh)
         other.apply_translation([1, 2, 3])
+        other.vertices += 1
+        other.visual.uv[:] = 5
+        other.faces[:] = 0
     after = (mesh.vertices, mesh.faces, mesh.visual.uv, mesh.vertex_normals)
     for array, original in zip(after, before, strict=True):
         np.testing.assert_array_equal(array, original)

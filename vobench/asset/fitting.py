@@ -162,7 +162,11 @@ def curtain(
     return [Part(two_sided(hanging), cloth(colour))]
 
 
-def radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]:
+def radiator(
+    _: Rng,
+    width_m: float = 1.4,
+    height_m: float = 0.55,
+) -> list[Part]:
     """Columns between two headers, a valve and a pipe into the floor."""
     w = width_m / 2
     bottom = 0.14
@@ -200,7 +204,11 @@ def socket(_: Rng, count: int = 2) -> list[Part]:
     return [put(plate, WHITE, 0.006), *wells, *pins]
 
 
-def skirting(_: Rng, length_m: float = 1.0, height_m: float = 0.08) -> list[Part]:
+def skirting(
+    _: Rng,
+    length_m: float = 1.0,
+    height_m: float = 0.08,
+) -> list[Part]:
     """A board along the foot of a wall."""
     return [stood((0.014, length_m, height_m), WHITE, 0.007, bevel=0.004)]
 
@@ -222,7 +230,12 @@ def framed(
     ]
 
 
-def _framed_face(style: str, width_m: float, height_m: float, seed: int) -> Material:
+def _framed_face(
+    style: str,
+    width_m: float,
+    height_m: float,
+    seed: int,
+) -> Material:
     """What a frame shows."""
     if style == "mirror":
         return MIRROR
@@ -234,7 +247,11 @@ def _framed_face(style: str, width_m: float, height_m: float, seed: int) -> Mate
     return matt(texture=picture.poster(style, seed, width_px, height_px))
 
 
-def noticeboard(rng: Rng, width_m: float = 1.2, height_m: float = 0.9) -> list[Part]:
+def noticeboard(
+    rng: Rng,
+    width_m: float = 1.2,
+    height_m: float = 0.9,
+) -> list[Part]:
     """Cork with sheets pinned to it."""
     cork = matt(texture=picture.ground("cork", tile_m=1.0))
     pin = lathe(mm("0 0, 5 0, 5 8, 0 9"), sections=8)
@@ -259,7 +276,11 @@ def noticeboard(rng: Rng, width_m: float = 1.2, height_m: float = 0.9) -> list[P
     ]
 
 
-def glass_wall(_: Rng, width_m: float = 1.6, height_m: float = 2.2) -> list[Part]:
+def glass_wall(
+    _: Rng,
+    width_m: float = 1.6,
+    height_m: float = 2.2,
+) -> list[Part]:
     """A pane on the floor in a slender frame of steel."""
     pane_m = (width_m, height_m - 0.06)
     frame = bars(*pane_m, 0.03, 0.03)
@@ -281,7 +302,11 @@ def pipe(
     return [put(joined([rod, *flanges]), coated(colour), 0.06 + radius_m)]
 
 
-def lamp_housing(_: Rng, size_m: tuple[float, float] = (1.2, 0.3), hang_m: float = 0.1) -> list[Part]:
+def lamp_housing(
+    _: Rng,
+    size_m: tuple[float, float] = (1.2, 0.3),
+    hang_m: float = 0.1,
+) -> list[Part]:
     """What is above a level panel that shines down at z = 0 and hangs hang_m below its ceiling."""
     length, width = size_m
     tray_m = (length + 0.03, width + 0.03, 0.035)

@@ -8,7 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vobench.asset import picture
-from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PAPER, SAGE, SAND, TEAL, Rng, Spines, one_of
+from vobench.asset.picture import (
+    BRICK,
+    INK,
+    NAVY,
+    OCHRE,
+    PAPER,
+    SAGE,
+    SAND,
+    TEAL,
+    Rng,
+    Spines,
+    one_of,
+)
 from vobench.asset.shape import (
     at,
     block,
@@ -56,14 +68,21 @@ class Part:
         return Part(self.arrays.moved(T_a_b), self.material)
 
 
-def matt(colour: str = "#ffffff", texture: Texture | None = None) -> Material:
+def matt(
+    colour: str = "#ffffff",
+    texture: Texture | None = None,
+) -> Material:
     """A surface of #rrggbb (times a texture) without gloss."""
     srgb = np.array(picture.rgb(colour), np.uint8)
     red, green, blue = linear(srgb).tolist()
     return Material(colour=(red, green, blue), texture=texture)
 
 
-def coated(colour: str = "#ffffff", texture: Texture | None = None, roughness: float = 0.3) -> Material:
+def coated(
+    colour: str = "#ffffff",
+    texture: Texture | None = None,
+    roughness: float = 0.3,
+) -> Material:
     """Lacquer, plastic or glaze over a surface."""
     return replace(matt(colour, texture), eta=1.5, roughness=roughness)
 
@@ -134,8 +153,9 @@ def desk(
     leg_y = width_m / 2 - 0.12
     d = depth_m
     h = height_m
-    top = stood((d, width_m, 0.026), wood(tones), 0, 0, h - 0.026, bevel=0.004, u=rng.uniform(0, 2))
-    parts = [top]
+    top_m = (d, width_m, 0.026)
+    start_u = rng.uniform(0, 2)
+    parts = [stood(top_m, wood(tones), 0, 0, h - 0.026, bevel=0.004, u=start_u)]
 
     foot_m = (d - 0.08, 0.06, 0.03)
     post_m = (0.06, 0.08, h - 0.08)
@@ -175,7 +195,8 @@ def chair(rng: Rng, colour: str = NAVY) -> list[Part]:
         x = 0.3 * np.cos(angle)
         y = 0.3 * np.sin(angle)
         parts.append(put(leg, BLACK, yaw=np.rad2deg(angle)))
-        parts.append(put(castor, DARK, x, y, 0.03, yaw=rng.uniform(0, 360), roll=90))
+        heading = rng.uniform(0, 360)
+        parts.append(put(castor, DARK, x, y, 0.03, yaw=heading, roll=90))
 
     fabric = cloth(colour)
     seat = cushion((0.48, 0.5, 0.085), power=4.5)
@@ -216,7 +237,12 @@ def _book(spines: Spines, k: int, depth_m: float) -> MeshArrays:
     return replace(mesh, uv=uv)
 
 
-def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> MeshArrays:
+def _books(
+    rng: Rng,
+    spines: Spines,
+    width_m: float,
+    height_m: float,
+) -> MeshArrays:
     """A row of books between ±width_m / 2, in runs of neighbours, some leaning, and a pile in what is left."""
     fitting = [k for k, (_, high) in enumerate(spines.sizes_m) if high < height_m - 0.01]
     y = -width_m / 2
@@ -260,7 +286,11 @@ def _pile(rng: Rng, spines: Spines, count: int) -> MeshArrays:
     return joined_arrays(meshes)
 
 
-def book_stack(rng: Rng, count: int = 4, seed: int = 0) -> list[Part]:
+def book_stack(
+    rng: Rng,
+    count: int = 4,
+    seed: int = 0,
+) -> list[Part]:
     """Books that lie on one another."""
     spines = picture.spines(seed)
     pile = _pile(rng, spines, count)
@@ -301,7 +331,8 @@ def shelf(
     for bay, row in product(range(bays), range(rows)):
         y = bay * bay_m + bay_m / 2 - half
         z = 0.06 + row * row_m
-        parts.append(stood(plank_m, board, 0, y, z - 0.02, bevel=0.002, u=rng.uniform(0, 2)))
+        start_u = rng.uniform(0, 2)
+        parts.append(stood(plank_m, board, 0, y, z - 0.02, bevel=0.002, u=start_u))
         has_boxes = rng.random() < 0.12
         if has_boxes:
             cardboard = matt(one_of(rng, SAGE, SAND, NAVY))
@@ -314,24 +345,35 @@ def shelf(
     return [*parts, Part(joined_arrays(books), matt(texture=spines.picture))]
 
 
-def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> list[Part]:
+def papers(
+    rng: Rng,
+    count: int = 4,
+    spread_m: float = 0.07,
+    seed: int = 0,
+) -> list[Part]:
     """Sheets of A4 that lie over one another, a corner of each lifted."""
     u, v = np.meshgrid(np.linspace(0, 1, 6), np.linspace(1, 0, 7))
     corner = np.clip(u + v - 1.3, 0, 1) ** 2
     sheets = []
     for k in range(count):
         lift = 0.0006 * (k + 1) + 0.012 * rng.random() * corner
-        points_m = np.stack([0.297 * (v - 0.5), 0.21 * (u - 0.5), lift], axis=-1)
+        x = 0.297 * (v - 0.5)
+        y = 0.21 * (u - 0.5)
+        points_m = np.stack([x, y, lift], axis=-1)
         column = rng.integers(3)
         row = rng.integers(2)
         cells = np.stack([column + u, row + v], axis=-1).reshape(-1, 2)
         page = textured(sheet(points_m), cells / [3, 2])
-        x, y = rng.normal(0, spread_m, 2)
-        sheets.append(moved(page, at(x, y, yaw=rng.normal(0, 14))))
+        center_x, center_y = rng.normal(0, spread_m, 2)
+        sheets.append(moved(page, at(center_x, center_y, yaw=rng.normal(0, 14))))
     return [Part(joined(sheets), matt(texture=picture.pages(seed)))]
 
 
-def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
+def monitor(
+    rng: Rng,
+    width_m: float = 0.6,
+    seed: int = 0,
+) -> list[Part]:
     """A display on a foot, switched on, tilted a little."""
     h = width_m * 0.58
     tilt = rng.uniform(-4, 0)
@@ -414,7 +456,11 @@ def desk_lamp(rng: Rng, colour: str = TEAL) -> list[Part]:
     ]
 
 
-def cables(rng: Rng, length_m: float = 1.2, height_m: float = 0.7) -> list[Part]:
+def cables(
+    rng: Rng,
+    length_m: float = 1.2,
+    height_m: float = 0.7,
+) -> list[Part]:
     """Leads that sag from a desk at height_m to a socket on the wall length_m behind it."""
     radius_m = 0.0045
     lowest = [-9, -9, 0.006]  # so that cables lie on the floor
@@ -428,7 +474,11 @@ def cables(rng: Rng, length_m: float = 1.2, height_m: float = 0.7) -> list[Part]
     return [Part(joined_arrays(leads), BLACK)]
 
 
-def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
+def plant(
+    rng: Rng,
+    height_m: float = 1.2,
+    leaves: int = 26,
+) -> list[Part]:
     """Broad leaves on stems in a pot of clay."""
     pot_m = 0.28 * height_m
     stems = []
@@ -464,7 +514,11 @@ def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
     ]
 
 
-def carton(_: Rng, size_m: tuple[float, float, float] = (0.36, 0.46, 0.3), seed: int = 0) -> list[Part]:
+def carton(
+    _: Rng,
+    size_m: tuple[float, float, float] = (0.36, 0.46, 0.3),
+    seed: int = 0,
+) -> list[Part]:
     """A cardboard box, taped and labelled."""
     tile_m = max(size_m)
     box = block(size_m, bevel_m=0.002, uv_m=(tile_m / 2, tile_m / 2))
@@ -472,7 +526,10 @@ def carton(_: Rng, size_m: tuple[float, float, float] = (0.36, 0.46, 0.3), seed:
     return [Part(standing, matt(texture=picture.carton(seed, tile_m)))]
 
 
-def crate(rng: Rng, size_m: tuple[float, float, float] = (0.8, 0.8, 1.2)) -> list[Part]:
+def crate(
+    rng: Rng,
+    size_m: tuple[float, float, float] = (0.8, 0.8, 1.2),
+) -> list[Part]:
     """A box of rough planks on posts, with a plate."""
     x, y, z = size_m
     rough = matt(texture=picture.boards("beech", 5, rows=6))
@@ -550,7 +607,11 @@ def sofa(
     return parts
 
 
-def waste_bin(rng: Rng, width_m: float = 0.3, height_m: float = 0.4) -> list[Part]:
+def waste_bin(
+    rng: Rng,
+    width_m: float = 0.3,
+    height_m: float = 0.4,
+) -> list[Part]:
     """A waste bin with crumpled paper."""
     profile = mm("0 0, 400 0, 500 1000, 480 1000, 385 20, 0 20") * [width_m, height_m]
     size_m = [width_m, width_m, height_m]
@@ -596,7 +657,12 @@ def cabinet(
     return parts
 
 
-def bench(rng: Rng, width_m: float = 2.0, depth_m: float = 0.9, height_m: float = 0.7) -> list[Part]:
+def bench(
+    rng: Rng,
+    width_m: float = 2.0,
+    depth_m: float = 0.9,
+    height_m: float = 0.7,
+) -> list[Part]:
     """A work bench of beech with a shelf below."""
     beech = wood("beech")
     d = depth_m
@@ -620,7 +686,11 @@ def bench(rng: Rng, width_m: float = 2.0, depth_m: float = 0.9, height_m: float 
     return parts
 
 
-def pillar(rng: Rng, width_m: float = 0.4, height_m: float = 3.0) -> list[Part]:
+def pillar(
+    rng: Rng,
+    width_m: float = 0.4,
+    height_m: float = 3.0,
+) -> list[Part]:
     """A column of raw concrete with chamfered edges, a kick plate and a sign."""
     concrete = matt(texture=picture.ground("concrete"))
     sign = matt(texture=picture.sign("P2", OCHRE))

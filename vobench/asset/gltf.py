@@ -64,7 +64,12 @@ class Primitive:
     dropped: int = 0
 
 
-def read_gltf(data: bytes, folder: Path, *, has_srgb_vertices: bool = False) -> "Gltf":
+def read_gltf(
+    data: bytes,
+    folder: Path,
+    *,
+    has_srgb_vertices: bool = False,
+) -> "Gltf":
     """A file that is in a folder. Raises ModelError where it is incomplete or requires an unknown extension."""
     file = read_gltf_file(data, folder)
     return Gltf(file, MaterialReader(file), has_srgb_vertices)
@@ -146,7 +151,12 @@ class Gltf:
         """The primitives of a node's mesh; poses: T_model_node of every node, for skins."""
         return [self._primitive(node, source, poses) for source in self._primitives(node)]
 
-    def _primitive(self, node: Node, source: Json, poses: Mapping[int, Array]) -> Primitive:
+    def _primitive(
+        self,
+        node: Node,
+        source: Json,
+        poses: Mapping[int, Array],
+    ) -> Primitive:
         attributes = source["attributes"]
         mode = source.get("mode", TRIANGLES)
         vertices = self.file.accessor(attributes["POSITION"]).astype(float)
@@ -182,7 +192,12 @@ class Gltf:
             notes=tuple(f"{node}: {note}" for note in notes),
         )
 
-    def _faces(self, source: Json, mode: int, count: int) -> NDArray[np.int64]:
+    def _faces(
+        self,
+        source: Json,
+        mode: int,
+        count: int,
+    ) -> NDArray[np.int64]:
         """Faces (F, 3) of a primitive with that many vertices."""
         index = np.arange(count)
         if "indices" in source:
@@ -207,7 +222,13 @@ class Gltf:
         colours = np.clip(self.file.accessor(attributes["COLOR_0"], count)[:, :3], 0, 1)
         return linear(colours).astype(float) if self.has_srgb_vertices else colours
 
-    def _blend(self, index: Any, attributes: Json, poses: Mapping[int, Array], count: int) -> Array:
+    def _blend(
+        self,
+        index: Any,
+        attributes: Json,
+        poses: Mapping[int, Array],
+        count: int,
+    ) -> Array:
         """T_model_vertex (V, 4, 4) of a skin's vertices, the weighted sums over the joints that move them."""
         skin = self.file.entry("skins", index)
         joints = np.stack([poses[joint] for joint in skin["joints"]])
@@ -288,7 +309,10 @@ def _transforms(parts: Mapping[str, Array]) -> Array:
     return se3.transform(R * scale[..., None, :], parts.get("TRANSLATION", (0, 0, 0)))
 
 
-def _triangles(index: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
+def _triangles(
+    index: NDArray[np.int64],
+    mode: int,
+) -> NDArray[np.int64]:
     """Triangles (F, 3) of a list, strip or fan of vertices, none of points and lines. Source: section 3.7.2.1."""
     if mode == TRIANGLES:
         return index[: len(index) // 3 * 3].reshape(-1, 3)

@@ -7,8 +7,30 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from vobench.asset import picture
-from vobench.asset.furniture import BLACK, DARK, STEEL, WHITE, Part, cloth, coated, matt, mm, put, stood, wood
-from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, SAGE, SAND, Rng, one_of
+from vobench.asset.furniture import (
+    BLACK,
+    DARK,
+    STEEL,
+    WHITE,
+    Part,
+    cloth,
+    coated,
+    matt,
+    mm,
+    put,
+    stood,
+    wood,
+)
+from vobench.asset.picture import (
+    BRICK,
+    INK,
+    NAVY,
+    OCHRE,
+    SAGE,
+    SAND,
+    Rng,
+    one_of,
+)
 from vobench.asset.shape import at, card, cushion, lathe, sheet, spline, tube
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import flipped, joined, moved
@@ -45,7 +67,11 @@ def table(
     return parts
 
 
-def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
+def dining_chair(
+    _: Rng,
+    colour: str = SAND,
+    tones: str = "oak",
+) -> list[Part]:
     """A wooden chair with a cushion; who sits on it looks along x."""
     look = wood(tones)
     legs = []
@@ -124,7 +150,11 @@ def rug(
     ]
 
 
-def television(_: Rng, width_m: float = 1.2, seed: int = 0) -> list[Part]:
+def television(
+    _: Rng,
+    width_m: float = 1.2,
+    seed: int = 0,
+) -> list[Part]:
     """A flat screen on two feet that shows hills."""
     h = 0.57 * width_m
     glow = Material(
@@ -159,7 +189,12 @@ def _shade(colour: str, width_m: float, height_m: float) -> list[Part]:
     return [Part(outer, cloth(colour)), Part(inner, WHITE)]
 
 
-def bulb(x_m: float, y_m: float, z_m: float, width_m: float = 0.07) -> "Trimesh":
+def bulb(
+    x_m: float,
+    y_m: float,
+    z_m: float,
+    width_m: float = 0.07,
+) -> "Trimesh":
     """A round bulb, to be the mesh of a lamp."""
     ball = cushion((width_m, width_m, width_m), power=2, cells=3)
     return moved(ball, at(x_m, y_m, z_m))

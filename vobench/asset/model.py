@@ -17,7 +17,16 @@ from vobench.asset.vertex_colour import painted
 from vobench.errors import ModelError, unknown_name_sentence
 from vobench.geometry.se3 import Array
 from vobench.scene.material import LUMINANCE, Material
-from vobench.scene.mesh import Faces, MeshArrays, Thing, areas_m2, arrays, corners, face_normals, is_closed_body
+from vobench.scene.mesh import (
+    Faces,
+    MeshArrays,
+    Thing,
+    areas_m2,
+    arrays,
+    corners,
+    face_normals,
+    is_closed_body,
+)
 
 Roles = Mapping[str, str]
 Key = TypeVar("Key")
@@ -143,7 +152,11 @@ def _require_matched(roles: Roles, nodes: Sequence[Node]) -> None:
             raise ModelError(unknown_name_sentence("node", glob, names))
 
 
-def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles: Roles) -> Model:
+def _model(
+    primitives: Sequence[Primitive],
+    lights: Sequence[ModelLight],
+    roles: Roles,
+) -> Model:
     """Things, materials and lights with names that differ, in their roles, movers apart from what is stationary."""
     solid = [primitive for primitive in primitives if len(primitive.mesh.faces)]
     if not solid:
@@ -183,7 +196,10 @@ def _renamed(lights: Sequence[ModelLight]) -> tuple[ModelLight, ...]:
     return tuple(replace(light, name=names[nth]) for nth, light in enumerate(lights))
 
 
-def _lamps(lamps: Sequence[Node], bright: Mapping[Node, str]) -> tuple[str, ...]:
+def _lamps(
+    lamps: Sequence[Node],
+    bright: Mapping[Node, str],
+) -> tuple[str, ...]:
     """The names of the things of lamps that emit light. Raises ModelError where there are lamps but none of these."""
     shining = tuple(bright[node] for node in lamps if node in bright)
     if lamps and not shining:

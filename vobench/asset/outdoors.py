@@ -9,9 +9,43 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from vobench.asset import picture
-from vobench.asset.furniture import BLACK, CHROME, DARK, GREY, STEEL, Part, cloth, coated, matt, mm, put, stood
-from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PLUM, SAGE, SAND, TEAL, Rng, one_of
-from vobench.asset.shape import at, block, card, cards_arrays, cushion, lathe, sheet, spline, tube
+from vobench.asset.furniture import (
+    BLACK,
+    CHROME,
+    DARK,
+    GREY,
+    STEEL,
+    Part,
+    cloth,
+    coated,
+    matt,
+    mm,
+    put,
+    stood,
+)
+from vobench.asset.picture import (
+    BRICK,
+    INK,
+    NAVY,
+    OCHRE,
+    PLUM,
+    SAGE,
+    SAND,
+    TEAL,
+    Rng,
+    one_of,
+)
+from vobench.asset.shape import (
+    at,
+    block,
+    card,
+    cards_arrays,
+    cushion,
+    lathe,
+    sheet,
+    spline,
+    tube,
+)
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.scene.material import Material, Picture
@@ -108,7 +142,9 @@ def _body() -> "Trimesh":
 
     low = outline.low_m
     high = outline.high_m
-    height = (low + high)[:, None] / 2 + (high - low)[:, None] / 2 * z
+    middle = (low + high)[:, None] / 2
+    half_height = (high - low)[:, None] / 2
+    height = middle + half_height * z
     across = outline.half_width_m[:, None] * y
     along = np.broadcast_to(outline.x_m[:, None], height.shape)
     grid = np.stack([along, across, height], axis=-1)  # (sections, points around, 3)
@@ -248,7 +284,11 @@ class _Clothes:
     shoe: Material
 
 
-def walker(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.0) -> Walker:
+def walker(
+    rng: Rng,
+    height_m: float = NOMINAL_HEIGHT_M,
+    stride_deg: float = 22.0,
+) -> Walker:
     """Somebody who walks along x, in trousers and a coat or a jumper; their feet do not slip."""
     coat = one_of(rng, *COATS)
     trousers = one_of(rng, *TROUSERS)
@@ -292,12 +332,18 @@ def _leg_angles(stride_deg: float) -> tuple[Array, Array]:
     swing = -np.cos(np.pi * swing_share)
     hip_rad = np.arcsin(reach * np.concatenate([stance, swing]))
 
-    lift = 2.6 * reach * np.sin(np.pi * swing_share) * (1 - 0.3 * swing_share)
+    arch = np.sin(np.pi * swing_share)
+    lift = 2.6 * reach * arch * (1 - 0.3 * swing_share)
     knee_rad = np.concatenate([np.full(half, 0.07), 0.07 + lift])
     return hip_rad, knee_rad
 
 
-def _leg(side: int, clothes: _Clothes, hip_rad: Array, knee_rad: Array) -> list[Limb]:
+def _leg(
+    side: int,
+    clothes: _Clothes,
+    hip_rad: Array,
+    knee_rad: Array,
+) -> list[Limb]:
     """The thigh, and the shin with its shoe, of one side."""
     hip = np.array([0, side * 0.095, 0.88])
     knee = hip - [0, 0, 0.43]
@@ -356,7 +402,11 @@ def _trunk(coat: Material, skin: Material, hair: Material) -> list[Part]:
     ]
 
 
-def person(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.0) -> list[Part]:
+def person(
+    rng: Rng,
+    height_m: float = NOMINAL_HEIGHT_M,
+    stride_deg: float = 22.0,
+) -> list[Part]:
     """Somebody in the middle of a step along x."""
     who = walker(rng, height_m, stride_deg)
     step = int(rng.choice([0, STEPS // 2]))
@@ -364,7 +414,13 @@ def person(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.
     return [part.moved(T_ground_body) for limb in who.limbs for part in limb.posed(step)]
 
 
-def _limb(start_m: Array, end_m: Array, first_radius_m: float, last_radius_m: float, material: Material) -> Part:
+def _limb(
+    start_m: Array,
+    end_m: Array,
+    first_radius_m: float,
+    last_radius_m: float,
+    material: Material,
+) -> Part:
     """A round limb between two joints, thinner at its end."""
     direction = end_m - start_m
     length = float(np.linalg.norm(direction))
@@ -401,7 +457,9 @@ def foliage(seed: int = 0, px: int = 512) -> Picture:
         ahead = np.array([np.cos(heading), np.sin(heading)])
         side = np.array([-np.sin(heading), np.cos(heading)])
         taper = 1 - 0.3 * np.cos(turn)
-        outline = np.array([x, y]) + length * np.cos(turn) * ahead + 0.45 * length * np.sin(turn) * taper * side
+        along = length * np.cos(turn) * ahead
+        across = 0.45 * length * np.sin(turn) * taper * side
+        outline = np.array([x, y]) + along + across
 
         colour = (128 + rng.normal(0, 14), 160, 78)
         ink = tuple(int(np.clip(channel * tone, 0, 255)) for channel in colour)
@@ -412,7 +470,11 @@ def foliage(seed: int = 0, px: int = 512) -> Picture:
     return Picture(np.asarray(image))
 
 
-def _leaves(rng: Rng, colours: tuple[str, ...], seed: int) -> Material:
+def _leaves(
+    rng: Rng,
+    colours: tuple[str, ...],
+    seed: int,
+) -> Material:
     """Leaves cut out of foliage, in one of some tones."""
     material = matt(one_of(rng, *colours), foliage(seed))
     return replace(material, cutout=0.5)
@@ -424,7 +486,11 @@ def _facing(direction: Array, yaw_spread_deg: float, rng: Rng) -> float:
     return float(yaw_deg + rng.normal(0, yaw_spread_deg))
 
 
-def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
+def tree(
+    rng: Rng,
+    height_m: float = 6.0,
+    clumps: int = 110,
+) -> list[Part]:
     """A broad-leaved tree with a trunk, boughs and a crown."""
     h = height_m
     bark = matt("#6d5c4b", picture.boards("walnut", 3, 512, 0.8))
@@ -435,8 +501,11 @@ def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
     for _ in range(9):
         angle = rng.uniform(0, 2 * np.pi)
         z = rng.uniform(0.34, 0.6) * h
-        end = rng.uniform(0.14, 0.24) * h * np.array([np.cos(angle), np.sin(angle)])
-        path = spline([[0, 0, z], [*(0.5 * end), z + 0.1 * h], [*end, z + 0.24 * h]], 6)
+        reach = rng.uniform(0.14, 0.24) * h
+        end = reach * np.array([np.cos(angle), np.sin(angle)])
+        middle_m = [*(0.5 * end), z + 0.1 * h]
+        end_m = [*end, z + 0.24 * h]
+        path = spline([[0, 0, z], middle_m, end_m], 6)
         boughs.append(tube(path, 0.006 * h, sections=6))
 
     crown_m = np.array([*sway, 0.67 * h])
@@ -457,14 +526,23 @@ def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
     return [Part(trunk, bark), Part(joined(boughs), bark), Part(cards_arrays(sizes_m, poses), leaves)]
 
 
-def street_lamp(_: Rng, height_m: float = 5.0, reach_m: float = 1.2) -> list[Part]:
+def street_lamp(
+    _: Rng,
+    height_m: float = 5.0,
+    reach_m: float = 1.2,
+) -> list[Part]:
     """A steel mast with an arm along x; its lamp would shine at (reach_m, 0, height_m)."""
     iron = coated("#2d3532", roughness=0.35)
     h = height_m
     top = h - 0.3
     mast_profile = np.array([[0, 0], [0.1, 0], [0.1, 0.5], [0.06, 0.6], [0.04, top], [0, top]])
     mast = lathe(mast_profile, sections=16)
-    arm_path = spline([[0, 0, h - 0.32], [0.25 * reach_m, 0, h + 0.05], [reach_m, 0, h + 0.07]], 10)
+    arm_points = [
+        [0, 0, h - 0.32],
+        [0.25 * reach_m, 0, h + 0.05],
+        [reach_m, 0, h + 0.07],
+    ]
+    arm_path = spline(arm_points, 10)
     head_m = (0.62, 0.2, 0.09)
     return [
         put(mast, iron),
@@ -480,7 +558,11 @@ def bollard(_: Rng, height_m: float = 0.95) -> list[Part]:
     return [put(post, coated("#23282a", roughness=0.35))]
 
 
-def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
+def bush(
+    rng: Rng,
+    height_m: float = 1.1,
+    width_m: float = 1.6,
+) -> list[Part]:
     """A round bush of leaves down to the ground."""
     radii_m = np.array([width_m, width_m, height_m]) / 2
     sizes_m = []

@@ -195,10 +195,12 @@ def noise(
     f_v = scipy.fft.fftfreq(n)[:, None] * n
     f = np.hypot(f_u, f_v).astype(np.float32)
     is_in_band = (f >= low) & (f <= high)
-    shape = np.where(is_in_band, np.maximum(f, 1) ** -slope, 0).astype(np.float32)
+    falloff = np.maximum(f, 1) ** -slope
+    shape = np.where(is_in_band, falloff, 0).astype(np.float32)
 
     white = rng.standard_normal((n, n), dtype=np.float32)
-    values = scipy.fft.irfft2(scipy.fft.rfft2(white) * shape, s=(n, n))
+    spectrum = scipy.fft.rfft2(white) * shape
+    values = scipy.fft.irfft2(spectrum, s=(n, n))
     unit_variance = values / (values.std() or 1)
     return np.tile(unit_variance, (repeats, repeats)).astype(np.float32)
 
@@ -239,13 +241,17 @@ def _scratches(rng: Rng, px: int, count: int) -> Map:
     start = rng.uniform(0, px, (count, 1, 2))
     step = rng.normal(0, 0.03 * px, (count, 1, 2))
     bend = rng.normal(0, 0.004 * px, (count, 1, 2))
-    lines = np.concatenate([start, start + step / 2 + bend, start + step], axis=1)
+    middle = start + step / 2 + bend
+    lines = np.concatenate([start, middle, start + step], axis=1)
     tones = rng.integers(30, 255, count)
     blank = Image.new("L", (px, px))
     return _polygons(blank, lines, tones, is_open=True) / np.float32(255)
 
 
-def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
+def _cells(
+    px: int,
+    cuts: Array,
+) -> tuple[NDArray[np.int64], Map]:
     """The cell (px, px) and its distance in pixels to the next joint, in rows cut at `cuts` (rows, K) of a row."""
     rows, count = cuts.shape
     x = np.arange(px)
@@ -255,7 +261,8 @@ def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
     columns = [np.searchsorted(np.sort(cut * px), x) % count for cut in cuts]
     cell = np.stack(columns) + np.arange(rows)[:, None] * count
 
-    to_cut = (x - cuts[..., None] * px + px / 2) % px - px / 2
+    cuts_px = cuts[..., None] * px
+    to_cut = (x - cuts_px + px / 2) % px - px / 2
     along = np.abs(to_cut).min(axis=1)
     across = np.minimum(x % row_px, row_px - x % row_px)
     to_joint = np.minimum(along[row], across[:, None])
@@ -285,7 +292,8 @@ def boards(
     heart = rng.uniform(-0.05, 0.15, planks)
     depth = rng.uniform(0.01, 0.07, planks)
     phase = rng.uniform(0, 7, planks)
-    wave = np.sin(2 * np.pi * np.arange(px) / px + phase[cell]) * 0.02
+    turn = 2 * np.pi * np.arange(px) / px
+    wave = np.sin(turn + phase[cell]) * 0.02
     bend = noise(rng, px, 1, 12, slope=1.6, stretch=3) * 0.004
     radius = np.hypot(v - heart[cell] + bend, depth[cell] + wave)
     ring_m = rng.uniform(0.005, 0.009, planks)
@@ -326,7 +334,9 @@ def masonry(
     cuts = (np.arange(columns) + shift + 1e-3) / columns
     cell, to_joint = _cells(px, cuts)
 
-    rough = noise(rng, px, 4, 60, slope=0.6) * 0.6 + noise(rng, px, 60, 400, slope=0.2)
+    coarse = noise(rng, px, 4, 60, slope=0.6)
+    fine = noise(rng, px, 60, 400, slope=0.2)
+    rough = coarse * 0.6 + fine
     pits = noise(rng, px, 40, 200, slope=0.2) > 2.3
     brick_tone = rng.normal(0, variety, rows * columns)
     tone = 0.5 + brick_tone[cell] + variety * 0.5 * rough - 0.2 * pits
@@ -341,26 +351,37 @@ def masonry(
 
 
 @painted
-def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Picture:
+def ground(
+    kind: str,
+    seed: int = 0,
+    px: int = 1024,
+    tile_m: float = 2.0,
+) -> Picture:
     """An even surface of GROUNDS: blotches, grain, pits and scratches."""
     rng = np.random.default_rng(seed)
     surface = GROUNDS[kind]
-    bands = (band.amount * noise(rng, px, band.low, band.high, slope=band.slope) for band in surface.octaves)
+    bands = [band.amount * noise(rng, px, band.low, band.high, slope=band.slope) for band in surface.octaves]
     tone = 0.6 + sum(bands)
 
     pits = surface.pits
-    excess = (noise(rng, px, pits.low, pits.high, slope=0.3) - pits.threshold) / 0.3
+    spots = noise(rng, px, pits.low, pits.high, slope=0.3)
+    excess = (spots - pits.threshold) / 0.3
     tone = tone + pits.depth * np.clip(excess, 0, 1)
     scratched = tone - 0.2 * _scratches(rng, px, px // 20)
     return Picture(_ramp(scratched, kind), tile_m)
 
 
 @painted
-def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
+def fabric(
+    seed: int = 0,
+    px: int = 512,
+    tile_m: float = 0.4,
+) -> Picture:
     """A plain weave of threads in slightly different greys, to be coloured by its material."""
     rng = np.random.default_rng(seed)
     thread = np.arange(px) // 4
-    bulge = np.abs(np.sin(np.arange(px) * np.pi / 4 + 0.4))
+    phase = np.arange(px) * np.pi / 4 + 0.4  # four pixels to a thread
+    bulge = np.abs(np.sin(phase))
     warp = 0.5 + 0.14 * rng.standard_normal(px // 4)[thread] + 0.3 * bulge
     weft = 0.5 + 0.14 * rng.standard_normal(px // 4)[thread] + 0.3 * bulge
 
@@ -368,16 +389,24 @@ def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
     warp_tone = warp * (0.7 + 0.3 * bulge[:, None])
     weft_tone = weft[:, None] * (0.7 + 0.3 * bulge)
     tone = np.where(is_warp_above, warp_tone, weft_tone)
-    tone = tone + 0.06 * noise(rng, px, 1, 12) + 0.1 * noise(rng, px, 40, 250, slope=0.0)
+    stains = noise(rng, px, 1, 12)
+    fluff = noise(rng, px, 40, 250, slope=0.0)
+    tone = tone + 0.06 * stains + 0.1 * fluff
     return Picture(_ramp(tone, "cloth"), tile_m)
 
 
 @painted
-def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
+def terrazzo(
+    seed: int = 0,
+    px: int = 2048,
+    tile_m: float = 1.6,
+) -> Picture:
     """Broken stones of all sizes ground flush with their cement, between strips of brass, with stains and scratches."""
     rng = np.random.default_rng(seed)
     chips, stone_colours = _stone_chips(rng, px, tile_m)
-    grain = 0.045 * noise(rng, px, 20, 1500, slope=0.6) + 0.02 * noise(rng, px, 3, 12)
+    fine = noise(rng, px, 20, 1500, slope=0.6)
+    stains = noise(rng, px, 3, 12)
+    grain = 0.045 * fine + 0.02 * stains
     grain -= 0.1 * _scratches(rng, px, px // 6)
     pixels = _scaled(stone_colours[chips], (1 + grain)[..., None])
 
@@ -387,10 +416,15 @@ def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
     return Picture(pixels, tile_m)
 
 
-def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
+def _stone_chips(
+    rng: Rng,
+    px: int,
+    tile_m: float,
+) -> tuple[Bytes, Bytes]:
     """The stone (px, px) that is seen at each pixel, 0 for cement, and the colours (stones + 1, 3) of all."""
     count = round(11700 * tile_m**2)
-    size_m = np.sort(0.0016 * rng.uniform(0, 1, count) ** -0.55)[::-1].clip(max=0.014)
+    sizes_m = 0.0016 * rng.uniform(0, 1, count) ** -0.55  # few are large
+    size_m = np.sort(sizes_m)[::-1].clip(max=0.014)
     radius_px = size_m / tile_m * px
     angle = np.sort(rng.uniform(0, 2 * np.pi, (count, 6)), axis=1)
     circle = np.stack([np.cos(angle), np.sin(angle)], -1)
@@ -406,7 +440,11 @@ def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
 
 
 # Printed matter: a picture fills [0, 1]², to be cut into cells.
-def _canvas(width: int, height: int, colour: str) -> tuple[Image.Image, Draw]:
+def _canvas(
+    width: int,
+    height: int,
+    colour: str,
+) -> tuple[Image.Image, Draw]:
     image = Image.new("RGB", (width, height), colour)
     return image, ImageDraw.Draw(image)
 
@@ -462,20 +500,36 @@ def _chart(draw: Draw, rng: Rng, box: Box) -> None:
             _curve(draw, xs, ys, ink)
 
 
-def _bars(draw: Draw, xs: Array, ys: Array, bottom: float, ink: str) -> None:
+def _bars(
+    draw: Draw,
+    xs: Array,
+    ys: Array,
+    bottom: float,
+    ink: str,
+) -> None:
     half = 0.3 * (xs[1] - xs[0])
     for x, y in zip(xs, ys, strict=True):
         draw.rectangle([x - half, y, x + half, bottom], fill=ink)
 
 
-def _curve(draw: Draw, xs: Array, ys: Array, ink: str) -> None:
+def _curve(
+    draw: Draw,
+    xs: Array,
+    ys: Array,
+    ink: str,
+) -> None:
     for x, y in zip(xs, ys, strict=True):
         draw.rectangle([x - 2, y - 2, x + 2, y + 2], fill=ink)
     points = np.stack([xs, ys], axis=1)
     draw.line(points.ravel().tolist(), fill=ink, width=2)
 
 
-def _column(draw: Draw, rng: Rng, box: Box, size: float) -> None:
+def _column(
+    draw: Draw,
+    rng: Rng,
+    box: Box,
+    size: float,
+) -> None:
     """Paragraphs of text, with a chart now and then, that fill a box."""
     x0, y, x1, y1 = box
     characters = (x1 - x0) / (0.52 * size)
@@ -502,7 +556,12 @@ def pages(seed: int = 0) -> Picture:
     return Picture(np.asarray(image))
 
 
-def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
+def _page(
+    draw: Draw,
+    rng: Rng,
+    x: float,
+    y: float,
+) -> None:
     """A sheet with its upper left corner at x, y: a title over one or two columns."""
     band = one_of(rng, PAPER, PAPER, *INKS)
     split = rng.choice([220, 440])
@@ -634,16 +693,27 @@ def screen(seed: int = 0) -> Picture:
 
 
 @painted
-def poster(style: str, seed: int = 0, width: int = 700, height: int = 1000) -> Picture:
+def poster(
+    style: str,
+    seed: int = 0,
+    width: int = 700,
+    height: int = 1000,
+) -> Picture:
     """A print in one of POSTERS' styles."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(width, height, PAPER)
     POSTERS[style](draw, rng, width, height)
-    paint = 1 + 0.03 * noise(rng, 1024, 10, 500, slope=0.5, stretch=2)[:height, :width]
+    brush = noise(rng, 1024, 10, 500, slope=0.5, stretch=2)
+    paint = 1 + 0.03 * brush[:height, :width]
     return Picture(_scaled(image, paint[..., None]))
 
 
-def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
+def _hills(
+    draw: Draw,
+    rng: Rng,
+    w: int,
+    h: int,
+) -> None:
     """Ridges in the haze below a sun."""
     sky_tones = np.linspace(rgb(SKY), rgb(PAPER), 40).astype(int)
     for k, tone in enumerate(sky_tones.tolist()):
@@ -663,7 +733,12 @@ def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
         draw.polygon([(0, h), *zip(x, ridge, strict=True), (w, h)], fill=tuple(tone))
 
 
-def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
+def _circles(
+    draw: Draw,
+    rng: Rng,
+    w: int,
+    h: int,
+) -> None:
     """Quarters and halves of circles in squares."""
     side = w // 5
     for y, x in product(range(0, h, side), range(0, w, side)):
@@ -687,7 +762,12 @@ def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
         draw.ellipse([x + near, y + near, x + far, y + far], fill=dot_colour)
 
 
-def _talk(draw: Draw, rng: Rng, w: int, h: int) -> None:
+def _talk(
+    draw: Draw,
+    rng: Rng,
+    w: int,
+    h: int,
+) -> None:
     """A title over three columns of text and charts."""
     banner = one_of(rng, NAVY, TEAL, PLUM)
     draw.rectangle([0, 0, w, 0.12 * h], fill=banner)
@@ -748,10 +828,12 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
 
     for bar in np.cumsum(rng.integers(3, 8, 34)):
         left = x + 12 + bar
-        draw.rectangle([left, y + 84, left + rng.integers(1, 4), y + 136], fill=INK)
+        right = left + rng.integers(1, 4)
+        draw.rectangle([left, y + 84, right, y + 136], fill=INK)
     for k in range(3):
         line = _words(rng, 3).title()
-        _text(draw, (x + 12, y + 10 + 22 * k), line, 19 - 2 * k, INK)
+        line_y = y + 10 + 22 * k
+        _text(draw, (x + 12, line_y), line, 19 - 2 * k, INK)
         arrow_x = 110 + 60 * k
         shaft = [arrow_x, 640, arrow_x, 580]
         head = [arrow_x - 16, 600, arrow_x, 580, arrow_x + 16, 600]

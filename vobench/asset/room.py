@@ -78,7 +78,8 @@ class Piece:
 
 
 def things(
-    instances: Iterable[Instance], known: Mapping[str, Material] = {}
+    instances: Iterable[Instance],
+    known: Mapping[str, Material] = {},
 ) -> tuple[tuple[Thing, ...], dict[str, Material]]:
     """The parts of instances as things, one per material of an instance, and the materials by name.
 

@@ -26,7 +26,13 @@ LARGEST_BEVEL = 0.45  # of half the shortest side of a block
 
 
 def at(
-    x_m: float = 0.0, y_m: float = 0.0, z_m: float = 0.0, *, yaw: float = 0.0, pitch: float = 0.0, roll: float = 0.0
+    x_m: float = 0.0,
+    y_m: float = 0.0,
+    z_m: float = 0.0,
+    *,
+    yaw: float = 0.0,
+    pitch: float = 0.0,
+    roll: float = 0.0,
 ) -> Array:
     """The pose (4, 4) at a position, rotated by Rz(yaw) Ry(pitch) Rx(roll) in degrees."""
     angles_rad = np.deg2rad([yaw, pitch, roll])
@@ -53,7 +59,12 @@ def block(
     return arrays.mesh() if transform is None else arrays.moved(transform).mesh()
 
 
-def block_arrays(size_m: ArrayLike, *, bevel_m: float = 0.003, uv_m: ArrayLike = (0.0, 0.0)) -> MeshArrays:
+def block_arrays(
+    size_m: ArrayLike,
+    *,
+    bevel_m: float = 0.003,
+    uv_m: ArrayLike = (0.0, 0.0),
+) -> MeshArrays:
     """The arrays of `block`."""
     half_m = np.asarray(size_m, float) / 2
     bevel = min(bevel_m, LARGEST_BEVEL * half_m.min())
@@ -109,7 +120,10 @@ class _Cube:
         self.normals = (signs * sides)[faces] if sides.any() else _flat_normals(self._corners)
         self._uv_indices: dict[tuple[int, ...], tuple[NDArray[np.int64], ...]] = {}
 
-    def uv_index(self, order: tuple[int, ...]) -> tuple[NDArray[np.int64], ...]:
+    def uv_index(
+        self,
+        order: tuple[int, ...],
+    ) -> tuple[NDArray[np.int64], ...]:
         """The index of u and v (F, 3, 2) in corners (F, 3, 3), as `_uv_axes` has them."""
         if order not in self._uv_indices:
             axes = _uv_axes(self._corners, order)
@@ -240,12 +254,22 @@ def spline(points_m: ArrayLike, count: int = 16) -> Array:
     return np.asarray(scipy.interpolate.CubicSpline(knots, points)(t))
 
 
-def tube(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> "Trimesh":
+def tube(
+    path_m: ArrayLike,
+    radius_m: float,
+    *,
+    sections: int = 8,
+) -> "Trimesh":
     """A round rod along a polyline (N, 3), closed by flat ends."""
     return tube_arrays(path_m, radius_m, sections=sections).mesh()
 
 
-def tube_arrays(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> MeshArrays:
+def tube_arrays(
+    path_m: ArrayLike,
+    radius_m: float,
+    *,
+    sections: int = 8,
+) -> MeshArrays:
     """The arrays of `tube`."""
     path = np.asarray(path_m, float)
     steps = np.diff(path, axis=0)
@@ -285,7 +309,12 @@ def _cross_section_axes(tangents: Array) -> Array:
     return np.stack([first, cross(tangents, first)], axis=1)
 
 
-def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> MeshArrays:
+def _disc(
+    center_m: Array,
+    ring_m: Array,
+    normal: Array,
+    uv: Array,
+) -> MeshArrays:
     """The flat end of a tube within a ring (C, 3) of vertices, seen from the side of its normal."""
     rows = np.stack([np.broadcast_to(center_m, ring_m.shape), ring_m])
     places = np.stack([0 * uv, uv])
@@ -296,7 +325,12 @@ def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> MeshArray
     return _grids(rows[None], normals, places[None])
 
 
-def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimesh":
+def cushion(
+    size_m: ArrayLike,
+    *,
+    power: float = 5.0,
+    cells: int = 6,
+) -> "Trimesh":
     """A superellipsoid around the origin: |x/a|^p + |y/b|^p + |z/c|^p = 1; 2 is an ellipsoid, more is boxier."""
     half_m = np.asarray(size_m, float) / 2
     steps = np.linspace(-1, 1, cells + 1)
@@ -340,12 +374,20 @@ def _grid_length_m(points_m: Array, axis: int) -> Array:
     return np.cumsum(np.linalg.norm(steps, axis=2), axis=axis)
 
 
-def card(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> "Trimesh":
+def card(
+    size_m: tuple[float, float],
+    *,
+    cell: Hole = WHOLE_PICTURE,
+) -> "Trimesh":
     """An upright rectangle around the origin that faces x and shows a cell of a picture, in shares of its sides."""
     return card_arrays(size_m, cell=cell).mesh()
 
 
-def card_arrays(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> MeshArrays:
+def card_arrays(
+    size_m: tuple[float, float],
+    *,
+    cell: Hole = WHOLE_PICTURE,
+) -> MeshArrays:
     """The arrays of `card`."""
     width, height = size_m
     u0, u1, v0, v1 = cell
@@ -385,7 +427,12 @@ def cards_arrays(sizes_m: ArrayLike, poses: ArrayLike) -> MeshArrays:
     )
 
 
-def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayLike] = ()) -> "Trimesh":
+def extrusion(
+    polygon_m: ArrayLike,
+    height_m: float,
+    *,
+    holes_m: Sequence[ArrayLike] = (),
+) -> "Trimesh":
     """A prism between z = 0 and height_m over a polygon (N, 2) less holes within it, in any orientation."""
     outline = oriented(polygon_m, counter_clockwise=True)
     holes = [oriented(hole, counter_clockwise=False) for hole in holes_m]

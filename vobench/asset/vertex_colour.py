@@ -16,7 +16,11 @@ MOST_LARGE_PATCHES = 1 << 16
 FACES_AT_ONCE = 65_536  # that are drawn, which bounds the memory
 
 
-def painted(mesh: MeshArrays, colours: Array, look: Look) -> tuple[MeshArrays, Look]:
+def painted(
+    mesh: MeshArrays,
+    colours: Array,
+    look: Look,
+) -> tuple[MeshArrays, Look]:
     """Linear colours (F, 3, 3) of corners: the material's where there is but one, else a picture with a patch for each.
 
     Over a texture only their mean is used. In a patch colours run linearly from corner to corner.
@@ -72,7 +76,11 @@ LARGE_PATCH = _Patch(size=8, first=1, last=6)
 SMALL_PATCH = _Patch(size=4, first=0, last=3)
 
 
-def _atlas(kinds: Map, patch: _Patch, columns: int) -> NDArray[np.uint8]:
+def _atlas(
+    kinds: Map,
+    patch: _Patch,
+    columns: int,
+) -> NDArray[np.uint8]:
     """A square picture of patches, row by row, of faces' colours (N, 9)."""
     chunks = np.array_split(kinds, len(kinds) // FACES_AT_ONCE + 1)
     patches = np.concatenate([patch.drawn(chunk.reshape(-1, 3, 1, 1, 3)) for chunk in chunks])
@@ -81,7 +89,11 @@ def _atlas(kinds: Map, patch: _Patch, columns: int) -> NDArray[np.uint8]:
     return grid.swapaxes(1, 2).reshape(side, side, 3)
 
 
-def _patch_uv(kind: NDArray[np.int64], patch: _Patch, columns: int) -> Array:
+def _patch_uv(
+    kind: NDArray[np.int64],
+    patch: _Patch,
+    columns: int,
+) -> Array:
     """Texture coordinates (F, 3, 2) of faces in the patch of each one's kind (F,)."""
     row, column = np.divmod(kind, columns)
     corner_px = np.stack([column, row], 1)[:, None] * patch.size + 0.5

@@ -20,7 +20,12 @@ LAP_M = 0.01
 Hole = tuple[float, float, float, float]  # first and last u, first and last v, in metres from a wall's corner
 
 
-def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes: Sequence[Hole] = ()) -> "Trimesh":
+def pierced(
+    corner_m: ArrayLike,
+    edge_u_m: ArrayLike,
+    edge_v_m: ArrayLike,
+    holes: Sequence[Hole] = (),
+) -> "Trimesh":
     """A rectangle less rectangular holes, cut into a grid along their edges, with laps behind its four borders.
 
     The laps stop the light that would pass where two walls only touch.
@@ -37,7 +42,11 @@ def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes
     return joined_arrays(cells + laps).mesh()
 
 
-def _solid_cells(width_m: float, height_m: float, holes: Sequence[Hole]) -> list[Hole]:
+def _solid_cells(
+    width_m: float,
+    height_m: float,
+    holes: Sequence[Hole],
+) -> list[Hole]:
     """The cells of the grid through all edges of the holes that lie in no hole."""
     edges_u = [edge for hole in holes for edge in hole[:2]]
     edges_v = [edge for hole in holes for edge in hole[2:]]
@@ -65,7 +74,12 @@ def _laps(width_m: float, height_m: float) -> list[Hole]:
     return along_u + along_v
 
 
-def _rectangle(corner: Array, u: Array, v: Array, cell: Hole) -> MeshArrays:
+def _rectangle(
+    corner: Array,
+    u: Array,
+    v: Array,
+    cell: Hole,
+) -> MeshArrays:
     """A cell of a wall, whose texture continues that of its neighbours."""
     u0, u1, v0, v1 = cell
     axis_u = unit(u)
@@ -74,7 +88,13 @@ def _rectangle(corner: Array, u: Array, v: Array, cell: Hole) -> MeshArrays:
     return quad_arrays(cell_corner, (u1 - u0) * axis_u, (v1 - v0) * axis_v, (u0, v0))
 
 
-def reveal(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, hole: Hole, depth_m: float) -> "Trimesh":
+def reveal(
+    corner_m: ArrayLike,
+    edge_u_m: ArrayLike,
+    edge_v_m: ArrayLike,
+    hole: Hole,
+    depth_m: float,
+) -> "Trimesh":
     """The four sides of a rectangle's hole, down to depth_m behind its face."""
     u = unit(edge_u_m)
     v = unit(edge_v_m)

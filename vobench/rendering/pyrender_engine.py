@@ -31,7 +31,17 @@ from vobench.rendering.view import NEAR_M, T_CV_GL, Box
 from vobench.rendering.warp import warp
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Rgb
-from vobench.scene.mesh import MeshArrays, Thing, areas_m2, arrays, corners, distinct, face_normals, joined_arrays
+from vobench.scene.mesh import (
+    MeshArrays,
+    Thing,
+    areas_m2,
+    arrays,
+    corners,
+    face_normals,
+    joined_arrays,
+    open_edges,
+    welded,
+)
 from vobench.scene.scene import Scene
 
 GAMMA = 2.2  # pyrender stores linear ** (1 / 2.2)
@@ -47,7 +57,6 @@ PANEL_OUTER_RAD = np.deg2rad(68)
 # Before its panel: pyrender divides by the distance ahead of the spot, which is 0 on the panel itself.
 SPOT_AHEAD_M = 0.01
 # Welds corners where edges are compared, in digits after the point of a metre.
-WELD_DIGITS = 5
 # A lamp whose normals cancel out further than this shines to all sides.
 LEAST_AHEAD = 0.5
 
@@ -345,12 +354,8 @@ def _turned_away(mesh: MeshArrays, sun: Array) -> MeshArrays:
 
 def _is_open(mesh: MeshArrays) -> bool:
     """Whether a mesh has an edge with a face on one side only, as a sheet has and a box has not."""
-    corners = np.round(mesh.corners_m, WELD_DIGITS).reshape(-1, 3)
-    _, kind = distinct(corners)
-    loops = kind.reshape(-1, 3)
-    edges = np.sort(np.stack([loops, np.roll(loops, -1, axis=1)], -1).reshape(-1, 2), axis=1)
-    _, edge = distinct(edges)
-    return bool((np.bincount(edge) == 1).any())
+    point = welded(mesh.vertices_m)[1]
+    return len(open_edges(point[mesh.faces])) > 0
 
 
 def _chosen(lights: Sequence[Light]) -> list[int]:

@@ -131,7 +131,11 @@ class Scene:
         return tuple(light for light in self.lights if isinstance(light, AreaLight))
 
 
-def triangles(scene: Scene, *, t_ns: float | None = None) -> Triangles:
+def triangles(
+    scene: Scene,
+    *,
+    t_ns: float | None = None,
+) -> Triangles:
     """Every face of a scene: things, panels, movers; these in their own frames where t_ns is None."""
     things = list(scene.things)
     mover = [-1] * len(things)
@@ -150,7 +154,13 @@ def triangles(scene: Scene, *, t_ns: float | None = None) -> Triangles:
     return faces if t_ns is None else faces.moved([body.path.pose(t_ns) for body in scene.movers])
 
 
-def ceiling_light(name: str, center_m: Array, size_m: tuple[float, float], *, power_lm: float) -> AreaLight:
+def ceiling_light(
+    name: str,
+    center_m: Array,
+    size_m: tuple[float, float],
+    *,
+    power_lm: float,
+) -> AreaLight:
     """A panel that hangs level and shines down."""
     x = np.array([size_m[0], 0, 0])
     y = np.array([0, size_m[1], 0])
