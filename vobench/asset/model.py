@@ -88,9 +88,10 @@ def read_model(
 ) -> Model:
     """The contents of a glTF, OBJ, STL or PLY file whose unit is `scale` metres.
 
-    roles: by glob of node names, before the roles that nodes have in the file (extras: {"vobench": "mirror"}); nodes
-    have the role of their nearest ancestor with one. up: "y" or "z", else as the format has it. Emission of 1 is
-    1 cd/m² and lights are in cd and lx, as in glTF, whatever the scale. Raises ModelError with file, node and advice.
+    roles: a role for each glob of node names; it replaces the role that the file gives (extras: {"vobench": "mirror"}).
+    A node without a role has that of its nearest ancestor with one. up: "y" or "z"; by default that of the format.
+    An emission of 1 is 1 cd/m², and lights are in cd and lx, as in glTF; `scale` does not change them.
+    Raises ModelError with the file, the node and advice.
     """
     path = Path(path)
     with located(str(path)), np.errstate(all="ignore"):
@@ -152,12 +153,8 @@ def _require_matched(roles: Roles, nodes: Sequence[Node]) -> None:
             raise ModelError(unknown_name_sentence("node", glob, names))
 
 
-def _model(
-    primitives: Sequence[Primitive],
-    lights: Sequence[ModelLight],
-    roles: Roles,
-) -> Model:
-    """Things, materials and lights with names that differ, in their roles, movers apart from what is stationary."""
+def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles: Roles) -> Model:
+    """The model of a file: names are unique, roles are applied, and movers are separated from stationary things."""
     solid = [primitive for primitive in primitives if len(primitive.mesh.faces)]
     if not solid:
         raise ModelError("has no faces to see: are its nodes empty, of points or lines, without area, or ignored?")
@@ -169,15 +166,16 @@ def _model(
     stationary = []
     moving = []
     bright = {}
-    for primitive, named in zip(solid, named_materials, strict=True):
+    for primitive, named_material in zip(solid, named_materials, strict=True):
         node = primitive.node
-        thing = Thing(names[node], primitive.mesh.mesh(), material_names[named])
+        _, material = named_material
+        thing = Thing(names[node], primitive.mesh.mesh(), material_names[named_material])
         mover = role[node].mover
         if mover is None:
             stationary.append(thing)
         else:
             moving.append((node, mover, thing))
-        if max(named[1].emission_cd_m2) > 0:
+        if max(material.emission_cd_m2) > 0:
             bright[node] = names[node]
 
     return Model(
@@ -225,14 +223,16 @@ def _shifted(thing: Thing, by_m: Array) -> Thing:
 
 
 def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:
-    """Names that differ: a second 'chair' is 'chair_2'."""
-    taken = set(wanted.values())
-    names: dict[str, Key] = {}
+    """A name for each key, none of them twice: a second 'chair' is 'chair_2'."""
+    reserved = set(wanted.values())
+    given: set[str] = set()
+    unique_names: dict[Key, str] = {}
     for key, name in wanted.items():
-        unique = name if name not in names else next(_free_names(name, taken))
-        taken.add(unique)
-        names[unique] = key
-    return {key: name for name, key in names.items()}
+        unique = name if name not in given else next(_free_names(name, reserved))
+        reserved.add(unique)
+        given.add(unique)
+        unique_names[key] = unique
+    return unique_names
 
 
 def _free_names(name: str, taken: set[str]) -> Iterator[str]:
@@ -281,18 +281,20 @@ def _in_role(look: Look, role: str) -> tuple[str, Material]:
 
 
 def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
-    """Whether a model is likely a place that lies on its side, with its floor as a wall, as it is read with `axis` up.
+    """A note if a model, read with `axis` up, is likely a place that lies on its side, its floor upright as a wall.
 
-    Either most of its faces look along the other axis, or it is flat along that axis, as rooms are in height.
+    Signs of it: most of its area faces along the other axis, or it is flat along that axis, as rooms are in height.
     """
     corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
     width_m, depth_m, height_m = np.ptp(corners_m, axis=(0, 1))
-    _, along_m2, up_m2 = areas_m2(corners_m) @ np.abs(face_normals(corners_m))
+    projected_m2 = areas_m2(corners_m) @ np.abs(face_normals(corners_m))  # (3,), along x, y and z
+    _, sideways_m2, up_m2 = projected_m2
 
     is_place = max(width_m, depth_m, height_m) > PLACE_M
-    looks_sideways = along_m2 > LYING * up_m2
-    is_flat = depth_m < FLAT * min(width_m, height_m) and height_m > PLACE_M and LYING * along_m2 > up_m2
-    if not (is_place and (looks_sideways or is_flat)):
+    faces_sideways = sideways_m2 > LYING * up_m2
+    has_large_sides = LYING * sideways_m2 > up_m2
+    is_flat_sideways = depth_m < FLAT * min(width_m, height_m) and height_m > PLACE_M and has_large_sides
+    if not (is_place and (faces_sideways or is_flat_sideways)):
         return []
     other = "z" if axis == "y" else "y"
     return [
