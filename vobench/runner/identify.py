@@ -166,7 +166,10 @@ def read_csv_log(path: Path, wheels: WheelGeometry) -> WheelLog:
     if missing:
         raise InputError(f"a drive to identify has the columns {listed}; no {', '.join(missing)} in {path}")
     try:
-        columns = [np.array([float(row[name]) for row in rows]) for name in names]
+        columns = []
+        for name in names:
+            column = [float(row[name]) for row in rows]
+            columns.append(np.array(column))
         values = np.stack(columns, -1)  # (N, 5)
     except (TypeError, ValueError):
         raise InputError(f"the columns {listed} should hold a number in each row: {path}") from None
