@@ -114,7 +114,12 @@ def main() -> None:
     raster.close()
     pictures, seconds = in_blender(arguments.python, job(scene, camera, poses))
     tracers = [PathRenderer(scene, samples=arguments.samples // 2, seed=seed, max_depth=None) for seed in (1, 2)]
-    halves = [[tracer.radiance(camera, single_instant(camera, pose)) for pose in poses] for tracer in tracers]
+    views = [single_instant(camera, pose) for pose in poses]
+
+    def traced_by(tracer: PathRenderer) -> list[np.ndarray]:
+        return [tracer.radiance(camera, view) for view in views]
+
+    halves = [traced_by(tracer) for tracer in tracers]
     print(f"room, {camera.width_px} x {camera.height_px}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     print(f"{'':28}{'s a picture':>12}{'PSNR dB':>9}{'mean / path':>13}{'times raster':>14}")
     traced = np.mean(halves)

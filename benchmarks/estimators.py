@@ -21,6 +21,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import cache
+from itertools import product
 from pathlib import Path
 from typing import TypeVar
 
@@ -152,7 +153,9 @@ def compare_fusions(runs: Path) -> None:
     for suite, names, cases in FUSIONS:
         for case in cases:
             folders = [sequence_folder(Case(case, suite, case, seed=seed), runs) for seed in SEEDS]
-            errors = np.array([[measured(as_filmed, folder, name).segments for name in names] for folder in folders])
+            pairs = list(product(folders, names))
+            segment_errors = [measured(as_filmed, folder, name).segments for folder, name in pairs]
+            errors = np.array(segment_errors).reshape(len(folders), len(names))
             ratio = np.log(errors[:, 0] / errors[:, 1:].min(1))
             half = stats.t.ppf(0.975, len(ratio) - 1) * ratio.std(ddof=1) / np.sqrt(len(ratio))
             said = ", ".join(f"{name} {mean:.3g}" for name, mean in zip(names, errors.mean(0), strict=True))

@@ -108,7 +108,10 @@ class Compared:
 
 def pooled(parts: Sequence[Compared]) -> Compared:
     """All places together."""
-    return Compared(*(np.concatenate([getattr(part, name) for part in parts]) for name in ("raster", "a", "b")))
+    raster = np.concatenate([part.raster for part in parts])
+    a = np.concatenate([part.a for part in parts])
+    b = np.concatenate([part.b for part in parts])
+    return Compared(raster, a, b)
 
 
 def decibels(mse: float) -> float:

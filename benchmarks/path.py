@@ -82,7 +82,10 @@ def compare(scene: Scene, samples: int, pictures: int) -> None:
     for name, wall_s, cpu_s in rows:
         print(f"{name:16s} wall {wall_s:6.2f} s   CPU {cpu_s:6.2f} s")
     print(f"ratio            wall {rows[1][1] / rows[0][1]:6.2f}     CPU {rows[1][2] / rows[0][2]:6.2f}")
-    means = [np.mean([draw(index) for index in range(2)]) for draw in (direct, ours)]
+    means = []
+    for draw in (direct, ours):
+        pictures_drawn = [draw(index) for index in range(2)]
+        means.append(np.mean(pictures_drawn))
     print(f"mean luminance   {means[0]:.3f} and {means[1]:.3f} cd/m²")
 
 

@@ -136,7 +136,10 @@ def main() -> None:
     runs = {name: way(theta=AS_PRINTED, controller=paper) for name, way in WAYS.items()}
     presets = {name: drive(TARGETS, theta=AS_PRINTED, controller=settings) for name, settings in CONTROLLERS.items()}
     robots = [nearly(rng) for rng in np.random.default_rng(0).spawn(asked.draws)]
-    spread = {name: np.array([minima(way(theta=t, controller=c)) for t, c in robots]) for name, way in WAYS.items()}
+    spread = {}
+    for name, way in WAYS.items():
+        closest = [minima(way(theta=t, controller=c)) for t, c in robots]
+        spread[name] = np.array(closest)
     asked.folder.mkdir(parents=True, exist_ok=True)
     draw_figure_10(asked.folder / "paper_figure_10.png", runs, presets)
     draw_figure_11(asked.folder / "paper_figure_11.png", runs, spread)

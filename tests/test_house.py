@@ -53,3 +53,30 @@ def test_no_conditional_expression_stands_in_another() -> None:
         f"{path.relative_to(ROOT)}:{node.lineno}" for path, node in _statements() if _holds_itself(node, ast.IfExp)
     ]
     assert nested == []
+
+
+COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+
+
+def _has_inner_comprehension(node: ast.AST) -> bool:
+    """Whether a comprehension builds another collection inside; a generator in any() or join() does not."""
+    if not isinstance(node, COMPREHENSIONS):
+        return False
+    inner = [each for each in ast.walk(node) if each is not node]
+    return any(isinstance(each, ast.ListComp | ast.SetComp | ast.DictComp) for each in inner)
+
+
+def test_no_comprehension_builds_a_collection_in_another() -> None:
+    nested = [
+        f"{path.relative_to(ROOT)}:{node.lineno}" for path, node in _statements() if _has_inner_comprehension(node)
+    ]
+    assert nested == []
+
+
+def test_no_class_name_of_vobench_has_two_meanings() -> None:
+    places: dict[str, list[str]] = {}
+    for path in sorted((ROOT / "vobench").rglob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                places.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
+    assert {name: where for name, where in places.items() if len(where) > 1} == {}

@@ -199,7 +199,7 @@ HOMES = {
     "assemble": "vobench.dataset.recording",
     "numbered": "vobench.dataset.picture_list",
     "picture_files": "vobench.dataset.picture_list",
-    "truth_file": "vobench.dataset.truth_file",
+    "truth_file": "vobench.dataset.truth_file:truth_file",
     "ExportSource": "vobench.dataset.source",
     "Views": "vobench.dataset.source",
     "png_frames": "vobench.dataset.source",
@@ -445,7 +445,7 @@ if not TYPE_CHECKING:  # otherwise a type checker would accept every misspelt na
 
             return retired.lookup(__name__, name)
         module, _, attribute = HOMES[name].partition(":")
-        is_module = module.rpartition(".")[2] == name
+        is_module = not attribute and module.rpartition(".")[2] == name
         value = import_module(module) if is_module else getattr(import_module(module), attribute or name)
         globals()[name] = value  # found without this function from now on
         return value

@@ -19,7 +19,7 @@ from vobench.analysis.disparity_offset import (
     fit_offset,
 )
 from vobench.analysis.stereo_matches import PairShot, match_shots
-from vobench.estimator.tools import stereo_pair
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry import se3
 
 PAIR = stereo_pair(RIG, "test")

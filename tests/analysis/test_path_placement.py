@@ -15,7 +15,7 @@ from vobench.analysis.path_placement import (
 from vobench.analysis.stereo_fit import StereoFit, Uncertain
 from vobench.analysis.stereo_matches import Matches
 from vobench.errors import InputError
-from vobench.estimator.tools import stereo_pair
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking, stereo_rig

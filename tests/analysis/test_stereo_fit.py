@@ -6,7 +6,7 @@ import pytest
 
 from vobench.analysis.stereo_fit import Uncertain, combined_yaw, fit_pair, robust_fit, row_error
 from vobench.analysis.stereo_matches import PairShot
-from vobench.estimator.tools import stereo_pair
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import CalibrationError, Rig, stereo_rig, true_rig

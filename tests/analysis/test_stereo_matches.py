@@ -13,7 +13,7 @@ from vobench.analysis.stereo_matches import (
     match_shots,
     row_errors,
 )
-from vobench.estimator.tools import stereo_pair
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry.rig import CalibrationError
 
 PAIR = stereo_pair(RIG, "test")

@@ -82,9 +82,9 @@ def test_a_narrow_terminal_omits_the_least_important_columns_of_the_totals_first
 @pytest.mark.parametrize(
     ("cell", "text"),
     [
-        (cli_board.Shown("1.2"), "1.2"),
-        (cli_board.Shown("1.2", mark="*"), "1.2*"),
-        (cli_board.Shown("1.2", range="1–2", mark="~"), "1.2~\n1–2"),
+        (cli_board.ShownCell("1.2"), "1.2"),
+        (cli_board.ShownCell("1.2", mark="*"), "1.2*"),
+        (cli_board.ShownCell("1.2", range="1–2", mark="~"), "1.2~\n1–2"),
     ],
 )
 def test_a_cell_has_its_mark_behind_and_its_range_below(cell, text):

@@ -15,6 +15,8 @@ HEAVY = {
     *("pandas", "matplotlib", "jinja2", "rerun", "cv2", "rosbags", "mcap", "mitsuba"),
     *("pyrender", "trimesh", "OpenGL", "rich.progress", "xatlas"),
 }
+# `check` builds the scenes of a suite, whose meshes are trimesh's; trimesh imports these.
+MESHES = {"trimesh", "scipy.optimize", "scipy.spatial"}
 COMMAND = "from vobench.cli import main; main()"
 
 
@@ -53,7 +55,8 @@ def test_a_command_imports_nothing_that_it_does_not_use(here, walk, words, unuse
     modules, printed = imported(COMMAND, *words, at=here)
     assert printed
     assert "vobench.cli.app" in modules
-    assert sorted(modules & HEAVY.union(unused)) == []
+    used = MESHES if words[0] == "check" else set()
+    assert sorted(modules & HEAVY.union(unused) - used) == []
 
 
 def test_importing_the_package_imports_nothing_else(tmp_path):

@@ -3,11 +3,11 @@
 import pytest
 
 from vobench.cli import verify
-from vobench.report.verify import Finding
+from vobench.report.verify import VerifiedItem
 
-RIGHT = Finding("hash", "a.tum")
-WRONG = Finding("hash", "b.tum", "has another hash")
-SCORE = Finding("score", "trial")
+RIGHT = VerifiedItem("hash", "a.tum")
+WRONG = VerifiedItem("hash", "b.tum", "has another hash")
+SCORE = VerifiedItem("score", "trial")
 
 
 @pytest.fixture

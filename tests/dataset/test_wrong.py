@@ -120,7 +120,7 @@ def test_an_inf_in_a_pose(euroc, kitti, word):
     path = edit(euroc / "mav0/state_groundtruth_estimate0/data.csv", lambda text: spoil(text, ","))
     assert complaint(euroc).startswith(f"{path}:3: ")
     path = edit(kitti.parent.parent / "poses/00.txt", lambda text: spoil(text, " "))
-    assert complaint(kitti).startswith(f"{path}:3: r31 should be a finite number")
+    assert complaint(kitti).startswith(f"{path}:3: r13 should be a finite number")
 
 
 def test_an_empty_folder(tmp_path):

@@ -163,7 +163,7 @@ def test_turn_is_the_derivative_of_rotation_in_body_axes(kind):
 def test_turn_rate_is_the_derivative_of_turn(kind):
     motion = motion_of(kind)
     t_s = instants(motion)
-    expected = derivative(lambda t: motion.at(t * 1e9).turn_radps, t_s)
+    expected = derivative(lambda t: motion.at(t * 1e9).angular_velocity_radps, t_s)
     np.testing.assert_allclose(motion.at(t_s * 1e9).angular_acceleration_radps2, expected, atol=5e-6)
 
 

@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 import vobench
+from tests.forgery import forged
 from vobench.errors import InputError, MissingDependencyError, UnknownNameError
 from vobench.notebook.runs import plan
 
@@ -100,6 +101,13 @@ def test_a_bundle_is_a_zip_that_compares_with_its_run(ran, tmp_path):
     assert set(vobench.compare(path, ran)["verdict"]) == {"same"}
     with pytest.raises(InputError, match=r"should end in \.zip"):
         vobench.bundle(ran, tmp_path / "run.tar")
+
+
+def test_a_forged_score_of_a_bundle_is_named_and_does_not_count(ran, tmp_path):
+    forged(vobench.bundle(ran, tmp_path / "honest.zip"), tmp_path / "forged.zip")
+    with pytest.warns(UserWarning, match=r"forged\.zip: stand_still on short, 0: another score"):
+        changes = vobench.compare(ran, tmp_path / "forged.zip")
+    assert set(changes["verdict"]) == {"same"}
 
 
 def test_plots_take_the_cases_and_estimators_that_there_are(ran):

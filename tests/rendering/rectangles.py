@@ -6,7 +6,8 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import Thing, moved, quad, unit
+from vobench.geometry.vector import unit
+from vobench.scene.mesh import Thing, moved, quad
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,12 +13,13 @@ from vobench.errors import MissingDependencyError, RenderError
 from vobench.geometry import se3
 from vobench.geometry.camera import KannalaBrandt, Pinhole, pixel_grid
 from vobench.geometry.rig import looking
+from vobench.geometry.vector import unit
 from vobench.rendering import mitsuba
 from vobench.rendering.path import PathRenderer
 from vobench.rendering.renderer import View, single_instant
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import LUMINANCE, Material, Picture, fresnel, linear, pane_reflectance, under_coat
-from vobench.scene.mesh import Thing, quad, two_sided, unit
+from vobench.scene.mesh import Thing, quad, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
 
 X, Y, Z = np.eye(3)

@@ -12,7 +12,7 @@ from vobench.rendering.geometry import RayCaster, reversed_faces
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import PointLight
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flipped, joined, moved, quad, table
+from vobench.scene.mesh import Thing, flipped, joined, moved, quad, table, two_sided
 from vobench.scene.scene import Scene, triangles
 
 GREY = {"grey": Material(texture=Procedural("plain", 0.5, 0.0, 1.0, 8, 0))}
@@ -38,8 +38,8 @@ def test_a_ray_meets_the_side_of_a_sheet_that_it_comes_from(back_first: bool) ->
 
 def test_only_faces_with_the_same_corners_in_reverse_are_twins() -> None:
     solid = block((1, 1, 1))
-    assert (reversed_faces(solid.corners_m) < 0).all()
-    doubled = solid.two_sided().corners_m
+    assert (reversed_faces(solid.triangles) < 0).all()
+    doubled = two_sided(solid).triangles
     found, count = reversed_faces(doubled), len(solid.faces)
     np.testing.assert_array_equal(found, np.roll(np.arange(2 * count), count))
 

@@ -20,11 +20,12 @@ from vobench.geometry.camera import (
 )
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.lamp import lamp_of
 from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Thing, Triangles, flat, flipped, joined, quad, two_sided, unit
+from vobench.scene.mesh import Thing, Triangles, flat, flipped, joined, moved, quad, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 
@@ -58,7 +59,7 @@ def block(name: str, center_m, size_m, *, yaw_deg: float = 0.0) -> Thing:
 def shell(size_m, *, floor: str = "diffuse") -> list[Thing]:
     """The inner sides of a block that stands on the floor."""
     names = ("wall_east", "wall_west", "wall_north", "wall_south", "ceiling", "floor")
-    meshes = [side.flipped() for side in sides([0, 0, size_m[2] / 2], size_m)]
+    meshes = [flipped(side) for side in sides([0, 0, size_m[2] / 2], size_m)]
     return [Thing(n, mesh, floor if n == "floor" else "diffuse") for n, mesh in zip(names, meshes, strict=True)]
 
 
@@ -501,7 +502,7 @@ def shards(count: int, seed: int) -> Scene:
     things = [
         Thing(
             f"shard {n}",
-            flat(c, [[0, 1, 2]], np.zeros((3, 2))).two_sided() if n % 3 else flat(c, [[0, 1, 2]], np.zeros((3, 2))),
+            two_sided(flat(c, [[0, 1, 2]], np.zeros((3, 2)))) if n % 3 else flat(c, [[0, 1, 2]], np.zeros((3, 2))),
             "diffuse",
         )
         for n, c in enumerate(corners)
@@ -550,7 +551,7 @@ def test_every_ray_inside_a_closed_room_ends(seed):
     rng = np.random.default_rng(seed)
     turned = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     T = se3.transform(turned * np.linalg.det(turned), rng.uniform(-40, 40, 3))
-    inside = joined([side.flipped() for side in sides([0, 0, 1.5], rng.uniform(3, 12, 3))]).moved(T)
+    inside = moved(joined([flipped(side) for side in sides([0, 0, 1.5], rng.uniform(3, 12, 3))]), T)
     caster = TruthCaster(Scene("room", (Thing("room", inside, "diffuse"),), MATERIALS, ()))
     shot = CameraShot(T @ se3.transform(np.eye(3), [0.1, -0.3, 1.6]), 0)
     truth = caster.frame(Equirectangular(720, 360), shot, ["depth", "normals", "instance"])
@@ -560,7 +561,7 @@ def test_every_ray_inside_a_closed_room_ends(seed):
 
 
 def test_the_back_of_a_sheet_of_two_sides_is_seen_as_its_front_is():
-    both = Thing("card", quad([2.0, -0.5, -0.5], [0, 1.0, 0], [0, 0, 1.0]).two_sided(), "diffuse")
+    both = Thing("card", two_sided(quad([2.0, -0.5, -0.5], [0, 1.0, 0], [0, 0, 1.0])), "diffuse")
     caster = TruthCaster(Scene("card", (both,), MATERIALS, ()))
     camera = CAMERAS["pinhole"]
     ahead = looking(pitch_deg=0, position_m=(0, 0, 0))

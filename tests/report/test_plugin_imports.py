@@ -10,10 +10,10 @@ IMPORTS = [
     ("from vobench.geometry import se3", "vobench.geometry.se3: from vobench.plugin import se3"),
     ("import vobench.geometry.se3", "vobench.geometry.se3: from vobench.plugin import se3"),
     ("from vobench.estimator import Result", "vobench.estimator.Result: from vobench.plugin import Result"),
-    ("from vobench.asset.shape import quad", "vobench.asset.shape.quad: from vobench.plugin import quad"),
+    ("from vobench.asset.shape import block", "vobench.asset.shape.block: from vobench.plugin import block"),
     (
-        "from vobench.dataset.picture import Picture",
-        "vobench.dataset.picture.Picture: from vobench.plugin import RecordedPicture",
+        "from vobench.dataset.picture import EncodedPicture",
+        "vobench.dataset.picture.EncodedPicture: from vobench.plugin import RecordedPicture",
     ),
     (
         "from vobench.scene.material import Picture",

@@ -6,6 +6,7 @@ import os
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 from multiprocessing import get_context
@@ -116,6 +117,23 @@ def test_what_a_killed_process_left_is_swept_and_what_a_living_one_fills_is_not(
         process.kill()
     sweep(folder.parent)
     assert not folder.exists()
+
+
+def test_a_folder_that_another_process_sweeps_before_it_is_locked_is_made_again(store, monkeypatch):
+    make = tempfile.mkdtemp
+    swept = []
+
+    def mkdtemp(**options):
+        folder = make(**options)
+        if not swept:
+            swept.append(folder)
+            Path(folder).rmdir()
+        return folder
+
+    monkeypatch.setattr("tempfile.mkdtemp", mkdtemp)
+    entry = store.get("kind", {"from": "here"}, lambda folder: (folder / "file").write_text("x"))
+    assert len(swept) == 1
+    assert (entry / "file").read_text() == "x"
 
 
 @given(st.dictionaries(st.text(), Json, max_size=4))

@@ -143,6 +143,16 @@ def test_level_ground_gets_the_skys_illuminance(kind: str) -> None:
     assert arriving.mean() * 4 * np.pi == pytest.approx(12_000, rel=1e-3)
 
 
+@pytest.mark.parametrize("azimuth_deg", [90.0, 137.0, 270.0])
+def test_a_sky_turns_with_its_sun(azimuth_deg: float) -> None:
+    R = at(yaw=azimuth_deg)[:3, :3]
+    sun = np.array([0.6, 0.0, 0.8])
+    directions = sphere(1000)
+    here = Sky("c", 1000.0, "clear", sun).luminance_cd_m2(directions)
+    there = Sky("c", 1000.0, "clear", R @ sun).luminance_cd_m2(directions @ R.T)
+    np.testing.assert_allclose(there, here, rtol=1e-3)
+
+
 def test_skies_differ_as_the_standard_says() -> None:
     horizon, zenith, down = np.array([1.0, 0, 0.0]), np.array([0, 0, 1.0]), np.array([0, 0, -1.0])
     uniform, overcast = Sky("u", 1000.0, "uniform"), Sky("o", 1000.0, "overcast")

@@ -9,6 +9,7 @@ from vobench.scene.material import (
     fresnel,
     inner_reflectance,
     linear,
+    linear_texture,
     pane_reflectance,
     reflectance,
     under_coat,
@@ -93,3 +94,11 @@ def test_srgb_is_linear_near_black_and_a_power_above() -> None:
     assert linear(np.array([0, 255], np.uint8)).tolist() == [0.0, 1.0]
     assert linear(np.array([0.04045 / 2])) == pytest.approx(0.04045 / 2 / 12.92)
     assert linear(np.array([0.5])) == pytest.approx(0.2140, abs=1e-4)
+
+
+def test_a_linear_texture_is_a_grey_one_as_it_is_and_a_coloured_one_without_its_encoding_and_opacity() -> None:
+    grey = np.array([[0.1, 0.5], [0.7, 0.9]], np.float32)
+    np.testing.assert_array_equal(linear_texture(Picture(grey)), grey[..., None])
+    coloured = np.array([[[0, 128, 255, 40]]], np.uint8)
+    np.testing.assert_array_equal(linear_texture(Picture(coloured)), linear(coloured[..., :3]))
+    assert linear_texture(Picture(coloured)).shape == (1, 1, 3)

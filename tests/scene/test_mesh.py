@@ -10,6 +10,7 @@ from trimesh import Trimesh
 
 from vobench.asset.shape import block
 from vobench.geometry import se3
+from vobench.geometry.vector import unit
 from vobench.scene.light import PointLight
 from vobench.scene.mesh import (
     WELD_M,
@@ -29,7 +30,6 @@ from vobench.scene.mesh import (
     table,
     textured,
     two_sided,
-    unit,
     welded,
 )
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
@@ -154,6 +154,9 @@ def test_nothing_changes_the_mesh_that_it_is_given() -> None:
     for change in (flipped, two_sided, lambda m: moved(m, T), lambda m: textured(m, m.visual.uv + 1)):
         other = change(mesh)
         other.apply_translation([1, 2, 3])
+        other.vertices += 1
+        other.visual.uv[:] = 5
+        other.faces[:] = 0
     after = (mesh.vertices, mesh.faces, mesh.visual.uv, mesh.vertex_normals)
     for array, original in zip(after, before, strict=True):
         np.testing.assert_array_equal(array, original)

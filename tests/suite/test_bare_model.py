@@ -9,7 +9,7 @@ from vobench.asset import model as model_module
 from vobench.asset.shape import at, block
 from vobench.scene.light import PointLight, Sky, Sun
 from vobench.scene.material import LUMINANCE, Material
-from vobench.scene.mesh import Thing, quad
+from vobench.scene.mesh import Thing, flipped, moved, quad
 from vobench.suite.bare_model import DAYLIGHT_SKY, DAYLIGHT_SUN, bare_model_scene
 
 GREY = 0.5
@@ -38,7 +38,7 @@ def grey(reflectance):
 
 def room(size_m=(4.0, 4.0, 2.5), *, material="grey"):
     """A closed room, seen from inside, that stands on z = 0."""
-    return Thing("room", block(size_m, bevel_m=0).flipped().moved(at(z_m=size_m[2] / 2)), material)
+    return Thing("room", moved(flipped(block(size_m, bevel_m=0)), at(z_m=size_m[2] / 2)), material)
 
 
 AREA_M2 = 2 * 4 * 4 + 4 * 4 * 2.5

@@ -105,7 +105,7 @@ def test_scenes_and_estimators_are_found_beside_their_suite_from_anywhere(bent, 
 def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch):
     calls = []
     for module, name in (
-        (scene_file, "survey"),
+        (scene_file, "read_scene_with_mistakes"),
         (scene_build, "build"),
         (entrant, "read_manifest"),
     ):
@@ -117,7 +117,7 @@ def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch)
     calls.clear()
     many = bent(("short: {targets_m: [[0.5, 0]]}", ways), ("clean: {sensor: clean}", cameras)), sorted(calls)
     assert (len(few[0].cases), len(many[0].cases)) == (2, 90)
-    assert few[1] == many[1] == ["read_manifest", "read_manifest", "survey"]
+    assert few[1] == many[1] == ["read_manifest", "read_manifest", "read_scene_with_mistakes"]
 
 
 def test_merge_keys_and_aliases_keep_a_suite_short(bent):

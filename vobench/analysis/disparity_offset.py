@@ -8,7 +8,8 @@ import numpy as np
 from vobench.analysis.patch_refinement import AFFINE, refined
 from vobench.analysis.stereo_matches import MARGIN_PX, WINDOW_PX, MatchedShot, PairShot
 from vobench.estimator.pose import pose_from_points, twist
-from vobench.estimator.tools import StereoPair, comparable, follow, inside
+from vobench.estimator.stereo import StereoPair
+from vobench.estimator.tracking import comparable, follow, inside
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 
 from vobench.analysis.image_noise import BLACK_DN, SATURATED_DN, noise_dn
-from vobench.estimator.tools import Points, follow, inside
+from vobench.estimator.tracking import Points, follow, inside
 from vobench.geometry.se3 import Array
 from vobench.sequence.picture import Image
 

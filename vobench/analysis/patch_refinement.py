@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.estimator.tools import Mask, Points
+from vobench.estimator.tracking import Mask, Points
 from vobench.geometry.se3 import Array
 from vobench.sequence.picture import Image
 

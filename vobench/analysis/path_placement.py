@@ -8,7 +8,7 @@ import scipy
 
 from vobench.analysis.stereo_fit import StereoFit
 from vobench.errors import InputError
-from vobench.estimator.tools import StereoPair
+from vobench.estimator.stereo import StereoPair
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.rendering.geometry import RayCaster

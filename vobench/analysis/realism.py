@@ -20,7 +20,7 @@ from vobench.analysis.stereo_fit import StereoFit, Uncertain, fit_pair
 from vobench.analysis.stereo_matches import PairShot
 from vobench.dataset.recording import Recording
 from vobench.errors import InputError
-from vobench.estimator.tools import stereo_pair
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry.rig import Rig, Side, rectification
 from vobench.geometry.se3 import Array
 from vobench.sequence import EncodedFrame

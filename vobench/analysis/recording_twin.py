@@ -18,7 +18,7 @@ from vobench.analysis.stereo_fit import StereoFit
 from vobench.dataset.picture import require_free
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
-from vobench.estimator.tools import stereo_pair
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry.rig import custom_stereo_pair
 from vobench.geometry.se3 import Array, inverse
 from vobench.runner.data_frame import data_frame
@@ -26,7 +26,7 @@ from vobench.runner.estimate import ESTIMATE
 from vobench.runner.folder import RunFolder, TrialScore, read_tum
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.key import cache_folder
-from vobench.runner.motion import NS_PER_S, body_motion
+from vobench.runner.motion import body_motion
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.recording import NOTHING_MORE, read_recording, sequence_path
 from vobench.runner.score import NO_SCALE
@@ -40,6 +40,7 @@ from vobench.suite.scene_file import read_scene
 from vobench.suite.suite import read_plan
 from vobench.suite.yaml_file import plain
 from vobench.trajectory.formats import format_tum
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
 if TYPE_CHECKING:

@@ -5,10 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vobench.geometry.vector import unit
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture
-from vobench.scene.mesh import Triangles, distinct, open_edges, unit, welded
+from vobench.scene.mesh import Triangles, distinct, open_edges, welded
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_way import FreeCircle, largest_free_circle
 
@@ -22,8 +23,9 @@ class SceneSurvey:
     """The contents of a scene at its start.
 
     `open_edges` are edges of a single face, of all objects but rectangles. `twins` are faces with the corners of
-    another face. `backs` is the share of directions, from the free circle or else from the centre of the scene, in
-    which the back of a face, which is not drawn, is seen before any front. `free` is None if there is no floor.
+    another face. `backs` is the share of directions in which a viewer sees the back of a face first; backs are not
+    drawn. The viewer is in the free circle, or in the centre of the scene if there is none. `free` is None if there is
+    no floor.
     """
 
     things: int
@@ -60,7 +62,7 @@ def survey(scene: Scene) -> SceneSurvey:
         high_m=_rounded(high_m),
         lights=tuple(light.name for light in scene.lights),
         open_edges=_open_edges(faces, point_ids),
-        twins=len(point_ids) - len(distinct(np.sort(point_ids, axis=1))[0]),
+        twins=_twins(point_ids),
         backs=_share_of_backs(faces, caster, eye_m),
         free=free,
     )
@@ -87,9 +89,19 @@ def _point_ids(faces: Triangles) -> NDArray[np.intp]:
 def _open_edges(faces: Triangles, point_ids: NDArray[np.intp]) -> int:
     """The number of edges of objects that belong to a single face; those of rectangles do not count."""
     faces_of_thing = np.bincount(faces.thing, minlength=len(faces.things))
-    is_solid = np.isin(faces.thing, np.flatnonzero(faces_of_thing > MAX_FACES_OF_RECTANGLE))
-    thing_offset = faces.thing[is_solid, None] * (point_ids.max(initial=0) + 1)  # edges of two things are not shared
-    return len(open_edges(point_ids[is_solid] + thing_offset))
+    solid_things = np.flatnonzero(faces_of_thing > MAX_FACES_OF_RECTANGLE)
+    is_solid = np.isin(faces.thing, solid_things)
+    # Every object has point numbers of its own, so that edges of two objects are never the same.
+    point_count = point_ids.max(initial=0) + 1
+    first_point = faces.thing[is_solid, None] * point_count
+    return len(open_edges(point_ids[is_solid] + first_point))
+
+
+def _twins(point_ids: NDArray[np.intp]) -> int:
+    """The number of faces with the same three points as an earlier face."""
+    sorted_corners = np.sort(point_ids, axis=1)
+    first_faces, _ = distinct(sorted_corners)
+    return len(point_ids) - len(first_faces)
 
 
 def _share_of_backs(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:

@@ -12,7 +12,7 @@ import numpy as np
 
 from vobench.analysis.disparity_offset import fit_offset
 from vobench.analysis.stereo_matches import Matches, PairShot, all_matches, gain_of, match_shots, row_errors
-from vobench.estimator.tools import StereoPair
+from vobench.estimator.stereo import StereoPair
 from vobench.geometry.se3 import Array
 
 MIN_MATCHES = 50  # for a fit of five coefficients

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.analysis.patch_refinement import SLANT, refined
-from vobench.estimator.tools import Points, StereoPair, corners_per_cell
+from vobench.estimator.stereo import StereoPair
+from vobench.estimator.tracking import Points, corners_per_cell
 from vobench.geometry.se3 import Array
 from vobench.sequence.picture import Image
 

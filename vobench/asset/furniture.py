@@ -8,7 +8,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vobench.asset import picture
-from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PAPER, SAGE, SAND, TEAL, Rng, Spines, one_of
+from vobench.asset.picture import (
+    BRICK,
+    INK,
+    NAVY,
+    OCHRE,
+    PAPER,
+    SAGE,
+    SAND,
+    TEAL,
+    Rng,
+    Spines,
+    one_of,
+)
 from vobench.asset.shape import (
     at,
     block,
@@ -176,7 +188,8 @@ def chair(rng: Rng, colour: str = NAVY) -> list[Part]:
         x = 0.3 * np.cos(angle)
         y = 0.3 * np.sin(angle)
         parts.append(put(leg, BLACK, yaw=np.rad2deg(angle)))
-        parts.append(put(castor, DARK, x, y, 0.03, yaw=rng.uniform(0, 360), roll=90))
+        heading = rng.uniform(0, 360)
+        parts.append(put(castor, DARK, x, y, 0.03, yaw=heading, roll=90))
 
     fabric = cloth(colour)
     seat = cushion((0.48, 0.5, 0.085), power=4.5)
@@ -311,7 +324,8 @@ def shelf(
     for bay, row in product(range(bays), range(rows)):
         y = bay * bay_m + bay_m / 2 - half
         z = 0.06 + row * row_m
-        parts.append(stood(plank_m, board, 0, y, z - 0.02, bevel=0.002, u=rng.uniform(0, 2)))
+        start_u = rng.uniform(0, 2)
+        parts.append(stood(plank_m, board, 0, y, z - 0.02, bevel=0.002, u=start_u))
         has_boxes = rng.random() < 0.12
         if has_boxes:
             cardboard = matt(one_of(rng, SAGE, SAND, NAVY))
@@ -338,8 +352,8 @@ def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> l
         row = rng.integers(2)
         cells = np.stack([column + u, row + v], axis=-1).reshape(-1, 2)
         page = textured(sheet(points_m), cells / [3, 2])
-        x, y = rng.normal(0, spread_m, 2)
-        sheets.append(moved(page, at(x, y, yaw=rng.normal(0, 14))))
+        center_x, center_y = rng.normal(0, spread_m, 2)
+        sheets.append(moved(page, at(center_x, center_y, yaw=rng.normal(0, 14))))
     return [Part(joined(sheets), matt(texture=picture.pages(seed)))]
 
 
@@ -442,7 +456,11 @@ def cables(rng: Rng, length_m: float = 1.2, height_m: float = 0.7) -> list[Part]
     return [Part(joined_arrays(leads), BLACK)]
 
 
-def plant(rng: Rng, height_m: float = 1.2, leaves: int = 26) -> list[Part]:
+def plant(
+    rng: Rng,
+    height_m: float = 1.2,
+    leaves: int = 26,
+) -> list[Part]:
     """Broad leaves on stems in a pot of clay."""
     pot_m = 0.28 * height_m
     stems = []
@@ -572,7 +590,11 @@ def sofa(
     return parts
 
 
-def waste_bin(rng: Rng, width_m: float = 0.3, height_m: float = 0.4) -> list[Part]:
+def waste_bin(
+    rng: Rng,
+    width_m: float = 0.3,
+    height_m: float = 0.4,
+) -> list[Part]:
     """A waste bin with crumpled paper."""
     profile = mm("0 0, 400 0, 500 1000, 480 1000, 385 20, 0 20") * [width_m, height_m]
     size_m = [width_m, width_m, height_m]
@@ -618,7 +640,12 @@ def cabinet(
     return parts
 
 
-def bench(rng: Rng, width_m: float = 2.0, depth_m: float = 0.9, height_m: float = 0.7) -> list[Part]:
+def bench(
+    rng: Rng,
+    width_m: float = 2.0,
+    depth_m: float = 0.9,
+    height_m: float = 0.7,
+) -> list[Part]:
     """A work bench of beech with a shelf below."""
     beech = wood("beech")
     d = depth_m
@@ -642,7 +669,11 @@ def bench(rng: Rng, width_m: float = 2.0, depth_m: float = 0.9, height_m: float 
     return parts
 
 
-def pillar(rng: Rng, width_m: float = 0.4, height_m: float = 3.0) -> list[Part]:
+def pillar(
+    rng: Rng,
+    width_m: float = 0.4,
+    height_m: float = 3.0,
+) -> list[Part]:
     """A column of raw concrete with chamfered edges, a kick plate and a sign."""
     concrete = matt(texture=picture.ground("concrete"))
     sign = matt(texture=picture.sign("P2", OCHRE))

@@ -17,9 +17,10 @@ from vobench.asset.gltf_material import BARE, Look, MaterialReader
 from vobench.errors import ModelError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.scene.light import PointLight, SpotLight, Sun
 from vobench.scene.material import WHITE, linear
-from vobench.scene.mesh import MeshArrays, unit
+from vobench.scene.mesh import MeshArrays
 
 ModelLight = PointLight | SpotLight | Sun
 MOST_INSTANCES = 100_000
@@ -157,7 +158,12 @@ class Gltf:
         """The primitives of a node's mesh; poses: T_model_node of every node by its index, for skins."""
         return [self._primitive(node, source, poses) for source in self._primitives(node)]
 
-    def _primitive(self, node: Node, source: Json, poses: Mapping[int, Array]) -> Primitive:
+    def _primitive(
+        self,
+        node: Node,
+        source: Json,
+        poses: Mapping[int, Array],
+    ) -> Primitive:
         attributes = source["attributes"]
         mode = source.get("mode", TRIANGLES)
         notes = []

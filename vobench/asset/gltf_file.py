@@ -93,7 +93,11 @@ class GltfFile:
             raise ModelError(f"accessor {index} has {count} rows; export it again")
         return count
 
-    def accessor(self, index: Any, rows: int | None = None) -> NDArray[Any]:
+    def accessor(
+        self,
+        index: Any,
+        rows: int | None = None,
+    ) -> NDArray[Any]:
         """Numbers (rows, width) of an accessor, which has as many rows as expected; floats where normalized."""
         count = self.rows(index)
         accessor = self.entry("accessors", index)
@@ -122,7 +126,13 @@ class GltfFile:
         substituted[indices] = self._array(sparse["values"], len(indices), values.dtype, width)
         return substituted
 
-    def _array(self, source: Json, count: int, dtype: np.dtype[Any], width: int) -> NDArray[Any]:
+    def _array(
+        self,
+        source: Json,
+        count: int,
+        dtype: np.dtype[Any],
+        width: int,
+    ) -> NDArray[Any]:
         """Numbers (count, width) from a buffer view and an offset."""
         data = self.view(source["bufferView"])
         offset = source.get("byteOffset", 0)

@@ -132,7 +132,11 @@ class MaterialReader:
             return Material("pane", eta=max(material.eta, GLASS_ETA), tint=tint)
         return material
 
-    def _picture(self, texture: Json | None, channels: int = 3) -> Picture | None:
+    def _picture(
+        self,
+        texture: Json | None,
+        channels: int = 3,
+    ) -> Picture | None:
         """The pixels of a texture (H, W, 3), or (H, W, 4) where it has opacity and four channels are requested."""
         if not texture:
             return None
@@ -195,7 +199,9 @@ def _emission_cd_m2(source: Json) -> tuple[float, float, float]:
 
 
 def _notes_on_emission(
-    colour_texture: Json | None, emission_texture: Json | None, emission_cd_m2: Sequence[float]
+    colour_texture: Json | None,
+    emission_texture: Json | None,
+    emission_cd_m2: Sequence[float],
 ) -> list[str]:
     """Notes where an emission is weak, and where it is mapped otherwise than the colour."""
     red, green, blue = emission_cd_m2
@@ -234,7 +240,11 @@ def _opacity(material: Material, factor: float) -> Map | Array:
     return np.asarray(pixels[..., 3] / np.float32(255) * factor)
 
 
-def _with_opacity(material: Material, source: Json, factor: float) -> tuple[Material, list[str]]:
+def _with_opacity(
+    material: Material,
+    source: Json,
+    factor: float,
+) -> tuple[Material, list[str]]:
     """A material with the holes, or as the pane, that its opacity makes of it, and notes on that."""
     mode = source.get("alphaMode", "OPAQUE")
     if mode == "OPAQUE" or material.kind == "pane":
@@ -246,7 +256,12 @@ def _with_opacity(material: Material, source: Json, factor: float) -> tuple[Mate
     return _blended(material, opacity, factor)
 
 
-def _masked(material: Material, opacity: Map | Array, cutoff: float, factor: float) -> tuple[Material, list[str]]:
+def _masked(
+    material: Material,
+    opacity: Map | Array,
+    cutoff: float,
+    factor: float,
+) -> tuple[Material, list[str]]:
     """A material with holes where its opacity is below a cutoff."""
     if opacity.max() < cutoff:
         return _open_pane()
@@ -255,7 +270,11 @@ def _masked(material: Material, opacity: Map | Array, cutoff: float, factor: flo
     return material, []
 
 
-def _blended(material: Material, opacity: Map | Array, factor: float) -> tuple[Material, list[str]]:
+def _blended(
+    material: Material,
+    opacity: Map | Array,
+    factor: float,
+) -> tuple[Material, list[str]]:
     """A blended material as what it likely stands for: nothing, holes, glass or a solid."""
     if opacity.max() < ABSENT_OPACITY:
         return _open_pane()

@@ -7,8 +7,30 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from vobench.asset import picture
-from vobench.asset.furniture import BLACK, DARK, STEEL, WHITE, Part, cloth, coated, matt, mm, put, stood, wood
-from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, SAGE, SAND, Rng, one_of
+from vobench.asset.furniture import (
+    BLACK,
+    DARK,
+    STEEL,
+    WHITE,
+    Part,
+    cloth,
+    coated,
+    matt,
+    mm,
+    put,
+    stood,
+    wood,
+)
+from vobench.asset.picture import (
+    BRICK,
+    INK,
+    NAVY,
+    OCHRE,
+    SAGE,
+    SAND,
+    Rng,
+    one_of,
+)
 from vobench.asset.shape import at, card, cushion, lathe, sheet, spline, tube
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import flipped, joined, moved
@@ -124,7 +146,11 @@ def rug(
     ]
 
 
-def television(_: Rng, width_m: float = 1.2, seed: int = 0) -> list[Part]:
+def television(
+    _: Rng,
+    width_m: float = 1.2,
+    seed: int = 0,
+) -> list[Part]:
     """A flat screen on two feet that shows hills."""
     h = 0.57 * width_m
     glow = Material(

@@ -17,7 +17,16 @@ from vobench.asset.vertex_colour import painted
 from vobench.errors import ModelError, unknown_name_sentence
 from vobench.geometry.se3 import Array
 from vobench.scene.material import LUMINANCE, Material
-from vobench.scene.mesh import Faces, MeshArrays, Thing, areas_m2, arrays, corners, face_normals, is_closed_body
+from vobench.scene.mesh import (
+    Faces,
+    MeshArrays,
+    Thing,
+    areas_m2,
+    arrays,
+    corners,
+    face_normals,
+    is_closed_body,
+)
 
 Roles = Mapping[str, str]
 Key = TypeVar("Key")
@@ -158,15 +167,16 @@ def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles:
     stationary = []
     moving = []
     bright = {}
-    for primitive, named in zip(solid, named_materials, strict=True):
+    for primitive, named_material in zip(solid, named_materials, strict=True):
         node = primitive.node
-        thing = Thing(names[node], primitive.mesh.mesh(), material_names[named])
+        _, material = named_material
+        thing = Thing(names[node], primitive.mesh.mesh(), material_names[named_material])
         mover = role[node].mover
         if mover is None:
             stationary.append(thing)
         else:
             moving.append((node, mover, thing))
-        if max(named[1].emission_cd_m2) > 0:
+        if max(material.emission_cd_m2) > 0:
             bright[node] = names[node]
 
     return Model(
@@ -215,10 +225,11 @@ def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:
     taken = set(wanted.values())
     names: dict[str, Key] = {}
     for key, name in wanted.items():
-        unique = name if name not in names else next(_free_names(name, taken))
-        taken.add(unique)
-        names[unique] = key
-    return {key: name for name, key in names.items()}
+        unique = name if name not in given else next(_free_names(name, reserved))
+        reserved.add(unique)
+        given.add(unique)
+        unique_names[key] = unique
+    return unique_names
 
 
 def _free_names(name: str, taken: set[str]) -> Iterator[str]:
@@ -273,12 +284,14 @@ def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
     """
     corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
     width_m, depth_m, height_m = np.ptp(corners_m, axis=(0, 1))
-    _, along_m2, up_m2 = areas_m2(corners_m) @ np.abs(face_normals(corners_m))
+    projected_m2 = areas_m2(corners_m) @ np.abs(face_normals(corners_m))  # (3,), along x, y and z
+    _, sideways_m2, up_m2 = projected_m2
 
     is_place = max(width_m, depth_m, height_m) > PLACE_M
-    looks_sideways = along_m2 > LYING * up_m2
-    is_flat = depth_m < FLAT * min(width_m, height_m) and height_m > PLACE_M and LYING * along_m2 > up_m2
-    if not (is_place and (looks_sideways or is_flat)):
+    faces_sideways = sideways_m2 > LYING * up_m2
+    has_large_sides = LYING * sideways_m2 > up_m2
+    is_flat_sideways = depth_m < FLAT * min(width_m, height_m) and height_m > PLACE_M and has_large_sides
+    if not (is_place and (faces_sideways or is_flat_sideways)):
         return []
     other = "z" if axis == "y" else "y"
     return [

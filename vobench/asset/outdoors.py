@@ -8,22 +8,47 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from vobench.asset import picture
-from vobench.asset.furniture import BLACK, CHROME, DARK, GREY, STEEL, Part, cloth, coated, matt, mm, put, stood
-from vobench.asset.picture import BRICK, INK, NAVY, OCHRE, PLUM, SAGE, SAND, TEAL, Rng, one_of
-from vobench.asset.shape import at, block, card, cards_arrays, cushion, lathe, sheet, spline, tube
-from vobench.geometry.se3 import Array
-from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import (
-    arrays,
-    corners,
-    flat,
-    flipped,
-    joined,
-    make_mesh,
-    moved,
-    texture_coordinates,
-    unit,
+from vobench.asset.furniture import (
+    BLACK,
+    CHROME,
+    DARK,
+    GREY,
+    STEEL,
+    Part,
+    cloth,
+    coated,
+    matt,
+    mm,
+    put,
+    stood,
 )
+from vobench.asset.picture import (
+    BRICK,
+    INK,
+    NAVY,
+    OCHRE,
+    PLUM,
+    SAGE,
+    SAND,
+    TEAL,
+    Rng,
+    one_of,
+)
+from vobench.asset.shape import (
+    at,
+    block,
+    card,
+    cards_arrays,
+    cushion,
+    lathe,
+    sheet,
+    spline,
+    tube,
+)
+from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
+from vobench.scene.material import Material, Picture
+from vobench.scene.mesh import arrays, corners, flat, flipped, joined, make_mesh, moved, texture_coordinates
 from vobench.scene.scene import jointed
 
 if TYPE_CHECKING:
@@ -461,7 +486,11 @@ def _facing(direction: Array, yaw_spread_deg: float, rng: Rng) -> float:
     return float(yaw_deg + rng.normal(0, yaw_spread_deg))
 
 
-def tree(rng: Rng, height_m: float = 6.0, clumps: int = 110) -> list[Part]:
+def tree(
+    rng: Rng,
+    height_m: float = 6.0,
+    clumps: int = 110,
+) -> list[Part]:
     """A broad-leaved tree with a trunk, boughs and a crown."""
     h = height_m
     bark = matt("#6d5c4b", picture.boards("walnut", 3, 512, 0.8))
@@ -523,7 +552,11 @@ def bollard(_: Rng, height_m: float = 0.95) -> list[Part]:
     return [put(post, coated("#23282a", roughness=0.35))]
 
 
-def bush(rng: Rng, height_m: float = 1.1, width_m: float = 1.6) -> list[Part]:
+def bush(
+    rng: Rng,
+    height_m: float = 1.1,
+    width_m: float = 1.6,
+) -> list[Part]:
     """A round bush of leaves down to the ground."""
     radii_m = np.array([width_m, width_m, height_m]) / 2
     sizes_m = []

@@ -501,13 +501,24 @@ def _chart(draw: Draw, rng: Rng, box: Box) -> None:
             _curve(draw, xs, ys, ink)
 
 
-def _bars(draw: Draw, xs: Array, ys: Array, bottom: float, ink: str) -> None:
+def _bars(
+    draw: Draw,
+    xs: Array,
+    ys: Array,
+    bottom: float,
+    ink: str,
+) -> None:
     half = 0.3 * (xs[1] - xs[0])
     for x, y in zip(xs, ys, strict=True):
         draw.rectangle([x - half, y, x + half, bottom], fill=ink)
 
 
-def _curve(draw: Draw, xs: Array, ys: Array, ink: str) -> None:
+def _curve(
+    draw: Draw,
+    xs: Array,
+    ys: Array,
+    ink: str,
+) -> None:
     for x, y in zip(xs, ys, strict=True):
         draw.rectangle([x - 2, y - 2, x + 2, y + 2], fill=ink)
     points = np.stack([xs, ys], axis=1)
@@ -810,7 +821,8 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
         draw.rectangle([left, y + 84, right, y + 136], fill=INK)
     for k in range(3):
         line = _words(rng, 3).title()
-        _text(draw, (x + 12, y + 10 + 22 * k), line, 19 - 2 * k, INK)
+        line_y = y + 10 + 22 * k
+        _text(draw, (x + 12, line_y), line, 19 - 2 * k, INK)
         arrow_x = 110 + 60 * k
         shaft = [arrow_x, 640, arrow_x, 580]
         head = [arrow_x - 16, 600, arrow_x, 580, arrow_x + 16, 600]

@@ -80,7 +80,8 @@ class Piece:
 
 
 def things(
-    instances: Iterable[Instance], known: Mapping[str, Material] = {}
+    instances: Iterable[Instance],
+    known: Mapping[str, Material] = {},
 ) -> tuple[tuple[Thing, ...], dict[str, Material]]:
     """The things of all instances, one per material of an instance, and the materials by name.
 

@@ -13,15 +13,8 @@ from vobench.asset.polygon import oriented, triangulated
 from vobench.asset.wall import Hole
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import (
-    Faces,
-    MeshArrays,
-    cross,
-    face_normals,
-    joined_arrays,
-    quad_arrays,
-    unit,
-)
+from vobench.geometry.vector import cross, unit
+from vobench.scene.mesh import Faces, MeshArrays, face_normals, joined_arrays, quad_arrays
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -68,7 +61,12 @@ def block(
     return arrays.mesh() if transform is None else arrays.moved(transform).mesh()
 
 
-def block_arrays(size_m: ArrayLike, *, bevel_m: float = 0.003, uv_m: ArrayLike = (0.0, 0.0)) -> MeshArrays:
+def block_arrays(
+    size_m: ArrayLike,
+    *,
+    bevel_m: float = 0.003,
+    uv_m: ArrayLike = (0.0, 0.0),
+) -> MeshArrays:
     """The arrays of `block`."""
     half_m = np.asarray(size_m, float) / 2
     bevel = min(bevel_m, LARGEST_BEVEL * half_m.min())
@@ -299,12 +297,22 @@ def spline(points_m: ArrayLike, count: int = 16) -> Array:
     return np.asarray(scipy.interpolate.CubicSpline(knots, points)(t))
 
 
-def tube(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> "Trimesh":
+def tube(
+    path_m: ArrayLike,
+    radius_m: float,
+    *,
+    sections: int = 8,
+) -> "Trimesh":
     """A round rod along a polyline (N, 3), closed by flat ends."""
     return tube_arrays(path_m, radius_m, sections=sections).mesh()
 
 
-def tube_arrays(path_m: ArrayLike, radius_m: float, *, sections: int = 8) -> MeshArrays:
+def tube_arrays(
+    path_m: ArrayLike,
+    radius_m: float,
+    *,
+    sections: int = 8,
+) -> MeshArrays:
     """The arrays of `tube`."""
     path = np.asarray(path_m, float)
     steps = np.diff(path, axis=0)
@@ -419,7 +427,11 @@ def card(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> "Trimesh
     return card_arrays(size_m, cell=cell).mesh()
 
 
-def card_arrays(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> MeshArrays:
+def card_arrays(
+    size_m: tuple[float, float],
+    *,
+    cell: Hole = WHOLE_PICTURE,
+) -> MeshArrays:
     """The arrays of `card`."""
     width, height = size_m
     u0, u1, v0, v1 = cell

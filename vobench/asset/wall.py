@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import MeshArrays, cross, joined_arrays, quad_arrays, unit
+from vobench.geometry.vector import cross, unit
+from vobench.scene.mesh import MeshArrays, joined_arrays, quad_arrays
 
 if TYPE_CHECKING:
     from trimesh import Trimesh

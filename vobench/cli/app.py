@@ -88,11 +88,12 @@ def _installed_commands() -> dict[str, str]:
 
 
 def _summary(target: str) -> str:
-    """The first line of a command's docstring, read from its source: to import all commands would take seconds."""
+    """The first line of a command's docstring, read from its source because importing all commands takes seconds."""
     module_name, _, function_name = target.partition(":")
     spec = find_spec(module_name)
     source = Path(spec.origin).read_text(encoding="utf-8") if spec and spec.origin else ""
-    match = re.search(rf'^def {function_name}\(.*?"""(.+?)(?:\n|""")', source, re.MULTILINE | re.DOTALL)
+    first_line_of_docstring = rf'^def {function_name}\(.*?"""(.+?)(?:\n|""")'
+    match = re.search(first_line_of_docstring, source, re.MULTILINE | re.DOTALL)
     return match[1] if match else ""
 
 
@@ -126,10 +127,15 @@ def run() -> None:
         stop.check()  # a request to stop may have caused the error
         _fail(_sentence(error), error)
     finally:
-        try:  # now, because at exit a closed pipe would print a traceback
-            sys.stdout.flush()
-        except BrokenPipeError:
-            _discard_output()
+        _flush_output()
+
+
+def _flush_output() -> None:
+    """Flush standard output now, because at exit a closed pipe would print a traceback."""
+    try:
+        sys.stdout.flush()
+    except BrokenPipeError:
+        _discard_output()
 
 
 def _trusted_folders() -> tuple[Path, ...]:
@@ -176,12 +182,12 @@ def _fail(sentence: str, error: BaseException) -> None:
 
 
 def _mistakes(error: BaseException) -> dict[str, Any]:
-    """Every mistake in a file with its place and value; `asked_by` are the places that name the file."""
+    """The mistakes in a file, each with its place, value and sentence; `asked_by` are the places that name the file."""
     if not isinstance(error, SuiteError):
         return {}
-    rows = list[dict[str, Any]]()
+    rows: list[dict[str, Any]] = []
     for mistake in error.mistakes:
-        place = {"file": None, "line": None, "column": None, "key": None, "value": None}
+        place: dict[str, Any] = dict.fromkeys(("file", "line", "column", "key", "value"))
         if mistake.places:
             place = asdict(mistake.places[-1])
         naming_places = [str(outer) for outer in mistake.places[:-1]]

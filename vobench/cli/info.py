@@ -12,6 +12,7 @@ from vobench.dataset.recording import Recording
 from vobench.geometry.rig import Rig
 from vobench.sequence import has_truth, payload_hash, read_import_notes, read_provenance
 from vobench.sequence.recording import is_recording, topic_facts
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
 
 COMMAND_CLASS = FormCommand
 SEQUENCE_FORM = "vobench"
-NS_PER_S = 1e9
 TOPIC_HEADINGS = ("name", "kind", "messages", "Hz", "seconds")
 
 

@@ -14,11 +14,11 @@ from vobench.errors import InputError, SettingError
 from vobench.metric.settings import ScoreSettings
 from vobench.report import score_table
 from vobench.setting import hints
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 if TYPE_CHECKING:
     from vobench.runner.score_files import FilePair, ScoredFiles
 
-NS_PER_S = 1e9
 # Options whose names differ from the setting's.
 OPTION_BY_SETTING = {"alignment": "--align", "align_n": "--align-n", "rpe_delta": "--delta"}
 

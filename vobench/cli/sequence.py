@@ -70,7 +70,8 @@ def export_command(
 ) -> None:
     """Write a sequence in another layout, or a trajectory in another form, and print what was lost."""
     path = source.parent if source.name == SENSORS_FILE else source
-    exported = _export_trajectory(path, out, form) if path.is_file() else _export_sequence(path, out, form)
+    write = _export_trajectory if path.is_file() else _export_sequence
+    exported = write(path, out, form)
     if json:
         content = {"form": form, "path": str(out), "files": exported.file_count, "notes": exported.notes}
         terminal.print_json(content)
@@ -82,18 +83,22 @@ def export_command(
 
 
 def _export_sequence(folder: Path, out: Path, form: str) -> WrittenFiles:
-    """Raises VobenchError if the folder is not a sequence, or the form is unknown."""
-    is_sequence = (folder / SENSORS_FILE).is_file()
-    if form in writable() and folder.is_dir() and not is_sequence:
+    """Write a sequence in another layout.
+
+    Raises VobenchError if the folder is not a sequence, or the form is unknown.
+    """
+    is_other_folder = folder.is_dir() and not (folder / SENSORS_FILE).is_file()
+    if form in writable() and is_other_folder:
         raise InputError(f"not a vobench sequence (it has no {SENSORS_FILE}); vobench import creates one: {folder}")
     exported = export(folder, out, form)
     return WrittenFiles(len(exported.files), exported.notes)
 
 
 def _export_trajectory(path: Path, out: Path, form: str) -> WrittenFiles:
-    """Raises VobenchError if the trajectory cannot be read, or the form is unknown."""
+    """Write a trajectory in another form. Raises VobenchError if it cannot be read, or the form is unknown."""
     files = export_trajectory(_read_trajectory(path), out, form)
-    notes = tuple(f"Poses in KITTI's form have no stamps; the stamps are in {file.name}." for file in files[1:])
+    stamp_files = files[1:]  # only KITTI's form has one
+    notes = tuple(f"Poses in KITTI's form have no stamps; the stamps are in {file.name}." for file in stamp_files)
     return WrittenFiles(len(files), notes)
 
 

@@ -3,7 +3,7 @@
 import json as json_module
 import sys
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from vobench.errors import printable, require_known
 
@@ -14,11 +14,35 @@ if TYPE_CHECKING:
     from vobench.suite.catalog import CatalogEntry
 
 REDIRECTED_WIDTH = 200  # columns, where standard output is not a terminal
-LEFT_ALIGNED = {
-    *("estimator", "status", "name", "case", "kind", "summary", "path", "origin", "check", "result"),
-    *("sequence", "metric", "headline", "is", "with", "trajectory", "condition", "without", "instead", "tried"),
-    *("contributing conditions", "statistic", "unit", "changed by"),
-}
+# Headings of columns of words; all other columns hold numbers.
+LEFT_ALIGNED = frozenset(
+    {
+        "case",
+        "changed by",
+        "check",
+        "condition",
+        "contributing conditions",
+        "estimator",
+        "headline",
+        "instead",
+        "is",
+        "kind",
+        "metric",
+        "name",
+        "origin",
+        "path",
+        "result",
+        "sequence",
+        "statistic",
+        "status",
+        "summary",
+        "trajectory",
+        "tried",
+        "unit",
+        "with",
+        "without",
+    }
+)
 
 
 def known(kind: str, name: str, names: Iterable[str]) -> str:
@@ -38,16 +62,14 @@ def warn(sentence: str) -> None:
 
 
 def warn_about_hidden(entries: "Iterable[CatalogEntry]") -> None:
-    """Warn about each estimator that hides one of the same name included with vobench.
-
-    An estimator that was given by its path hides none.
-    """
+    """Warn about each estimator that replaces a built-in one of the same name; one given by its path replaces none."""
     from vobench.suite.catalog import builtin_root
 
     for entry in entries:
+        if entry.kind != "estimator" or entry.origin == "path":
+            continue
         builtin = builtin_root() / "estimators" / entry.name
-        may_hide = entry.kind == "estimator" and entry.origin != "path" and builtin.is_dir()
-        if may_hide and entry.path.resolve() != builtin.resolve():
+        if builtin.is_dir() and entry.path.resolve() != builtin.resolve():
             warn(f"{entry.name} is {entry.path}, not the estimator included with vobench")
 
 
@@ -68,8 +90,8 @@ def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) ->
 
     result = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE, pad_edge=False)
     for heading in headings:
-        justify = "left" if heading in LEFT_ALIGNED else "right"
-        result.add_column(heading, justify=justify, overflow="fold")  # type: ignore[arg-type]
+        justify: Literal["left", "right"] = "left" if heading in LEFT_ALIGNED else "right"
+        result.add_column(heading, justify=justify, overflow="fold")
     for row in rows:
         result.add_row(*map(printable, row))
     return result

@@ -1,5 +1,6 @@
-"""vobench verify."""
+"""The command that checks whether the files and scores of a run are unchanged."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import asdict
 
@@ -11,23 +12,25 @@ from vobench.runner.folder import open_run
 
 def verify_command(run: RunPath, *, json: Json = False) -> None:
     """Recompute all hashes and scores of a run from its files; exit code 1 if anything differs."""
-    findings = list(verify_run(open_run(run)))
-    wrong = [finding for finding in findings if finding.wrong]
+    items = list(verify_run(open_run(run)))
+    wrong = [item for item in items if item.wrong]
     if json:
-        rows = [asdict(finding) for finding in findings]
-        terminal.print_json({"run": str(run), "checked": len(findings), "wrong": len(wrong), "findings": rows})
+        rows = [asdict(item) for item in items]
+        terminal.print_json({"run": str(run), "checked": len(items), "wrong": len(wrong), "findings": rows})
     else:
-        _print_findings(findings)
+        _print_items(items)
     raise SystemExit(1 if wrong else 0)
 
 
-def _print_findings(findings: Sequence[VerifiedItem]) -> None:
-    """Print what is wrong, and how much of each kind is unchanged."""
+def _print_items(items: Sequence[VerifiedItem]) -> None:
+    """Print each item that is wrong, and the number of unchanged items of each kind."""
     console = terminal.console()
-    for finding in findings:
-        if finding.wrong:
-            console.print(f"{finding.kind}: {finding.what}: {finding.wrong}")
-    kinds = dict.fromkeys(finding.kind for finding in findings)
-    for kind in kinds:
-        is_right = [not finding.wrong for finding in findings if finding.kind == kind]
-        console.print(f"{kind}: {sum(is_right)} of {len(is_right)} unchanged")
+    wrong = [item for item in items if item.wrong]
+    for item in wrong:
+        console.print(f"{item.kind}: {item.what}: {item.wrong}")
+
+    total_by_kind = Counter(item.kind for item in items)
+    wrong_by_kind = Counter(item.kind for item in wrong)
+    for kind, total in total_by_kind.items():
+        unchanged = total - wrong_by_kind[kind]
+        console.print(f"{kind}: {unchanged} of {total} unchanged")

@@ -51,14 +51,19 @@ def _rigid_transform(value: Any) -> Array:
 
 
 def _flattened(matrix: Any) -> list[Any]:
-    """The cells of a matrix that is a list of rows, or of cells."""
+    """The cells of a matrix that is a list of rows, or of cells; empty for any other value."""
+    if not isinstance(matrix, list):
+        return []
     cells: list[Any] = []
-    for row in matrix if isinstance(matrix, list) else ():
-        cells += row if isinstance(row, list) else [row]
+    for entry in matrix:
+        if isinstance(entry, list):
+            cells.extend(entry)
+        else:
+            cells.append(entry)
     return cells
 
 
-# The types of the keys of calibration files. A text is no number, and neither is true or false.
+# The types of values in calibration files. They are strict: neither text nor true and false are read as numbers.
 Text = Annotated[str, Strict()]
 Number = Annotated[float, Strict(), AllowInfNan(False), Gt(-1e300), Lt(1e300)]
 AboveZero = Annotated[Number, Gt(0)]
@@ -106,10 +111,10 @@ class CalibrationFile:
         return InputError(f"{self.path}: the key {key} is missing; the keys beside it are {present}")
 
     def _complaint(self, error: ValidationError, section: str) -> InputError:
-        """The first of the errors that pydantic found, in the words of somebody who writes YAML."""
+        """The first of pydantic's errors as a sentence: the file, the key, what would be right and the value seen."""
         first = error.errors(include_url=False)[0]
-        steps = [section, *first["loc"]] if section else first["loc"]
-        key = ".".join(map(str, steps))
+        key_path = [section, *first["loc"]] if section else first["loc"]
+        key = ".".join(map(str, key_path))
         if first["type"] == "missing":
             return self.missing(key, first["input"])
 
@@ -118,7 +123,7 @@ class CalibrationFile:
         return InputError(f"{self.path}: {key} {wanted}, but is {shown(first['input'])}")
 
 
-# What is wrong with a value, by pydantic's names; {} are filled in.
+# The complaint for each of pydantic's types of error; {} is filled in from the context of the error.
 WORDS = {
     **COMPLAINTS,
     "float_type": "should be a finite number",

@@ -115,7 +115,7 @@ def _matrix_name(folder_name: str) -> str:
 def read_pair(path: Path, size_px: tuple[int, int] | None = None) -> Rig:
     """The pair of a calib.txt: P0 and P1 if there are both, else P2 and P3; the body is the camera of P0.
 
-    Without a size, the pictures are as large as KITTI's first ones. Raises InputError, also where that can't be.
+    Without a size, that of KITTI's first sequences is used. Raises InputError, also if the camera contradicts it.
     """
     matrices = read_calibration(path)
     needed = _matrix_pair(path, matrices)
@@ -153,7 +153,7 @@ def _rig(
 
 
 def read_calibration(path: Path) -> dict[str, Array]:
-    """The matrices (3, 4) of calib.txt by name. Raises TrajectoryError naming an invalid line."""
+    """The matrices (3, 4) of calib.txt by name. Raises InputError that names an invalid line."""
     names = []
     rows = []
     for line, body in content(read_text(path)):
@@ -176,13 +176,13 @@ def _camera(
     size_px: tuple[int, int],
     place: str,
 ) -> MountedCamera:
-    """The camera of P = K [1 | t] on the body from whose axes P takes points."""
+    """The camera of P = K [1 | t], mounted on a body; P projects points in the axes of that body."""
     K = P[:, :3]
     below_diagonal = [*K[1:, 0], K[2, 1]]
-    deviations = np.abs([K[0, 1], *below_diagonal, K[2, 2] - 1])
-    is_upright = deviations.max() <= SKEW_TOLERANCE
+    deviations = np.abs([K[0, 1], *below_diagonal, K[2, 2] - 1])  # from fx 0 cx / 0 fy cy / 0 0 1
+    is_rectified = deviations.max() <= SKEW_TOLERANCE
     has_focal_lengths = K[0, 0] > 0 and K[1, 1] > 0
-    if not (is_upright and has_focal_lengths):
+    if not (is_rectified and has_focal_lengths):
         raise InputError(f"{place} should be a rectified camera, fx 0 cx / 0 fy cy / 0 0 1, but is {K.tolist()}")
     fx, fy, cx, cy = K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     position_m = -np.linalg.solve(K, P[:, 3])
@@ -253,14 +253,12 @@ def _calibration_text(rig: Rig) -> str:
 
 
 def _picture_notes(source: ExportSource, views: Views) -> list[str]:
+    """Notes on how the pictures differ from the recorded ones."""
+    is_pair = views.rig.right is not None
     if views.source_px is None:
-        if views.rig.right is None:
-            return []
-        return ["The pair was recorded rectified, so its pixels are unchanged."]
-    dark = 0.0  # share of a picture
-    for side in views.rig.sides:
-        recorded = source.rig.camera(side)
-        dark = max(dark, views.dark_share(side, recorded))
+        return ["The pair was recorded rectified, so its pixels are unchanged."] if is_pair else []
+    dark_shares = [views.dark_share(side, source.rig.camera(side)) for side in views.rig.sides]
+    dark = max(dark_shares)
     dark_note = f"; up to {dark:.1%} of a picture is outside the recorded one and black" if dark else ""
     return [
         "KITTI needs rectified pictures: these were resampled, with linear interpolation between pixels, "

@@ -35,16 +35,20 @@ FAR_PX = 30_000.0  # outside any picture; OpenCV resamples NaN from an arbitrary
 
 @dataclass(frozen=True, slots=True)
 class Views:
-    """The rig of resampled pictures, and where their pixels (H, W, 2) lie in the recorded ones; None: as recorded."""
+    """The rig of exported pictures, and how these are resampled from the recorded ones.
+
+    source_px: the position (H, W, 2) in the recorded picture of each pixel, NaN if it shows nothing; None if pictures
+    are exported as recorded.
+    """
 
     rig: Rig
     source_px: dict[Side, Array] | None = None
 
     def rays_of(self, side: Side, camera: Camera) -> Array:
-        """Directions (H, W, 3) that light came from, in the axes of the camera that recorded; NaN for none."""
-        if self.source_px:
-            return camera.rays(self.source_px[side])
-        return camera.rays(pixel_grid(camera))
+        """Rays (H, W, 3) of this view's pixels in the frame of the recording camera; NaN for pixels without one."""
+        if self.source_px is None:
+            return camera.rays(pixel_grid(camera))
+        return camera.rays(self.source_px[side])
 
     def show(self, side: Side, picture: Image) -> Image:
         """A recorded picture in this view: linear between its pixels, black where it shows nothing."""
@@ -97,16 +101,16 @@ def _rectified_rig(rig: Rig) -> _Rectified:
             "rectified, as KITTI needs it; the forms euroc and ros2 keep it as it is"
         )
 
-    focal_px = rig.left.K[[0, 1, 0, 1], [0, 1, 2, 2]]  # fx, fy, cx, cy
-    pinhole = Pinhole(rig.left.width_px, rig.left.height_px, *focal_px.tolist())
+    fx_fy_cx_cy_px = rig.left.K[[0, 1, 0, 1], [0, 1, 2, 2]]
+    pinhole = Pinhole(rig.left.width_px, rig.left.height_px, *fx_fy_cx_cy_px.tolist())
     R_view_left = np.eye(3) if views is None else views.R_view_left
     T_body_left = rig.T_body_left @ se3.transform(R_view_left.T, np.zeros(3))
     if views is None:
         return _Rectified(Rig(pinhole, None, T_body_left, None), {"left": R_view_left})
 
     T_body_right = T_body_left @ side_by_side(views.baseline_m)
-    turns: dict[Side, Array] = {"left": R_view_left, "right": views.R_view_right}
-    return _Rectified(Rig(pinhole, pinhole, T_body_left, T_body_right), turns)
+    R_view_camera: dict[Side, Array] = {"left": R_view_left, "right": views.R_view_right}
+    return _Rectified(Rig(pinhole, pinhole, T_body_left, T_body_right), R_view_camera)
 
 
 PNG = "png"
@@ -202,9 +206,10 @@ def _as_png(
 
 
 def rate_hz(t_ns: Stamps) -> float:
-    """The mean rate of stamps (N,); 0 for a single one."""
-    intervals = len(t_ns) - 1
-    span_ns = int(t_ns[-1]) - int(t_ns[0]) if intervals > 0 else 0
-    if not span_ns:
+    """The mean rate of stamps (N,); 0 if they span no time."""
+    if len(t_ns) < 2:
         return 0.0
-    return intervals * float(NS_PER_S) / span_ns
+    span_ns = int(t_ns[-1]) - int(t_ns[0])
+    if span_ns == 0:
+        return 0.0
+    return (len(t_ns) - 1) * float(NS_PER_S) / span_ns

@@ -7,7 +7,6 @@ import signal
 import socket
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import ExitStack, suppress
@@ -27,6 +26,7 @@ from vobench.estimator.manifest import Limits
 from vobench.estimator.protocol import Result
 from vobench.estimator.sandbox import Sandbox
 from vobench.portable import PORTABLE, VARIABLES
+from vobench.temporary import temporary_folder
 
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 KEPT_ENVIRONMENT = (
@@ -415,9 +415,9 @@ def _open_log(path: Path) -> int:
 @cache
 def sandbox_here() -> Sandbox:
     """What a program on this machine could see; it is tried once."""
-    with tempfile.TemporaryDirectory() as folder:
+    with temporary_folder() as folder:
         try:
-            with Program(["true"], log=Path(folder, "log.txt"), limits=Limits()) as program:
+            with Program(["true"], log=folder / "log.txt", limits=Limits()) as program:
                 return program.sandbox
         except EstimatorFailure:
             return sandbox.unsandboxed()

@@ -15,10 +15,10 @@ from vobench.estimator.manifest import Limits
 READ = "VOBENCH_SANDBOX_READ"
 SWITCH = "VOBENCH_SANDBOX"
 OFF = "off"
-# What is given to every estimator in another form, or would be everything.
+# Never opened: an estimator has /dev, /proc, /sys and /tmp of its own, and / would be all files.
 NEVER_READ = ("/", "/dev", "/proc", "/sys", "/tmp")
 MEBIBYTE = 1 << 20
-DISK_ALLOWANCE_BYTES = MEBIBYTE  # beyond the limit, so that whoever exceeds it is seen to
+DISK_ALLOWANCE_BYTES = MEBIBYTE  # beyond the limit, so that an estimator can exceed it and this is noticed
 
 Level = Literal["full", "partial", "none"]
 EVERYTHING = (isolation.FILES, isolation.PROCESSES, isolation.NETWORK)
@@ -26,9 +26,10 @@ EVERYTHING = (isolation.FILES, isolation.PROCESSES, isolation.NETWORK)
 
 @dataclass(frozen=True, slots=True)
 class Sandbox:
-    """What an estimator could see: `sees` beyond its own, and the folders `read` that the user has opened to it.
+    """How well an estimator was isolated.
 
-    `why` is the reason for which the kernel gave no mount tree; empty where it did.
+    sees: what it could see beyond its own files and processes. read: the folders that the user has opened to it.
+    why: the reason that the kernel did not allow a mount tree of its own; empty if it did.
     """
 
     level: Level
@@ -95,10 +96,10 @@ def user_packages() -> dict[str, str]:
 def plan(
     argv: Sequence[str], *, home: Path, homes: Path, folder: Path | None, hidden: Sequence[Path], limits: Limits
 ) -> dict[str, Any]:
-    """What the guard is to start and what that may see, of types that marshal takes.
+    """The guard's instructions: the program to start, its limits and what it may see, in types that marshal supports.
 
-    `home` is an empty folder to work in, or one with what the program is given; `homes` holds it and those of others.
-    `folder` is the estimator's own; whatever lies in a readable folder and is `hidden` is empty.
+    home: the folder to work in, empty or with what the program is given. homes: the folder with the homes of all
+    estimators. folder: the estimator's. hidden: paths that are empty to the estimator even in a readable folder.
     """
     own = [] if folder is None else [str(folder.absolute())]
     return {
@@ -151,8 +152,17 @@ def hint_on_modules(folder: Path | None) -> str:
 
 
 def _out_of_reach(paths: Sequence[str], folder: Path | None) -> list[str]:
-    """Those of some paths that exist, but lie in no folder that an estimator may read."""
-    readable = [*isolation.SYSTEM, *libraries(), *opened(), *([str(folder)] if folder else [])]
-    real = [Path(place).resolve() for place in readable]
-    found_paths = [path for path in paths if Path(path).exists()]
-    return [path for path in found_paths if not any(Path(path).resolve().is_relative_to(place) for place in real)]
+    """The paths that exist, but lie in no folder that an estimator may read."""
+    readable = [*isolation.SYSTEM, *libraries(), *opened()]
+    if folder is not None:
+        readable.append(str(folder))
+    readable_folders = [Path(name).resolve() for name in readable]
+
+    unreadable = []
+    for path in paths:
+        if not Path(path).exists():
+            continue
+        resolved = Path(path).resolve()
+        if not any(resolved.is_relative_to(readable_folder) for readable_folder in readable_folders):
+            unreadable.append(path)
+    return unreadable

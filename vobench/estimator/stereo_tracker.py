@@ -93,56 +93,64 @@ class StereoTracker:
         return True
 
     def follow(self, left: Image, right: Image, T_now_last: Array) -> Followed:
-        """The view's points in a later pair; a predicted motion of the view is the guess."""
+        """Track the view's points into a later pair, from where the predicted motion of the view puts them."""
         view = self._view
-        pair = self._pair
-        s = self._settings
         assert view is not None
-        rho = (view.disparity_px - self.offset.px) / pair.focal_baseline
-        guess = predicted(pair.left, view.in_left, rho, T_now_last)
-
-        earlier, now = comparable(view.left, left)
-        there, found = follow_predicted(earlier, now, view.in_left, guess, window_px=s.window_px)
-        good = found & inside(there, left, s.margin_px) & pair.seen(there)
-        in_view = StereoView(view.left, view.right, view.in_left[good], view.in_right[good], view.disparity_px[good])
-        disparity_px = self._present_disparity(in_view, right, there[good], T_now_last)
-        return Followed(in_view.in_left, there[good], in_view.disparity_px, disparity_px)
-
-    def _present_disparity(self, view: StereoView, right: Image, there: Points, T_now_last: Array) -> Array:
-        """Disparities (N,) of a view's points, which are now at `there` (N, 2) in the left picture; NaN if lost.
-
-        The predicted motion gives the guess.
-        """
         pair = self._pair
-        s = self._settings
-        if not len(there):
+        margin_px = self._settings.margin_px
+
+        inverse_depth = (view.disparity_px - self.offset.px) / pair.focal_baseline  # (N,), 1/m
+        guess_px = predicted(pair.left, view.in_left, inverse_depth, T_now_last)
+        before, now = comparable(view.left, left)
+        uv_px, is_found = follow_predicted(before, now, view.in_left, guess_px, window_px=self._settings.window_px)
+        is_tracked = is_found & inside(uv_px, left, margin_px) & pair.seen(uv_px)
+
+        tracked_px = uv_px[is_tracked]
+        tracked = StereoView(
+            view.left,
+            view.right,
+            view.in_left[is_tracked],
+            view.in_right[is_tracked],
+            view.disparity_px[is_tracked],
+        )
+        disparity_px = self._present_disparity(tracked, right, tracked_px, T_now_last)
+        return Followed(tracked.in_left, tracked_px, tracked.disparity_px, disparity_px)
+
+    def _present_disparity(self, view: StereoView, right: Image, uv_px: Points, T_now_last: Array) -> Array:
+        """Disparities (N,) of a view's points, which are now at uv_px (N, 2) in the left picture; NaN if lost.
+
+        The search in the right picture starts where the predicted motion puts each point.
+        """
+        if not len(uv_px):
             return np.zeros(0)
+        pair = self._pair
         offset_px = self.offset.px
+
         points_m = pair.points(view.in_left, view.disparity_px - offset_px)
         depth_m = se3.apply(T_now_last, points_m)[:, 2]
-        predicted_px = pair.focal_baseline / depth_m + offset_px
-        in_right_view = shifted_left(pair.left.in_view(there), predicted_px)
-        in_right_guess = pair.right.from_view(in_right_view)
-        guess = np.where(np.isfinite(in_right_guess), in_right_guess, view.in_right).astype(np.float32)
+        predicted_disparity_px = pair.focal_baseline / depth_m + offset_px
+        in_right_view = shifted_left(pair.left.in_view(uv_px), predicted_disparity_px)
+        predicted_right_px = pair.right.from_view(in_right_view)
+        is_predicted = np.isfinite(predicted_right_px)
+        guess_px = np.where(is_predicted, predicted_right_px, view.in_right).astype(np.float32)
 
         # Not checked backwards: least squares shows whether both cameras agree.
-        earlier, now = comparable(view.right, right)
-        in_right, found = lucas_kanade(earlier, now, view.in_right, guess, window_px=s.window_px)
-        disparity_px = pair.disparity(there, in_right)
-        is_tracked = found & inside(in_right, right, s.margin_px)
-        return np.where(is_tracked, disparity_px, np.nan)
+        before, now = comparable(view.right, right)
+        in_right, is_found = lucas_kanade(before, now, view.in_right, guess_px, window_px=self._settings.window_px)
+        is_tracked = is_found & inside(in_right, right, self._settings.margin_px)
+        return np.where(is_tracked, pair.disparity(uv_px, in_right), np.nan)
 
     def fit(self, followed: Followed) -> PoseFit | None:
         """The motion T_now_last of the view that explains the points; None if there is none."""
         if len(followed.uv_px) < self._settings.min_points:
             return None
-        true_last_px = followed.disparity_last_px - self.offset.px
-        true_px = followed.disparity_px - self.offset.px
+        corrected_last_px = followed.disparity_last_px - self.offset.px
+        corrected_px = followed.disparity_px - self.offset.px
         return pose_from_points(
-            self._pair.points(followed.uv_last_px, true_last_px),
+            self._pair.points(followed.uv_last_px, corrected_last_px),
             self._pair.left.in_view(followed.uv_px),
             self._pair.K,
-            disparity_px=true_px,
+            disparity_px=corrected_px,
             baseline_m=self._pair.baseline_m,
             ransac_px=self._settings.ransac_px,
         )

@@ -12,7 +12,7 @@ from vobench.metric.comparison import HARTLEY, OURS, POSES, STURM_ATE, ZHANG, Co
 from vobench.trajectory.associate import Index
 
 Rows = tuple[Array, ...]
-BLOCK = 1 << 14  # poses worked on at once: their matrices stay in the processor's cache, and memory small
+BLOCK = 1 << 14  # poses per block, few enough for their matrices to fit into the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +27,10 @@ class PoseErrors:
 
 
 def angle_rad(R: Array) -> Array:
-    """Angles (...) of rotations (..., 3, 3), corrected for the skew of text with few digits.
+    """Angles (...) in radians of rotation matrices (..., 3, 3) that may be slightly non-orthonormal.
 
-    One Newton step towards the nearest rotation first: KITTI's six digits leave R 2e-7 off
-    orthonormal, which alone would shift an angle by 3e-7 rad. Source: Higham (1986), eq. 3.6.
+    One Newton step towards the nearest rotation removes the rounding error of text files: KITTI's six digits leave R
+    2e-7 from orthonormal, which alone would change an angle by 3e-7 rad. Source: Higham (1986), eq. 3.6.
     """
     R_transposed = se3.transposed(R)
     correction = 1.5 * np.eye(3) - 0.5 * R_transposed @ R
@@ -119,7 +119,7 @@ def _relative_errors(gt: Array, est: Array) -> Rows:
 def in_blocks(n: int, work: Callable[[slice], Rows]) -> Rows:
     """The arrays (n,) that `work` returns for n samples, computed one block of samples at a time."""
     results = []
-    for begin in range(0, max(n, 1), BLOCK):
+    for begin in range(0, max(n, 1), BLOCK):  # no samples are one empty block, so that the results are arrays
         end = min(begin + BLOCK, n)
         results.append(work(slice(begin, end)))
     return tuple(np.concatenate(blocks) for blocks in zip(*results, strict=True))

@@ -2,6 +2,7 @@
 
 import fnmatch
 import html
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -278,19 +279,25 @@ def read_board(path: Path | str) -> "pd.DataFrame":
 def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | None = None) -> "pd.DataFrame":
     """What got better or worse from one run to another: one row per estimator, then one per case and estimator.
 
-    A ratio of losses above `at_most` counts as worse. A run is a `Run`, its folder or a bundle. Raises InputError if
-    the two runs have nothing in common.
+    A ratio of losses above `at_most` counts as worse. A run is a `Run`, its folder or a bundle. All trials are scored
+    again from their estimates and ground truths; a UserWarning names those whose stored score differs. Raises
+    InputError if the two runs have nothing in common.
     """
     import pandas as pd
 
     from vobench.report import compare as comparison
     from vobench.report import page
     from vobench.runner.bundle import opened
+    from vobench.runner.rescore import check, wrong_truths
 
     boards = []
     for given in (old, new):
-        with opened(run_path(given)) as folder:
-            boards.append(page.run_board(folder, folder.scores()))
+        path = run_path(given)
+        with opened(path) as folder:
+            checked = check(folder, wrong_truths(folder) if path.is_file() else {})
+            boards.append(page.run_board(folder, checked.scores))
+        for note in checked.notes:
+            warnings.warn(f"{path.name}: {note}", stacklevel=2)
     changes = comparison.compare(boards[0], boards[1], at_most=at_most)
     return pd.DataFrame([_change_row(change) for change in changes])
 

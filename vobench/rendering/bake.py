@@ -26,11 +26,12 @@ from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.rendering.visibility import Visibility
-from vobench.scene.light import NS_PER_S, AreaLight, Light, Sky, Sun
+from vobench.scene.light import AreaLight, Light, Sky, Sun
 from vobench.scene.material import Material, Picture, Texture
 from vobench.scene.mesh import Triangles, areas_m2, distinct
 from vobench.scene.scene import Scene, triangles
 from vobench.setting import Positive, settings
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

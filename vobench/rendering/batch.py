@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.culling import Clusters
 from vobench.rendering.planar_mirror import MirrorFaces, PlanarMirror, planar_mirrors, sharpness
-from vobench.rendering.watertight import WELD_M, WatertightMesh, watertight
+from vobench.rendering.watertight import WatertightMesh, watertight
 from vobench.scene.material import Material
-from vobench.scene.mesh import Triangles, distinct, unit
+from vobench.scene.mesh import WELD_M, Triangles, distinct
 
 Indices = NDArray[np.int64]
 

@@ -15,32 +15,32 @@ class CutOuts:
     """Faces whose texture leaves holes, by the opacity of their materials."""
 
     def __init__(self, faces: Triangles, materials: dict[str, Material]) -> None:
-        self._holed = {
-            name: material for name, material in materials.items() if material.cutout is not None and material.texture
-        }
-        number = {name: nth for nth, name in enumerate(self._holed)}
-        numbers = [number.get(thing.material, -1) for thing in faces.things]
-        of_things = np.array(numbers, np.int32)
-        # The number (F + 1,) of a face's material among those with holes, -1 for none; the last one for the face -1.
-        self.material = np.append(of_things[faces.thing], -1)
+        self._with_holes = {name: material for name, material in materials.items() if _has_holes(material)}
+        number_by_name = {name: number for number, name in enumerate(self._with_holes)}
+        number_by_thing = np.array([number_by_name.get(thing.material, -1) for thing in faces.things], np.int32)
+        # (F + 1,): the place of each face's material in _with_holes, -1 if not in it; the last is for rays that miss.
+        self.material = np.append(number_by_thing[faces.thing], -1)
         self._uv = faces.uv
 
     def holes(self, hits: Hits) -> Mask:
-        """Which of the places (R,) are holes."""
+        """Which hits (R,) are in a hole."""
         is_hole = np.zeros(len(hits.face), bool)
-        if not self._holed:
+        if not self._with_holes:
             return is_hole
-        material_of = self.material[hits.face]
-        for number, material in enumerate(self._holed.values()):
-            rays = np.flatnonzero(material_of == number)
-            u = hits.u[rays, None]
-            v = hits.v[rays, None]
-            corners_uv = self._uv[hits.face[rays]]
-            a, b, c = np.moveaxis(corners_uv, 1, 0)
+        material_of_hit = self.material[hits.face]
+        for number, material in enumerate(self._with_holes.values()):
+            rows = np.flatnonzero(material_of_hit == number)
+            u = hits.u[rows, None]
+            v = hits.v[rows, None]
+            corners_uv_m = self._uv[hits.face[rows]]  # (R, 3, 2)
+            a, b, c = np.moveaxis(corners_uv_m, 1, 0)
             uv_m = (1 - u - v) * a + u * b + v * c
-            places = uv_m / material.tile_m
-            is_hole[rays] = ~opaque(material, places)
+            is_hole[rows] = ~opaque(material, uv_m / material.tile_m)
         return is_hole
+
+
+def _has_holes(material: Material) -> bool:
+    return material.cutout is not None and material.texture is not None
 
 
 def opaque(material: Material, places: Array) -> Mask:
@@ -62,7 +62,7 @@ def _opacity(material: Material) -> Floats:
 
 
 def _sampled(tile: Floats, places: Array) -> Array:
-    """A repeating picture (H, W) at places (R, 2), linear between the middles of its pixels."""
+    """A tiled image (H, W) at places (R, 2) in tiles, by bilinear interpolation between the centres of its pixels."""
     height, width = tile.shape
     x = places[:, 0] * width - 0.5
     y = places[:, 1] * height - 0.5

@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.geometry import (
     FAR_M,
@@ -21,7 +22,7 @@ from vobench.rendering.geometry import (
 from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.mesh import areas_m2, face_normals, unit
+from vobench.scene.mesh import areas_m2, face_normals
 from vobench.scene.mesh import corners as mesh_corners
 
 FAR_OFF = 2.9  # radii of a rectangle, beyond which rays spread over its area tell as well what hides it

@@ -8,10 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.embree import Hits, TriangleCaster
 from vobench.scene.material import Material
-from vobench.scene.mesh import Triangles, areas_m2, distinct, unit
+from vobench.scene.mesh import Triangles, areas_m2, distinct
 
 T = TypeVar("T")
 

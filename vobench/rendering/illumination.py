@@ -10,7 +10,8 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats
 from vobench.rendering.bake import BakedScene, SunTrack, direct_layer, direct_points, static_scene, travelled_rad
 from vobench.rendering.mover_light import MoverLight, MoverLightAt, Views
-from vobench.scene.light import NS_PER_S, SKIES, Light, Sky, Steady, Sun
+from vobench.scene.light import SKIES, Light, Sky, Steady, Sun
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 ZENITH = np.array([0.0, 0.0, 1.0])
 SUN_TURN_RAD = 1e-4  # a moving sun counts as still within less than a fiftieth of its disc

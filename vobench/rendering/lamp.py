@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.geometry import RAY_OFFSET_M
 from vobench.rendering.occlusion import Bodies, dot
 from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun
-from vobench.scene.mesh import unit
 from vobench.scene.scene import Scene
 
 SUN_DISTANCE_M = 1e4  # beyond every scene

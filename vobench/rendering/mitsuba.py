@@ -5,7 +5,6 @@ import re
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -26,6 +25,7 @@ from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sk
 from vobench.scene.material import Map, Material, Rgb, Texture, linear_texture
 from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
+from vobench.temporary import temporary_folder
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
 VARIANT = "llvm_ad_rgb"
@@ -99,9 +99,8 @@ def major(library: Path) -> int:
 
 def failure(library: Path) -> str:
     """Why Mitsuba does not render with this library, "" if it does: tried in a process with an empty kernel cache."""
-    home = tempfile.mkdtemp(prefix="vobench-llvm-")
-    with stop.cleanup_after(lambda: stop.remove(Path(home))):
-        environment = os.environ | {VARIABLE: str(library), "HOME": home}
+    with temporary_folder() as home:
+        environment = os.environ | {VARIABLE: str(library), "HOME": str(home)}
         command = [sys.executable, "-P", "-c", PROBE]
         try:
             done = stop.run(command, env=environment, timeout_s=PROBE_TIMEOUT_S)

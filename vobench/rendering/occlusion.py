@@ -8,12 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Pixels
 from vobench.rendering.cutout import CutOuts
 from vobench.rendering.embree import Hits, TriangleCaster
 from vobench.rendering.geometry import RAY_OFFSET_M
 from vobench.rendering.shot import moved, rays_in, turn
-from vobench.scene.mesh import Triangles, unit
+from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
 
 REACH_M = 1e8  # beyond every scene

@@ -8,10 +8,11 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Mask
 from vobench.rendering.view import Plane
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import distinct, unit
+from vobench.scene.mesh import distinct
 
 Indices = NDArray[np.int64]
 

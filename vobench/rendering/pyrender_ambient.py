@@ -7,10 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.light import AreaLight, Light, Sky, Sun
 from vobench.scene.material import Material, reflectance
-from vobench.scene.mesh import areas_m2, corners, unit
+from vobench.scene.mesh import areas_m2, corners
 from vobench.scene.scene import Scene, triangles
 
 POINTS = 1024

@@ -16,6 +16,7 @@ from vobench.errors import MissingDependencyError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import cross, unit
 from vobench.rendering.context import create_context
 from vobench.rendering.pyrender_ambient import MeanLight, mean_light
 from vobench.rendering.pyrender_material import (
@@ -36,11 +37,10 @@ from vobench.scene.mesh import (
     areas_m2,
     arrays,
     corners,
-    cross,
-    distinct,
     face_normals,
     joined_arrays,
-    unit,
+    open_edges,
+    welded,
 )
 from vobench.scene.scene import Scene
 
@@ -57,7 +57,6 @@ PANEL_OUTER_RAD = np.deg2rad(68)
 # Before its panel: pyrender divides by the distance ahead of the spot, which is 0 on the panel itself.
 SPOT_AHEAD_M = 0.01
 # Welds corners where edges are compared, in digits after the point of a metre.
-WELD_DIGITS = 5
 # A lamp whose normals cancel out further than this shines to all sides.
 LEAST_AHEAD = 0.5
 
@@ -355,12 +354,8 @@ def _turned_away(mesh: MeshArrays, sun: Array) -> MeshArrays:
 
 def _is_open(mesh: MeshArrays) -> bool:
     """Whether a mesh has an edge with a face on one side only, as a sheet has and a box has not."""
-    corners = np.round(mesh.corners_m, WELD_DIGITS).reshape(-1, 3)
-    _, kind = distinct(corners)
-    loops = kind.reshape(-1, 3)
-    edges = np.sort(np.stack([loops, np.roll(loops, -1, axis=1)], -1).reshape(-1, 2), axis=1)
-    _, edge = distinct(edges)
-    return bool((np.bincount(edge) == 1).any())
+    point = welded(mesh.vertices_m)[1]
+    return len(open_edges(point[mesh.faces])) > 0
 
 
 def _chosen(lights: Sequence[Light]) -> list[int]:

@@ -13,9 +13,8 @@ from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas, doubled_areas_px2
-from vobench.scene.mesh import Triangles, areas_m2, distinct
+from vobench.scene.mesh import WELD_M, Triangles, areas_m2, distinct
 
-WELD_M = 1e-5  # corners nearer than this are one
 TEXELS = 16_000_000  # at most in one map: some 100 bytes each, and 4 more for each light
 FINENESS = 4096  # steps a texel: places that are meant to be at the middle of texels are so to the last bit
 PADDING = 1  # texels around a chart, besides those that interpolation within it reads

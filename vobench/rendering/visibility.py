@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import (
@@ -19,7 +20,7 @@ from vobench.rendering.geometry import (
     sample_points,
 )
 from vobench.scene.material import Material, pane_reflectance
-from vobench.scene.mesh import Triangles, unit
+from vobench.scene.mesh import Triangles
 
 MOST_PANES = 16  # crossed by one ray
 WIDE_M2 = 0.05  # of mirrors that show lamps and of panes that show the sky

@@ -10,12 +10,10 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import distinct
+from vobench.scene.mesh import WELD_M, distinct
 
 Indices = NDArray[np.int64]
 
-# Corners nearer than this are one: float32 resolves 1e-6 m at 10 m.
-WELD_M = 1e-5
 PIECE_M = 0.25  # of long edges, so that few corners are looked at for each
 
 Cuts = dict[int, list[tuple[float, int]]]

@@ -1,6 +1,5 @@
 """Whether an estimator keeps the contract: it is tried on short recordings, each with something unusual."""
 
-import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -23,6 +22,7 @@ from vobench.suite.entrant import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Trial
 from vobench.suite.source import RecordedCase, Source
+from vobench.temporary import temporary_folder
 
 MOST_STATIONARY_M = 0.01  # which a tracker should not exceed within a second at rest
 MM_PER_M = 1e3
@@ -54,8 +54,8 @@ def contract(folder: Path) -> Iterator[Clause]:
     for path, foreign in foreign_imports(folder):
         yield Clause("imports", Verdict.ADVICE, f"{path}:{foreign.line}: {foreign.full_name}: {foreign.remedy}")
     entrant = EstimatorEntry(manifest.name, folder, manifest, manifest.params, manifest.limits)
-    with tempfile.TemporaryDirectory(prefix="vobench-try-") as place:
-        yield from _Attempt(entrant, Path(place)).clauses()
+    with temporary_folder() as place:
+        yield from _Attempt(entrant, place).clauses()
 
 
 def assert_contract(folder: Path | str) -> None:

@@ -13,7 +13,7 @@ from vobench.motion.course import Unled
 from vobench.motion.drive import Waypoints
 from vobench.motion.wheeled import Wheeled
 from vobench.runner.drive import TrajectoryDrive
-from vobench.runner.motion import NS_PER_S
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

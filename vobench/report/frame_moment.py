@@ -7,10 +7,10 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.runner.frames import FrameRow
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 LEAST_GAP_FRAMES = 5  # between two moments
 NO_ERROR = -1.0  # in place of the error of a frame without a pose: below every error
-NS_PER_S = 1e9
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,12 +24,12 @@ from vobench.runner.estimate import ESTIMATE, LOG
 from vobench.runner.folder import SCORE, SURVIVED, RunFolder, TrialScore, read_tum, with_sequence
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, FrameRow, read_frames
 from vobench.trajectory.align import Alignment
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 MOST_DETAILS = 200  # cells that a page can open, the worst of all
 THUMBNAIL_WIDTH_PX = 176
 FILES = (SCORE, FRAMES, ESTIMATE, LOG, "run.rrd")
 MM_PER_M = 1e3
-NS_PER_S = 1e9
 JsonObject = dict[str, Any]
 Matrix = Sequence[tuple[str, Sequence[ShownCell]]]
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.report.blueprint import FRAME_TIMELINE
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
 Color = tuple[int, int, int]
@@ -19,7 +20,6 @@ RED = (235, 60, 60)
 PATH_RADIUS = rr.Radius.ui_points(1.8)
 LINE_RADIUS = rr.Radius.ui_points(1.5)
 PIXEL_CENTRE = 0.5  # Rerun has the corner of the top-left pixel at (0, 0), vobench its centre
-NS_PER_S = 1_000_000_000
 
 
 def time_columns(frames: Indices, t_ns: Stamps) -> list[rr.TimeColumn]:

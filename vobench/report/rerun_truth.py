@@ -36,25 +36,32 @@ def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
     for frame in view.frames():
         times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
         for side, truth in (("left", frame.left), ("right", frame.right)):
-            channels = truth.channels() if truth else {}
-            for channel, values in channels.items():
+            if truth is None:
+                continue
+            for channel, values in truth.channels().items():
                 stream.send_columns(truth_entity(side, channel), times, _columns(channel, values))
 
 
 def _columns(channel: str, values: NDArray[np.generic]) -> Any:
-    """Depth as a depth image, ids, counts and masks as classes, directions as colours."""
+    """One frame of a channel: a depth image, classes for ids, counts and masks, or colours for directions."""
     if channel == "depth":
-        return rr.DepthImage.columns(buffer=[_bytes(values)], format=[_format(values, "F32")], meter=[1.0])
+        depth_format = _format(values, rr.ChannelDatatype.F32)
+        return rr.DepthImage.columns(buffer=[_bytes(values)], format=[depth_format], meter=[1.0])
     if CHANNELS[channel].depth == 1:
         classes = values.astype(np.uint16)
-        return rr.SegmentationImage.columns(buffer=[_bytes(classes)], format=[_format(classes, "U16")])
+        class_format = _format(classes, rr.ChannelDatatype.U16)
+        return rr.SegmentationImage.columns(buffer=[_bytes(classes)], format=[class_format])
     colors = picture(channel, values)
-    return rr.Image.columns(buffer=[_bytes(colors)], format=[_format(colors, "U8", rr.ColorModel.RGB)])
+    color_format = _format(colors, rr.ChannelDatatype.U8, rr.ColorModel.RGB)
+    return rr.Image.columns(buffer=[_bytes(colors)], format=[color_format])
 
 
-def _format(values: NDArray[np.generic], kind: str, colors: rr.ColorModel | None = None) -> rr.components.ImageFormat:
+def _format(
+    values: NDArray[np.generic],
+    datatype: rr.ChannelDatatype,
+    colors: rr.ColorModel | None = None,
+) -> rr.components.ImageFormat:
     height_px, width_px = values.shape[:2]
-    datatype = getattr(rr.ChannelDatatype, kind)
     return rr.components.ImageFormat(width_px, height_px, color_model=colors, channel_datatype=datatype)
 
 
@@ -76,7 +83,8 @@ def _classes(channel: str, names: TruthNames) -> list[rr.AnnotationInfo]:
 
 
 def _named_ids(channel: str, names: tuple[str, ...]) -> list[rr.AnnotationInfo]:
+    """The name of each id, and the colour that pictures of the channel show it in."""
     ids = np.arange(len(names), dtype=np.uint16)
-    colors = picture(channel, ids[None])[0]
-    named_colors = zip(names, colors.tolist(), strict=True)
-    return [rr.AnnotationInfo(index, name, tuple(color)) for index, (name, color) in enumerate(named_colors)]
+    one_row = ids[None]  # (1, N), a picture with a pixel for each id
+    colors = picture(channel, one_row)[0].tolist()
+    return [rr.AnnotationInfo(index, names[index], tuple(color)) for index, color in enumerate(colors)]

@@ -14,6 +14,7 @@ from vobench.runner.estimate import ESTIMATE
 from vobench.runner.folder import RunFolder, TrialScore, read_tum
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.score import score_estimate
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -25,7 +26,6 @@ if TYPE_CHECKING:
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 LINES = ("-", "--", "-.", ":")
 SIZE_INCHES = (9.0, 3.6)
-NS_PER_S = 1e9
 INLINE_DPI = 110
 MARGIN = 1.5  # the side of the plot of paths, relative to the longer side of the ground truth
 LEAST_SPAN_M = 0.05  # from the centre of that plot to its edge

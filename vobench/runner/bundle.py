@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
-from tempfile import TemporaryDirectory
 from types import MappingProxyType
 from typing import Any
 from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
@@ -41,6 +40,7 @@ from vobench.runner.folder import (
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, TIMES
 from vobench.runner.rescore import rescored
 from vobench.runner.store import Tell, write_json
+from vobench.temporary import temporary_folder
 
 OF_RUN = (SUITE, ENVIRONMENT, ESTIMATORS)
 OF_CASE = (CASE, GROUND_TRUTH)
@@ -140,10 +140,10 @@ def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
         _require_names(folder)
         yield folder
         return
-    with TemporaryDirectory(prefix="vobench-bundle-") as temporary:
+    with temporary_folder() as temporary:
         try:
             with ZipFile(path) as file:
-                folder = RunFolder(Path(temporary) / _suite(file) / (_plain_name(path.stem) or "bundle"))
+                folder = RunFolder(temporary / _suite(file) / (_plain_name(path.stem) or "bundle"))
                 names = _unpack(file, folder.path, path)
         except (BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
             raise InputError(f"neither a run's folder nor a bundle of one ({error}): {path}") from None
@@ -277,8 +277,8 @@ def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFo
     if len(folders) == 1:
         yield folders[0]
         return
-    with TemporaryDirectory(prefix="vobench-merged-") as temporary:
-        made = RunFolder(Path(temporary) / "merged" / "runs")
+    with temporary_folder() as temporary:
+        made = RunFolder(temporary / "merged" / "runs")
         made.path.mkdir(parents=True)
         environments = [stated for folder in folders if (stated := read_environment(folder))]
         write_json(made.path / ENVIRONMENT, merged_environment(environments))

@@ -13,12 +13,13 @@ from vobench.motion.drive import Waypoints
 from vobench.motion.motor import loop_voltages, wheel_voltages
 from vobench.motion.wheeled import Wheeled
 from vobench.runner.data_frame import data_frame
-from vobench.runner.motion import NS_PER_S, BodyMotion, body_motion, check_cases
+from vobench.runner.motion import BodyMotion, body_motion, check_cases
 from vobench.runner.sensors import wheel_error_m
 from vobench.suite.case import Case
 from vobench.suite.plan import Plan
 from vobench.trajectory.formats import format_tum
 from vobench.trajectory.kinematics import Kinematics
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:

@@ -17,8 +17,9 @@ from vobench.motion.pioneer import Theta
 from vobench.runner.data_frame import data_frame
 from vobench.runner.drive import REFERENCE_COLUMNS, RIM_COLUMNS
 from vobench.runner.folder import SEQUENCE, open_run
-from vobench.runner.motion import NS_PER_S, recorded_drive
+from vobench.runner.motion import recorded_drive
 from vobench.sequence import Sequence, read_truth
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
 if TYPE_CHECKING:
@@ -165,7 +166,10 @@ def read_csv_log(path: Path, wheels: WheelGeometry) -> WheelLog:
     if missing:
         raise InputError(f"a drive to identify has the columns {listed}; no {', '.join(missing)} in {path}")
     try:
-        columns = [np.array([float(row[name]) for row in rows]) for name in names]
+        columns = []
+        for name in names:
+            column = [float(row[name]) for row in rows]
+            columns.append(np.array(column))
         values = np.stack(columns, -1)  # (N, 5)
     except (TypeError, ValueError):
         raise InputError(f"the columns {listed} should hold a number in each row: {path}") from None

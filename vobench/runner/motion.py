@@ -34,6 +34,7 @@ from vobench.suite.yaml_file import checked
 from vobench.suite.yaml_source import Mistakes
 from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.kinematics import Kinematics, Motion
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
 
@@ -44,7 +45,6 @@ def generator(seed: int, stream: str) -> np.random.Generator:
     return np.random.default_rng([seed, stream_number])
 
 
-NS_PER_S = 1e9
 ENCODERS_PER_FRAME = 4
 MOST_FRAMES = 200_000  # nearly two hours at 30 Hz
 UP_M = 1e3  # length of the ray that finds the ceiling above

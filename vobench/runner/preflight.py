@@ -10,6 +10,7 @@ from vobench.runner.task import is_done, plan, sequence_tasks
 from vobench.suite.case import Case
 from vobench.suite.plan import Plan
 from vobench.suite.source import RecordedCase
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
 
 IN_CACHE = "in the cache"
 TO_SIMULATE = "to simulate"
-NS_PER_S = 1e9
 
 
 @dataclass(frozen=True, slots=True)

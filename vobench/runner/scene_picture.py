@@ -19,7 +19,6 @@ from vobench.runner.key import cache_folder
 from vobench.runner.simulate import open_renderer
 from vobench.runner.store import SILENT, Progress
 from vobench.runner.task import bake_task, perform
-from vobench.scene.light import NS_PER_S
 from vobench.sensor.image_sensor import CAMERAS, CameraSettings, NoiseStreams, expose, fixed_pattern
 from vobench.sensor.pixel_truth import CHANNELS, picture
 from vobench.sensor.response import Grey
@@ -29,6 +28,7 @@ from vobench.suite import catalog
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 from vobench.suite.suite_spec import Rendering
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
 # Flow and occlusion are of one picture and the next.

@@ -60,8 +60,11 @@ def _locked_folder(parent: Path) -> tuple[Path, int]:
     """A new folder, and the descriptor whose lock ends with this process, however that ends."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
-        folder.chmod(0o755)
-        lock = os.open(folder, os.O_RDONLY)
+        try:
+            folder.chmod(0o755)
+            lock = os.open(folder, os.O_RDONLY)
+        except FileNotFoundError:  # another process swept it before it had a lock
+            continue
         with suppress(OSError):  # a file system without locks has no sweeping either
             fcntl.flock(lock, fcntl.LOCK_EX)
         if folder.is_dir():

@@ -18,9 +18,9 @@ from vobench.trajectory.formats import (
     parse_any,
     parse_times,
 )
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import PoseConvention, Trajectory, parse_pose_convention
 
-NS_PER_S = 10**9
 UNITS: tuple[StampUnit, ...] = get_args(StampUnit)
 ORDERS: tuple[QuaternionOrder, ...] = get_args(QuaternionOrder)
 TRUTH = "truth.mcap"

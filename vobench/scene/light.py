@@ -14,11 +14,11 @@ from vobench.geometry.se3 import Array
 from vobench.scene.material import WHITE, Rgb
 from vobench.scene.mesh import areas_m2, corners
 from vobench.setting import Positive, Share, settings
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-NS_PER_S = 1e9
 SUN_RADIUS_RAD = np.deg2rad(0.533 / 2)  # seen from the Earth
 
 

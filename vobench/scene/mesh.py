@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import cross, unit
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -27,22 +28,6 @@ Faces = NDArray[np.int64]
 Index = NDArray[np.int32]
 # Vertices nearer than this are one, here and in all rooms above: float32 resolves 1e-6 m at 10 m.
 WELD_M = 1e-5
-
-
-def unit(vectors: ArrayLike) -> Array:
-    """Vectors (..., 3) at length 1; 0 stays 0."""
-    v = np.asarray(vectors, float)
-    length = np.sqrt((v * v).sum(-1, keepdims=True))
-    return np.asarray(v / np.where(length > 0, length, 1))
-
-
-NEXT = np.array([1, 2, 0])
-LAST = np.array([2, 0, 1])
-
-
-def cross(a: Array, b: Array) -> Array:
-    """Products (..., 3), to the last bit those of np.cross, whose checks take longer than small meshes do."""
-    return np.asarray(a[..., NEXT] * b[..., LAST] - a[..., LAST] * b[..., NEXT])
 
 
 def face_normals(corners_m: Array) -> Array:
@@ -127,17 +112,26 @@ def _no_material() -> "SimpleMaterial":
     return SimpleMaterial()  # type: ignore[no-untyped-call]
 
 
-def make_mesh(vertices_m: ArrayLike, faces: ArrayLike, uv: ArrayLike, normals: ArrayLike) -> "Trimesh":
-    """A mesh of vertices (V, 3), faces (F, 3), texture coordinates (V, 2) and normals (V, 3), in this order."""
+def make_mesh(
+    vertices_m: ArrayLike,
+    faces: ArrayLike,
+    uv: ArrayLike,
+    normals: ArrayLike,
+) -> "Trimesh":
+    """A mesh of copies of vertices (V, 3), faces (F, 3), texture coordinates (V, 2) and normals (V, 3), in this order.
+
+    It casts rays without embree, whose set-up takes longer than all else.
+    """
     from trimesh import Trimesh
     from trimesh.visual import TextureVisuals
 
-    visual = TextureVisuals(uv=uv, material=_no_material())  # type: ignore[no-untyped-call]
-    is_empty = not len(np.asarray(vertices_m))
+    vertices = np.array(vertices_m, float)
+    is_empty = not len(vertices)  # trimesh refuses normals of no vertices
+    visual = TextureVisuals(uv=np.array(uv, float), material=_no_material())  # type: ignore[no-untyped-call]
     return Trimesh(
-        np.asarray(vertices_m, float),
-        np.asarray(faces, np.int64),
-        vertex_normals=None if is_empty else normals,
+        vertices,
+        np.array(faces, np.int64),
+        vertex_normals=None if is_empty else np.array(normals, float),
         visual=visual,
         process=False,
         use_embree=False,
@@ -222,7 +216,10 @@ QUAD_FACES = np.array([[0, 1, 2], [0, 2, 3]])
 
 
 def quad_arrays(
-    corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, uv_m: ArrayLike = (0.0, 0.0)
+    corner_m: ArrayLike,
+    edge_u_m: ArrayLike,
+    edge_v_m: ArrayLike,
+    uv_m: ArrayLike = (0.0, 0.0),
 ) -> MeshArrays:
     """The arrays of `quad`."""
     corner = np.asarray(corner_m, float)
@@ -340,7 +337,11 @@ class Triangles:
         return replace(self, corners_m=corners, normals=normals, plane=plane)
 
 
-def table(things: Sequence[Thing], mover: Sequence[int], lamp: Sequence[int]) -> Triangles:
+def table(
+    things: Sequence[Thing],
+    mover: Sequence[int],
+    lamp: Sequence[int],
+) -> Triangles:
     """The faces of things whose mover and lamp are given, -1 for none, each in its own frame."""
     parts = [arrays(thing.mesh) for thing in things]
     counts = [len(part.faces) for part in parts]

@@ -7,9 +7,10 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.scene.light import NS_PER_S, AreaLight, Light, PointLight, SpotLight
+from vobench.scene.light import AreaLight, Light, PointLight, SpotLight
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, Triangles, moved, quad, table
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 
 class MoverMotion(Protocol):
@@ -130,7 +131,11 @@ class Scene:
         return tuple(light for light in self.lights if isinstance(light, AreaLight))
 
 
-def triangles(scene: Scene, *, t_ns: float | None = None) -> Triangles:
+def triangles(
+    scene: Scene,
+    *,
+    t_ns: float | None = None,
+) -> Triangles:
     """Every face of a scene: things, panels, movers; these in their own frames where t_ns is None."""
     things = list(scene.things)
     mover = [-1] * len(things)
@@ -149,7 +154,13 @@ def triangles(scene: Scene, *, t_ns: float | None = None) -> Triangles:
     return faces if t_ns is None else faces.moved([body.path.pose(t_ns) for body in scene.movers])
 
 
-def ceiling_light(name: str, center_m: Array, size_m: tuple[float, float], *, power_lm: float) -> AreaLight:
+def ceiling_light(
+    name: str,
+    center_m: Array,
+    size_m: tuple[float, float],
+    *,
+    power_lm: float,
+) -> AreaLight:
     """A panel that hangs level and shines down."""
     x = np.array([size_m[0], 0, 0])
     y = np.array([0, size_m[1], 0])

@@ -5,18 +5,17 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from tempfile import mkdtemp
 from typing import Any
 
 import numpy as np
 from rosbags.highlevel import AnyReader
 from rosbags.rosbag2.storage_mcap import DECOMPRESSORS
 
-from vobench import stop
 from vobench.errors import SequenceError, VobenchError
 from vobench.geometry.se3 import Array
 from vobench.sequence import messages as ros
 from vobench.sequence.mcap_file import decompressed
+from vobench.temporary import temporary_folder
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
@@ -107,8 +106,7 @@ def open_bag(path: Path) -> Iterator[AnyReader]:
     """
     # rosbags checks the size of a chunk after it has decompressed it: a few kB can become many GB.
     DECOMPRESSORS.update({name: partial(decompressed, name) for name in ("zstd", "lz4")})
-    folder = Path(mkdtemp(prefix="vobench-bag-"))
-    with stop.cleanup_after(lambda: stop.remove(folder)):
+    with temporary_folder() as folder:
         link = path
         if not path.is_dir():
             link = folder / f"recording{_suffix(path)}"

@@ -23,7 +23,7 @@ NO_CAMERA = CameraSettings()
 class Setup:
     """The setup that a case is simulated with: one variant of each axis.
 
-    `scene_changes` are values that replace those of the scene's file; their keys are joined by dots.
+    `scene_changes` replaces values of the scene's file; the keys of nested values are joined by dots.
     """
 
     scene: str
@@ -38,7 +38,7 @@ class Setup:
 class ScenarioFile:
     """A scenario's YAML: a base setup, and for each severity the keys that change.
 
-    Keys that the file omits are those of the file that it includes: another scenario, or a file with only a `base`.
+    Omitted keys are read from the file that it includes: another scenario, or a file with only a `base`.
     """
 
     include: str | None = None
@@ -61,12 +61,12 @@ class Scenario:
         return self.setups[severity]
 
     def variant(self, severity: int, scene: str) -> dict[str, str]:
-        """The name on each axis: the scenario's, with the severity appended if that changes the axis."""
-        setup = self.setups[severity]
-        names = {axis: self._name_on(axis, severity, self.name) for axis in SETUP_AXES}
-        if setup.scene_changes:
-            scene = self._name_on("scene_changes", severity, f"{scene}.{self.name}")
-        return {"scene": scene, **names}
+        """The name of the variant on each axis: the scenario's name, with the severity if that changes the axis."""
+        setup_names = {axis: self._name_on(axis, severity, self.name) for axis in SETUP_AXES}
+        scene_name = scene
+        if self.setups[severity].scene_changes:
+            scene_name = self._name_on("scene_changes", severity, f"{scene}.{self.name}")
+        return {"scene": scene_name, **setup_names}
 
     def _name_on(self, axis: str, severity: int, name: str) -> str:
         is_unchanged = getattr(self.setups[severity], axis) == getattr(self.setups[0], axis)
@@ -79,14 +79,17 @@ def read_scenario(path: Path) -> Scenario:
     if reading.mistakes:
         raise SuiteError(*reading.mistakes)
     base = reading.source.plain["base"]
-    mistakes = list[Mistake]()
-    setups = list[Setup]()
+    setups: list[Setup] = []
+    mistakes: list[Mistake] = []
     for severity, changes in enumerate(reading.model.severity):
         place = reading.source.place(("severity", severity))
+        merged = merged_over(base, changes)
         try:
-            setups.append(yaml_file.checked_section(Setup, merged_over(base, changes), place))
+            setup = yaml_file.checked_section(Setup, merged, place)
         except SuiteError as error:
             mistakes += error.mistakes
+        else:
+            setups.append(setup)
     if mistakes:
         raise SuiteError(*mistakes)
     return Scenario(reading.model.name, path, tuple(setups))

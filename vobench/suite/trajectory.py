@@ -17,7 +17,8 @@ from vobench.motion.replay import Replay
 from vobench.motion.spline import PoseSpline
 from vobench.motion.wheeled import MOVER_KEYS, Wheeled
 from vobench.setting import ByKind, hints
-from vobench.trajectory.formats import NS_PER_S, ParsedTrajectory, format_tum, parse_any, parse_times
+from vobench.trajectory.formats import ParsedTrajectory, format_tum, parse_any, parse_times
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 Spatial = PoseSpline | Handheld | Rail | Quadrotor

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vobench.errors import TrajectoryError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 Rows = NDArray[np.intp]
@@ -22,7 +23,6 @@ NORM_TOLERANCE = 1e-3  # 4 printed digits change a norm by 1e-4; other units or 
 DIGITS: dict[StampUnit, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}  # decimals down to the nanosecond
 WORDS: dict[StampUnit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 MAX_NS = 2**63 - 1
-NS_PER_S = 10**9
 SCALAR_LAST = [1, 2, 3, 0]  # the places of x, y, z, w among w, x, y, z
 SCALAR_FIRST = [3, 0, 1, 2]  # the places of w, x, y, z among x, y, z, w
 # Stricter than float(), which also takes 1_000, nan, infinity and the digits of other scripts.
