@@ -89,10 +89,10 @@ def read_model(
 ) -> Model:
     """The contents of a glTF, OBJ, STL or PLY file whose unit is `scale` metres.
 
-    roles: by globs of node names. They override the roles in the file, which are extras: {"vobench": "mirror"}. A node
-    has the role of its nearest ancestor with one. up: "y" or "z"; by default that of the format. As in glTF, an
-    emission of 1 is 1 cd/m², and lights are in cd and lx; the scale does not change them. Raises ModelError with file,
-    node and advice.
+    roles: a role for each glob of node names; it replaces the role that the file gives (extras: {"vobench": "mirror"}).
+    A node without a role has that of its nearest ancestor with one. up: "y" or "z"; by default that of the format.
+    An emission of 1 is 1 cd/m², and lights are in cd and lx, as in glTF; `scale` does not change them.
+    Raises ModelError with the file, the node and advice.
     """
     path = Path(path)
     with located(str(path)), np.errstate(all="ignore"):
@@ -155,7 +155,7 @@ def _require_matched(roles: Roles, nodes: Sequence[Node]) -> None:
 
 
 def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles: Roles) -> Model:
-    """A model with unique names; things have the materials of their roles, and movers are separate."""
+    """The model of a file: names are unique, roles are applied, and movers are separated from stationary things."""
     solid = [primitive for primitive in primitives if len(primitive.mesh.faces)]
     if not solid:
         raise ModelError("has no faces to see: are its nodes empty, of points or lines, without area, or ignored?")
@@ -195,7 +195,10 @@ def _renamed(lights: Sequence[ModelLight]) -> tuple[ModelLight, ...]:
     return tuple(replace(light, name=names[nth]) for nth, light in enumerate(lights))
 
 
-def _lamps(lamps: Sequence[Node], bright: Mapping[Node, str]) -> tuple[str, ...]:
+def _lamps(
+    lamps: Sequence[Node],
+    bright: Mapping[Node, str],
+) -> tuple[str, ...]:
     """The names of the things of lamps that emit light. Raises ModelError if there are lamps, but none emits."""
     shining = tuple(bright[node] for node in lamps if node in bright)
     if lamps and not shining:
@@ -221,9 +224,10 @@ def _shifted(thing: Thing, by_m: Array) -> Thing:
 
 
 def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:
-    """Unique names: a second 'chair' becomes 'chair_2'."""
-    taken = set(wanted.values())
-    names: dict[str, Key] = {}
+    """A name for each key, none of them twice: a second 'chair' is 'chair_2'."""
+    reserved = set(wanted.values())
+    given: set[str] = set()
+    unique_names: dict[Key, str] = {}
     for key, name in wanted.items():
         unique = name if name not in given else next(_free_names(name, reserved))
         reserved.add(unique)
@@ -278,9 +282,9 @@ def _in_role(look: Look, role: str) -> tuple[str, Material]:
 
 
 def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
-    """A note if a model, read with `axis` up, is probably a place that lies on its side, with its floor as a wall.
+    """A note if a model, read with `axis` up, is likely a place that lies on its side, its floor upright as a wall.
 
-    Either most of its area faces along the other axis, or it is flat along that axis, as places are in height.
+    Signs of it: most of its area faces along the other axis, or it is flat along that axis, as rooms are in height.
     """
     corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
     width_m, depth_m, height_m = np.ptp(corners_m, axis=(0, 1))
