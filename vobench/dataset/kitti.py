@@ -213,12 +213,16 @@ def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
 def _covered(source: ExportSource) -> NDArray[np.bool_]:
     """Which frames (N,) are exported: those within the truth's time; all frames where that is none of them."""
     stamps = source.sequence.frame_stamps()
-    truth = source.truth
     every = np.ones(len(stamps), bool)
-    if truth is None:
+    if source.truth is None:
         return every
-    within = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
+    within = _within(source.truth, stamps)
     return within if within.any() else every
+
+
+def _within(truth: Trajectory, stamps: Stamps) -> NDArray[np.bool_]:
+    """Which stamps (N,) lie between the first and the last pose of the truth, or at them."""
+    return (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
 
 
 def _exported_stamps(source: ExportSource) -> Stamps:
@@ -232,9 +236,9 @@ def kitti_path(
 ) -> Trajectory | None:
     """The left camera's poses at stamps (N,), relative to the first one, as KITTI has them.
 
-    None where the stamps share no time with the truth.
+    None where none of the stamps lies within the truth's time.
     """
-    if stamps[-1] < truth.t_ns[0] or stamps[0] > truth.t_ns[-1]:
+    if not _within(truth, stamps).any():
         return None
     T_world_left = poses_at(truth, stamps) @ rig.T_body_left
     T_first_left = se3.inverse(T_world_left[:1]) @ T_world_left
@@ -277,7 +281,7 @@ def _write_poses(
         return ["No truth was recorded, so there is no poses.txt."]
     path = kitti_path(truth, views.rig, stamps)
     if path is None:
-        return ["The truth shares no time with the pictures, so there is no poses.txt."]
+        return ["No picture lies within the truth's time, so there is no poses.txt."]
     (folder / POSES).write_text(format_kitti(path.T_world_frame), encoding="utf-8")
 
     notes = ["The poses are those of the left camera relative to the first picture, as in KITTI: no world, no gravity."]
