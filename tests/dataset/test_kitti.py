@@ -42,6 +42,14 @@ def test_the_colour_pair_sits_beside_the_grey_one_that_the_truth_is_of(scene, tm
         assert np.array_equal(frame.left, left)  # three equal channels come to themselves
 
 
+@pytest.mark.parametrize("pair", [("image_0", "image_3"), ("image_2", "image_1"), ("image_0", "image_2")])
+def test_of_single_cameras_of_both_pairs_one_is_read_and_the_other_one_is_named(scene, tmp_path, pair):
+    recording = read(scene.kitti(tmp_path, pair=pair))
+    assert recording.rig.right is None
+    assert f"There is one camera: {pair[0]} has no partner." in recording.notes
+    assert f"The pictures of {pair[1]} were dropped." in recording.notes
+
+
 def test_rotations_of_seven_digits_are_made_exact(scene, tmp_path):
     folder = scene.kitti(tmp_path)
     rough = "\n".join(" ".join(f"{v:.6e}" for v in T[:3].ravel()) for T in scene.T_world_body)

@@ -71,15 +71,18 @@ def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
     present = [name for name in names if (folder / name).is_dir()]
     for pair in PAIRS:
         if set(pair) <= set(present):
-            others = [name for name in present if name not in pair]
-            if not others:
-                return pair, ()
-            return pair, (f"The pictures of {' and '.join(others)} were dropped.",)
+            return pair, _dropped(present, pair)
     for left, _ in PAIRS:
         if left in present:
-            return (left,), (f"There is one camera: {left} has no partner.",)
+            return (left,), (f"There is one camera: {left} has no partner.", *_dropped(present, (left,)))
     wanted = " or ".join(" and ".join(pair) for pair in PAIRS)
     raise InputError(f"no folders {wanted} with pictures in {folder}")
+
+
+def _dropped(present: list[str], used: tuple[str, ...]) -> Notes:
+    """The note on the folders of cameras that are not used; none where all are."""
+    others = [name for name in present if name not in used]
+    return (f"The pictures of {' and '.join(others)} were dropped.",) if others else ()
 
 
 def _calibrated_rig(
