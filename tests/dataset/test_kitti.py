@@ -132,6 +132,13 @@ def test_a_matrix_that_is_not_rectified_is_refused(scene, tmp_path):
         read(folder)
 
 
+def test_a_matrix_that_occurs_twice_is_refused_with_both_lines(scene, tmp_path):
+    path = scene.kitti(tmp_path) / "calib.txt"
+    path.write_text(path.read_text() + "P1: 40 0 23 -80 0 40 15 0 0 0 1 0\n")
+    with pytest.raises(VobenchError, match=r"calib\.txt:6: P1 should occur once, but is also in line 2"):
+        read(path.parent)
+
+
 @pytest.mark.parametrize("offsets_ns", [[60_000_000], [60_000_000, 80_000_000], [-2, -1], [1_000_000_000]])
 def test_pictures_that_all_lie_outside_of_the_truth_are_exported_without_poses(make_sequence, tmp_path, offsets_ns):
     made = make_sequence(truth_ns=START_NS + np.array(offsets_ns))

@@ -157,7 +157,7 @@ def _rig(
 
 def read_calibration(path: Path) -> dict[str, Array]:
     """The matrices (3, 4) of calib.txt by name. Raises InputError that names an invalid line."""
-    names = []
+    lines_by_name: dict[str, int] = {}
     rows = []
     for line, body in content(read_text(path)):
         label, colon, numbers = body.partition(":")
@@ -165,13 +165,15 @@ def read_calibration(path: Path) -> dict[str, Array]:
             example = "`P0: 718.9 0 607.2 ...`"
             raise InputError(f"{path}:{line}: a line should be a name, a colon and a matrix, as in {example}")
         name = label.strip()
+        if name in lines_by_name:
+            raise InputError(f"{path}:{line}: {name} should occur once, but is also in line {lines_by_name[name]}")
         if name.startswith(("P", "T")):
-            names.append(name)
+            lines_by_name[name] = line
             rows.append((line, numbers))
     columns = [f"{row}{column}" for row in range(3) for column in range(4)]
     table = read_table(rows, name=str(path), columns=tuple(columns), row="a matrix")
     matrices = table.values.reshape(-1, 3, 4)
-    return dict(zip(names, matrices, strict=True))
+    return dict(zip(lines_by_name, matrices, strict=True))
 
 
 def _camera(
