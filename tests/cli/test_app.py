@@ -204,6 +204,39 @@ def test_a_reader_that_has_seen_enough_is_no_failure_and_gets_no_traceback(ran, 
     assert (done.returncode, done.stderr) == (0, "")
 
 
+def run_in_bash(redirection, words, **variables):
+    """vobench as a process whose output bash redirects."""
+    script = f"import sys; from vobench.cli import main; sys.argv = ['vobench', *{words!r}]; main()"
+    command = ["bash", "-c", f'"$0" -c "$1" {redirection}', sys.executable, script]
+    return subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ | variables)
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
+@pytest.mark.parametrize("words", [("list", "--json"), ("metrics",), ("--version",), ("--help",)], ids=" ".join)
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_output_that_a_full_disk_does_not_take_is_one_line_and_exit_code_1(words, unbuffered):
+    done = run_in_bash("> /dev/full", words, PYTHONUNBUFFERED=unbuffered)
+    assert done.returncode == 1
+    assert done.stderr.startswith("vobench: ")
+    assert done.stderr.endswith("No space left on device\n")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("redirection", ["> /dev/full", ">&-"])
+@pytest.mark.parametrize("unbuffered", ["", "1"])
+def test_a_mistake_is_one_line_though_its_json_cannot_be_written(redirection, unbuffered):
+    done = run_in_bash(redirection, ("run", "nope", "--json"), PYTHONUNBUFFERED=unbuffered)
+    assert done.returncode == 1
+    assert done.stderr.startswith("vobench: no suite named 'nope'")
+    assert done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize("words", [("list", "--json"), ("metrics",), ("--version",), ("--help",)], ids=" ".join)
+def test_a_command_without_a_standard_output_ends_well(words):
+    done = run_in_bash(">&-", words)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_every_shell_is_told_how_to_complete_and_is_offered_the_commands(shell):
     asked = {"COMP_WORDS": "vobench ver", "COMP_CWORD": "1"}

@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 from vobench import stop
 from vobench.cli.terminal import warn
-from vobench.errors import SuiteError, VobenchError
+from vobench.errors import InputError, SuiteError, VobenchError
 from vobench.trust import gate
 
 # The module and function of each command. The first line of its docstring is its summary. Installed distributions may
@@ -115,10 +115,7 @@ def run() -> None:
     for stream in filter(None, (sys.stdout, sys.stderr)):
         stream.reconfigure(errors="replace")  # terminals that have no ° show a ?
     try:
-        with gate(warn, ours=_trusted_folders, folder=_trusted_hashes):
-            # --debug is accepted before and after the command.
-            words = [word for word in sys.argv[1:] if word != DEBUG]
-            app(words, prog_name=app.info.name)
+        _call_command()
     except SystemExit as end:
         if not isinstance(end.__context__, BrokenPipeError):
             raise
@@ -126,16 +123,33 @@ def run() -> None:
     except (VobenchError, OSError) as error:
         stop.check()  # a request to stop may have caused the error
         _fail(_sentence(error), error)
+
+
+def _call_command() -> None:
+    """Call the command that the arguments name, and print all of its output. Raises SystemExit at the end."""
+    try:
+        with gate(warn, ours=_trusted_folders, folder=_trusted_hashes):
+            # --debug is accepted before and after the command.
+            words = [word for word in sys.argv[1:] if word != DEBUG]
+            app(words, prog_name=app.info.name)
     finally:
         _flush_output()
 
 
 def _flush_output() -> None:
-    """Flush standard output now, because at exit a closed pipe would print a traceback."""
+    """Flush standard output now, because at exit an error would print a traceback.
+
+    Raises InputError if the output cannot be written, say to a full disk. A closed pipe is no error.
+    """
+    if sys.stdout is None:  # closed before the start, as by >&-
+        return
     try:
         sys.stdout.flush()
     except BrokenPipeError:
         _discard_output()
+    except OSError as error:
+        _discard_output()
+        raise InputError(f"standard output cannot be written: {error.strerror}") from error
 
 
 def _trusted_folders() -> tuple[Path, ...]:
@@ -174,11 +188,19 @@ def _fail(sentence: str, error: BaseException) -> None:
         raise error
     if "--json" in sys.argv:
         content = {"error": sentence, **_mistakes(error)}
-        print(json_module.dumps(content, ensure_ascii=False))
+        _print_error(json_module.dumps(content, ensure_ascii=False))
     lines = str(error).splitlines() if isinstance(error, SuiteError) else [sentence]
     for line in lines:
         warn(line)
     raise SystemExit(1) from None
+
+
+def _print_error(text: str) -> None:
+    """Print an error to standard output, if that can be written: standard error has it, too."""
+    try:
+        print(text, flush=True)
+    except OSError:
+        _discard_output()
 
 
 def _mistakes(error: BaseException) -> dict[str, Any]:
