@@ -11,7 +11,7 @@ import pytest
 
 from vobench import __version__
 from vobench.cli import main
-from vobench.cli.app import VERBS
+from vobench.cli.app import VERBS, Verbs
 from vobench.errors import UnknownNameError
 
 # ruff: noqa: E501 - a sentence stands in one line
@@ -35,6 +35,23 @@ def test_help_imports_no_heavy_library():
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1].strip() == "heavy:"
     assert "Usage: vobench" in done.stdout
+
+
+def install(site, entry_points):
+    """Make a distribution with these commands findable in a folder."""
+    information = site / "outside-1.dist-info"
+    information.mkdir(parents=True)
+    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: outside\nVersion: 1\n")
+    (information / "entry_points.txt").write_text(f"[vobench.commands]\n{entry_points}")
+
+
+def test_installed_commands_come_after_vobench_s_in_the_help_and_in_lists(vobench, tmp_path, monkeypatch):
+    install(tmp_path / "site", "zebra = vobench.cli.list:list_command\napple = vobench.cli.list:list_command\n")
+    monkeypatch.syspath_prepend(str(tmp_path / "site"))
+    names = [*COMMANDS, "apple", "zebra"]
+    assert Verbs().list_commands(None) == names
+    _, _, commands = vobench("--help").out.partition("Commands:\n")
+    assert re.findall(r"^  (\w+)", commands, re.MULTILINE) == names
 
 
 OUTSIDE = """

@@ -58,7 +58,7 @@ class Verbs(TyperGroup):
 
     def list_commands(self, _: Any) -> list[str]:
         """Names of vobench's commands, and of installed ones."""
-        return [*VERBS, *sorted(_installed_commands().keys() - VERBS.keys())]
+        return list(_targets())
 
     def get_command(self, _: Any, cmd_name: str) -> Any:
         """The command with that name; None if there is none."""
@@ -75,9 +75,15 @@ class Verbs(TyperGroup):
 
     def format_commands(self, _: Any, formatter: Any) -> None:
         """Write every command with its summary."""
-        targets = {**_installed_commands(), **VERBS}
         with formatter.section("Commands"):
-            formatter.write_dl([(name, _summary(target)) for name, target in targets.items()])
+            formatter.write_dl([(name, _summary(target)) for name, target in _targets().items()])
+
+
+def _targets() -> dict[str, str]:
+    """The targets of all commands by name: vobench's in their order, then installed ones by name."""
+    installed = _installed_commands()
+    names = sorted(installed.keys() - VERBS.keys())
+    return {**VERBS, **{name: installed[name] for name in names}}
 
 
 def _installed_commands() -> dict[str, str]:
