@@ -54,6 +54,23 @@ def test_installed_commands_come_after_vobench_s_in_the_help_and_in_lists(vobenc
     assert re.findall(r"^  (\w+)", commands, re.MULTILINE) == names
 
 
+def test_the_help_says_which_installed_commands_cannot_be_imported(vobench, tmp_path, monkeypatch):
+    site = tmp_path / "site"
+    broken = site / "broken_package"
+    broken.mkdir(parents=True)
+    (broken / "__init__.py").write_text("raise RuntimeError('no licence')\n")
+    install(site, "top = no_package:go\ninner = no_package.cli:go\nraising = broken_package.cli:go\n")
+    monkeypatch.syspath_prepend(str(site))
+    said = vobench("--help")
+    assert (said.code, said.err) == (0, "")
+    lines = [line.split(maxsplit=1) for line in said.out.splitlines()[-3:]]
+    assert lines == [
+        ["inner", "cannot be imported: No module named 'no_package'"],
+        ["raising", "cannot be imported: no licence"],
+        ["top", "cannot be imported: No module named 'no_package'"],
+    ]
+
+
 OUTSIDE = """
 import numpy as np
 from vobench.plugin import POSES, MetricDefinition

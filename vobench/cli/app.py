@@ -96,8 +96,13 @@ def _installed_commands() -> dict[str, str]:
 def _summary(target: str) -> str:
     """The first line of a command's docstring, read from its source because importing all commands takes seconds."""
     module_name, _, function_name = target.partition(":")
-    spec = find_spec(module_name)
-    source = Path(spec.origin).read_text(encoding="utf-8") if spec and spec.origin else ""
+    try:
+        spec = find_spec(module_name)
+    except Exception as error:  # of an installed command's package, which find_spec imports
+        return f"cannot be imported: {_sentence(error)}"
+    if spec is None:
+        return f"cannot be imported: No module named '{module_name}'"
+    source = Path(spec.origin).read_text(encoding="utf-8") if spec.origin else ""
     first_line_of_docstring = rf'^def {function_name}\(.*?"""(.+?)(?:\n|""")'
     match = re.search(first_line_of_docstring, source, re.MULTILINE | re.DOTALL)
     return match[1] if match else ""
