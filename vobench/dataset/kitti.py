@@ -227,7 +227,8 @@ def _covered(source: ExportSource) -> NDArray[np.bool_]:
 
 def _within(truth: Trajectory, stamps: Stamps) -> NDArray[np.bool_]:
     """Which stamps (N,) lie between the first and the last pose of the truth, or at them."""
-    return (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
+    is_within: NDArray[np.bool_] = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
+    return is_within
 
 
 def _exported_stamps(source: ExportSource) -> Stamps:
