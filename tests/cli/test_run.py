@@ -33,6 +33,14 @@ def test_where_nobody_watches_each_stage_is_one_line_and_one_in_the_cache_is_non
     assert vobench("run", "tiny").err == ""
 
 
+def test_a_folder_that_the_sandbox_does_not_open_is_named_once_and_the_run_goes_on(vobench, here, monkeypatch):
+    monkeypatch.delenv("VOBENCH_SANDBOX", raising=False)
+    monkeypatch.setenv("VOBENCH_SANDBOX_READ", "/tmp")
+    said = vobench("run", "tiny")
+    assert said.code == 0
+    assert said.err.count("vobench: VOBENCH_SANDBOX_READ does not open /tmp: ") == 1
+
+
 def test_run_takes_the_estimators_that_are_asked_for(vobench, here):
     said = vobench("run", "tiny", "-e", "stand_still", "-e", "constant_velocity", "--json")
     assert {row["estimator"] for row in said.json["totals"]} == {"stand_still", "constant_velocity"}

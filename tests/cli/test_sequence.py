@@ -50,6 +50,19 @@ def test_an_import_says_all_that_it_assumed(vobench, sequence):
     assert "The body is the left grey camera" in vobench("info", "back").out
 
 
+def test_an_import_of_one_frame_says_frame(vobench, sequence, here):
+    vobench("export", sequence, "out", "--form", "kitti")
+    for pictures in ("image_0", "image_1"):
+        for path in sorted((here / "out" / pictures).iterdir())[1:]:
+            path.unlink()
+    for name in ("times.txt", "poses.txt"):
+        first_line = (here / "out" / name).read_text().splitlines()[0]
+        (here / "out" / name).write_text(f"{first_line}\n")
+    assert vobench("import", "out", "back").out.endswith(
+        "\nimported 1 frame of a recording of the form 'kitti': back\n"
+    )
+
+
 def test_info_names_topics_cameras_truth_and_the_hash(vobench, sequence):
     facts = vobench("info", sequence, "--json").json
     topics = {topic["name"]: topic for topic in facts["files"]["sensors.mcap"]}

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vobench.dataset.export import export
 from vobench.dataset.layout import read
 from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
@@ -14,6 +15,7 @@ from vobench.geometry.rig import looking
 from vobench.sequence import Sequence, read_truth
 
 POSES = Path(__file__).parents[3] / "shared" / "data" / "trajectories" / "KITTI_00_gt.txt"
+START_NS = 1_403_636_579_763_555_584  # of make_sequence: its pictures are about 50 ms apart
 LEVEL = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))  # ahead, left, up of a camera's right, down, ahead
 TIMES = POSES.with_name("KITTI_00_gt_times.txt")
 
@@ -38,6 +40,14 @@ def test_the_colour_pair_sits_beside_the_grey_one_that_the_truth_is_of(scene, tm
     assert any("converted to grey" in note for note in recording.notes)
     for frame, left in zip(recording.frames(), scene.left, strict=True):
         assert np.array_equal(frame.left, left)  # three equal channels come to themselves
+
+
+@pytest.mark.parametrize("pair", [("image_0", "image_3"), ("image_2", "image_1"), ("image_0", "image_2")])
+def test_of_single_cameras_of_both_pairs_one_is_read_and_the_other_one_is_named(scene, tmp_path, pair):
+    recording = read(scene.kitti(tmp_path, pair=pair))
+    assert recording.rig.right is None
+    assert f"There is one camera: {pair[0]} has no partner." in recording.notes
+    assert f"The pictures of {pair[1]} were dropped." in recording.notes
 
 
 def test_rotations_of_seven_digits_are_made_exact(scene, tmp_path):
@@ -120,6 +130,31 @@ def test_a_matrix_that_is_not_rectified_is_refused(scene, tmp_path):
     (folder / "calib.txt").write_text("P0: 40 3 23 0 0 40 15 0 0 0 1 0\nP1: 40 0 23 -20 0 40 15 0 0 0 1 0\n")
     with pytest.raises(VobenchError, match=r"calib\.txt: P0 should be a rectified camera"):
         read(folder)
+
+
+def test_a_matrix_that_occurs_twice_is_refused_with_both_lines(scene, tmp_path):
+    path = scene.kitti(tmp_path) / "calib.txt"
+    path.write_text(path.read_text() + "P1: 40 0 23 -80 0 40 15 0 0 0 1 0\n")
+    with pytest.raises(VobenchError, match=r"calib\.txt:6: P1 should occur once, but is also in line 2"):
+        read(path.parent)
+
+
+@pytest.mark.parametrize("offsets_ns", [[60_000_000], [60_000_000, 80_000_000], [-2, -1], [1_000_000_000]])
+def test_pictures_that_all_lie_outside_of_the_truth_are_exported_without_poses(make_sequence, tmp_path, offsets_ns):
+    made = make_sequence(truth_ns=START_NS + np.array(offsets_ns))
+    exported = export(made.folder, tmp_path / "out", "kitti")
+    assert "No picture lies within the truth's time, so there is no poses.txt." in exported.notes
+    assert not any("interpolated" in note or "frames lie before" in note for note in exported.notes)
+    assert not (tmp_path / "out" / "poses.txt").exists()
+    assert len((tmp_path / "out" / "times.txt").read_text().splitlines()) == len(made.t_ns)
+
+
+def test_a_single_true_pose_at_a_picture_is_exported_with_that_picture_alone(make_sequence, tmp_path):
+    t_ns = make_sequence().t_ns
+    made = make_sequence(truth_ns=t_ns[2:3])
+    exported = export(made.folder, tmp_path / "out", "kitti")
+    assert f"4 of {len(t_ns)} frames lie before or after the truth and were left out." in exported.notes
+    assert len((tmp_path / "out" / "poses.txt").read_text().splitlines()) == 1
 
 
 @pytest.mark.skipif(not POSES.is_file(), reason="no folder ../shared/data with real trajectories")

@@ -88,6 +88,13 @@ def test_a_source_has_what_was_recorded_and_none_for_the_rest(make_sequence: Mak
     assert plain.case is None
 
 
+@pytest.mark.parametrize("case_json", [b'{"seed": ', b"", b'{"\xff": 7}'])
+def test_a_damaged_case_is_refused_with_its_file(make_sequence: Make, case_json: bytes) -> None:
+    made = make_sequence(case_json=case_json)
+    with pytest.raises(SequenceError, match=r"case\.json is not JSON \(.*\): .*truth\.mcap$"):
+        open_source(made.folder)
+
+
 def test_png_pictures_pass_as_they_are_and_others_as_png(make_sequence: Make, rig_of: Callable[..., Rig]) -> None:
     for quality in (None, 80):
         made = make_sequence(rig_of(), jpeg_quality=quality)

@@ -496,6 +496,29 @@ def test_a_folder_can_be_opened_to_it_which_the_record_names(run, world, monkeyp
         assert str(world.place / "user") in saw.sentence
 
 
+@pytest.mark.parametrize(
+    ("named", "unopened", "read"),
+    [
+        ("", "", ()),
+        ("/opt/ros:/tmp/slam", "", ("/opt/ros", "/tmp/slam")),
+        ("/opt/ros:/tmp", "/tmp", ("/opt/ros",)),
+        ("/proc:/opt/..:/dev/", "/proc, / and /dev", ()),
+    ],
+)
+def test_a_folder_that_is_never_opened_is_named_with_the_reason(monkeypatch, named, unopened, read):
+    monkeypatch.delenv(SWITCH, raising=False)
+    monkeypatch.setenv(READ, named)
+    assert sandbox.opened() == read
+    note = sandbox.note_on_unopened()
+    assert note.startswith(f"{READ} does not open {unopened}: estimators have their own /dev") if unopened else not note
+
+
+def test_without_a_sandbox_no_folder_stays_closed(monkeypatch):
+    monkeypatch.setenv(READ, "/tmp")
+    monkeypatch.setenv(SWITCH, "off")
+    assert sandbox.note_on_unopened() == ""
+
+
 def test_what_is_hidden_stays_hidden_in_a_folder_that_is_opened(run, world, monkeypatch):
     if sandbox_here().level != "full":
         pytest.skip("without mounts a folder is opened as a whole")

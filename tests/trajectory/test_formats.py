@@ -63,6 +63,7 @@ def test_kittis_matrices_stay_as_they_are_given():
         ("1500000000,1,2,3,1,0,0,0", "ns", "wxyz"),
         ("1.5,1,2,3,1,0,0,0", "s", "wxyz"),
         ("t [s],x,y,z,qw,qx,qy,qz\n1,1,2,3,1,0,0,0", "s", "wxyz"),
+        ("# made by x, y\n# and z\nt [s],x,y,z,qx,qy,qz,qw\n1,1,2,3,0,0,0,1", "s", "xyzw"),
         ("#time(ns), tx, ty, tz, qx, qy, qz, qw\n1,1,2,3,0,0,0,1", "ns", "xyzw"),
     ],
 )

@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 
 from vobench import stop
 from vobench.cli.terminal import warn
-from vobench.errors import SuiteError, VobenchError
+from vobench.errors import InputError, SuiteError, VobenchError
 from vobench.trust import gate
 
 # The module and function of each command. The first line of its docstring is its summary. Installed distributions may
@@ -58,7 +58,7 @@ class Verbs(TyperGroup):
 
     def list_commands(self, _: Any) -> list[str]:
         """Names of vobench's commands, and of installed ones."""
-        return [*VERBS, *sorted(_installed_commands().keys() - VERBS.keys())]
+        return list(_targets())
 
     def get_command(self, _: Any, cmd_name: str) -> Any:
         """The command with that name; None if there is none."""
@@ -75,9 +75,15 @@ class Verbs(TyperGroup):
 
     def format_commands(self, _: Any, formatter: Any) -> None:
         """Write every command with its summary."""
-        targets = {**_installed_commands(), **VERBS}
         with formatter.section("Commands"):
-            formatter.write_dl([(name, _summary(target)) for name, target in targets.items()])
+            formatter.write_dl([(name, _summary(target)) for name, target in _targets().items()])
+
+
+def _targets() -> dict[str, str]:
+    """The targets of all commands by name: vobench's in their order, then installed ones by name."""
+    installed = _installed_commands()
+    names = sorted(installed.keys() - VERBS.keys())
+    return {**VERBS, **{name: installed[name] for name in names}}
 
 
 def _installed_commands() -> dict[str, str]:
@@ -90,8 +96,13 @@ def _installed_commands() -> dict[str, str]:
 def _summary(target: str) -> str:
     """The first line of a command's docstring, read from its source because importing all commands takes seconds."""
     module_name, _, function_name = target.partition(":")
-    spec = find_spec(module_name)
-    source = Path(spec.origin).read_text(encoding="utf-8") if spec and spec.origin else ""
+    try:
+        spec = find_spec(module_name)
+    except Exception as error:  # of an installed command's package, which find_spec imports
+        return f"cannot be imported: {_sentence(error)}"
+    if spec is None:
+        return f"cannot be imported: No module named '{module_name}'"
+    source = Path(spec.origin).read_text(encoding="utf-8") if spec.origin else ""
     first_line_of_docstring = rf'^def {function_name}\(.*?"""(.+?)(?:\n|""")'
     match = re.search(first_line_of_docstring, source, re.MULTILINE | re.DOTALL)
     return match[1] if match else ""
@@ -115,10 +126,7 @@ def run() -> None:
     for stream in filter(None, (sys.stdout, sys.stderr)):
         stream.reconfigure(errors="replace")  # terminals that have no ° show a ?
     try:
-        with gate(warn, ours=_trusted_folders, folder=_trusted_hashes):
-            # --debug is accepted before and after the command.
-            words = [word for word in sys.argv[1:] if word != DEBUG]
-            app(words, prog_name=app.info.name)
+        _call_command()
     except SystemExit as end:
         if not isinstance(end.__context__, BrokenPipeError):
             raise
@@ -126,16 +134,33 @@ def run() -> None:
     except (VobenchError, OSError) as error:
         stop.check()  # a request to stop may have caused the error
         _fail(_sentence(error), error)
+
+
+def _call_command() -> None:
+    """Call the command that the arguments name, and print all of its output. Raises SystemExit at the end."""
+    try:
+        with gate(warn, ours=_trusted_folders, folder=_trusted_hashes):
+            # --debug is accepted before and after the command.
+            words = [word for word in sys.argv[1:] if word != DEBUG]
+            app(words, prog_name=app.info.name)
     finally:
         _flush_output()
 
 
 def _flush_output() -> None:
-    """Flush standard output now, because at exit a closed pipe would print a traceback."""
+    """Flush standard output now, because at exit an error would print a traceback.
+
+    Raises InputError if the output cannot be written, say to a full disk. A closed pipe is no error.
+    """
+    if sys.stdout is None:  # closed before the start, as by >&-
+        return
     try:
         sys.stdout.flush()
     except BrokenPipeError:
         _discard_output()
+    except OSError as error:
+        _discard_output()
+        raise InputError(f"standard output cannot be written: {error.strerror}") from error
 
 
 def _trusted_folders() -> tuple[Path, ...]:
@@ -174,11 +199,19 @@ def _fail(sentence: str, error: BaseException) -> None:
         raise error
     if "--json" in sys.argv:
         content = {"error": sentence, **_mistakes(error)}
-        print(json_module.dumps(content, ensure_ascii=False))
+        _print_error(json_module.dumps(content, ensure_ascii=False))
     lines = str(error).splitlines() if isinstance(error, SuiteError) else [sentence]
     for line in lines:
         warn(line)
     raise SystemExit(1) from None
+
+
+def _print_error(text: str) -> None:
+    """Print an error to standard output, if that can be written: standard error has it, too."""
+    try:
+        print(text, flush=True)
+    except OSError:
+        _discard_output()
 
 
 def _mistakes(error: BaseException) -> dict[str, Any]:

@@ -50,7 +50,8 @@ def import_command(
         return
     for note in recording.notes:
         print(f"- {note}")
-    print(f"imported {frame_count} frames of a recording of the form '{recording.form}': {out}")
+    noun = "frame" if frame_count == 1 else "frames"
+    print(f"imported {frame_count} {noun} of a recording of the form '{recording.form}': {out}")
 
 
 @dataclass(frozen=True, slots=True)

@@ -71,15 +71,18 @@ def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
     present = [name for name in names if (folder / name).is_dir()]
     for pair in PAIRS:
         if set(pair) <= set(present):
-            others = [name for name in present if name not in pair]
-            if not others:
-                return pair, ()
-            return pair, (f"The pictures of {' and '.join(others)} were dropped.",)
+            return pair, _dropped(present, pair)
     for left, _ in PAIRS:
         if left in present:
-            return (left,), (f"There is one camera: {left} has no partner.",)
+            return (left,), (f"There is one camera: {left} has no partner.", *_dropped(present, (left,)))
     wanted = " or ".join(" and ".join(pair) for pair in PAIRS)
     raise InputError(f"no folders {wanted} with pictures in {folder}")
+
+
+def _dropped(present: list[str], used: tuple[str, ...]) -> Notes:
+    """The note on the folders of cameras that are not used; none where all are."""
+    others = [name for name in present if name not in used]
+    return (f"The pictures of {' and '.join(others)} were dropped.",) if others else ()
 
 
 def _calibrated_rig(
@@ -154,7 +157,7 @@ def _rig(
 
 def read_calibration(path: Path) -> dict[str, Array]:
     """The matrices (3, 4) of calib.txt by name. Raises InputError that names an invalid line."""
-    names = []
+    lines_by_name: dict[str, int] = {}
     rows = []
     for line, body in content(read_text(path)):
         label, colon, numbers = body.partition(":")
@@ -162,13 +165,15 @@ def read_calibration(path: Path) -> dict[str, Array]:
             example = "`P0: 718.9 0 607.2 ...`"
             raise InputError(f"{path}:{line}: a line should be a name, a colon and a matrix, as in {example}")
         name = label.strip()
+        if name in lines_by_name:
+            raise InputError(f"{path}:{line}: {name} should occur once, but is also in line {lines_by_name[name]}")
         if name.startswith(("P", "T")):
-            names.append(name)
+            lines_by_name[name] = line
             rows.append((line, numbers))
     columns = [f"{row}{column}" for row in range(3) for column in range(4)]
     table = read_table(rows, name=str(path), columns=tuple(columns), row="a matrix")
     matrices = table.values.reshape(-1, 3, 4)
-    return dict(zip(names, matrices, strict=True))
+    return dict(zip(lines_by_name, matrices, strict=True))
 
 
 def _camera(
@@ -213,12 +218,17 @@ def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
 def _covered(source: ExportSource) -> NDArray[np.bool_]:
     """Which frames (N,) are exported: those within the truth's time; all frames where that is none of them."""
     stamps = source.sequence.frame_stamps()
-    truth = source.truth
     every = np.ones(len(stamps), bool)
-    if truth is None:
+    if source.truth is None:
         return every
-    within = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
+    within = _within(source.truth, stamps)
     return within if within.any() else every
+
+
+def _within(truth: Trajectory, stamps: Stamps) -> NDArray[np.bool_]:
+    """Which stamps (N,) lie between the first and the last pose of the truth, or at them."""
+    is_within: NDArray[np.bool_] = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
+    return is_within
 
 
 def _exported_stamps(source: ExportSource) -> Stamps:
@@ -232,9 +242,9 @@ def kitti_path(
 ) -> Trajectory | None:
     """The left camera's poses at stamps (N,), relative to the first one, as KITTI has them.
 
-    None where the stamps share no time with the truth.
+    None where none of the stamps lies within the truth's time.
     """
-    if stamps[-1] < truth.t_ns[0] or stamps[0] > truth.t_ns[-1]:
+    if not _within(truth, stamps).any():
         return None
     T_world_left = poses_at(truth, stamps) @ rig.T_body_left
     T_first_left = se3.inverse(T_world_left[:1]) @ T_world_left
@@ -277,7 +287,7 @@ def _write_poses(
         return ["No truth was recorded, so there is no poses.txt."]
     path = kitti_path(truth, views.rig, stamps)
     if path is None:
-        return ["The truth shares no time with the pictures, so there is no poses.txt."]
+        return ["No picture lies within the truth's time, so there is no poses.txt."]
     (folder / POSES).write_text(format_kitti(path.T_world_frame), encoding="utf-8")
 
     notes = ["The poses are those of the left camera relative to the first picture, as in KITTI: no world, no gravity."]

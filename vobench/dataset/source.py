@@ -26,6 +26,7 @@ from vobench.sequence import (
     read_twist,
     truth_channels,
 )
+from vobench.sequence.messages import CASE_ATTACHMENT, TRUTH_FILE
 from vobench.sequence.picture import Image, decode, encode
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -174,9 +175,13 @@ def open_source(folder: Path) -> ExportSource:
 
 def _case(folder: Path) -> Mapping[str, Any] | None:
     try:
-        case = json.loads(read_case(folder))
+        text = read_case(folder)
     except SequenceError:
         return None
+    try:
+        case = json.loads(text)
+    except ValueError as error:  # of JSON, or of UTF-8
+        raise SequenceError(f"the attachment {CASE_ATTACHMENT} is not JSON ({error}): {folder / TRUTH_FILE}") from None
     return case if isinstance(case, dict) else None
 
 

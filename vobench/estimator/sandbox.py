@@ -75,9 +75,28 @@ def is_switched_off() -> bool:
 
 def opened() -> tuple[str, ...]:
     """The folders that the user has opened to all estimators by $VOBENCH_SANDBOX_READ."""
+    return tuple(path for path in _named_folders() if not _is_never_read(path))
+
+
+def note_on_unopened() -> str:
+    """Why some folders in $VOBENCH_SANDBOX_READ are not opened, as one sentence; empty if all are."""
+    unopened = [path for path in _named_folders() if _is_never_read(path)]
+    if not unopened or is_switched_off():
+        return ""
+    return (
+        f"{READ} does not open {_listed(unopened)}: estimators have their own /dev, /proc, /sys and /tmp, "
+        "and / holds all files; name the folders inside that they need"
+    )
+
+
+def _named_folders() -> list[str]:
+    """The folders in $VOBENCH_SANDBOX_READ."""
     words = [word for word in os.environ.get(READ, "").split(os.pathsep) if word]
-    paths = [os.path.abspath(os.path.expanduser(word)) for word in words]
-    return tuple(path for path in paths if os.path.realpath(path) not in NEVER_READ)
+    return [os.path.abspath(os.path.expanduser(word)) for word in words]
+
+
+def _is_never_read(path: str) -> bool:
+    return os.path.realpath(path) in NEVER_READ
 
 
 def libraries() -> list[str]:

@@ -9,6 +9,7 @@ from zipfile import ZipFile
 from vobench import stop
 from vobench.errors import NoSequenceError
 from vobench.estimator.program import sandbox_works
+from vobench.estimator.sandbox import note_on_unopened
 from vobench.portable import require_held
 from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import copy_files
@@ -81,12 +82,15 @@ def run_suite(
     says why. A case that could not be simulated or imported is in the folder's `unmade()`; its trials have the status
     `no_sequence` and count for no estimator. `is_fresh` ignores what the store holds. `begin` is given the
     tasks that are to be performed. `executor`, `shares_time` (which the suite may ask for itself) and `heard` are
-    those of `perform_all`; `tell` is called with sentences about the store, such as that a result was damaged.
+    those of `perform_all`; `tell` is called with sentences about the store, such as that a result was damaged, and
+    about folders that the user names for the sandbox, but that it does not open.
 
     Raises NoSequenceError, and makes no folder, if no case could be simulated or imported; with `require_all`, if any
     could not. Raises MissingDependencyError if a library is missing and InputError if the disk is full.
     """
     require_held()
+    if unopened := note_on_unopened():
+        tell(unopened)
     tasks = plan(suite, recordings)
     scores = [task for task in tasks if task.stage == "score"]
     results = Store(store)

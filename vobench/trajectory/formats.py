@@ -271,8 +271,12 @@ def csv_layout(text: str) -> tuple[list[tuple[int, str]], StampUnit, QuaternionO
     They follow a header that names w last, or seconds; stamps with a decimal point are seconds.
     """
     first_line = text.removeprefix("\ufeff").lstrip().partition("\n")[0]
-    title = first_line.lstrip("#")
     rows = content(text)
+    top_row = rows[0][1]
+    is_note = first_line.startswith("#") and first_line.count(",") < top_row.count(",")
+    if is_note and not any(NUMBER.fullmatch(cell.strip()) for cell in top_row.split(",")):
+        first_line = top_row  # the header is not a comment, but stands below one
+    title = first_line.lstrip("#")
     header = [""]
     if WORD.search(title):
         header = [cell.strip().lower() for cell in title.split(",")]
