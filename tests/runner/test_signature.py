@@ -47,7 +47,7 @@ def test_without_a_list_of_signers_only_the_key_is_named(bundle, key):
 
 
 def test_a_missing_list_of_signers_is_reported(bundle, tmp_path):
-    with pytest.raises(InputError, match="there is no such allowed-signers file: .*allowed"):
+    with pytest.raises(InputError, match=r"there is no such allowed-signers file: .*allowed$"):
         signed_by(bundle, tmp_path / "allowed")
 
 

@@ -163,7 +163,10 @@ def _truth_tab(side: str, channels: Sequence[str]) -> rrb.Grid:
 
 
 def _space(truth_m: Array, shown_m: Array, labels: Sequence[str]) -> rrb.Spatial3DView:
-    """The 3-D view of the paths, from a viewpoint at which the points (K, 3) fill it. Its name is a legend of colours."""
+    """The 3-D view of the paths, from a viewpoint at which the points `shown_m` (K, 3) fill it.
+
+    Its name is a legend of the colours.
+    """
     eye_m, target_m = eye_and_target(shown_m)
     estimates = [f"{label} {color}" for label, color in zip(labels, ESTIMATOR_COLORS, strict=False)]
     grid: Any = rrb.LineGrid3D(
