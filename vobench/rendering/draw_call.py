@@ -57,10 +57,10 @@ class DrawCalls:
         self._pass = Blocks(PASS.binding, self._pass_values[None])
 
         textures = [self._textures.get(id(batch.material.texture)) for batch in self._batches]
-        pairs = list(zip(self._batches, textures, strict=True))
-        self.abilities = [_abilities(batch, texture) for batch, texture in pairs]
-        self._batch_values = np.zeros(len(pairs), BATCH.dtype)
-        for batch, texture in pairs:
+        batches_with_texture = list(zip(self._batches, textures, strict=True))
+        self.abilities = [_abilities(batch, texture) for batch, texture in batches_with_texture]
+        self._batch_values = np.zeros(len(self._batches), BATCH.dtype)
+        for batch, texture in batches_with_texture:
             _set_batch(self._batch_values[batch.index], batch, texture)
         self._block = Blocks(BATCH.binding, self._batch_values)
 
@@ -121,8 +121,8 @@ class DrawCalls:
         `abilities` are further preprocessor names for the shader.
         """
         batch_abilities = self.abilities[batch.index]
-        names = [*abilities, "IS_MIRRORED"] if view.mirror else abilities
-        program = self._program("surface", "surface", *names, *batch_abilities, *canvas.abilities)
+        view_abilities = ["IS_MIRRORED"] if view.mirror else []
+        program = self._program("surface", "surface", *abilities, *view_abilities, *batch_abilities, *canvas.abilities)
         program.use()
         self._block.use(batch.index)
         material = batch.material

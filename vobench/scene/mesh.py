@@ -1,4 +1,4 @@
-"""Meshes, the things that are made of them, and a table of all triangles of a scene.
+"""Meshes, things that consist of a mesh and a material, and a table of all triangles of a scene.
 
 A mesh is a `trimesh.Trimesh` that was created with process=False, which preserves the order of its vertices.
 
@@ -262,10 +262,9 @@ def quad(
 
 
 def distinct(rows: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The distinct rows among rows (N, K), sorted: the index of the first row equal to each, and each row's group.
+    """The G groups of equal rows among rows (N, K), sorted by their values.
 
-    The first array (G,) contains, for every distinct row, the smallest index of a row that equals it. The second array
-    (N,) contains, for every row, the index of the equal distinct row.
+    Returns the index of the first row of each group (G,), and the group of each row (N,).
     """
     order = np.lexsort(rows.T[::-1])  # stable, and much faster than np.unique
     sorted_rows = rows[order]
@@ -276,7 +275,10 @@ def distinct(rows: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def welded(points_m: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The distinct points among points (N, 3), if all points in a cell of WELD_M are one; see `distinct`."""
+    """The P cells of size WELD_M that contain points (N, 3).
+
+    Returns the index of the first point in each cell (P,), and the cell of each point (N,).
+    """
     cells = np.rint(points_m / WELD_M).astype(np.int64)
     return distinct(cells)
 
@@ -295,8 +297,8 @@ def is_closed_body(mesh: MeshArrays) -> bool:
     """Whether a mesh encloses a volume and its faces are visible from outside, after its vertices are welded."""
     from trimesh import Trimesh
 
-    first_vertices, points = welded(mesh.vertices_m)
-    faces = points[mesh.faces]
+    first_vertices, cells = welded(mesh.vertices_m)
+    faces = cells[mesh.faces]
     has_three_corners = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     body = Trimesh(mesh.vertices_m[first_vertices], faces[has_three_corners], process=False, use_embree=False)
     return bool(body.is_volume)
@@ -326,7 +328,7 @@ class Thing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangles:
-    """A table of all faces of a scene: those of stationary things, then of visible lamps, then of movers.
+    """A table of all faces of a scene, in the order stationary things, visible lamps, movers.
 
     `corners_m` (F, 3, 3), `normals` (F, 3, 3) and `uv` (F, 3, 2) belong to the three corners of each face. Positions
     and normals are those at one instant.

@@ -47,10 +47,10 @@ def strips(
 ) -> list[RowStrip]:
     """The row strips of a picture from top to bottom.
 
-    `t_ns` is the middle of the exposure of the middle row.
+    `t_ns` is the mid-exposure time of the middle row.
     `readout_s` is the number of rows times the delay between adjacent rows; it is 0 for a global shutter.
     Each strip is exposed when its middle row is exposed. For its outermost rows, that time is wrong by
-    readout_s / (2 · row_strips). A global shutter has one strip, whatever `row_strips` is.
+    readout_s / (2 · row_strips). For a global shutter there is always one strip.
     Raises InputError if the exposure has fewer nanoseconds than sub-frames, if the picture has fewer rows than strips,
     or if a number is below 1.
     Source: Kalibr; row v is exposed v times the line delay after row 0.
@@ -76,7 +76,7 @@ def strips(
 
 
 def row_stamps(height: int, readout_s: float, t_ns: int) -> Stamps:
-    """The middle of the exposure of each row (height,), if that of the middle row is `t_ns`."""
+    """The mid-exposure time of each row (height,). `t_ns` is the mid-exposure time of the middle row."""
     readout_ns = round(readout_s * NS_PER_S)
     stamps = [t_ns + _delay_ns(row, row + 1, height, readout_ns) for row in range(height)]
     return np.array(stamps, np.int64)
@@ -88,10 +88,10 @@ def _delay_ns(
     height: int,
     readout_ns: int,
 ) -> int:
-    """The time from the exposure of the picture's middle to that of the middle of rows [first_row, end_row).
+    """The delay of the middle of rows [first_row, end_row) relative to the middle of the picture.
 
-    It is negative above the middle of the picture. Halves of a nanosecond are rounded away from 0, so that two rows at
-    the same distance above and below the middle have exactly opposite delays.
+    It is negative in the upper half of the picture. Half a nanosecond is rounded away from 0, so two rows at the same
+    distance above and below the middle have exactly opposite delays.
     """
     # Twice the distance in rows between the two middles is an integer.
     doubled_offset = first_row + end_row - height
@@ -163,7 +163,7 @@ def next_exposures(
 
     `linear_of_grey` (256,) is the signal at each grey value, without the black level, as a share of full scale.
     The target follows from the exposure with which the picture was taken, not from the newest one. The loop therefore
-    does not oscillate, whatever its lag.
+    does not oscillate for any lag.
     """
     darkest = float(linear_of_grey[linear_of_grey > 0][0]) / 2  # a black pixel may have up to half a grey value
     measured = max(_brightness(loop, grey, linear_of_grey), darkest)

@@ -295,7 +295,7 @@ def imu(
 ) -> Any:
     """A sensor_msgs/Imu with the angular velocity (3,) and the acceleration (3,) of one reading.
 
-    `variances` are those of an axis of the gyroscope and of the accelerometer; 0 if they are unknown.
+    `variances` are the variance of the gyroscope and that of the accelerometer, per axis; 0 if they are unknown.
     """
     orientation = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
     gyro_variance, accel_variance = variances

@@ -15,7 +15,7 @@ from vobench.suite.suite_spec import EXACT, Rendering, TruthNoise, Window
 from vobench.suite.trajectory import TrajectorySpec
 
 AXES = ("scene", "lighting", "rig", "trajectory", "camera")
-CALIBRATION_STREAM = 7_301  # gives calibration errors a random stream of their own
+CALIBRATION_STREAM = 7_301  # separates calibration errors from the other random streams of a seed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,7 +28,7 @@ class Case:
     `replayed` is the replayed trajectory as TUM text, None for a trajectory that is generated.
     `truth` lists the channels of per-pixel ground truth to record, such as depth.
     `truth_noise` is the error that is added to the ground-truth trajectory; it is EXACT by default.
-    `frames` is the range of frames to keep; None keeps all frames.
+    `frames` (first, end) is the range of frames that the sequence contains, without `end`; None means all frames.
     `seed` is the seed of the suite.
     `scenario` and `severity` are set only for a case of a scenario.
     """
@@ -56,12 +56,12 @@ class Case:
         return build(self.scene, self.lighting)
 
     def build_rig(self) -> Rig:
-        """The sensors with their nominal calibration, which is what estimators receive."""
+        """The sensors with the nominal calibration that estimators receive."""
         wheels = self.trajectory.wheels if isinstance(self.trajectory, Wheeled) else None
         return replace(self.rig.build(), wheels=wheels)
 
     def build_true_rig(self) -> Rig:
-        """The sensors with their true calibration, which is what images are rendered with.
+        """The sensors with the true calibration that images are rendered with.
 
         Raises VobenchError under the same conditions as `true_rig`.
         """
