@@ -109,3 +109,9 @@ def test_the_ground_truth_is_a_wide_pale_line_and_estimates_are_thin(plot):
     figure.canvas.draw()
     ratio = errors.get_gridspec().get_width_ratios()
     assert ratio[1] == 1.25 * ratio[0]
+
+
+def test_a_trial_that_ended_well_but_has_no_score_is_named_with_its_status(plot):
+    paths, errors = plot(0.01, None).axes
+    assert labels(paths) == ["ground truth", "start", "e0", "e1 (ok)"]
+    assert labels(errors) == ["e0"]

@@ -124,8 +124,35 @@ def test_one_that_does_not_end_is_ended(make, monkeypatch) -> None:
         make("while True: pass")
 
 
-def test_a_file_without_make_is_named(tmp_path) -> None:
+@pytest.mark.parametrize("is_builtin", [False, True])
+def test_a_file_without_make_is_named_once(tmp_path, monkeypatch, is_builtin) -> None:
     path = tmp_path / "maker.py"
     path.write_text("x = 1\n")
-    with pytest.raises(SuiteError, match=r"has no function make\(seed\)"):
+    if is_builtin:
+        monkeypatch.setattr(maker, "builtin_root", lambda: tmp_path)
+    with pytest.raises(SuiteError) as raised:
         made_by(path, seed=0, scene="theirs")
+    assert str(raised.value) == f"{path}: has no function make(seed)"
+
+
+def test_a_scene_file_that_is_too_large_is_reported_as_such(make, monkeypatch) -> None:
+    monkeypatch.setattr(maker, "SCENE_BYTES", 10)
+    with pytest.raises(SuiteError, match=r"handing back a scene: scene\.bin is larger than 10 bytes$"):
+        make("return wall((0.5, 0.5, 0.5))")
+
+
+def test_a_scene_file_with_a_second_name_is_reported_as_such(make) -> None:
+    with pytest.raises(SuiteError, match=r"handing back a scene: scene\.bin has a second name.*\(a hard link\)$"):
+        make("Path('a').write_bytes(b'x')\nos.link('a', 'scene.bin')\nos._exit(0)")
+
+
+def test_a_maker_is_trusted_with_every_python_file_of_its_folder(tmp_path) -> None:
+    path = tmp_path / "maker.py"
+    other = tmp_path / "parts" / "maker.py"
+    other.parent.mkdir()
+    path.write_text("one\n")
+    other.write_text("two\n")
+    (tmp_path / "table.py").write_text("three\n")
+    names_and_contents = [*maker._sources(path)]
+    assert names_and_contents[:2] == [b"maker.py", b"one\n"]
+    assert names_and_contents[2:] == [b"parts/maker.py", b"two\n", b"table.py", b"three\n"]

@@ -93,6 +93,13 @@ def test_what_make_should_not_return_is_named(returned, sentence) -> None:
         checked(returned)
 
 
+def test_things_and_lights_may_come_from_generators() -> None:
+    sent = _scene()
+    made = checked(((thing for thing in sent.things), sent.materials, (light for light in sent.lights)))
+    assert made.things == sent.things
+    assert made.lights == sent.lights
+
+
 class TestHostile:
     """Each changes one thing in a message that is right."""
 

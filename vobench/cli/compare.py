@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -15,11 +15,9 @@ from vobench.runner.bundle import merged, opened
 from vobench.runner.folder import RunFolder
 from vobench.runner.rescore import check, wrong_truths
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
-REGRESSED = 3  # exit code if something got worse
+REGRESSED = 3  # exit code if a score got worse
 HEADINGS = ("estimator", "verdict", "old", "new", "ratio", "p")
+RATIO_EXPLANATION = "ratio: new loss to old, 1 - lost-aware score"
 
 
 def compare_command(
@@ -32,7 +30,7 @@ def compare_command(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Print what became better or worse between two runs; exit code 3 if something got worse or fails now."""
+    """Print which scores changed between two runs; the exit code is 3 if one got worse or a trial fails now."""
     with (
         opened(old, terminal.warn) as old_folder,
         opened(new, terminal.warn) as new_folder,
@@ -53,15 +51,17 @@ def compare_command(
 
 
 def _checked_board(folder: RunFolder, path: Path) -> Board:
-    """The board of a run whose trials were scored again, with a warning about those that differ."""
-    checked = check(folder, wrong_truths(folder) if path.is_file() else {})
+    """Score the trials of a run again, warn about stored scores that differ, and return the board."""
+    is_bundle = path.is_file()
+    wrong_truth_by_case = wrong_truths(folder) if is_bundle else {}
+    checked = check(folder, wrong_truth_by_case)
     for note in checked.notes:
         terminal.warn(f"{path.name}: {note}")
     return page.run_board(folder, checked.scores)
 
 
 def _print_changes(changes: Sequence[compare.ScoreChange], environment_differences: Sequence[str]) -> None:
-    """Print the totals, the cells that changed, and what the environments have not in common."""
+    """Print the totals, the cells of the board that changed, and the differences between the environments."""
     console = terminal.console()
     totals = [change for change in changes if not change.case]
     cells = [change for change in changes if change.case]
@@ -73,23 +73,20 @@ def _print_changes(changes: Sequence[compare.ScoreChange], environment_differenc
     if changed_cells:
         rows = [[cell.case, *_row(cell)] for cell in changed_cells]
         console.print(terminal.table("ATE % of path", ["case", *HEADINGS], rows))
-    _print_same_count(len(cells) - len(changed_cells), len(cells), console)
+    same_count = len(cells) - len(changed_cells)
+    console.print(f"{same_count} of {len(cells)} cells are the same to the last digit; {RATIO_EXPLANATION}")
     if environment_differences:
         console.print(f"The runs differ in what can change scores: {'; '.join(environment_differences)}")
 
 
-def _print_same_count(same_count: int, cell_count: int, console: "Console") -> None:
-    explanation = "ratio: new loss to old, 1 - lost-aware score"
-    console.print(f"{same_count} of {cell_count} cells are the same to the last digit; {explanation}")
-
-
 def _row(change: compare.ScoreChange) -> list[str]:
+    """The cells of a change, in the order of HEADINGS."""
     p_value = "" if change.p is None else f"{change.p:.2g}"
     return [change.estimator, change.verdict, change.old, change.new, _format_ratio(change), p_value]
 
 
 def _format_ratio(change: compare.ScoreChange) -> str:
-    """The ratio of the losses with its interval, if they are known."""
+    """The ratio of the new loss to the old one, and its confidence interval if there is one."""
     if change.ratio is None:
         return ""
     if not change.interval:

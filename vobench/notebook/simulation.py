@@ -1,6 +1,6 @@
-"""Sequences from Python: simulate a case, render a picture, and open a recorded sequence."""
+"""Simulate a case, render a picture and open a sequence from Python."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class RenderOptions(TypedDict, total=False):
-    """The options of `render`: pose, time and model of the camera, and the engine that draws the picture."""
+    """The options of `render`: the camera's pose, time and sensor, and the rendering engine."""
 
     camera: str
     at_m: tuple[float, float, float]
@@ -39,7 +39,7 @@ class RenderOptions(TypedDict, total=False):
 
 @dataclass(frozen=True, slots=True)
 class Simulation:
-    """A simulated or imported case: its folder, what an estimator may see, and the ground truth."""
+    """A case that was simulated or imported, and the folder `path` that holds its sequence and ground truth."""
 
     case: Case | RecordedCase
     path: Path
@@ -51,7 +51,7 @@ class Simulation:
 
     @property
     def ground_truth(self) -> "Trajectory":
-        """The true path of the left camera."""
+        """The true trajectory of the left camera."""
         return read_trajectory(self.path)
 
     def __repr__(self) -> str:
@@ -65,30 +65,49 @@ def simulate(
     changes: Mapping[str, Any] | None = None,
     quiet: bool = False,
 ) -> Simulation:
-    """Simulate one case, or import it if it is a recording; a case that is in the cache is reused.
+    """Simulate a case, or import it if it is a recording. A cached result is reused.
 
-    `case` is a case of a plan, as `check(suite).plan.cases` has them, or the name or path of a suite, of which `name`
-    is the case: the first one without it. `changes` are those of `run`. Raises SuiteError and UnknownNameError.
+    `case` is a case from `check(suite).plan.cases`, or the name or path of a suite.
+    `name` selects a case of the suite; without it, the first case is used.
+    `changes` modify the suite, as in `run`.
+    Raises SuiteError if the suite is wrong, UnknownNameError if there is no such suite or case, and InputError if
+    `name` or `changes` are given without a suite.
     """
-    if isinstance(case, str):
-        planned = plan(case, changes=changes)
-        chosen = _case_of(planned.cases, name)
-    elif name or changes:
-        raise InputError("name and changes apply to a suite; a case of a plan already has both")
-    else:
-        chosen = case
-    recordings: dict[str, Recording] = {}
-    if isinstance(chosen, RecordedCase):
-        from vobench.runner.import_recording import read_case
-
-        recordings = {chosen.name: read_case(chosen)}
-    tasks = sequence_tasks(chosen, recordings)
+    chosen = _chosen_case(case, name, changes)
+    tasks = sequence_tasks(chosen, _recordings(chosen))
     folder = perform_tasks(tasks, display=choose_display(is_quiet=quiet))
     return Simulation(chosen, folder)
 
 
+def _chosen_case(
+    case: Case | RecordedCase | str, name: str | None, changes: Mapping[str, Any] | None
+) -> Case | RecordedCase:
+    """The given case, or the case of the given suite that has this name."""
+    if not isinstance(case, str):
+        if name or changes:
+            raise InputError("name and changes apply to a suite; a case of a plan already has both")
+        return case
+
+    cases = plan(case, changes=changes).cases
+    case_by_name = {each.name: each for each in cases}
+    if name is None:
+        return next(iter(case_by_name.values()))
+    if name not in case_by_name:
+        raise UnknownNameError(unknown_name_sentence("case", name, list(case_by_name)))
+    return case_by_name[name]
+
+
+def _recordings(case: Case | RecordedCase) -> "dict[str, Recording]":
+    """The recording of a recorded case by the case's name; a simulated case has none."""
+    if not isinstance(case, RecordedCase):
+        return {}
+    from vobench.runner.import_recording import read_case
+
+    return {case.name: read_case(case)}
+
+
 def render(scene: str, **options: Unpack[RenderOptions]) -> "NDArray[np.uint8]":
-    """A picture (H, W, 3) uint8 of a scene in red, green and blue, as `vobench render` draws it.
+    """An RGB picture (H, W, 3) of a scene, the same that `vobench render` draws.
 
     `options` are the keywords of `RenderOptions`: camera, at_m, yaw_deg, pitch_deg, time_s, sensor, gain, engine,
     samples. Raises UnknownNameError, InputError and MissingDependencyError.
@@ -99,15 +118,7 @@ def render(scene: str, **options: Unpack[RenderOptions]) -> "NDArray[np.uint8]":
 
 
 def read_sequence(folder: Path | str) -> "Sequence":
-    """The pictures and readings of a sequence, which are read on access. Raises SequenceError."""
+    """Open the sequence in a folder; its pictures and readings are read on access. Raises SequenceError."""
     from vobench.sequence import Sequence
 
     return Sequence.open(Path(folder))
-
-
-def _case_of(cases: Collection[Case | RecordedCase], name: str | None) -> Case | RecordedCase:
-    by_name = {case.name: case for case in cases}
-    chosen = next(iter(by_name)) if name is None else name
-    if chosen not in by_name:
-        raise UnknownNameError(unknown_name_sentence("case", chosen, list(by_name)))
-    return by_name[chosen]

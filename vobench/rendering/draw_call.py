@@ -1,4 +1,4 @@
-"""Single draw calls: a batch of triangles, the sky, and the mean of samples; with the uniforms that they read."""
+"""OpenGL draw calls for a batch of triangles, the sky and the mean of samples, with the uniforms that they read."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -26,7 +26,7 @@ from vobench.rendering.uniform_block import BATCH, PASS
 from vobench.rendering.view import Box, PinholeView, Plane
 from vobench.scene.material import Rgb, emitted_cd_m2, inner_reflectance
 
-# Texture units, numbered as in the shaders.
+# Texture units; the shaders use the same numbers.
 BODY_UNIT = GL.GL_TEXTURE0
 LIGHT_UNIT = GL.GL_TEXTURE0 + 1
 LAYERS_UNIT = GL.GL_TEXTURE0 + 2
@@ -35,35 +35,39 @@ PROBE_UNIT = GL.GL_TEXTURE0 + 4
 
 LAYERS = GL.GL_TEXTURE_2D_ARRAY
 CLIP_MARGIN_PX = 1 / 8
-Block = NDArray[np.void]  # a single value () of a uniform block's type
-FADE = 0.1  # of roughness, over which the probe gives way
+Block = NDArray[np.void]  # the values of one uniform block, a structured array of shape ()
+FADE = 0.1  # the range of roughness below PROBE_MOST in which the share of the probe falls to 0
 
 
 class DrawCalls:
-    """Single draw calls, with the programs and state they share, as long as their context is current."""
+    """The draw calls of a scene, and the shader programs and buffers that they share.
+
+    They can be used while the OpenGL context in which they were created is current. `abilities` are the preprocessor
+    names of each batch's shader.
+    """
 
     def __init__(self, geometry: Geometry, light: LightTexture) -> None:
         self._program = cache(ShaderProgram)
         self._light = light
         self._batches = geometry.batches
-        self._poses = b""
+        self._uploaded_poses = b""
         self._textures = _textures(geometry.batches)
         self._elements = Elements(geometry.vertices, geometry.indices)
         self._pass_values = np.zeros((), PASS.dtype)
         self._pass = Blocks(PASS.binding, self._pass_values[None])
 
         textures = [self._textures.get(id(batch.material.texture)) for batch in self._batches]
-        pairs = list(zip(self._batches, textures, strict=True))
-        self.abilities = [_abilities(batch, texture) for batch, texture in pairs]
-        self._batch_values = np.zeros(len(pairs), BATCH.dtype)
-        for batch, texture in pairs:
+        batches_with_texture = list(zip(self._batches, textures, strict=True))
+        self.abilities = [_abilities(batch, texture) for batch, texture in batches_with_texture]
+        self._batch_values = np.zeros(len(self._batches), BATCH.dtype)
+        for batch, texture in batches_with_texture:
             _set_batch(self._batch_values[batch.index], batch, texture)
         self._block = Blocks(BATCH.binding, self._batch_values)
 
-        self._vertices = GL.glGenVertexArrays(1)
-        for ability in (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE):
-            GL.glEnable(ability)
-        # Nearness instead of depth: see view.
+        self._empty_vertex_array = GL.glGenVertexArrays(1)
+        for capability in (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE):
+            GL.glEnable(capability)
+        # The depth buffer holds nearness, which is 0 at infinity; see `view`.
         GL.glClipControl(GL.GL_LOWER_LEFT, GL.GL_ZERO_TO_ONE)
         GL.glDepthFunc(GL.GL_GEQUAL)
         GL.glClearDepth(0.0)
@@ -75,7 +79,7 @@ class DrawCalls:
         weights: Rgb,
         probe: Probe | None,
     ) -> None:
-        """Set what all draw calls of one view share."""
+        """Set the uniforms, textures and state that all draw calls of a view share."""
         values = self._pass_values
         values[...] = np.zeros((), PASS.dtype)
         _set_view(values, view, canvas, weights)
@@ -85,16 +89,16 @@ class DrawCalls:
         self._pass.update(0, values)
         self._pass.use(0)
         self._move(view)
-        # Each mirror swaps left and right.
+        # A mirror swaps left and right, and with them the orientation of front faces.
         GL.glFrontFace(GL.GL_CW if view.depth % 2 else GL.GL_CCW)
         bind(LIGHT_UNIT, self._light.id)
 
     def _move(self, view: PinholeView) -> None:
-        """Put movers where they are."""
+        """Upload the poses of moving objects, if they have changed."""
         poses = np.array(view.T_world_movers).tobytes()
-        if poses == self._poses:
+        if poses == self._uploaded_poses:
             return
-        self._poses = poses
+        self._uploaded_poses = poses
         for batch in self._batches:
             if batch.mover < 0:
                 continue
@@ -112,10 +116,13 @@ class DrawCalls:
         canvas: Canvas,
         *abilities: str,
     ) -> None:
-        """Draw what is visible of a batch; the reflections that it is able to show must be bound."""
+        """Draw the visible triangles of a batch. The textures of its reflections must be bound.
+
+        `abilities` are further preprocessor names for the shader.
+        """
         batch_abilities = self.abilities[batch.index]
-        names = [*abilities, "IS_MIRRORED"] if view.mirror else abilities
-        program = self._program("surface", "surface", *names, *batch_abilities, *canvas.abilities)
+        view_abilities = ["IS_MIRRORED"] if view.mirror else []
+        program = self._program("surface", "surface", *abilities, *view_abilities, *batch_abilities, *canvas.abilities)
         program.use()
         self._block.use(batch.index)
         material = batch.material
@@ -129,17 +136,21 @@ class DrawCalls:
             self._elements.draw(runs, canvas.layers)
 
     def background(self, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
-        """Draw the skies wherever nothing has been drawn."""
-        # Nothing has been drawn there yet, so that several skies add up.
+        """Draw the skies in all pixels without a surface."""
+        # These pixels are still black, so additive blending sums the skies.
         GL.glEnable(GL.GL_BLEND)
         GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
         for gradation, scatter, sun, colour in view.skies:
             is_mono = canvas.abilities != ()
-            mono = np.array([colour[:3] @ weights, 0, 0, 0])
-            shown = mono if is_mono else colour
+            mono_colour = np.array([colour[:3] @ weights, 0, 0, 0])
+            canvas_colour = mono_colour if is_mono else colour
             program = self._program("background", "background")
             program.use(
-                world_from_screen=view.world_from_screen, gradation=gradation, scatter=scatter, sun=sun, colour=shown
+                world_from_screen=view.world_from_screen,
+                gradation=gradation,
+                scatter=scatter,
+                sun=sun,
+                colour=canvas_colour,
             )
             self._cover(canvas.layers)
         GL.glDisable(GL.GL_BLEND)
@@ -151,15 +162,15 @@ class DrawCalls:
         box: Box,
         share: float,
     ) -> None:
-        """Add the mean of a target's samples in a box, times a share, to a total."""
+        """Add the mean of a target's samples, multiplied by `share`, to a total; only pixels in the box change."""
         total.begin(box)
         canvas = target.canvas
         bind(LAYERS_UNIT, canvas.colour, LAYERS)
-        is_mixed = total.channels == 1 and canvas.abilities == ()
-        weights = target.weights if is_mixed else np.ones(3)
-        defines = ["IS_MONO"] if is_mixed else []
+        is_colour_to_mono = total.channels == 1 and canvas.abilities == ()
+        channel_weights = target.weights if is_colour_to_mono else np.ones(3)
+        defines = ["IS_MONO"] if is_colour_to_mono else []
         program = self._program("fullscreen", "mean", *defines)
-        weight = share / canvas.layers * np.array([*weights, 0.0])
+        weight = share / canvas.layers * np.array([*channel_weights, 0.0])
         program.use(count=canvas.layers, weight=weight)
         GL.glEnable(GL.GL_BLEND)
         GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
@@ -169,9 +180,9 @@ class DrawCalls:
         GL.glDisable(GL.GL_BLEND)
 
     def _cover(self, copies: int) -> None:
-        """Draw a triangle over the whole picture by the program in use."""
+        """Cover the whole picture with one triangle, drawn by the current program."""
         GL.glDisable(GL.GL_CULL_FACE)
-        GL.glBindVertexArray(self._vertices)
+        GL.glBindVertexArray(self._empty_vertex_array)
         GL.glDrawArraysInstanced(GL.GL_TRIANGLES, 0, 3, copies)
         GL.glEnable(GL.GL_CULL_FACE)
 
@@ -182,7 +193,10 @@ class DrawCalls:
         *,
         is_grey: bool,
     ) -> None:
-        """Draw both sides over what is behind them: alpha, or the second colour, is the share that shines through."""
+        """Draw both sides of a pane over the surfaces behind it.
+
+        The transmittance is the alpha of the colour if the pane is grey, otherwise the second colour output.
+        """
         GL.glDisable(GL.GL_CULL_FACE)
         GL.glDepthMask(GL.GL_FALSE)
         GL.glEnable(GL.GL_BLEND)
@@ -193,35 +207,50 @@ class DrawCalls:
         GL.glEnable(GL.GL_CULL_FACE)
 
 
-MOST_TEXELS = 1 << 26  # of all textures: half a gigabyte in colour
+MOST_TEXELS = 1 << 26  # of all textures together; in colour they occupy half a gigabyte
 
 
 def _textures(batches: Sequence[Batch]) -> dict[int, SurfaceTexture]:
-    """Every texture by its identity; the finest of them are coarser where all together are too large."""
-    textures = {}
+    """The textures of all batches by identity, reduced in resolution if they have too many texels together."""
+    texture_by_id = {}
     for batch in batches:
         for texture in (batch.material.texture, batch.material.emission_texture):
             if texture:
-                textures[id(texture)] = texture
-    pixels = {key: texture.pixels() for key, texture in textures.items()}
-    sizes = np.array([np.prod(picture.shape[:2]) for picture in pixels.values()], float)
-    shrink = np.zeros(len(pixels), int)
-    while (sizes / 4.0**shrink).sum() > MOST_TEXELS:
-        shrink[np.argmax(sizes / 4.0**shrink)] += 1
-    return {key: SurfaceTexture(pixels[key], shrink=int(n)) for key, n in zip(pixels, shrink, strict=True)}
+                texture_by_id[id(texture)] = texture
+    pixels_by_id = {key: texture.pixels() for key, texture in texture_by_id.items()}
+
+    texel_counts = np.array([np.prod(pixels.shape[:2]) for pixels in pixels_by_id.values()], float)
+    halvings = _halvings(texel_counts)
+    surface_textures = {}
+    for (key, pixels), count in zip(pixels_by_id.items(), halvings, strict=True):
+        surface_textures[key] = SurfaceTexture(pixels, shrink=int(count))
+    return surface_textures
+
+
+def _halvings(texel_counts: Array) -> NDArray[np.intp]:
+    """How often to halve the sides of each of N textures so that their texels sum to at most MOST_TEXELS.
+
+    `texel_counts` (N,) are those at full resolution. In each step, the texture with the most texels is halved.
+    """
+    halvings = np.zeros(len(texel_counts), np.intp)
+    while True:
+        reduced_counts = texel_counts / 4.0**halvings
+        if reduced_counts.sum() <= MOST_TEXELS:
+            return halvings
+        halvings[np.argmax(reduced_counts)] += 1
 
 
 def _abilities(batch: Batch, texture: SurfaceTexture | None) -> tuple[str, ...]:
-    """What the shader needs to know of a batch, as preprocessor names."""
+    """The preprocessor names that adapt the shader to a batch."""
     material = batch.material
-    has_one_colour = len({*material.colour}) == 1
+    has_grey_colour = len({*material.colour}) == 1
     is_body = material.kind == "body"
-    names = {
+    is_name_set = {
         "IS_PLANAR": batch.mirror is not None,
         "IS_PANE": batch.is_pane,
         "IS_MIRROR": material.kind == "mirror" and not batch.is_lamp,
         "IS_LAMP": batch.is_lamp,
-        "IS_GREY": has_one_colour and (texture is None or texture.is_grey),
+        "IS_GREY": has_grey_colour and (texture is None or texture.is_grey),
         "HAS_GLOSS": batch.has_gloss,
         "HAS_METAL": material.metal > 0,
         "HAS_TEXTURE": is_body and material.texture is not None and not batch.is_lamp,
@@ -230,7 +259,7 @@ def _abilities(batch: Batch, texture: SurfaceTexture | None) -> tuple[str, ...]:
         "HAS_EMISSION": batch.is_lamp or max(material.emission_cd_m2) > 0,
         "HAS_EMISSION_TEXTURE": material.emission_texture is not None,
     }
-    return tuple(name for name, has in names.items() if has)
+    return tuple(name for name, is_set in is_name_set.items() if is_set)
 
 
 def _set_view(
@@ -239,13 +268,14 @@ def _set_view(
     canvas: Canvas,
     weights: Rgb,
 ) -> None:
+    """Set the uniforms of the view, except those of the probe."""
     values["direct"] = view.direct.T
     values["eye"] = view.eye_m
     if view.mirror is not None:
-        # Cut a little behind the mirror: what goes through it leaves no gap along the cut.
+        # Clip slightly behind the mirror, so that surfaces that cross it leave no gap.
         focal_px = min(view.camera.fx_px, view.camera.fy_px)
-        pixel_m = view.view_projection[3] / focal_px  # (4,): as a plane, a pixel's width at each point
-        values["clip_plane"] = _coefficients(view.mirror) + pixel_m * CLIP_MARGIN_PX
+        pixel_width_m = view.view_projection[3] / focal_px  # (4,), a linear function of the homogeneous point
+        values["clip_plane"] = _coefficients(view.mirror) + pixel_width_m * CLIP_MARGIN_PX
     values["lod_bias"][: canvas.layers] = canvas.grid.lod_bias
     for index, plane in enumerate(view.mirrors):
         values["mirrors"][index] = _coefficients(plane)
@@ -255,6 +285,7 @@ def _set_view(
 
 
 def _set_probe(values: Block, view: PinholeView, probe: Probe) -> None:
+    """Set the uniforms of the probe and of the glints."""
     values["probe_centre"] = probe.centre_m
     values["probe_low"] = probe.low_m
     values["probe_high"] = probe.high_m
@@ -266,7 +297,7 @@ def _set_probe(values: Block, view: PinholeView, probe: Probe) -> None:
 
 
 def _coefficients(plane: Plane) -> Array:
-    """The plane as (4,): its normal and its offset."""
+    """The coefficients (4,) of a plane: its normal, then its offset in metres."""
     return np.array([*plane.normal, plane.offset_m])
 
 
@@ -275,47 +306,65 @@ def _set_batch(
     batch: Batch,
     texture: SurfaceTexture | None,
 ) -> None:
-    material = batch.material
+    """Set the uniforms of a batch."""
     values["model"] = np.eye(4)
+    if batch.mirror:
+        values["plane"] = _coefficients(batch.mirror.plane)
+    values["cutout"] = batch.material.cutout or 0.0
+    _set_colour(values, batch, texture)
+    _set_emission(values, batch)
+    _set_coat(values, batch)
+    _set_gloss(values, batch)
 
+
+def _set_colour(values: np.void, batch: Batch, texture: SurfaceTexture | None) -> None:
+    material = batch.material
     texture_scale = texture.scale if texture else 1.0
     scale = texture_scale if material.kind == "body" else material.tint
     values["colour"] = scale * np.array(material.colour)
     values["tint"] = material.tint
 
-    # A lamp's light is on the map: its texture only says how that is spread.
-    emitted = emitted_cd_m2(material)
-    spread = np.divide(material.emission_cd_m2, emitted, out=np.ones(3), where=emitted > 0)
-    values["emission"] = spread if batch.is_lamp else material.emission_cd_m2
+
+def _set_emission(values: np.void, batch: Batch) -> None:
+    material = batch.material
+    # The light map contains a lamp's mean emission; its texture only distributes it over the lamp.
+    mean_cd_m2 = emitted_cd_m2(material)
+    relative_emission = np.divide(material.emission_cd_m2, mean_cd_m2, out=np.ones(3), where=mean_cd_m2 > 0)
+    values["emission"] = relative_emission if batch.is_lamp else material.emission_cd_m2
     values["emission_repeats"] = 1.0
     if material.emission_texture:
         values["emission_repeats"] = material.tile_m / material.emission_texture.tile_m
 
-    if batch.mirror:
-        values["plane"] = _coefficients(batch.mirror.plane)
-    eta = material.eta
+
+def _set_coat(values: np.void, batch: Batch) -> None:
+    """Set the refraction of light that enters and leaves a body through its coat."""
+    eta = batch.material.eta
     inner = inner_reflectance(eta)
     values["eta"] = eta
     values["inner_reflectance"] = inner
     values["inverse_eta_squared"] = 1 / eta**2
     values["arriving_over_entering"] = 1 / ((1 - inner) * eta**2)
 
-    # How far a rough coat's facets let its reflectance rise towards grazing: Lagarde (2011).
-    normal_reflectance = ((1 - eta) / (1 + eta)) ** 2
+
+def _set_gloss(values: np.void, batch: Batch) -> None:
+    """Set the reflectance of a surface, its roughness and the share of the probe."""
+    material = batch.material
+    # Rougher surfaces reflect less at grazing incidence: Lagarde (2011).
+    normal_reflectance = ((1 - material.eta) / (1 + material.eta)) ** 2
     dullness = 0.0 if batch.mirror else np.sqrt(material.roughness)
     grazing_reflectance = max(1 - dullness, normal_reflectance)
-    values["metal"] = material.metal
+    values["normal_reflectance"] = normal_reflectance
     values["grazing_rise"] = (grazing_reflectance - normal_reflectance) / (1 - normal_reflectance)
-    values["cutout"] = material.cutout or 0.0
+    values["metal"] = material.metal
+
     values["roughness"] = material.roughness
     values["probe_level"] = level_of(material.roughness)
     values["probe_share"] = probe_share(batch)
-    values["normal_reflectance"] = normal_reflectance
 
 
 def probe_share(batch: Batch) -> float:
-    """How much a batch shows of the probe instead of what lights it."""
+    """The share of a batch's reflections that is read from the probe; it falls to 0 where roughness is PROBE_MOST."""
     if batch.material.kind != "body":
         return 1.0
-    below = PROBE_MOST - batch.material.roughness
-    return float(np.clip(below / FADE, 0, 1))
+    margin = PROBE_MOST - batch.material.roughness
+    return float(np.clip(margin / FADE, 0, 1))

@@ -1,4 +1,4 @@
-"""The initial layout of a recording in Rerun: its views, and where the 3-D view looks from."""
+"""The initial layout of a recording in Rerun: its views, and the viewpoint of the 3-D view."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -11,7 +11,7 @@ from vobench.geometry.se3 import Array
 
 FRAME_TIMELINE = "frame"
 
-# Entities: what a recording holds and the views below show.
+# The paths of entities in a recording.
 WORLD = "world"
 TRUTH_PATH = f"{WORLD}/ground_truth/path"
 SCENE = f"{WORLD}/scene"
@@ -26,7 +26,7 @@ SUMMARY = "summary"
 STATS = "stats"
 COSTS = "costs"
 
-# The colour of each estimator of a recording, in their order.
+# The names and RGB values of the estimators' colours; the first estimator has the first colour.
 ESTIMATOR_COLORS = {
     "orange": (255, 150, 40),
     "blue": (80, 160, 255),
@@ -36,13 +36,13 @@ ESTIMATOR_COLORS = {
 }
 GRID_COLOR = (255, 255, 255, 24)
 EYE_PITCH_DEG = 38.0
-EYE_DISTANCE_PER_RADIUS = 1.6  # fills the view with Rerun's default field of view, with a margin for frusta
+EYE_DISTANCE_PER_RADIUS = 1.6  # paths and camera frusta fill Rerun's default field of view
 FRUSTUM_PER_RADIUS = 0.16
 LEAST_RADIUS_M = 0.25
 FRAMES_AROUND_FOCUS = 15
-REPLAY_FPS = 5.0  # slow enough to see single frames
+REPLAY_FPS = 5.0  # slow enough to see each frame
 
-# Shares of height and width.
+# Relative heights of views in a column, and relative widths of columns.
 SPACE_SHARE = 6.0
 PLOT_SHARE = 2.2
 STATUS_SHARE = 1.2
@@ -54,7 +54,7 @@ COLUMN_SHARES = [3, 2]
 
 
 class Entities:
-    """The entities of one estimator in a recording."""
+    """The paths of the entities of one estimator; `label` is the estimator's name in the recording."""
 
     def __init__(self, label: str) -> None:
         self.path = f"{WORLD}/{label}/path"
@@ -71,7 +71,10 @@ class Entities:
 
 
 def truth_entity(side: str, channel: str) -> str:
-    """The entity of a channel of one camera; not in the world, where a depth image would hide the paths."""
+    """The entity of a channel of per-pixel ground truth from one camera.
+
+    It is outside of WORLD, because a depth image in the 3-D view would hide the paths.
+    """
     return f"truth/{side}/{channel}"
 
 
@@ -85,34 +88,38 @@ def layout(
     has_stats: bool = False,
     has_costs: bool = False,
 ) -> rrb.Blueprint:
-    """The default blueprint for paths (N, 3) and (M, 3); `focus` is a range of frames to start with.
+    """The default blueprint for a true path (N, 3) and an estimated path (M, 3).
 
-    Several estimators have one left picture each. Channels of ground truth have a tab for each camera, and the numbers
-    that an estimator reports and the cost of frames have a plot each.
+    `focus` is the range of frames that is replayed at first; without it, the recording starts paused.
+    `labels` are the names of the estimators. Each has a picture with its tracks.
+    `channels` are the channels of per-pixel ground truth. They are shown in one tab per camera.
+    `has_stats` and `has_costs` add a plot of the numbers that an estimator reports, and of the cost of each frame.
     """
-    run: rrb.Container = rrb.Horizontal(
+    views: rrb.Container = rrb.Horizontal(
         _paths_column(truth_m, estimate_m, labels, has_stats=has_stats, has_costs=has_costs),
         _pictures_column(labels),
         column_shares=COLUMN_SHARES,
     )
     if channels:
-        tabs = [_truth_tab(side, channels) for side in ("left", "right")]
-        run = rrb.Tabs(rrb.Horizontal(run, name="Run"), *tabs, active_tab=0)
+        truth_tabs = [_truth_tab(side, channels) for side in ("left", "right")]
+        views = rrb.Tabs(rrb.Horizontal(views, name="Run"), *truth_tabs, active_tab=0)
     return rrb.Blueprint(
-        run, _time_panel(focus), rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden")
+        views, _time_panel(focus), rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden")
     )
 
 
 def _paths_column(
     truth_m: Array, estimate_m: Array, labels: Sequence[str], *, has_stats: bool, has_costs: bool
 ) -> rrb.Vertical:
-    """The paths in 3-D, and below them plots of errors, statuses and numbers."""
+    """The 3-D view of the paths, with plots of errors, statuses and numbers below it."""
+    shown_m = _near_truth(truth_m, estimate_m)
+    status_share = STATUS_SHARE + STATUS_SHARE_PER_ESTIMATOR * (len(labels) - 1)
     views: list[rrb.View | rrb.Container] = [
-        _space(truth_m, _near_truth(truth_m, estimate_m), labels),
+        _space(truth_m, shown_m, labels),
         rrb.Horizontal(_plot(POSITION_ERROR, "Position error"), _plot(ROTATION_ERROR, "Rotation error")),
         rrb.StateTimelineView(origin=STATUS, name="Status of each frame"),
     ]
-    shares = [SPACE_SHARE, PLOT_SHARE, STATUS_SHARE + STATUS_SHARE_PER_ESTIMATOR * (len(labels) - 1)]
+    shares = [SPACE_SHARE, PLOT_SHARE, status_share]
     plots = []
     if has_stats:
         plots.append(rrb.TimeSeriesView(origin=STATS, name="Numbers reported by the estimator"))
@@ -125,7 +132,7 @@ def _paths_column(
 
 
 def _pictures_column(labels: Sequence[str]) -> rrb.Vertical:
-    """The pictures with tracks, and below them the scores."""
+    """The pictures with tracks, with the scores below them."""
     pictures = [_left_picture(label, labels) for label in labels]
     if len(labels) == 1:
         pictures.append(rrb.Spatial2DView(origin=TRUTH_RIGHT, name="Right"))
@@ -135,13 +142,14 @@ def _pictures_column(labels: Sequence[str]) -> rrb.Vertical:
 
 
 def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
+    """A plot of the entities below `origin` over time."""
     legend = rrb.PlotLegend(corner=rrb.Corner2D.RightTop)
     axis = rrb.ScalarAxis(zoom_lock=True)
     return rrb.TimeSeriesView(origin=origin, name=name, axis_y=axis, plot_legend=legend)
 
 
 def _left_picture(label: str, labels: Sequence[str]) -> rrb.Spatial2DView:
-    """The left picture with the tracks of one estimator."""
+    """The left picture with the tracks of one of the estimators."""
     hidden = [f"- {Entities(other).tracks}/**" for other in labels if other != label]
     owner = f" of {label}" if len(labels) > 1 else ""
     name = f"Left, tracks{owner}: inliers green, outliers red, true epipolar lines white"
@@ -149,13 +157,16 @@ def _left_picture(label: str, labels: Sequence[str]) -> rrb.Spatial2DView:
 
 
 def _truth_tab(side: str, channels: Sequence[str]) -> rrb.Grid:
-    """The channels of one camera, a view for each."""
+    """The channels of per-pixel ground truth from one camera, each in a view."""
     views = [rrb.Spatial2DView(origin=truth_entity(side, channel), name=channel) for channel in channels]
     return rrb.Grid(*views, name=f"Truth, {side}")
 
 
 def _space(truth_m: Array, shown_m: Array, labels: Sequence[str]) -> rrb.Spatial3DView:
-    """The 3-D view of the paths, named by their colours."""
+    """The 3-D view of the paths, from a viewpoint at which the points `shown_m` (K, 3) fill it.
+
+    Its name is a legend of the colours.
+    """
     eye_m, target_m = eye_and_target(shown_m)
     estimates = [f"{label} {color}" for label, color in zip(labels, ESTIMATOR_COLORS, strict=False)]
     grid: Any = rrb.LineGrid3D(
@@ -174,9 +185,9 @@ def _space(truth_m: Array, shown_m: Array, labels: Sequence[str]) -> rrb.Spatial
 
 
 def _time_panel(focus: tuple[int, int] | None) -> rrb.TimePanel:
-    """The time line `frame`: paused at its start, or replaying the frames around a failure.
+    """The panel of the timeline `frame`, which is paused at its start or replays the frames of `focus`.
 
-    A blueprint cannot place the time cursor, but a playing loop moves it to where the loop starts.
+    A blueprint cannot set the time cursor. A loop that plays moves it to the loop's start.
     """
     if focus is None:
         return rrb.TimePanel(timeline=FRAME_TIMELINE, play_state="paused", state="collapsed")
@@ -194,37 +205,49 @@ def _time_panel(focus: tuple[int, int] | None) -> rrb.TimePanel:
 def eye_and_target(points_m: Array) -> tuple[Array, Array]:
     """The position of the eye and the point that it looks at, so that points (N, 3) fill the view.
 
-    The eye is beside their longer side, on the side of -y.
+    The target is the centre of the points' bounding box.
     """
     target_m = (points_m.min(0) + points_m.max(0)) / 2
+    distance_m = EYE_DISTANCE_PER_RADIUS * _radius_m(points_m)
+    eye_m = target_m + distance_m * _direction_to_eye(points_m)
+    return eye_m, target_m
+
+
+def _direction_to_eye(points_m: Array) -> Array:
+    """The unit vector (3,) from points (N, 3) to the eye.
+
+    Seen from above, it is perpendicular to the points' principal axis and points towards -y.
+    """
     covariance = np.cov(points_m[:, :2].T, bias=True)
-    _, axes = np.linalg.eigh(covariance)
-    shorter_axis = axes[:, 0]
-    side = shorter_axis * (-1.0 if shorter_axis[1] > 0 else 1.0)
+    _, axes = np.linalg.eigh(covariance)  # columns, by increasing variance
+    minor_axis = axes[:, 0]
+    sign = -1.0 if minor_axis[1] > 0 else 1.0
     pitch_rad = np.deg2rad(EYE_PITCH_DEG)
-    horizontal = np.cos(pitch_rad) * side
-    direction = np.array([*horizontal, np.sin(pitch_rad)])
-    return target_m + EYE_DISTANCE_PER_RADIUS * _radius_m(points_m) * direction, target_m
+    horizontal = np.cos(pitch_rad) * (minor_axis * sign)
+    return np.array([*horizontal, np.sin(pitch_rad)])
 
 
 def grid_spacing_m(extent_m: float) -> float:
-    """A power of ten that divides `extent_m` into 3 to 30 parts."""
+    """The power of ten that divides `extent_m` into 3 to 30 parts."""
     return float(10.0 ** np.floor(np.log10(extent_m / 3)))
 
 
 def frustum_m(truth_m: Array) -> float:
-    """The length of a drawn camera, which is visible but does not hide a path (N, 3)."""
+    """The length of a drawn camera frustum, in proportion to the size of the true path (N, 3)."""
     return FRUSTUM_PER_RADIUS * _radius_m(truth_m)
 
 
 def _radius_m(points_m: Array) -> float:
-    """Half the diagonal of the bounding box, at least LEAST_RADIUS_M so that a stationary robot is framed, too."""
+    """Half the diagonal of the bounding box of points (N, 3), at least LEAST_RADIUS_M for a stationary robot."""
     diagonal_m = float(np.linalg.norm(np.ptp(points_m, axis=0)))
     return max(LEAST_RADIUS_M, diagonal_m / 2)
 
 
 def _near_truth(truth_m: Array, estimate_m: Array) -> Array:
-    """The truth and the part of the estimate near it (K, 3), so that a diverged estimate does not shrink the rest."""
+    """The true path (N, 3) and the nearby points of the estimated path (M, 3), together (K, 3).
+
+    Distant points are left out, so that a diverged estimate does not shrink the other paths in the view.
+    """
     centre_m = (truth_m.min(0) + truth_m.max(0)) / 2
     reach_m = 2 * _radius_m(truth_m)
     is_near = np.linalg.norm(estimate_m - centre_m, axis=1) <= reach_m

@@ -1,12 +1,13 @@
-"""The paths and errors of several estimators on one case, as one figure."""
+"""A figure of the paths and position errors of several estimators on one case."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from io import BytesIO
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from vobench.errors import InputError
 from vobench.report.drive_plot import SETTINGS
@@ -22,19 +23,20 @@ if TYPE_CHECKING:
     from vobench.metric.score import Score
     from vobench.trajectory.trajectory import Trajectory
 
-# Okabe and Ito (2008): colours that colour-blind readers can distinguish; black is for the ground truth.
+# Okabe and Ito (2008): colours that colour-blind readers can distinguish. Their black is used for the ground truth.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#F0E442")
 LINES = ("-", "--", "-.", ":")
 SIZE_INCHES = (9.0, 3.6)
 INLINE_DPI = 110
-MARGIN = 1.5  # the side of the plot of paths, relative to the longer side of the ground truth
-LEAST_SPAN_M = 0.05  # from the centre of that plot to its edge
-LOGARITHMIC_FROM = 20.0  # the ratio of median errors above which their axis is logarithmic
+RELATIVE_PATH_SIZE = 1.5  # side of the square path plot, relative to the longer side of the ground truth
+LEAST_HALF_SIDE_M = 0.05  # of the path plot, for a stationary robot
+LOGARITHMIC_FROM = 20.0  # ratio of the largest to the smallest median error above which the axis is logarithmic
+LINE_WIDTH = 1.2  # points
 MM_PER_M = 1e3
 
 
 class InlineFigure(Figure):
-    """A figure that Jupyter shows as a picture, whether pyplot has been imported or not."""
+    """A figure that Jupyter displays as a picture, even if pyplot has not been imported."""
 
     def _repr_png_(self) -> bytes:
         buffer = BytesIO()
@@ -43,10 +45,10 @@ class InlineFigure(Figure):
 
 
 def plot_case(folder: RunFolder, trials: Sequence[TrialScore]) -> Figure:
-    """Draw ground truth and aligned estimates in top view, and the position error over time.
+    """Plot the ground truth and the aligned estimates from above, and the position errors over time.
 
-    `trials` are of one case. An estimate that cannot be scored is listed in the legend but not drawn. Raises InputError
-    if there is no trial.
+    `trials` belong to one case. An estimate that cannot be scored appears only in the legend.
+    Raises InputError if there are no trials.
     """
     if not trials:
         raise InputError("there is no trial to plot")
@@ -58,67 +60,90 @@ def plot_case(folder: RunFolder, trials: Sequence[TrialScore]) -> Figure:
         figure.suptitle(case, fontweight="bold", x=0.01, ha="left")
         _draw_truth(path_axes, truth)
         for index, trial in enumerate(trials):
-            colour = COLOURS[index % len(COLOURS)]
-            line = LINES[index // len(COLOURS) % len(LINES)]
+            style = _style(index)
             scored = _score(folder, trial, truth)
-            _draw_trial(path_axes, error_axes, trial, scored, colour=colour, line=line)
+            label = _label(trial, is_scored=scored is not None)
+            if scored is None:
+                path_axes.plot([], [], **style, label=label)
+                continue
+            _draw_path(path_axes, scored, style, label)
+            _draw_error(error_axes, scored, style, label)
         _finish_path(path_axes, truth)
         _finish_errors(error_axes)
     return figure
 
 
+def _style(index: int) -> dict[str, Any]:
+    """The colour and line style of a trial; the line style changes once all colours are used."""
+    colour = COLOURS[index % len(COLOURS)]
+    line = LINES[index // len(COLOURS) % len(LINES)]
+    return {"color": colour, "ls": line}
+
+
+def _label(trial: TrialScore, *, is_scored: bool) -> str:
+    """The name of the estimator, followed by the status of a trial that did not succeed or has no score."""
+    if trial.status == "ok" and is_scored:
+        return trial.estimator
+    return f"{trial.estimator} ({trial.status})"
+
+
 def _score(folder: RunFolder, trial: TrialScore, truth: "Trajectory") -> "Score | None":
+    """The score of a trial's estimate; None if it cannot be scored."""
     place = folder.estimate(trial.case, trial.estimator, trial.repeat)
     return score_estimate(read_tum(place / ESTIMATE), truth, trial.claims)
 
 
 def _draw_truth(axes: "Axes", truth: "Trajectory") -> None:
+    """Draw the true path from above, and a dot at its start."""
     x_m, y_m, _ = truth.positions_m.T
     axes.plot(x_m, y_m, color="black", lw=2.2, alpha=0.45, label="ground truth")
     axes.plot(x_m[:1], y_m[:1], "o", color="black", ms=4, label="start")
 
 
-def _draw_trial(
-    path_axes: "Axes",
-    error_axes: "Axes",
-    trial: TrialScore,
-    scored: "Score | None",
-    *,
-    colour: str,
-    line: str,
-) -> None:
-    if scored is None:
-        path_axes.plot([], [], color=colour, ls=line, label=f"{trial.estimator} ({trial.status})")
-        return
-    name = trial.estimator if trial.status == "ok" else f"{trial.estimator} ({trial.status})"
+def _draw_path(axes: "Axes", scored: "Score", style: Mapping[str, Any], label: str) -> None:
+    """Draw an aligned estimate from above."""
     x_m, y_m, _ = scored.aligned_positions_m.T
-    path_axes.plot(x_m, y_m, color=colour, ls=line, lw=1.2, label=name)
+    axes.plot(x_m, y_m, lw=LINE_WIDTH, label=label, **style)
+
+
+def _draw_error(axes: "Axes", scored: "Score", style: Mapping[str, Any], label: str) -> None:
+    """Draw the position error of an estimate over time."""
     time_s = scored.gt_t_ns / NS_PER_S
     error_mm = MM_PER_M * scored.ate_trans_m
-    error_axes.plot(time_s, error_mm, color=colour, ls=line, lw=1.2, label=name)
+    axes.plot(time_s, error_mm, lw=LINE_WIDTH, label=label, **style)
 
 
 def _finish_path(axes: "Axes", truth: "Trajectory") -> None:
-    """Show what is near the ground truth: a diverged estimate leaves the plot instead of shrinking the rest."""
-    low_m = truth.positions_m[:, :2].min(axis=0)
+    """Label the axes, and limit them to a square around the ground truth.
+
+    A diverged estimate leaves the square instead of shrinking the other paths.
+    """
+    low_m = truth.positions_m[:, :2].min(axis=0)  # (2,)
     high_m = truth.positions_m[:, :2].max(axis=0)
-    centre_m = (low_m + high_m) / 2
+    x_m, y_m = (low_m + high_m) / 2
     longer_side_m = float((high_m - low_m).max())
-    half_m = max(longer_side_m * MARGIN / 2, LEAST_SPAN_M)
+    half_side_m = max(longer_side_m * RELATIVE_PATH_SIZE / 2, LEAST_HALF_SIDE_M)
     axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.set_xlim(centre_m[0] - half_m, centre_m[0] + half_m)
-    axes.set_ylim(centre_m[1] - half_m, centre_m[1] + half_m)
+    axes.set_xlim(x_m - half_side_m, x_m + half_side_m)
+    axes.set_ylim(y_m - half_side_m, y_m + half_side_m)
     axes.set_aspect("equal", adjustable="box")
     axes.legend(loc="best")
 
 
 def _finish_errors(axes: "Axes") -> None:
-    """A linear axis from zero, or a logarithmic one if errors differ too much for a linear axis."""
+    """Label the axes, and make the axis of errors linear from zero, or logarithmic if the errors differ widely."""
     axes.set(xlabel="time (s)", ylabel="position error (mm)")
     curves_mm = [np.asarray(line.get_ydata(), float) for line in axes.get_lines()]
-    medians_mm = [float(np.median(curve_mm)) for curve_mm in curves_mm]
-    positive_mm = [median for median in medians_mm if median > 0]
-    if positive_mm and max(positive_mm) > LOGARITHMIC_FROM * min(positive_mm):
+    if _differ_widely(curves_mm):
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=0)
+
+
+def _differ_widely(curves_mm: Sequence[NDArray[np.float64]]) -> bool:
+    """Whether the largest median of the curves exceeds LOGARITHMIC_FROM times the smallest one above 0."""
+    medians_mm = [float(np.median(curve_mm)) for curve_mm in curves_mm]
+    positive_mm = [median_mm for median_mm in medians_mm if median_mm > 0]
+    if not positive_mm:
+        return False
+    return max(positive_mm) > LOGARITHMIC_FROM * min(positive_mm)

@@ -1,11 +1,15 @@
-"""Meshes, the things made of them, and all triangles of a scene in one table.
+"""Meshes, things that consist of a mesh and a material, and a table of all triangles of a scene.
 
-A mesh is a `trimesh.Trimesh` made with process=False, so that its vertices keep their order. Its faces are seen from
-the side from which their corners run counter-clockwise. `mesh.visual.uv` (V, 2) are places on the texture, in the unit
-of `Texture.tile_m`, row 0 of the picture at v = 0 (trimesh's own readers have it at v = 1). `mesh.vertex_normals`
-(V, 3) are the normals of the shape that the triangles stand for. trimesh keeps given normals in its cache, so that
-`mesh.copy()` drops them; `mesh.copy(include_cache=True)` and the functions of this module keep them. No function here
-changes a mesh that it is given: things can share meshes.
+A mesh is a `trimesh.Trimesh` that was created with process=False, which preserves the order of its vertices.
+
+- A face is visible from the side on which its corners run counter-clockwise.
+- `mesh.visual.uv` (V, 2) are texture coordinates, in the unit of `Texture.tile_m`. v = 0 is row 0 of the picture.
+  trimesh's readers of mesh files have row 0 at v = 1.
+- `mesh.vertex_normals` (V, 3) are the normals of the smooth shape that the triangles approximate. trimesh keeps given
+  normals in a cache, so `mesh.copy()` drops them. `mesh.copy(include_cache=True)` and the functions of this module
+  preserve them.
+
+No function here modifies its arguments, so several things can share a mesh.
 """
 
 from collections.abc import Iterable, Sequence
@@ -26,27 +30,30 @@ if TYPE_CHECKING:
 
 Faces = NDArray[np.int64]
 Index = NDArray[np.int32]
-# Vertices nearer than this are one, here and in all rooms above: float32 resolves 1e-6 m at 10 m.
+# The size of the cells in which vertices are merged, in all of vobench. float32 resolves 1e-6 m at 10 m.
 WELD_M = 1e-5
 
 
 def face_normals(corners_m: Array) -> Array:
-    """Unit normals (F, 3) of triangles (F, 3, 3), 0 where one has no area."""
+    """The unit normals (F, 3) of triangles with corners (F, 3, 3); 0 for a triangle without area."""
     a = corners_m[:, 0]
     return unit(cross(corners_m[:, 1] - a, corners_m[:, 2] - a))
 
 
 def areas_m2(corners_m: Array) -> Array:
-    """Areas (F,) of triangles (F, 3, 3)."""
+    """The areas (F,) of triangles with corners (F, 3, 3)."""
     a, b, c = corners_m.swapaxes(0, 1)
     return np.asarray(np.linalg.norm(cross(b - a, c - a), axis=1) / 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshArrays:
-    """The arrays of a mesh that is still being made: a Trimesh takes far longer to make than most shapes.
+    """The arrays of a mesh. Most shapes are built from them, because a Trimesh takes much longer to create.
 
-    vertices_m (V, 3); faces (F, 3); uv (V, 2); normals (V, 3), unit vectors or 0.
+    `vertices_m` (V, 3) are positions.
+    `faces` (F, 3) are the vertex indices of each face.
+    `uv` (V, 2) are texture coordinates.
+    `normals` (V, 3) are unit vectors, or 0.
     """
 
     vertices_m: Array
@@ -60,7 +67,7 @@ class MeshArrays:
         return self.vertices_m[self.faces]
 
     def moved(self, T_a_b: Array) -> "MeshArrays":
-        """The arrays of a frame b in the frame a; T_a_b may scale and mirror."""
+        """The mesh transformed from frame b to frame a; T_a_b (4, 4) may scale and mirror."""
         T = np.asarray(T_a_b, float)
         M = T[:3, :3]
         M_inverse, mirrors = _inverse(M.tobytes())
@@ -70,32 +77,35 @@ class MeshArrays:
         return MeshArrays(vertices_m, faces, self.uv, normals)
 
     def flipped(self) -> "MeshArrays":
-        """The same faces, seen from their other side."""
+        """The mesh with faces that are visible from the opposite side."""
         return replace(self, faces=self.faces[:, ::-1], normals=-self.normals)
 
     def two_sided(self) -> "MeshArrays":
-        """The faces and their backs."""
+        """The mesh with faces that are visible from both sides."""
         return joined_arrays([self, self.flipped()])
 
     def mesh(self) -> "Trimesh":
-        """The mesh of these arrays."""
+        """The arrays as a Trimesh."""
         return make_mesh(self.vertices_m, self.faces, self.uv, self.normals)
 
 
 @lru_cache(maxsize=1024)
 def _inverse(matrix: bytes) -> tuple[Array, bool]:
-    """The inverse (3, 3) of a matrix, and whether it mirrors; parts of one thing are moved by the same one."""
+    """The inverse of a matrix (3, 3), given as bytes, and whether the matrix mirrors.
+
+    The result is cached because all parts of a thing are moved by the same matrix.
+    """
     M = np.frombuffer(matrix).reshape(3, 3)
-    mirrors = M[0] @ cross(M[1], M[2]) < 0
+    determinant = M[0] @ cross(M[1], M[2])
     inverse: Array = np.asarray(np.linalg.inv(M), float)
-    return inverse, bool(mirrors)
+    return inverse, bool(determinant < 0)
 
 
 def joined_arrays(parts: Sequence[MeshArrays]) -> MeshArrays:
-    """All faces of several meshes in one."""
-    counts = [len(part.vertices_m) for part in parts]
-    starts = np.cumsum([0, *counts])
-    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
+    """One mesh with the faces of all parts, in their order."""
+    vertex_counts = [len(part.vertices_m) for part in parts]
+    first_vertices = np.cumsum([0, *vertex_counts])
+    faces = [part.faces + first_vertex for part, first_vertex in zip(parts, first_vertices, strict=False)]
     return MeshArrays(
         np.concatenate([np.zeros((0, 3)), *(part.vertices_m for part in parts)]),
         np.concatenate([np.zeros((0, 3), np.int64), *faces]),
@@ -106,7 +116,7 @@ def joined_arrays(parts: Sequence[MeshArrays]) -> MeshArrays:
 
 @cache
 def _no_material() -> "SimpleMaterial":
-    """The one material of all meshes, for trimesh; a thing's material is that of its name."""
+    """The material that trimesh requires of every mesh. The renderers use the material of `Thing` instead."""
     from trimesh.visual.material import SimpleMaterial
 
     return SimpleMaterial()  # type: ignore[no-untyped-call]
@@ -118,20 +128,22 @@ def make_mesh(
     uv: ArrayLike,
     normals: ArrayLike,
 ) -> "Trimesh":
-    """A mesh of copies of vertices (V, 3), faces (F, 3), texture coordinates (V, 2) and normals (V, 3), in this order.
+    """A mesh with vertices (V, 3), faces (F, 3), texture coordinates (V, 2) and normals (V, 3).
 
-    It casts rays without embree, whose set-up takes longer than all else.
+    The arrays are copied and keep their order. Rays are cast without embree, because its set-up takes longer than
+    everything else.
     """
     from trimesh import Trimesh
     from trimesh.visual import TextureVisuals
 
     vertices = np.array(vertices_m, float)
-    is_empty = not len(vertices)  # trimesh refuses normals of no vertices
+    is_empty = not len(vertices)
+    vertex_normals = None if is_empty else np.array(normals, float)  # trimesh rejects an empty array
     visual = TextureVisuals(uv=np.array(uv, float), material=_no_material())  # type: ignore[no-untyped-call]
     return Trimesh(
         vertices,
         np.array(faces, np.int64),
-        vertex_normals=None if is_empty else np.array(normals, float),
+        vertex_normals=vertex_normals,
         visual=visual,
         process=False,
         use_embree=False,
@@ -139,12 +151,12 @@ def make_mesh(
 
 
 def has_texture_coordinates(mesh: "Trimesh") -> bool:
-    """Whether a mesh has texture coordinates; those of `trimesh.creation` have none."""
+    """Whether a mesh has texture coordinates; a mesh from `trimesh.creation` has none."""
     return getattr(mesh.visual, "uv", None) is not None
 
 
 def texture_coordinates(mesh: "Trimesh") -> Array:
-    """Texture coordinates (V, 2) of a mesh, 0 where it has none."""
+    """The texture coordinates (V, 2) of a mesh; 0 if it has none."""
     uv = getattr(mesh.visual, "uv", None)
     if uv is None:
         return np.zeros((len(mesh.vertices), 2))
@@ -168,47 +180,50 @@ def corners(mesh: "Trimesh") -> Array:
 
 
 def moved(mesh: "Trimesh", T_a_b: Array) -> "Trimesh":
-    """The mesh of a frame b in the frame a; T_a_b (4, 4) may scale and mirror."""
+    """The mesh transformed from frame b to frame a; T_a_b (4, 4) may scale and mirror."""
     return arrays(mesh).moved(T_a_b).mesh()
 
 
 def copies(mesh: "Trimesh", poses: Iterable[Array]) -> "Trimesh":
-    """A mesh at each of several poses T (4, 4), as one."""
+    """One mesh with a copy of the given mesh at each of the poses T (4, 4)."""
     original = arrays(mesh)
     return joined_arrays([original.moved(T) for T in poses]).mesh()
 
 
 def flipped(mesh: "Trimesh") -> "Trimesh":
-    """The same faces, seen from their other side."""
+    """The mesh with faces that are visible from the opposite side."""
     return arrays(mesh).flipped().mesh()
 
 
 def two_sided(mesh: "Trimesh") -> "Trimesh":
-    """The faces of a mesh and their backs."""
+    """The mesh with faces that are visible from both sides."""
     return arrays(mesh).two_sided().mesh()
 
 
 def textured(mesh: "Trimesh", uv: ArrayLike) -> "Trimesh":
-    """The mesh with other texture coordinates (V, 2)."""
+    """The mesh with the given texture coordinates (V, 2) instead of its own."""
     original = arrays(mesh)
     return make_mesh(original.vertices_m, original.faces, uv, original.normals)
 
 
 def joined(meshes: Sequence["Trimesh"]) -> "Trimesh":
-    """All faces of several meshes in one."""
+    """One mesh with the faces of all meshes, in their order."""
     if len(meshes) == 1:
         return meshes[0]
     return joined_arrays([arrays(mesh) for mesh in meshes]).mesh()
 
 
 def flat(vertices_m: ArrayLike, faces: ArrayLike, uv: ArrayLike) -> "Trimesh":
-    """A mesh with sharp edges, its vertices (V, 3) repeated for every face (F, 3)."""
-    index = np.asarray(faces, np.int64)
-    corners_m = np.asarray(vertices_m, float)[index]
-    corners_uv = np.asarray(uv, float)[index]
-    normals = np.repeat(face_normals(corners_m), 3, axis=0)
-    separate = np.arange(index.size).reshape(-1, 3)
-    return make_mesh(corners_m.reshape(-1, 3), separate, corners_uv.reshape(-1, 2), normals)
+    """A mesh with sharp edges: each face has three vertices that no other face shares.
+
+    `vertices_m` (V, 3), `faces` (F, 3) and `uv` (V, 2) describe the mesh with shared vertices.
+    """
+    shared_faces = np.asarray(faces, np.int64)
+    corners_m = np.asarray(vertices_m, float)[shared_faces]  # (F, 3, 3)
+    corners_uv = np.asarray(uv, float)[shared_faces]  # (F, 3, 2)
+    normals = np.repeat(face_normals(corners_m), 3, axis=0)  # (3 F, 3)
+    separate_faces = np.arange(shared_faces.size).reshape(-1, 3)
+    return make_mesh(corners_m.reshape(-1, 3), separate_faces, corners_uv.reshape(-1, 2), normals)
 
 
 QUAD_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], float)
@@ -221,14 +236,15 @@ def quad_arrays(
     edge_v_m: ArrayLike,
     uv_m: ArrayLike = (0.0, 0.0),
 ) -> MeshArrays:
-    """The arrays of `quad`."""
+    """The arrays of a parallelogram; see `quad`."""
     corner = np.asarray(corner_m, float)
-    u = np.asarray(edge_u_m, float)
-    v = np.asarray(edge_v_m, float)
-    lengths = np.linalg.norm([u, v], axis=1)
-    vertices = corner + QUAD_CORNERS @ np.stack([u, v])
-    uv = np.asarray(uv_m, float) + QUAD_CORNERS * lengths
-    return MeshArrays(vertices, QUAD_FACES, uv, np.tile(unit(cross(u, v)), (4, 1)))
+    u_m = np.asarray(edge_u_m, float)
+    v_m = np.asarray(edge_v_m, float)
+    lengths_m = np.linalg.norm([u_m, v_m], axis=1)
+    vertices_m = corner + QUAD_CORNERS @ np.stack([u_m, v_m])
+    uv = np.asarray(uv_m, float) + QUAD_CORNERS * lengths_m
+    normals = np.tile(unit(cross(u_m, v_m)), (4, 1))
+    return MeshArrays(vertices_m, QUAD_FACES, uv, normals)
 
 
 def quad(
@@ -238,42 +254,53 @@ def quad(
     *,
     uv_m: ArrayLike = (0.0, 0.0),
 ) -> "Trimesh":
-    """A parallelogram of two faces, seen from the side of edge_u × edge_v; its texture begins at uv_m, in metres."""
+    """A parallelogram of two faces that is visible from the side to which edge_u × edge_v points.
+
+    `corner_m` is the corner where both edges begin. `uv_m` are its texture coordinates, in metres.
+    """
     return quad_arrays(corner_m, edge_u_m, edge_v_m, uv_m).mesh()
 
 
 def distinct(rows: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which rows (N, K) are the first of their kind (V,), kinds in their order, and the kind of each (N,)."""
-    order = np.lexsort(rows.T[::-1])  # in a fraction of the time of np.unique
-    is_first = np.append(True, (np.diff(rows[order], axis=0) != 0).any(1))[: len(rows)]
-    kind = np.cumsum(is_first) - 1
-    return order[is_first], kind[np.argsort(order)]
+    """The G groups of equal rows among rows (N, K), sorted by their values.
+
+    Returns the index of the first row of each group (G,), and the group of each row (N,).
+    """
+    order = np.lexsort(rows.T[::-1])  # stable, and much faster than np.unique
+    sorted_rows = rows[order]
+    differs_from_previous = (np.diff(sorted_rows, axis=0) != 0).any(1)
+    is_first = np.append(True, differs_from_previous)[: len(rows)]  # the slice is for no rows
+    sorted_groups = np.cumsum(is_first) - 1
+    return order[is_first], sorted_groups[np.argsort(order)]
 
 
 def welded(points_m: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Which points (N, 3) are the first in their cell of WELD_M (P,), and which of these each is (N,)."""
+    """The P cells of size WELD_M that contain points (N, 3).
+
+    Returns the index of the first point in each cell (P,), and the cell of each point (N,).
+    """
     cells = np.rint(points_m / WELD_M).astype(np.int64)
     return distinct(cells)
 
 
 def open_edges(faces: NDArray[Any]) -> NDArray[np.int64]:
-    """The edges (E, 2) that one of the faces (F, 3) alone has."""
+    """The edges (E, 2) that belong to only one of the faces (F, 3)."""
     from trimesh.geometry import faces_to_edges
     from trimesh.grouping import group_rows
 
     edges = np.sort(faces_to_edges(faces), axis=1)  # type: ignore[no-untyped-call]
-    alone = group_rows(edges, require_count=1)  # type: ignore[no-untyped-call]
-    return np.asarray(edges[alone], np.int64)
+    single = group_rows(edges, require_count=1)  # type: ignore[no-untyped-call]
+    return np.asarray(edges[single], np.int64)
 
 
 def is_closed_body(mesh: MeshArrays) -> bool:
-    """Whether a mesh, its vertices welded, encloses a volume and is seen from outside."""
+    """Whether a mesh encloses a volume and its faces are visible from outside, after its vertices are welded."""
     from trimesh import Trimesh
 
-    first, point = welded(mesh.vertices_m)
-    faces = point[mesh.faces]
+    first_vertices, cells = welded(mesh.vertices_m)
+    faces = cells[mesh.faces]
     has_three_corners = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    body = Trimesh(mesh.vertices_m[first], faces[has_three_corners], process=False, use_embree=False)
+    body = Trimesh(mesh.vertices_m[first_vertices], faces[has_three_corners], process=False, use_embree=False)
     return bool(body.is_volume)
 
 
@@ -286,9 +313,11 @@ def is_mesh(value: object) -> bool:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Thing:
-    """A mesh of one material; `name` is the instance it belongs to, as ground truth tells things apart.
+    """A mesh with one material.
 
-    spacing_m: between samples of its light; None where the renderer's own will do.
+    `name` is the instance that the mesh belongs to; the ground truth distinguishes instances by name.
+    `material` is the name of the material.
+    `spacing_m` is the distance between samples of the light on the mesh; None selects the renderer's default.
     """
 
     name: str
@@ -299,11 +328,13 @@ class Thing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangles:
-    """Every face of a scene in one order: stationary things, the lamps that are seen, movers.
+    """A table of all faces of a scene, in the order stationary things, visible lamps, movers.
 
-    corners_m, normals (F, 3, 3) and uv (F, 3, 2) are those of each face's three corners, where its thing is at one
-    instant; plane (F, 3) is the unit normal of the flat face. thing, mover, lamp (F,) int32: its place among the things
-    of `things`, the scene's movers and the scene's lights; -1 for none.
+    `corners_m` (F, 3, 3), `normals` (F, 3, 3) and `uv` (F, 3, 2) belong to the three corners of each face. Positions
+    and normals are those at one instant.
+    `plane` (F, 3) is the unit normal of the flat face.
+    `thing` (F,) is the index of the face's thing in `things`.
+    `mover` and `lamp` (F,) are its indices among the scene's movers and lights; -1 if it belongs to none.
     """
 
     things: tuple[Thing, ...]
@@ -319,22 +350,22 @@ class Triangles:
         return len(self.corners_m)
 
     def some(self, which: NDArray[Any]) -> "Triangles":
-        """The table of the selected faces (K,) alone."""
+        """The table of the selected faces (K,)."""
         names = ("corners_m", "normals", "uv", "plane", "thing", "mover", "lamp")
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 
     def moved(self, T_world_movers: Sequence[Array]) -> "Triangles":
-        """The table of things in their movers' frames with the movers at these poses (4, 4)."""
-        corners = self.corners_m.copy()
+        """The table with the movers at poses (4, 4), if this table has their faces in the frames of the movers."""
+        corners_m = self.corners_m.copy()
         normals = self.normals.copy()
         plane = self.plane.copy()
-        for index, T in enumerate(T_world_movers):
-            moving = self.mover == index
-            R = T[:3, :3]
-            corners[moving] = se3.apply(T, corners[moving])
-            normals[moving] = normals[moving] @ R.T
-            plane[moving] = plane[moving] @ R.T
-        return replace(self, corners_m=corners, normals=normals, plane=plane)
+        for index, T_world_mover in enumerate(T_world_movers):
+            is_moved = self.mover == index
+            R_world_mover = T_world_mover[:3, :3]
+            corners_m[is_moved] = se3.apply(T_world_mover, corners_m[is_moved])
+            normals[is_moved] = normals[is_moved] @ R_world_mover.T
+            plane[is_moved] = plane[is_moved] @ R_world_mover.T
+        return replace(self, corners_m=corners_m, normals=normals, plane=plane)
 
 
 def table(
@@ -342,9 +373,12 @@ def table(
     mover: Sequence[int],
     lamp: Sequence[int],
 ) -> Triangles:
-    """The faces of things whose mover and lamp are given, -1 for none, each in its own frame."""
+    """The faces of things, each thing in the frame of its mesh.
+
+    `mover` and `lamp` are the index of each thing's mover and lamp; -1 if it has none.
+    """
     parts = [arrays(thing.mesh) for thing in things]
-    counts = [len(part.faces) for part in parts]
+    face_counts = [len(part.faces) for part in parts]
     whole = joined_arrays(parts)
     return Triangles(
         things=tuple(things),
@@ -352,7 +386,7 @@ def table(
         normals=whole.normals[whole.faces],
         uv=whole.uv[whole.faces],
         plane=face_normals(whole.corners_m),
-        thing=np.repeat(np.arange(len(things), dtype=np.int32), counts),
-        mover=np.repeat(np.asarray(mover, np.int32), counts),
-        lamp=np.repeat(np.asarray(lamp, np.int32), counts),
+        thing=np.repeat(np.arange(len(things), dtype=np.int32), face_counts),
+        mover=np.repeat(np.asarray(mover, np.int32), face_counts),
+        lamp=np.repeat(np.asarray(lamp, np.int32), face_counts),
     )

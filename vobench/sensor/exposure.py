@@ -1,4 +1,4 @@
-"""Exposure: time, gain, auto-exposure, and the shutter's rows. Pure."""
+"""Exposure time and gain, auto-exposure, and the exposure of each row by a rolling shutter."""
 
 import math
 from dataclasses import dataclass
@@ -20,7 +20,10 @@ MS_PER_S = 1e3
 
 @dataclass(frozen=True, slots=True)
 class RowStrip:
-    """Rows that are exposed together, and the M parts of their exposure: [start_ns, end_ns), each (M,)."""
+    """A strip of adjacent rows that are exposed at the same time.
+
+    The exposure is divided into M sub-frames. Sub-frame m lasts from start_ns[m] to end_ns[m]; both arrays are (M,).
+    """
 
     rows: slice
     start_ns: Stamps
@@ -28,9 +31,9 @@ class RowStrip:
 
     @property
     def mid_ns(self) -> Stamps:
-        """The middle of each part (M,), for which its rows are rendered."""
-        length_ns = self.end_ns - self.start_ns
-        return self.start_ns + length_ns // 2
+        """The middle of each sub-frame (M,), at which it is rendered."""
+        durations_ns = self.end_ns - self.start_ns
+        return self.start_ns + durations_ns // 2
 
 
 def strips(
@@ -42,78 +45,87 @@ def strips(
     row_strips: int,
     sub_frames: int,
 ) -> list[RowStrip]:
-    """The exposure of a picture, strip by strip from the top; t_ns is the middle of its middle row's exposure.
+    """The row strips of a picture from top to bottom.
 
-    `readout_s` is the time from the first row to the one that would follow the last, 0 for a global shutter.
-    Strips tile the rows, parts tile the exposure. A strip has the time of its middle row, so its outer rows are off by
-    readout / (2 · row_strips); a global shutter needs and gets one strip.
-    Raises InputError for fewer than one part or strip, or more than there are nanoseconds or rows.
-    Source: Kalibr, row v is v · line delay late.
+    `t_ns` is the mid-exposure time of the middle row.
+    `readout_s` is the number of rows times the delay between adjacent rows; it is 0 for a global shutter.
+    Each strip is exposed when its middle row is exposed. For its outermost rows, that time is wrong by
+    readout_s / (2 · row_strips). For a global shutter there is always one strip.
+    Raises InputError if the exposure has fewer nanoseconds than sub-frames, if the picture has fewer rows than strips,
+    or if a number is below 1.
+    Source: Kalibr; row v is exposed v times the line delay after row 0.
     """
     exposure_ns = round(exposure_s * NS_PER_S)
     readout_ns = round(readout_s * NS_PER_S)
-    if exposure_ns < sub_frames or sub_frames < 1:
+    if not 1 <= sub_frames <= exposure_ns:
         raise InputError(f"an exposure of {exposure_ns} ns cannot be divided into {sub_frames} sub-frames")
     if not 1 <= row_strips <= height:
         raise InputError(f"{height} rows cannot be divided into {row_strips} strips")
-    count = row_strips if readout_ns else 1
-    borders = [height * index // count for index in range(count + 1)]  # rows
-    offsets_ns = np.arange(sub_frames + 1, dtype=np.int64) * exposure_ns // sub_frames  # since the exposure's start
+    strip_count = row_strips if readout_ns else 1
+    border_rows = [height * index // strip_count for index in range(strip_count + 1)]
+    # The borders between sub-frames (sub_frames + 1,), relative to the start of the exposure.
+    border_offsets_ns = np.arange(sub_frames + 1, dtype=np.int64) * exposure_ns // sub_frames
 
-    all_strips = []
-    for first, end in pairwise(borders):
-        start_ns = t_ns + _delay_ns(first, end, height, readout_ns) - exposure_ns // 2
-        edges_ns = start_ns + offsets_ns
-        all_strips.append(RowStrip(slice(first, end), edges_ns[:-1], edges_ns[1:]))
-    return all_strips
+    row_strip_list = []
+    for first_row, end_row in pairwise(border_rows):
+        mid_ns = t_ns + _delay_ns(first_row, end_row, height, readout_ns)
+        start_ns = mid_ns - exposure_ns // 2
+        borders_ns = start_ns + border_offsets_ns
+        row_strip_list.append(RowStrip(slice(first_row, end_row), borders_ns[:-1], borders_ns[1:]))
+    return row_strip_list
 
 
 def row_stamps(height: int, readout_s: float, t_ns: int) -> Stamps:
-    """The middle of each row's exposure (H,) in a picture stamped t_ns."""
+    """The mid-exposure time of each row (height,). `t_ns` is the mid-exposure time of the middle row."""
     readout_ns = round(readout_s * NS_PER_S)
     stamps = [t_ns + _delay_ns(row, row + 1, height, readout_ns) for row in range(height)]
     return np.array(stamps, np.int64)
 
 
 def _delay_ns(
-    first: int,
-    end: int,
+    first_row: int,
+    end_row: int,
     height: int,
     readout_ns: int,
 ) -> int:
-    """The delay of the middle of rows [first, end) after the picture's middle, rounded.
+    """The delay of the middle of rows [first_row, end_row) relative to the middle of the picture.
 
-    It is odd about the middle: rows of the lower half are as late as their mirror images are early.
+    It is negative in the upper half of the picture. Half a nanosecond is rounded away from 0, so two rows at the same
+    distance above and below the middle have exactly opposite delays.
     """
-    rows_twice = first + end - height
-    rounded = (abs(rows_twice) * readout_ns + height) // (2 * height)
-    return rounded if rows_twice >= 0 else -rounded
+    # Twice the distance in rows between the two middles is an integer.
+    doubled_offset = first_row + end_row - height
+    magnitude_ns = (abs(doubled_offset) * readout_ns + height) // (2 * height)
+    return magnitude_ns if doubled_offset >= 0 else -magnitude_ns
 
 
-# Errors of the exposure (logarithm) up to this are not corrected, so that noise and flicker don't change it.
+# A smaller error of the exposure (natural logarithm) is not corrected, so that noise and flicker do not change it.
 DEAD_BAND = 0.02
 
 
 @settings(kw_only=False)
 class Exposure:
-    """The exposure of one picture: the time that the shutter is open and the analogue gain."""
+    """The exposure time and the analogue gain of one picture."""
 
     time_s: Positive
     gain_db: NonNegative = 0.0
 
     @property
     def amplification(self) -> float:
-        """Analogue gain as a factor."""
+        """The analogue gain as a factor."""
         return float(10 ** (self.gain_db / 20))
 
 
 @settings()
 class AutoExposure:
-    """A first-order loop in the logarithm of time × gain: first time, up to its limit, then gain.
+    """A first-order control loop on the logarithm of exposure time × gain.
 
-    `target_share` of full scale, linear, is what the mean (or the `percentile`) of a picture should be; a picture
-    sets the exposure `lag_frames` later; `damping` is the share of the error that one picture leaves.
-    Source: onsemi MT9V034 data sheet: exposure before gain, new settings reach the picture after the next.
+    The loop raises the exposure time up to its limit before it raises the gain.
+    `target_share` is the linear brightness that a picture should have, as a share of full scale.
+    `percentile` selects which brightness of a picture is measured; without it, the mean is.
+    `lag_frames` is the number of pictures from a measurement to the first picture with the new exposure.
+    `damping` is the share of the error that remains after one correction.
+    Source: onsemi MT9V034 data sheet (exposure before gain; settings take effect in the picture after the next).
     """
 
     target_share: Annotated[float, Gt(0), Lt(1)] = 0.18
@@ -131,14 +143,14 @@ class AutoExposure:
             )
 
 
-# The exposures of the next `lag_frames` pictures, which are decided already.
+# The exposures of the next `lag_frames` pictures, which can no longer change.
 PendingExposures = tuple[Exposure, ...]
 
 
 def initial_exposures(loop: AutoExposure, exposure: Exposure) -> PendingExposures:
-    """The loop at rest on an exposure, clipped to its limits."""
-    settled = _within(loop, _level(exposure))
-    return (settled,) * loop.lag_frames
+    """The pending exposures of a loop that starts at an exposure, clipped to the loop's limits."""
+    clipped = _exposure_of_level(loop, _level_s(exposure))
+    return (clipped,) * loop.lag_frames
 
 
 def next_exposures(
@@ -147,29 +159,31 @@ def next_exposures(
     grey: Grey,
     linear_of_grey: Array,
 ) -> PendingExposures:
-    """The pending exposures after a picture (H, W) that was taken with the first of `pending`.
+    """The pending exposures after a picture `grey` (H, W) that was taken with the first of `pending`.
 
-    `linear_of_grey` (256,) is the signal of each grey value in shares of full scale, without the black level. The
-    error is that of the exposure that the picture had, not of the newest one, so that no lag makes the loop oscillate.
+    `linear_of_grey` (256,) is the signal at each grey value, without the black level, as a share of full scale.
+    The target follows from the exposure with which the picture was taken, not from the newest one. The loop therefore
+    does not oscillate for any lag.
     """
-    darkest = float(linear_of_grey[linear_of_grey > 0][0]) / 2  # black may be up to half a grey value bright
-    metered = max(_meter(loop, grey, linear_of_grey), darkest)
-    target = _within(loop, _level(pending[0]) * loop.target_share / metered)
+    darkest = float(linear_of_grey[linear_of_grey > 0][0]) / 2  # a black pixel may have up to half a grey value
+    measured = max(_brightness(loop, grey, linear_of_grey), darkest)
+    target = _exposure_of_level(loop, _level_s(pending[0]) * loop.target_share / measured)
+
     newest = pending[-1]
-    error = math.log(_level(target) / _level(newest))
+    error = math.log(_level_s(target) / _level_s(newest))
     if abs(error) > _dead_band(loop, linear_of_grey):
         correction = math.exp((1 - loop.damping) * error)
-        newest = _within(loop, _level(newest) * correction)
+        newest = _exposure_of_level(loop, _level_s(newest) * correction)
     return (*pending[1:], newest)
 
 
-def _level(exposure: Exposure) -> float:
-    """Time × gain, in seconds at unit gain."""
+def _level_s(exposure: Exposure) -> float:
+    """The exposure's level: the product of its time and gain, which is the equivalent time at unit gain."""
     return exposure.time_s * exposure.amplification
 
 
-def _within(loop: AutoExposure, level_s: float) -> Exposure:
-    """The exposure of a level: as much time as allowed, the rest by gain."""
+def _exposure_of_level(loop: AutoExposure, level_s: float) -> Exposure:
+    """The exposure with a level, clipped to the loop's limits; the gain is raised only at the longest time."""
     shortest_s = loop.t_min_ms / MS_PER_S
     longest_s = loop.t_max_ms / MS_PER_S
     time_s = min(max(level_s, shortest_s), longest_s)
@@ -177,21 +191,25 @@ def _within(loop: AutoExposure, level_s: float) -> Exposure:
     return Exposure(time_s, min(max(gain_db, 0.0), loop.gain_max_db))
 
 
-def _meter(loop: AutoExposure, grey: Grey, linear_of_grey: Array) -> float:
-    """The picture's mean, or its percentile, in linear shares of full scale."""
+def _brightness(loop: AutoExposure, grey: Grey, linear_of_grey: Array) -> float:
+    """The mean of a picture, or the loop's percentile, as a linear share of full scale."""
     counts = np.bincount(grey.ravel(), minlength=FULL_SCALE_DN + 1)
     if loop.percentile is None:
         return float(counts @ linear_of_grey) / grey.size
-    # A grey value stands for signals half a step below and above it.
+    # A grey value represents the signals from half a step below to half a step above it.
     edges_dn = np.arange(FULL_SCALE_DN + 2) - 0.5
-    share_below = np.concatenate([[0.0], np.cumsum(counts) / grey.size])
-    percentile_dn = np.interp(loop.percentile / 100, share_below, edges_dn)
+    shares_below_edges = np.concatenate([[0.0], np.cumsum(counts) / grey.size])
+    percentile_dn = np.interp(loop.percentile / 100, shares_below_edges, edges_dn)
     return float(np.interp(percentile_dn, np.arange(FULL_SCALE_DN + 1), linear_of_grey))
 
 
 def _dead_band(loop: AutoExposure, linear_of_grey: Array) -> float:
-    """DEAD_BAND, or half the grey step at the target if that is larger, as smaller errors can't be seen."""
-    place = int(np.searchsorted(linear_of_grey, loop.target_share))
-    above = min(max(place, 1), FULL_SCALE_DN)
-    step_share = (linear_of_grey[above] - linear_of_grey[above - 1]) / loop.target_share
-    return float(max(DEAD_BAND, step_share / 2))
+    """The largest error that is not corrected: DEAD_BAND, or half a grey step at the target if that is larger.
+
+    A picture cannot show an error of less than half a grey step.
+    """
+    first_brighter_dn = int(np.searchsorted(linear_of_grey, loop.target_share))
+    upper_dn = min(max(first_brighter_dn, 1), FULL_SCALE_DN)
+    step_share = linear_of_grey[upper_dn] - linear_of_grey[upper_dn - 1]
+    relative_step = step_share / loop.target_share
+    return float(max(DEAD_BAND, relative_step / 2))

@@ -1,4 +1,4 @@
-"""Files, notes, topics and ROS 2 messages of a sequence, and their CDR form."""
+"""The files, topics and ROS 2 messages of a sequence, and the serialisation of messages as CDR."""
 
 import struct
 from dataclasses import dataclass
@@ -38,12 +38,12 @@ IMPORT_NOTE = "vobench.import"
 WHEELS_NOTE = "vobench.wheels"
 IMU_NOTE = "vobench.imu"
 END_OF_STAMPS_NS = 2**31 * NS_PER_S  # ROS counts seconds in 31 bits
-UNKNOWN = -1.0  # first element of a covariance that is not estimated; see sensor_msgs/Imu
+UNKNOWN = -1.0  # the first element of the covariance of a quantity without an estimate; see sensor_msgs/Imu
 
 
 @dataclass(frozen=True, slots=True)
 class Topic:
-    """A topic's name and message type; a latched one is replayed to late listeners."""
+    """The name and message type of a topic. A subscriber that joins late receives the messages of a latched topic."""
 
     name: str
     type_name: str
@@ -72,7 +72,7 @@ TRUE_INFO_TOPICS = (TRUE_LEFT_INFO, TRUE_RIGHT_INFO)
 SENSOR_TOPICS = (TF_STATIC, *INFO_TOPICS, *IMAGE_TOPICS, EXPOSURE, ENCODERS, IMU)
 TRUTH_TOPICS = (TF_STATIC, TF, ODOMETRY)
 
-# Names of camera models: the first two are ROS's, the others are defined here.
+# The names of camera models. ROS defines the first two, vobench the others.
 PLUMB_BOB = "plumb_bob"
 EQUIDISTANT = "equidistant"
 DOUBLE_SPHERE = "double_sphere"
@@ -85,7 +85,7 @@ ALL_AROUND = "equirectangular"
 
 
 def model_name(camera: Camera) -> str:
-    """The name of a camera's distortion model; that of a pinhole is a plumb bob without distortion."""
+    """The name of a camera's distortion model. A pinhole camera has PLUMB_BOB, with coefficients of 0."""
     if isinstance(camera, Equirectangular):
         return ALL_AROUND
     for name, model in FOCAL_MODELS.items():
@@ -95,29 +95,29 @@ def model_name(camera: Camera) -> str:
 
 
 WHEEL_TICKS_DEFINITION = """\
-# Counts of the two wheel encoders since the start of the recording, positive when the robot drives ahead.
+# Counts of the two wheel encoders since the start of the recording. They increase when the robot drives forward.
 std_msgs/Header header
 int64 left
 int64 right
 """
 
 EXPOSURE_DEFINITION = """\
-# How both pictures of a stereo pair were exposed; the stamp is the middle of the exposure.
+# Exposure time and gain of both pictures of a stereo pair. The stamp is the middle of the exposure.
 std_msgs/Header header
 float64 time_s
 float64 gain_db
 """
 
 IMU_BIAS_DEFINITION = """\
-# What an IMU's readings are off by, slowly varying, in its own axes: rad/s and m/s^2.
+# Bias of the gyroscope (rad/s) and of the accelerometer (m/s^2) of an IMU, in the axes of the IMU.
 std_msgs/Header header
 geometry_msgs/Vector3 gyro
 geometry_msgs/Vector3 accel
 """
 
 DISTURBANCE_DEFINITION = """\
-# What makes a robot move other than its wheels say, and than it was told: slip ratios (rim speed is ground speed
-# / (1 - slip)), the angle at which it slides to the left, and pushes on its speed and its yaw rate.
+# Disturbances of a wheeled robot. The slip ratio of a wheel is 1 - ground speed / rim speed. side_slip_rad is the
+# angle of the velocity to the left of the heading. The pushes are accelerations that the robot was not commanded.
 std_msgs/Header header
 float64 left_slip
 float64 right_slip
@@ -137,9 +137,9 @@ for _definition, _topic in (
 
 
 def sensor_topics(rig: Rig) -> tuple[Topic, ...]:
-    """The topics that a recording of this rig can have."""
-    cameras = len(rig.sides)
-    topics = [TF_STATIC, *INFO_TOPICS[:cameras], *IMAGE_TOPICS[:cameras], EXPOSURE]
+    """The topics that the sensor file of a recording with this rig can have."""
+    camera_count = len(rig.sides)
+    topics = [TF_STATIC, *INFO_TOPICS[:camera_count], *IMAGE_TOPICS[:camera_count], EXPOSURE]
     if rig.wheels:
         topics.append(ENCODERS)
     if rig.imu:
@@ -148,9 +148,9 @@ def sensor_topics(rig: Rig) -> tuple[Topic, ...]:
 
 
 def truth_topics(rig: Rig) -> tuple[Topic, ...]:
-    """The topics that the truth of this rig can have, except those of pixels."""
-    cameras = len(rig.sides)
-    topics = [*TRUTH_TOPICS, *TRUE_INFO_TOPICS[:cameras]]
+    """The topics that the truth file of a recording with this rig can have, except per-pixel ground truth."""
+    camera_count = len(rig.sides)
+    topics = [*TRUTH_TOPICS, *TRUE_INFO_TOPICS[:camera_count]]
     if rig.imu:
         topics.append(IMU_BIAS)
     if rig.wheels:
@@ -159,15 +159,20 @@ def truth_topics(rig: Rig) -> tuple[Topic, ...]:
 
 
 def _make(type_name: str, *fields: Any) -> Any:
+    """A message of a type, with its fields in the order of the definition."""
     return TYPES.types[type_name](*fields)
 
 
 def _quaternion(R: Array) -> Any:
+    """The geometry_msgs/Quaternion of a rotation (3, 3)."""
     return _make("geometry_msgs/msg/Quaternion", *se3.to_quaternion(R).tolist())
 
 
 def split_stamp(t_ns: int) -> tuple[int, int]:
-    """Seconds and nanoseconds of a stamp, as in ROS. Raises SequenceError outside the years 1970 to 2038."""
+    """A stamp as whole seconds and remaining nanoseconds, as in ROS.
+
+    Raises SequenceError for a stamp before 1970 or after the end of ROS stamps in 2038.
+    """
     if not 0 <= t_ns < END_OF_STAMPS_NS:
         raise SequenceError(f"a ROS stamp lies between 0 and {END_OF_STAMPS_NS - 1} ns (in 2038), got {t_ns} ns")
     return divmod(int(t_ns), NS_PER_S)
@@ -184,7 +189,7 @@ def transforms(
     parent: str,
     T_parent_child: dict[str, Array],
 ) -> Any:
-    """A tf2_msgs/TFMessage with the pose of each child frame on `parent`."""
+    """A tf2_msgs/TFMessage with the pose (4, 4) of each child frame in the frame `parent`."""
     stamped = []
     for child, T in T_parent_child.items():
         transform = _make("geometry_msgs/msg/Transform", vector(T[:3, 3]), _quaternion(T[:3, :3]))
@@ -193,7 +198,7 @@ def transforms(
 
 
 def camera_infos(t_ns: int, rig: Rig) -> tuple[Any, ...]:
-    """The sensor_msgs/CameraInfo of each camera, with the R and P that rectify a pair if it can be rectified."""
+    """The sensor_msgs/CameraInfo of each camera. For a pair that can be rectified, R and P rectify it."""
     if rig.right is None:
         return (camera_info(t_ns, LEFT, rig.left),)
     views = rectification(rig)
@@ -212,23 +217,23 @@ def camera_info(
     R: Array | None = None,
     P: Array | None = None,
 ) -> Any:
-    """A sensor_msgs/CameraInfo; without R (3, 3) and P (3, 4), that of a camera on its own."""
+    """A sensor_msgs/CameraInfo. R (3, 3) and P (3, 4) rectify a stereo pair; a single camera has none."""
     if R is None:
         R = np.eye(3)
     if P is None:
         P = projection(camera.K, 0.0)
-    d = np.zeros(5)
+    coefficients = np.zeros(5)
     if not isinstance(camera, Pinhole):
-        d = np.array([getattr(camera, name) for name in camera.coefficients])
-    binning = 0
-    region = _make("sensor_msgs/msg/RegionOfInterest", 0, 0, 0, 0, False)  # all of the picture
+        coefficients = np.array([getattr(camera, name) for name in camera.coefficients])
+    binning = 0  # means no binning
+    region = _make("sensor_msgs/msg/RegionOfInterest", 0, 0, 0, 0, False)  # means the full picture
     return _make(
         LEFT_INFO.type_name,
         header(t_ns, frame_id),
         camera.height_px,
         camera.width_px,
         model_name(camera),
-        d,
+        coefficients,
         _model_matrix(camera).ravel(),
         R.ravel(),
         P.ravel(),
@@ -239,7 +244,10 @@ def camera_info(
 
 
 def _model_matrix(camera: Camera) -> Array:
-    """The camera matrix of the model's focal lengths; those of a double sphere do not hold at its axis."""
+    """The matrix (3, 3) of the focal lengths and principal point that are parameters of the camera model.
+
+    For a double sphere it differs from `camera.K`, which has the focal lengths at the optical axis.
+    """
     if isinstance(camera, DoubleSphere):
         return camera_matrix(camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px)
     return camera.K
@@ -252,10 +260,10 @@ def image(
     form: str,
     colour: str = MONO,
 ) -> Any:
-    """A sensor_msgs/CompressedImage; `form` is png or jpeg.
+    """A sensor_msgs/CompressedImage with a picture that is `encoded` as `form`, which is png or jpeg.
 
-    The format of a grey picture is its form; that of others is as in ROS's compressed_image_transport:
-    "rgb8; png compressed bgr8".
+    The `format` field of a grey picture is `form`. For other pictures it follows ROS's compressed_image_transport, as
+    in "rgb8; png compressed bgr8".
     """
     format_name = form
     if colour != MONO:
@@ -270,12 +278,12 @@ def message(
     frame_id: str,
     *fields: Any,
 ) -> Any:
-    """A message that is a header and these fields, as those of vobench_msgs are."""
+    """A message of the topic's type that consists of a header and `fields`."""
     return _make(topic.type_name, header(t_ns, frame_id), *fields)
 
 
 def vector(xyz: ArrayLike) -> Any:
-    """A geometry_msgs/Vector3."""
+    """The geometry_msgs/Vector3 of a vector (3,)."""
     return _make("geometry_msgs/msg/Vector3", *np.asarray(xyz, float).tolist())
 
 
@@ -285,7 +293,10 @@ def imu(
     accel_mps2: ArrayLike,
     variances: tuple[float, float],
 ) -> Any:
-    """One reading as a sensor_msgs/Imu; `variances` are those of one axis of gyro and accelerometer, 0 if not known."""
+    """A sensor_msgs/Imu with the angular velocity (3,) and the acceleration (3,) of one reading.
+
+    `variances` are the variance of the gyroscope and that of the accelerometer, per axis; 0 if they are unknown.
+    """
     orientation = _make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
     gyro_variance, accel_variance = variances
     gyro_covariance = np.eye(3).ravel() * gyro_variance
@@ -304,6 +315,7 @@ def imu(
 
 
 def _unknown_covariance(size: int) -> Array:
+    """The covariance (size,) of a quantity that the message does not estimate."""
     covariance = np.zeros(size)
     covariance[0] = UNKNOWN
     return covariance
@@ -314,22 +326,25 @@ def odometry(
     T_world_body: Array,
     twist_body: ArrayLike | None,
 ) -> Any:
-    """A nav_msgs/Odometry: the body's pose in the world, its (6,) twist (m/s, rad/s) in its own axes, or None."""
+    """A nav_msgs/Odometry with the pose (4, 4) of the body in the world.
+
+    `twist_body` (6,) is the linear velocity (m/s) and the angular velocity (rad/s) in the body's axes, None if unknown.
+    """
     position = _make("geometry_msgs/msg/Point", *T_world_body[:3, 3].tolist())
     pose = _make("geometry_msgs/msg/Pose", position, _quaternion(T_world_body[:3, :3]))
-    exact = np.zeros(36)  # the covariance of a ground truth
+    exact_covariance = np.zeros(36)
     linear_mps = np.zeros(3)
     angular_radps = np.zeros(3)
     twist_covariance = _unknown_covariance(36)
     if twist_body is not None:
         linear_mps, angular_radps = np.asarray(twist_body, float).reshape(2, 3)
-        twist_covariance = exact
+        twist_covariance = exact_covariance
     twist = _make("geometry_msgs/msg/Twist", vector(linear_mps), vector(angular_radps))
     return _make(
         ODOMETRY.type_name,
         header(t_ns, WORLD),
         BODY,
-        _make("geometry_msgs/msg/PoseWithCovariance", pose, exact),
+        _make("geometry_msgs/msg/PoseWithCovariance", pose, exact_covariance),
         _make("geometry_msgs/msg/TwistWithCovariance", twist, twist_covariance),
     )
 
@@ -341,7 +356,7 @@ def stamp_ns(message: Any) -> int:
 
 
 def pose_fields(message: Any) -> tuple[float, ...]:
-    """Translation and quaternion (x, y, z, qx, qy, qz, qw) of a Transform or a Pose."""
+    """The translation and quaternion (x, y, z, qx, qy, qz, qw) of a Transform or Pose message."""
     t = message.translation if hasattr(message, "translation") else message.position
     q = message.rotation if hasattr(message, "rotation") else message.orientation
     translation = (t.x, t.y, t.z)
@@ -350,33 +365,36 @@ def pose_fields(message: Any) -> tuple[float, ...]:
 
 
 def poses(fields: ArrayLike) -> Array:
-    """Transforms (..., 4, 4) from `pose_fields` (..., 7)."""
+    """Transforms (..., 4, 4) from values (..., 7) of `pose_fields`."""
     values = np.asarray(fields, float)
     return se3.transform(se3.from_quaternion(values[..., 3:]), values[..., :3])
 
 
 def camera(message: Any) -> Camera:
-    """The camera of a CameraInfo. Raises SequenceError for an unknown distortion model."""
+    """The camera that a CameraInfo message describes.
+
+    Raises SequenceError for an unknown distortion model, or a wrong number of coefficients.
+    """
     size_px = (int(message.width), int(message.height))
-    d = [float(value) for value in message.d]
+    coefficients = [float(value) for value in message.d]
     name = message.distortion_model
     if name == ALL_AROUND:
         return Equirectangular(*size_px)
-    fx, _, cx, _, fy, cy = message.k[:6].tolist()
-    if name == PLUMB_BOB and not any(d):
-        return Pinhole(*size_px, fx, fy, cx, cy)
+    fx_px, _, cx_px, _, fy_px, cy_px = message.k[:6].tolist()
+    if name == PLUMB_BOB and not any(coefficients):
+        return Pinhole(*size_px, fx_px, fy_px, cx_px, cy_px)
     model = FOCAL_MODELS.get(name)
-    if model is None or len(d) != len(model.coefficients):
+    if model is None or len(coefficients) != len(model.coefficients):
         models = [f"{key} ({len(kind.coefficients)})" for key, kind in FOCAL_MODELS.items()]
         known = ", ".join(models)
         raise SequenceError(
-            f"camera {message.header.frame_id} has the distortion model '{name}' with {len(d)} coefficients. "
-            f"Known: {known}, {ALL_AROUND} (0)"
+            f"camera {message.header.frame_id} has the distortion model '{name}' with {len(coefficients)} "
+            f"coefficients. Known: {known}, {ALL_AROUND} (0)"
         )
-    return model(*size_px, fx, fy, cx, cy, *d)
+    return model(*size_px, fx_px, fy_px, cx_px, cy_px, *coefficients)
 
 
-# A serialised message begins with four bytes that state its byte order, then the stamp of its header.
+# A serialised message starts with four bytes for its byte order. If it has a header, the stamp follows.
 STAMP = struct.Struct("<iI")
 STAMP_BEGIN = 4
 STAMP_END = STAMP_BEGIN + STAMP.size
@@ -385,18 +403,21 @@ LITTLE_ENDIAN = b"\x00\x01"
 
 
 def serialise(message: Any) -> bytes:
-    """The CDR bytes of a message."""
+    """A message as CDR bytes, in little-endian order."""
     return bytes(TYPES.serialize_cdr(message, message.__msgtype__, little_endian=True))
 
 
 def with_stamp(template: bytes, t_ns: int) -> bytes:
-    """A serialised message that begins with a header, at another stamp."""
+    """A copy of the serialised message `template` with another stamp. The message must begin with a header."""
     stamp = STAMP.pack(*split_stamp(t_ns))
     return b"".join((template[:STAMP_BEGIN], stamp, template[STAMP_END:]))
 
 
 def with_picture(template: bytes, t_ns: int, encoded: bytes) -> bytes:
-    """A serialised CompressedImage without a picture, given a stamp and a picture, which is its last field."""
+    """A copy of the serialised CompressedImage `template` with another stamp, and with a picture.
+
+    The template must have an empty picture, which is the last field of the message.
+    """
     stamp = STAMP.pack(*split_stamp(t_ns))
     frame_and_format = template[STAMP_END : -LENGTH.size]
     length = LENGTH.pack(len(encoded))
@@ -413,34 +434,39 @@ class StampedPicture(NamedTuple):
 
 
 def picture_in(data: memoryview) -> StampedPicture:
-    """The content of a serialised CompressedImage. Raises ValueError where the data is something else."""
+    """The content of a serialised CompressedImage. Raises ValueError if the data has another form."""
     if data[: len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
         raise ValueError("a picture's message is not in little-endian CDR")
     sec, nanosec = STAMP.unpack_from(data, STAMP_BEGIN)
-    _, place = _string(data, STAMP_END)  # the frame
-    format_name, place = _string(data, place)
-    colour, _, rest = format_name.rpartition("; ")
+    _, offset = _read_string(data, STAMP_END)  # the name of the frame
+    format_name, offset = _read_string(data, offset)
+
+    colour, _, codec = format_name.rpartition("; ")
     colour = colour or MONO
-    form = rest.partition(" ")[0]
+    form = codec.partition(" ")[0]
     if colour not in CHANNELS:
         raise ValueError(f"a picture has the unknown format {format_name!r}")
-    begin, end = _counted(data, place)
+    begin, end = _sequence_bounds(data, offset)
     return StampedPicture(sec * NS_PER_S + nanosec, form, colour, data[begin:end])
 
 
-def _string(data: memoryview, place: int) -> tuple[str, int]:
-    """A string, which ends with a zero, and the place of what follows it."""
-    begin, end = _counted(data, place)
+def _read_string(data: memoryview, offset: int) -> tuple[str, int]:
+    """The string at an offset, and the offset after the zero byte that ends it."""
+    begin, end = _sequence_bounds(data, offset)
     text_end = max(begin, end - 1)
     return bytes(data[begin:text_end]).decode(), end
 
 
-def _counted(data: memoryview, place: int) -> tuple[int, int]:
-    """The begin and end of bytes whose number is stated at a place, or at the next multiple of four."""
-    aligned = place + -place % LENGTH.size
-    (length,) = LENGTH.unpack_from(data, aligned)
-    begin = aligned + LENGTH.size
+def _sequence_bounds(data: memoryview, offset: int) -> tuple[int, int]:
+    """The offsets of the begin and end of a sequence of bytes.
+
+    Its length is stored before it, at the first multiple of four that is not less than `offset`.
+    Raises ValueError if the data ends before the sequence.
+    """
+    length_offset = offset + -offset % LENGTH.size
+    (length,) = LENGTH.unpack_from(data, length_offset)
+    begin = length_offset + LENGTH.size
     end: int = begin + length
     if end > len(data):
-        raise ValueError(f"a message of {len(data)} bytes states {length} more at {aligned}")
+        raise ValueError(f"a message of {len(data)} bytes states {length} more at {length_offset}")
     return begin, end

@@ -15,16 +15,22 @@ from vobench.suite.suite_spec import EXACT, Rendering, TruthNoise, Window
 from vobench.suite.trajectory import TrajectorySpec
 
 AXES = ("scene", "lighting", "rig", "trajectory", "camera")
-CALIBRATION_STREAM = 7_301  # separates random calibration errors from the other random streams of a seed
+CALIBRATION_STREAM = 7_301  # separates calibration errors from the other random streams of a seed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
-    """One sequence to simulate, and everything that it depends on.
+    """One sequence to simulate, with all settings that determine it.
 
-    `variant` is the case's name on each of AXES. `name` joins those names that differ within the suite, so it is
-    unique there and can name a folder. `seed` is the suite's. `replayed` is the content of the trajectory's file, as
-    TUM text, if it has one. `scenario` and `severity` are set for cases of a scenario.
+    `name` is unique within the suite and valid as the name of a folder. It joins the values of `variant` that differ
+    within the suite.
+    `variant` maps each of AXES to the name of the scene, lighting, rig, trajectory or camera.
+    `replayed` is the replayed trajectory as TUM text, None for a trajectory that is generated.
+    `truth` lists the channels of per-pixel ground truth to record, such as depth.
+    `truth_noise` is the error that is added to the ground-truth trajectory; it is EXACT by default.
+    `frames` (first, end) is the range of frames that the sequence contains, without `end`; None means all frames.
+    `seed` is the seed of the suite.
+    `scenario` and `severity` are set only for a case of a scenario.
     """
 
     name: str
@@ -44,21 +50,22 @@ class Case:
     severity: int | None = None
 
     def build_scene(self) -> Scene:
-        """The scene under this case's lighting."""
+        """The scene with this case's lighting."""
         from vobench.suite.scene_build import build
 
         return build(self.scene, self.lighting)
 
     def build_rig(self) -> Rig:
-        """The sensors with their nominal calibration, which estimators receive."""
+        """The sensors with the nominal calibration that estimators receive."""
         wheels = self.trajectory.wheels if isinstance(self.trajectory, Wheeled) else None
         return replace(self.rig.build(), wheels=wheels)
 
     def build_true_rig(self) -> Rig:
-        """The stereo pair with its true calibration, which images are rendered with.
+        """The sensors with the true calibration that images are rendered with.
 
-        Raises VobenchError, as `true_rig` does.
+        Raises VobenchError under the same conditions as `true_rig`.
         """
-        rig = self.build_rig()
+        nominal_rig = self.build_rig()
         rng = np.random.default_rng([self.seed, CALIBRATION_STREAM])
-        return true_rig(rig, drawn_calibration_error(self.rig.calibration_error, rig, rng))
+        error = drawn_calibration_error(self.rig.calibration_error, nominal_rig, rng)
+        return true_rig(nominal_rig, error)

@@ -1,4 +1,4 @@
-"""Tells suites, scenarios, scenes and estimators' manifests apart by their keys."""
+"""Recognises suites, scenarios, scenes and estimator manifests by their top-level keys."""
 
 import os
 import re
@@ -30,14 +30,17 @@ TOP_LEVEL_KEY = re.compile(r"^(\w+)\s*:", re.MULTILINE)
 
 
 def kind_of(keys: Collection[str]) -> Kind | None:
-    """The kind of file that most of these top-level keys belong to; None if none of them tells."""
+    """The kind of file that has the most of these top-level keys; None if no kind has any of them."""
     counts = {kind: len(marks & set(keys)) for kind, marks in MARKS.items()}
     likeliest = max(counts, key=lambda kind: counts[kind])
-    return likeliest if counts[likeliest] else None
+    return likeliest if counts[likeliest] > 0 else None
 
 
 def kind_in(path: Path) -> Kind | None:
-    """The kind of a YAML file by the keys at the starts of its lines, without parsing; None if none of them tells."""
+    """The kind of a YAML file, guessed from the keys that begin its lines.
+
+    The file is not parsed. None if it cannot be read, or if no kind has any of its keys.
+    """
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError):
@@ -46,8 +49,12 @@ def kind_in(path: Path) -> Kind | None:
 
 
 def about_other_kind(wanted: Kind, path: Path, keys: Collection[str]) -> str | None:
-    """The sentence about a file whose keys are those of another kind; None if it may be of the wanted kind."""
-    if MARKS[wanted] & set(keys):
+    """A sentence that names the kind of a file, if it is not the wanted kind.
+
+    None if the file has a key of the wanted kind, or if its kind is unknown.
+    """
+    has_wanted_key = bool(MARKS[wanted] & set(keys))
+    if has_wanted_key:
         return None
     actual = kind_of(keys)
     if actual is None:
@@ -56,14 +63,14 @@ def about_other_kind(wanted: Kind, path: Path, keys: Collection[str]) -> str | N
 
 
 def about_model(wanted: Kind, path: Path) -> str | None:
-    """The sentence about a model's file that was given in place of a YAML file; None if it is not a model."""
+    """A sentence for a 3-D model that was given instead of a YAML file; None if the file is not a model."""
     if path.suffix.lower() not in MODEL_SUFFIXES:
         return None
     return f"this is a model, not {NOUNS[wanted]}; inspect it with `vobench scene {display_path(path)}`"
 
 
 def display_path(path: Path) -> str:
-    """A path as a user would type it: relative if it is below the working directory."""
+    """A path as a user would type it: relative if it is inside the working directory, otherwise absolute."""
     absolute = path.resolve()
     working_folder = Path.cwd()
     if absolute.is_relative_to(working_folder):
@@ -72,6 +79,7 @@ def display_path(path: Path) -> str:
 
 
 def _advice(kind: Kind, path: Path) -> str:
+    """How to use a file of this kind."""
     match kind:
         case "suite":
             return f"run it with `vobench run {display_path(path)}`"

@@ -1,8 +1,8 @@
 """Runs the maker of a scene: a Python file whose `make(seed)` returns things, materials and, optionally, lights.
 
-A maker is a program that somebody else may have written. It runs in the sandbox of estimators, where it can read its
-own folder and no other file of the user's, and hands back data. Makers that vobench brings along are part of vobench
-and run in its own process.
+A maker may be code from a stranger. It therefore runs in the same sandbox as estimators, where it can read the files in
+its folder but no other file of the user. It returns its scene as data. The makers that vobench includes are trusted and
+run in the process of vobench.
 """
 
 import os
@@ -26,13 +26,14 @@ LIMITS = Limits(trial_s=600.0, threads=max(os.cpu_count() or 1, 1))
 WORKER = (sys.executable, "-P", "-m", "vobench.suite.maker_worker")
 SCENE_BYTES = 2 << 30
 ERROR_BYTES = 1 << 16
+NO_SCENE = "ended without handing back a scene"
 
 
 def made_by(maker: Path, *, seed: int, scene: str) -> MakerScene:
-    """What a maker makes of a seed, for the scene of that name.
+    """The scene that a maker creates from a seed; `scene` is the scene's name.
 
-    Raises SuiteError, one line that names the maker, for whatever goes wrong in it; also where there is no sandbox on
-    this machine and the user does not trust the maker.
+    Raises SuiteError, one line that names the maker, if the maker fails, or if this machine has no sandbox and the user
+    does not trust the maker.
     """
     if maker.resolve().is_relative_to(builtin_root().resolve()):
         return _in_this_process(maker, seed)
@@ -48,51 +49,61 @@ def _in_this_process(maker: Path, seed: int) -> MakerScene:
 
 
 def _is_contained() -> bool:
-    """Whether a program in the sandbox of this machine is kept from the user's files."""
+    """Whether the sandbox of this machine hides the user's files from a program."""
     return isolation.FILES not in sandbox_here().sees
 
 
 def _sources(maker: Path) -> Iterator[bytes]:
-    """The maker's code and all other Python code in its folder, with names."""
-    others = [path for path in maker.parent.rglob("*.py") if path.name != maker.name and path.is_file()]
+    """The name and content of the maker, then of every other Python file in its folder and below."""
+    others = [path for path in maker.parent.rglob("*.py") if path != maker and path.is_file()]
     for path in [maker, *sorted(others)]:
         yield str(path.relative_to(maker.parent)).encode()
         yield path.read_bytes()
 
 
 def _in_a_sandbox(maker: Path, seed: int) -> MakerScene:
-    with ExitStack() as opened:
-        home = opened.enter_context(Home(Path(os.devnull)))
-        log = home.path.parent / "log.txt"
-        try:
-            argv = [*WORKER, str(maker.resolve()), str(seed)]
-            program = opened.enter_context(
-                Program(argv, log=log, limits=LIMITS, home=home, folder=maker.parent.resolve())
-            )
-            program.wait()
-            failure = _read(program, ERROR, ERROR_BYTES)
-            content = b"" if failure else program.read(SCENE, most_bytes=SCENE_BYTES)
-        except EstimatorFailure as failed:
-            raise SuiteError(f"{maker}: {_reason(failed)}") from None
-    if failure:
-        raise SuiteError(f"{maker}: {in_one_line(failure.decode('utf-8', 'replace'))}")
     try:
-        return decode(content)
+        return decode(_worker_output(maker, seed))
+    except EstimatorFailure as failure:
+        raise SuiteError(f"{maker}: {_reason(failure)}") from None
     except SuiteError as error:
         raise SuiteError(f"{maker}: {error}") from None
 
 
-def _reason(failed: EstimatorFailure) -> str:
-    """Why a maker handed back nothing, in a sentence on makers."""
-    if failed.kind == "timeout":
+def _worker_output(maker: Path, seed: int) -> bytes:
+    """The encoded scene that a worker process writes in the sandbox.
+
+    Raises EstimatorFailure if the process fails, and SuiteError with the error that the maker raised.
+    """
+    command = [*WORKER, str(maker.resolve()), str(seed)]
+    with ExitStack() as stack:
+        home = stack.enter_context(Home(Path(os.devnull)))
+        log = home.path.parent / "log.txt"
+        program = stack.enter_context(
+            Program(command, log=log, limits=LIMITS, home=home, folder=maker.parent.resolve())
+        )
+        program.wait()
+        error_text = _read_if_written(program, ERROR, ERROR_BYTES)
+        scene = b"" if error_text else program.read(SCENE, most_bytes=SCENE_BYTES)
+    if error_text:
+        raise SuiteError(in_one_line(error_text.decode("utf-8", "replace")))
+    return scene
+
+
+def _reason(failure: EstimatorFailure) -> str:
+    """Why a maker returned no scene; the reasons of estimators speak of trials and of their output file {out}."""
+    if failure.kind == "timeout":
         return f"took more than {LIMITS.trial_s:g} s"
-    if failed.kind == "invalid_output":
-        return "ended without handing back a scene"
-    return failed.reason
+    if failure.kind != "invalid_output":
+        return failure.reason
+    is_file_unreadable = failure.reason.startswith("{out} ")
+    if not is_file_unreadable:
+        return NO_SCENE
+    return f"{NO_SCENE}: {failure.reason.replace('{out}', SCENE)}"
 
 
-def _read(program: Program, name: str, most_bytes: int) -> bytes:
-    """The content of a file that the program may have written; empty where it has not."""
+def _read_if_written(program: Program, name: str, most_bytes: int) -> bytes:
+    """The content of a file that the program may have written; empty if it cannot be read."""
     try:
         return program.read(name, most_bytes=most_bytes)
     except EstimatorFailure:

@@ -61,31 +61,32 @@ def checked(returned: Any) -> MakerScene:
     """What `make(seed)` returned: things, their materials by name and, if it likes, lights. Raises SuiteError."""
     if not isinstance(returned, Sequence) or len(returned) not in (2, 3):
         raise SuiteError("make() should return things, materials by name and, optionally, lights")
-    things, materials, *rest = returned
-    lights = rest[0] if rest else ()
-    _require_all("thing", things, (Thing,))
-    _require_all("light", lights, LIGHTS)
+    returned_things, materials, *rest = returned
     if not isinstance(materials, Mapping):
         raise SuiteError(f"make() should return materials by name, not {type(materials).__name__}")
-    _require_all("material", materials.values(), (Material,))
+    things = _all_of("thing", returned_things, (Thing,))
+    lights = _all_of("light", rest[0] if rest else (), LIGHTS)
+    _all_of("material", materials.values(), (Material,))
 
     missing = {thing.material for thing in things} - materials.keys()
     if missing:
         raise SuiteError(f"make() returns things without materials: {', '.join(sorted(map(str, missing)))}")
     for thing in things:
         _require_drawable(thing, materials[thing.material])
-    return MakerScene(tuple(things), dict(materials), tuple(lights))
+    return MakerScene(things, dict(materials), lights)
 
 
-def _require_all(noun: str, objects: Any, classes: tuple[type, ...]) -> None:
-    """Raise SuiteError where something returned is of another class."""
+def _all_of(noun: str, objects: Any, classes: tuple[type, ...]) -> tuple[Any, ...]:
+    """The objects, which may come from a generator. Raises SuiteError where one is of another class."""
     try:
-        strange = [each for each in objects if not isinstance(each, classes)]
+        listed = tuple(objects)
     except TypeError:
         raise SuiteError(f"make() should return a list of {noun}s, not {type(objects).__name__}") from None
+    strange = [each for each in listed if not isinstance(each, classes)]
     if strange:
         names = " or ".join(each.__name__ for each in classes)
         raise SuiteError(f"make() returns a {noun} that is no {names}: {type(strange[0]).__name__}")
+    return listed
 
 
 def _require_drawable(thing: Thing, material: Material) -> None:

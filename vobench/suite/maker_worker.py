@@ -20,7 +20,7 @@ def call(maker: str, seed: int) -> MakerScene:
     # Never from bytecode: that of a file edited twice within a second would be the first one's.
     make: Any = run_path(maker).get("make")
     if make is None:
-        raise SuiteError(f"{maker} has no function make(seed)")
+        raise SuiteError("has no function make(seed)")
     return checked(make(seed))
 
 

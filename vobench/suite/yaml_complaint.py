@@ -1,4 +1,4 @@
-"""Turns pydantic's validation errors into sentences for those who write YAML."""
+"""Turns pydantic's validation errors into sentences for the authors of YAML files."""
 
 from collections.abc import Collection, Iterator
 from difflib import get_close_matches
@@ -10,36 +10,48 @@ from vobench.errors import Mistake, SettingError
 from vobench.setting import COMPLAINTS, complaint
 from vobench.suite.yaml_source import Keys, YamlFile
 
-Schema = dict[str, Any]  # a JSON Schema or a part of one
+Schema = dict[str, Any]  # a JSON Schema or a section of one
 UNKNOWN_KEY = "unexpected_keyword_argument"  # pydantic's type of the error
 
 
 def complaints(
     source: YamlFile, error: ValidationError, schema: Schema, unread: Collection[Keys] = ()
 ) -> Iterator[Mistake]:
-    """The mistakes behind a validation error, unknown keys first.
+    """The mistakes that caused a validation error, unknown keys first.
 
-    Consequences of other mistakes are left out: at places `unread`, a key that is missing because it is misspelt, and
-    a list that is too short because entries of it are wrong.
+    An error that another mistake explains is left out. `unread` are the places of values that could not be read; their
+    mistakes are reported elsewhere.
     """
     errors = sorted(error.errors(), key=lambda each: each["type"] != UNKNOWN_KEY)
     wrong_places = [*unread, *map(location, errors)]
-    intended_places = set[tuple[Any, ...]]()
-    for each in errors:
-        if each["type"] == UNKNOWN_KEY:
-            intended_places.add((*each["loc"][:-1], _nearest_key(each, schema)))
+    misspelt_places = _misspelt_places(errors, schema)
 
     for each in errors:
         place = location(each)
         keys, _ = _walk(schema, place)
-        is_misspelt = each["type"] == "missing" and place in intended_places
-        is_short_of_wrong_entries = each["type"] == "too_short" and _contains_any(place, wrong_places)
-        if not (keys in unread or is_misspelt or is_short_of_wrong_entries):
-            yield Mistake(_sentence(each, schema, source), (source.place(keys),))
+        if keys in unread:
+            continue
+        is_key_misspelt = each["type"] == "missing" and place in misspelt_places
+        if is_key_misspelt:
+            continue
+        is_list_without_wrong_entries = each["type"] == "too_short" and _contains_any(place, wrong_places)
+        if is_list_without_wrong_entries:
+            continue
+        yield Mistake(_sentence(each, schema, source), (source.place(keys),))
+
+
+def _misspelt_places(errors: Collection[Any], schema: Schema) -> set[tuple[Any, ...]]:
+    """The places of the known keys that unknown keys resemble."""
+    places = set[tuple[Any, ...]]()
+    for each in errors:
+        if each["type"] == UNKNOWN_KEY:
+            section_place = each["loc"][:-1]
+            places.add((*section_place, _nearest_key(each, schema)))
+    return places
 
 
 def location(error: Any) -> Keys:
-    """The place of an error in pydantic's terms. A SettingError also names the key of the section."""
+    """The place of an error as pydantic reports it, followed by the keys that a SettingError names."""
     cause = error.get("ctx", {}).get("error")
     if isinstance(cause, SettingError):
         return (*error["loc"], *cause.keys)
@@ -49,28 +61,30 @@ def location(error: Any) -> Keys:
 
 def _contains_any(place: Keys, others: Collection[Keys]) -> bool:
     """Whether one of the other places is inside this one."""
-    return any(place == other[: len(place)] != other for other in others)
+    return any(len(other) > len(place) and other[: len(place)] == place for other in others)
 
 
 def _nearest_key(error: Any, schema: Schema) -> str | None:
-    """The known key that an unknown one resembles most."""
+    """The known key that an unknown key resembles most; None if it resembles none."""
     unknown_key = str(error["loc"][-1])
     nearest = get_close_matches(unknown_key, _known_keys(error["loc"], schema), n=1)
     return nearest[0] if nearest else None
 
 
 def _known_keys(place: Keys, schema: Schema) -> list[str]:
-    """The keys of the section that a place is in."""
+    """The keys that the section around a place can have, sorted."""
     _, section = _walk(schema, place[:-1])
     return sorted(section.get("properties", {}))
 
 
 def _sentence(error: Any, schema: Schema, source: YamlFile) -> str:
+    """The sentence about one of pydantic's errors."""
     if error["type"] == UNKNOWN_KEY:
         return _about_unknown_key(error, schema, source)
     context = error.get("ctx", {})
-    if isinstance(context.get("error"), SettingError):  # names the value itself
-        return str(context["error"].sentence)
+    cause = context.get("error")
+    if isinstance(cause, SettingError):  # its sentence contains the value
+        return cause.sentence
     template = COMPLAINTS.get(error["type"])
     if template is None:
         return complaint(error["msg"], error["input"], {})
@@ -78,6 +92,7 @@ def _sentence(error: Any, schema: Schema, source: YamlFile) -> str:
 
 
 def _about_unknown_key(error: Any, schema: Schema, source: YamlFile) -> str:
+    """The sentence about an unknown key, with the nearest known key and all known keys."""
     elsewhere = _about_other_kinds(error["loc"], schema, source)
     if elsewhere:
         return elsewhere
@@ -87,64 +102,80 @@ def _about_unknown_key(error: Any, schema: Schema, source: YamlFile) -> str:
 
 
 def _about_other_kinds(place: Keys, schema: Schema, source: YamlFile) -> str:
-    """The sentence about an unknown key that other kinds of the section have.
+    """The sentence about an unknown key that belongs to other kinds of its section.
 
-    Empty if no kind has it, or if only its unit is missing.
+    Empty if no kind has the key, or if the key lacks only its unit.
     """
     if len(place) < 2:
         return ""
     *section_place, kind, key = place
-    keys, section = _walk(schema, tuple(section_place))
-    members: dict[str, str] = section.get("discriminator", {}).get("mapping", {})
-    if str(kind) not in members:
+    section_keys, section = _walk(schema, tuple(section_place))
+    references_by_kind = _references_by_kind(section)
+    if str(kind) not in references_by_kind:
         return ""
-    owners = [name for name, reference in members.items() if key in _resolve(schema, reference)["properties"]]
+
+    owners = []
+    for name, reference in references_by_kind.items():
+        if key in _resolve(schema, reference)["properties"]:
+            owners.append(name)
     lacks_unit = any(name.startswith(f"{key}_") for name in _known_keys(place, schema))
     if not owners or lacks_unit:
         return ""
-    is_kind_written = source.place((*keys, "kind")).value is not None
+
+    is_kind_written = source.place((*section_keys, "kind")).value is not None
     this_kind = f"this is {kind}" if is_kind_written else f"without a kind this is {kind}"
     return f"belongs to {', '.join(owners)}; {this_kind}"
 
 
-def _walk(schema: Schema, place: Keys) -> tuple[Keys, Schema]:
-    """The keys in the file that lead to a place in pydantic's terms, and the part of the schema there.
+def _references_by_kind(section: Schema) -> dict[str, str]:
+    """The references to the schemas of a section's kinds; empty if the section has no kinds."""
+    references: dict[str, str] = section.get("discriminator", {}).get("mapping", {})
+    return references
 
-    Pydantic's place also names the kind that was chosen among several, and ends in a part of its own if a key rather
-    than its value is wrong.
+
+def _walk(schema: Schema, place: Keys) -> tuple[Keys, Schema]:
+    """The keys in the file that lead to a place, and the schema there.
+
+    Pydantic's places have two parts that a file does not have: the kind of a section that has several kinds, and
+    "[key]" if a key is wrong instead of its value.
     """
     keys = list[int | str]()
-    part = _unwrapped(schema, schema)
-    for key in place:
-        if key == "[key]":
+    section = _without_alternatives(schema, schema)
+    for part in place:
+        if part == "[key]":
             continue
-        kind_reference = part.get("discriminator", {}).get("mapping", {}).get(key)
+        kind_reference = _references_by_kind(section).get(str(part))
         if kind_reference:
-            part = _resolve(schema, kind_reference)
+            section = _resolve(schema, kind_reference)
             continue
-        keys.append(key)
-        part = _unwrapped(schema, _entry_schema(part, key))
-    return tuple(keys), part
+        keys.append(part)
+        section = _without_alternatives(schema, _entry_schema(section, part))
+    return tuple(keys), section
 
 
-def _entry_schema(part: Schema, key: int | str) -> Schema:
-    """The schema of an entry of a section, a mapping or a list."""
-    named: Schema | None = part.get("properties", {}).get(key)
-    if named:
-        return named
-    by_pattern = part.get("patternProperties", {None: part.get("additionalProperties")})
-    of_values: Schema | None = next(iter(by_pattern.values()))
-    return of_values or part.get("items") or {}
+def _entry_schema(section: Schema, key: int | str) -> Schema:
+    """The schema of the entry at a key of a section, of a mapping or of a list; empty if it is unknown."""
+    property_schema: Schema | None = section.get("properties", {}).get(key)
+    return property_schema or _value_schema(section) or section.get("items") or {}
 
 
-def _unwrapped(schema: Schema, part: Schema) -> Schema:
-    """A part without its alternatives: an optional section may also be null, a preset section also a name."""
-    while "anyOf" in part or "$ref" in part:
-        part = _resolve(schema, part["$ref"]) if "$ref" in part else part["anyOf"][0]
-    return part
+def _value_schema(section: Schema) -> Schema | None:
+    """The schema of the values of a mapping, whose keys may have to match a pattern; None for other sections."""
+    if "patternProperties" not in section:
+        additional: Schema | None = section.get("additionalProperties")
+        return additional
+    schemas_by_pattern: dict[str, Schema] = section["patternProperties"]
+    return next(iter(schemas_by_pattern.values()))
+
+
+def _without_alternatives(schema: Schema, section: Schema) -> Schema:
+    """The first alternative of a section, which is its full form; the others are null or the name of a preset."""
+    while "anyOf" in section or "$ref" in section:
+        section = _resolve(schema, section["$ref"]) if "$ref" in section else section["anyOf"][0]
+    return section
 
 
 def _resolve(schema: Schema, reference: str) -> Schema:
-    """The part of the schema that a reference, such as #/$defs/Suite, points to."""
+    """The definition that a reference such as #/$defs/Suite points to."""
     resolved: Schema = schema["$defs"][reference.rpartition("/")[2]]
     return resolved

@@ -17,24 +17,31 @@ from vobench.trajectory.trajectory import Stamps, Trajectory
 
 Rows = NDArray[np.intp]
 StampUnit = Literal["s", "ms", "us", "ns"]
-QuaternionOrder = Literal["xyzw", "wxyz"]  # of a quaternion's four numbers
+QuaternionOrder = Literal["xyzw", "wxyz"]  # in which a file lists the four components of a quaternion
 
-NORM_TOLERANCE = 1e-3  # 4 printed digits change a norm by 1e-4; other units or another order by far more
-DIGITS: dict[StampUnit, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}  # decimals down to the nanosecond
+NORM_TOLERANCE = 1e-3  # rounding to 4 digits changes a norm by 1e-4; numbers that are no quaternion differ far more
+DIGITS: dict[StampUnit, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}  # decimal places that resolve a nanosecond
 WORDS: dict[StampUnit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 MAX_NS = 2**63 - 1
-SCALAR_LAST = [1, 2, 3, 0]  # the places of x, y, z, w among w, x, y, z
-SCALAR_FIRST = [3, 0, 1, 2]  # the places of w, x, y, z among x, y, z, w
-# Stricter than float(), which also takes 1_000, nan, infinity and the digits of other scripts.
+SCALAR_LAST = [1, 2, 3, 0]  # indices that reorder (w, x, y, z) to (x, y, z, w)
+SCALAR_FIRST = [3, 0, 1, 2]  # indices that reorder (x, y, z, w) to (w, x, y, z)
+# Stricter than float(), which also accepts 1_000, nan, infinity and the digits of other scripts.
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
-PLAIN = re.compile(r"([0-9]{1,9}|[0-8][0-9]{9})\.([0-9]{1,9})")  # seconds as nearly every file has them, below MAX_NS
+# The usual notation of seconds; its numbers stay below MAX_NS.
+PLAIN = re.compile(r"([0-9]{1,9}|[0-8][0-9]{9})\.([0-9]{1,9})")
 NUMERIC = re.compile(r"[0-9eE+\-., \t\r\n]*")
-EXACT = Context(prec=64, rounding=ROUND_HALF_EVEN)  # digits of seconds; int64 ns need 19
+EXACT = Context(prec=64, rounding=ROUND_HALF_EVEN)  # int64 nanoseconds need only 19 digits
 
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryTable:
-    """The numbers of a text, (N, columns), with the line number and the text of the first field of each row."""
+    """The numbers of a text file, and where each row stands in it.
+
+    `name` is the file's name, for messages.
+    `lines` are the N line numbers, from 1.
+    `first` are the N first fields as text, so that stamps lose no digit.
+    `values` are the numbers (N, columns).
+    """
 
     name: str
     lines: Sequence[int]
@@ -42,12 +49,15 @@ class TrajectoryTable:
     values: Array
 
     def place(self, row: int) -> str:
-        """File and line of a row, for the error message."""
+        """File and line of a row, for messages."""
         return f"{self.name}:{self.lines[row]}"
 
 
 def content(text: str) -> list[tuple[int, str]]:
-    """Line numbers and lines with content: no byte order mark, comments, blank lines or CR."""
+    """The line number and text of each line with content.
+
+    The byte order mark, comments, blank lines and carriage returns are removed.
+    """
     rows = []
     lines = text.removeprefix("\ufeff").split("\n")
     for number, line in enumerate(lines, 1):
@@ -65,87 +75,101 @@ def read_table(
     separator: str | None = None,
     row: str = "a pose",
 ) -> TrajectoryTable:
-    """The numbers of `content`, one per column and line; with a `separator` more columns may follow.
+    """The numbers in rows of `content`, one row per line.
 
-    `row` is what a line stands for, for the error message.
+    A line has one field per column. If there is a `separator`, further fields may follow and are ignored.
+    `row` says what a line is, for messages.
     Raises TrajectoryError with file, line and value for a field that is not a finite number.
     """
-    numbers = [number for number, _ in rows]
+    line_numbers = [number for number, _ in rows]
     bodies = [body for _, body in rows]
-    first = [body.split(separator, 1)[0].strip() for body in bodies]
+    first_fields = [body.split(separator, 1)[0].strip() for body in bodies]
     values = _read_fast(bodies, len(columns), separator)
     if values is None:
         values = _read_checked(rows, name, columns, separator, row)
-    return TrajectoryTable(name, numbers, first, values)
+    return TrajectoryTable(name, line_numbers, first_fields, values)
 
 
 def stamps_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
-    """The first column, exact to the nanosecond. Raises TrajectoryError unless it increases within int64."""
-    t_ns = _all_ns(table, unit)
-    _require_rising(table, t_ns, "stamps must increase by 1 ns or more", least=1)
+    """The stamps (N,) in the first column, exact to the nanosecond.
+
+    Raises TrajectoryError if a stamp does not exceed the one before, or exceeds int64.
+    """
+    t_ns = _first_column_ns(table, unit)
+    _require_steps(table, t_ns, least_step=1, demand="stamps must increase by 1 ns or more")
     return t_ns
 
 
-def first_of_equal(table: TrajectoryTable, numbers: Stamps, what: str) -> tuple[Stamps, Rows, tuple[str, ...]]:
-    """The rows' numbers (N,), such as stamps, without repetitions; their rows (K,); and a note of those left out.
+@dataclass(frozen=True, slots=True)
+class _DistinctRows:
+    """The rows of a table that do not repeat the number of the row before.
 
-    Raises TrajectoryError for decreasing numbers.
+    `numbers` (K,) are their numbers, `rows` (K,) their indices in the table, `notes` a sentence about the others.
     """
-    _require_rising(table, numbers, f"{what}s must increase", least=0)
-    rows = np.flatnonzero(np.diff(numbers, prepend=numbers[:1] - 1))
+
+    numbers: Stamps
+    rows: Rows
+    notes: tuple[str, ...]
+
+
+def _distinct_rows(table: TrajectoryTable, numbers: Stamps, noun: str) -> _DistinctRows:
+    """The rows of a table without those that repeat a number; `noun` says what the numbers (N,) are.
+
+    Raises TrajectoryError if a number is smaller than the one before.
+    """
+    _require_steps(table, numbers, least_step=0, demand=f"{noun}s must increase")
     repeated = np.flatnonzero(np.diff(numbers) == 0) + 1
     if not repeated.size:
-        return numbers, rows, ()
-    place = table.place(repeated[0])
+        return _DistinctRows(numbers, np.arange(len(numbers)), ())
+
+    rows = np.flatnonzero(np.diff(numbers, prepend=numbers[:1] - 1))
     note = (
-        f"rows that repeat the {what} of the row before were left out: {repeated.size} of {len(numbers)}, "
-        f"the first at {place}"
+        f"rows that repeat the {noun} of the row before were left out: {repeated.size} of {len(numbers)}, "
+        f"the first at {table.place(repeated[0])}"
     )
-    return numbers[rows], rows, (note,)
+    return _DistinctRows(numbers[rows], rows, (note,))
 
 
 def rotations(table: TrajectoryTable, q: Array, order: QuaternionOrder) -> Array:
-    """Rotations (N, 3, 3) of the rows' quaternions (N, 4). Raises TrajectoryError for a norm other than 1."""
+    """The rotations (N, 3, 3) of quaternions q (N, 4), one per row of the table.
+
+    Raises TrajectoryError for a quaternion whose norm is not 1.
+    """
     with np.errstate(over="ignore"):
-        norm = np.linalg.norm(q, axis=1)
-    bad = np.flatnonzero(np.abs(norm - 1) > NORM_TOLERANCE)
-    if bad.size:
-        row = bad[0]
-        values = ", ".join(f"{value:g}" for value in q[row])
+        norms = np.linalg.norm(q, axis=1)
+    wrong_rows = np.flatnonzero(np.abs(norms - 1) > NORM_TOLERANCE)
+    if wrong_rows.size:
+        row = wrong_rows[0]
+        components = ", ".join(f"{value:g}" for value in q[row])
         raise TrajectoryError(
             f"{table.place(row)}: the quaternion's norm should be 1 within {NORM_TOLERANCE}, "
-            f"but ({values}) has {norm[row]:.6g}"
+            f"but ({components}) has {norms[row]:.6g}"
         )
-    q = q / norm[:, None]
+    unit_q = q / norms[:, None]
     if order == "wxyz":
-        q = q[:, SCALAR_LAST]
-    return se3.from_quaternion(q)
+        unit_q = unit_q[:, SCALAR_LAST]
+    return se3.from_quaternion(unit_q)
 
 
-def _all_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
-    """The first column in ns."""
-    stamps = [_ns(text, unit, table, row) for row, text in enumerate(table.first)]
+def _first_column_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
+    """The stamps (N,) of the first column."""
+    stamps = [_stamp_ns(text, unit, table, row) for row, text in enumerate(table.first)]
     return np.array(stamps, np.int64)
 
 
-def _require_rising(
-    table: TrajectoryTable,
-    numbers: Stamps,
-    demand: str,
-    *,
-    least: int,
-) -> None:
-    """Raise TrajectoryError for the first number that is not `least` or more above the one before."""
-    late = np.flatnonzero(np.diff(numbers) < least)
-    if late.size:
-        row = late[0]
-        raise TrajectoryError(
-            f"{table.place(row + 1)}: {demand}, but {table.first[row + 1]} follows {table.first[row]}"
-        )
+def _require_steps(table: TrajectoryTable, numbers: Stamps, *, least_step: int, demand: str) -> None:
+    """Check that each of the numbers (N,) exceeds the one before by `least_step` or more.
+
+    Raises TrajectoryError with the `demand`, the first wrong row and the values of both rows.
+    """
+    wrong_rows = np.flatnonzero(np.diff(numbers) < least_step) + 1
+    if wrong_rows.size:
+        row = wrong_rows[0]
+        raise TrajectoryError(f"{table.place(row)}: {demand}, but {table.first[row]} follows {table.first[row - 1]}")
 
 
 def _read_fast(bodies: list[str], columns: int, separator: str | None) -> Array | None:
-    """The numbers as NumPy reads them at once; None for text that needs a closer look."""
+    """The numbers (N, columns), read by NumPy in one call; None if the text has another form or a number overflows."""
     if not bodies or not all(map(NUMERIC.fullmatch, bodies)):
         return None
     used_columns = range(columns) if separator else None
@@ -162,9 +186,9 @@ def _read_checked(
     name: str,
     columns: Sequence[str],
     separator: str | None,
-    what: str,
+    noun: str,
 ) -> Array:
-    """The numbers field by field, with an error message for the first that is wrong."""
+    """The numbers (N, columns), read field by field. Raises TrajectoryError for the first wrong line or field."""
     values = np.empty((len(rows), len(columns)))
     for row, (number, body) in enumerate(rows):
         fields = [field.strip() for field in body.split(separator)]
@@ -174,7 +198,7 @@ def _read_checked(
             is_last = row > 0 and row == len(rows) - 1
             hint = " (the last row: was the file cut off?)" if is_last else ""
             raise TrajectoryError(
-                f"{name}:{number}: {what} has {len(columns)} columns ({' '.join(columns)}), "
+                f"{name}:{number}: {noun} has {len(columns)} columns ({' '.join(columns)}), "
                 f"this line has {len(fields)}{hint}"
             )
         place = f"{name}:{number}"
@@ -183,6 +207,7 @@ def _read_checked(
 
 
 def _number(field: str, column: str, place: str) -> float:
+    """The number in a field. Raises TrajectoryError if it is not finite."""
     if not NUMBER.fullmatch(field):
         raise TrajectoryError(f"{place}: {column} should be a finite number, but is {field!r}")
     value = float(field)
@@ -191,13 +216,13 @@ def _number(field: str, column: str, place: str) -> float:
     return value
 
 
-def _ns(
+def _stamp_ns(
     text: str,
     unit: StampUnit,
     table: TrajectoryTable,
     row: int,
 ) -> int:
-    """The stamp of a row in ns, rounded to even. Raises TrajectoryError beyond int64."""
+    """The stamp of a row, rounded to the nanosecond with ties to even. Raises TrajectoryError if it exceeds int64."""
     if unit == "s" and (plain := PLAIN.fullmatch(text)):
         whole_s = int(plain[1])
         fraction_ns = int(plain[2].ljust(9, "0"))
@@ -215,11 +240,11 @@ COLUMNS = ("t", "x", "y", "z", "qx", "qy", "qz", "qw")
 
 
 def parse_tum(text: str, *, name: str) -> Trajectory:
-    """The trajectory in a TUM file's text; `name` is the file, for messages.
+    """The trajectory in the text of a TUM file; `name` is the file's name, for messages.
 
-    Comments (#), blank lines, tabs and CRLF are accepted. Digits beyond the nanosecond are rounded, ties to even.
-    Raises TrajectoryError with file, line and value for a line other than 8 finite numbers, for
-    quaternions whose norm is not 1, and for stamps that don't increase.
+    Comments (#), blank lines, tabs and CRLF are accepted. Stamps are rounded to the nanosecond, ties to even.
+    Raises TrajectoryError with file, line and value if a line does not consist of 8 finite numbers, if a quaternion's
+    norm is not 1, or if stamps do not increase.
     """
     table = read_table(content(text), name=name, columns=COLUMNS)
     R = rotations(table, table.values[:, 4:], "xyzw")
@@ -228,7 +253,7 @@ def parse_tum(text: str, *, name: str) -> Trajectory:
 
 
 def format_tum(trajectory: Trajectory) -> str:
-    """TUM text: stamps with 9 decimals, exact, and values with all their digits."""
+    """A trajectory as TUM text: exact stamps with 9 decimals, and values with all digits."""
     q_xyzw = se3.to_quaternion(trajectory.T_world_frame[:, :3, :3])
     rows = np.hstack([trajectory.positions_m, q_xyzw]).tolist()
     lines = []
@@ -238,7 +263,7 @@ def format_tum(trajectory: Trajectory) -> str:
 
 
 def seconds(t_ns: int) -> str:
-    """An instant or duration in ns as seconds with 9 decimals, exact."""
+    """A time in nanoseconds as text in seconds, exact with 9 decimals."""
     whole_s, fraction_ns = divmod(abs(t_ns), NS_PER_S)
     sign = "-" if t_ns < 0 else ""
     return f"{sign}{whole_s}.{fraction_ns:09d}"
@@ -254,7 +279,7 @@ POSE_STATE = (
     "q_RS_y []",
     "q_RS_z []",
 )
-# EuRoC's names for the columns of a state: the pose, then the velocity in the world, then the biases.
+# EuRoC's names for the columns of a state: pose, velocity in the world frame, gyroscope bias, accelerometer bias.
 STATE = (
     *POSE_STATE,
     *("v_RS_R_x [m s^-1]", "v_RS_R_y [m s^-1]", "v_RS_R_z [m s^-1]"),
@@ -262,37 +287,59 @@ STATE = (
     *("b_a_RS_S_x [m s^-2]", "b_a_RS_S_y [m s^-2]", "b_a_RS_S_z [m s^-2]"),
 )
 IN_SECONDS = re.compile(r"\[\s*s(?:ec(?:onds?)?)?\s*\]")
-WORD = re.compile(r"[a-df-z]", re.IGNORECASE)  # an e may be an exponent's
+WORD = re.compile(r"[a-df-z]", re.IGNORECASE)  # without e, which also occurs in numbers
 
 
-def csv_layout(text: str) -> tuple[list[tuple[int, str]], StampUnit, QuaternionOrder]:
-    """The rows below a csv's header, the unit of its stamps and the order of its quaternions.
+@dataclass(frozen=True, slots=True)
+class _CsvLayout:
+    """The rows below the header of a csv file, the unit of their stamps and the order of their quaternions."""
 
-    They follow a header that names w last, or seconds; stamps with a decimal point are seconds.
-    """
+    rows: list[tuple[int, str]]
+    unit: StampUnit
+    order: QuaternionOrder
+
+
+def _csv_layout(text: str) -> _CsvLayout:
+    """The layout of a csv file, from its header, if it has one, and its stamps."""
     first_line = text.removeprefix("\ufeff").lstrip().partition("\n")[0]
     rows = content(text)
     top_row = rows[0][1]
     is_note = first_line.startswith("#") and first_line.count(",") < top_row.count(",")
-    if is_note and not any(NUMBER.fullmatch(cell.strip()) for cell in top_row.split(",")):
+    has_numbers = any(NUMBER.fullmatch(cell.strip()) for cell in top_row.split(","))
+    if is_note and not has_numbers:
         first_line = top_row  # the header is not a comment, but stands below one
     title = first_line.lstrip("#")
-    header = [""]
-    if WORD.search(title):
-        header = [cell.strip().lower() for cell in title.split(",")]
-        is_comment = first_line.startswith("#")
-        rows = rows if is_comment else rows[1:]
+    if not WORD.search(title):
+        return _CsvLayout(rows, _stamp_unit("", rows), "wxyz")
 
-    quaternion_names = [cell.partition("[")[0].strip() for cell in header[4:8]]
-    last_letters = [name[-1:] for name in quaternion_names]
-    order: QuaternionOrder = "xyzw" if last_letters == ["x", "y", "z", "w"] else "wxyz"
-    return rows, _unit(header[0], rows), order
+    header_cells = [cell.strip().lower() for cell in title.split(",")]
+    is_comment = first_line.startswith("#")
+    if not is_comment:  # `content` has removed comments already
+        rows = rows[1:]
+    return _CsvLayout(rows, _stamp_unit(header_cells[0], rows), _quaternion_order(header_cells))
+
+
+def _quaternion_order(header_cells: list[str]) -> QuaternionOrder:
+    """The order xyzw if the names of columns 4 to 7 end in x, y, z and w; otherwise wxyz, as in EuRoC."""
+    names = [cell.partition("[")[0].strip() for cell in header_cells[4:8]]
+    last_letters = [name[-1:] for name in names]
+    return "xyzw" if last_letters == ["x", "y", "z", "w"] else "wxyz"
+
+
+def _stamp_unit(header_cell: str, rows: list[tuple[int, str]]) -> StampUnit:
+    """The unit of stamps: seconds if their header says so or a stamp has a decimal point, otherwise nanoseconds."""
+    if "[ns]" in header_cell.replace(" ", ""):
+        return "ns"
+    has_decimal_point = any("." in body.partition(",")[0] for _, body in rows)
+    is_in_seconds = has_decimal_point or IN_SECONDS.search(header_cell)
+    return "s" if is_in_seconds else "ns"
 
 
 def format_euroc(trajectory: Trajectory, more: Array | None = None) -> str:
-    """EuRoC's csv, stamps in ns and values with all their digits.
+    """A trajectory as EuRoC's csv text: stamps in nanoseconds, and values with all digits.
 
-    `more` (N, 3) or (N, 9): velocities in the world, then the biases of gyroscope and accelerometer.
+    `more` adds columns: (N, 3) the velocity in the world frame (m/s), or (N, 9) also the biases of the gyroscope
+    (rad/s) and of the accelerometer (m/s^2).
     """
     q_xyzw = se3.to_quaternion(trajectory.T_world_frame[:, :3, :3])
     columns = [trajectory.positions_m, q_xyzw[:, SCALAR_FIRST]]
@@ -304,20 +351,11 @@ def format_euroc(trajectory: Trajectory, more: Array | None = None) -> str:
 
 
 def csv_rows(t_ns: Stamps, values: Array) -> str:
-    """Rows `t,...` of stamps (N,) in ns and values (N, K) with all their digits."""
+    """The csv lines of stamps (N,) in nanoseconds and values (N, K), with all digits."""
     lines = []
     for t, row in zip(t_ns.tolist(), values.tolist(), strict=True):
         lines.append(f"{t},{','.join(map(repr, row))}\n")
     return "".join(lines)
-
-
-def _unit(header: str, rows: list[tuple[int, str]]) -> StampUnit:
-    """The unit of the stamps below a header."""
-    if "[ns]" in header.replace(" ", ""):
-        return "ns"
-    has_decimal_point = any("." in body.partition(",")[0] for _, body in rows)
-    is_in_seconds = has_decimal_point or IN_SECONDS.search(header)
-    return "s" if is_in_seconds else "ns"
 
 
 KITTI_COLUMNS = (
@@ -327,44 +365,45 @@ KITTI_COLUMNS = (
 )
 NUMBERED_COLUMNS = ("frame", *KITTI_COLUMNS)
 TARTANAIR_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
-# KITTI prints six digits, so its matrices are 1e-6 off a rotation; no intended rotation is this far off.
+# The largest element of R^T R - I in a rotation matrix. KITTI prints six digits, so its matrices have 1e-6.
 SKEW_TOLERANCE = 1e-3
 MAX_FRAME = 10**9
 
 
 def format_kitti(T: Array) -> str:
-    """KITTI text of poses (N, 4, 4) with all their digits."""
+    """Poses (N, 4, 4) as KITTI text, with all digits."""
     rows = T[:, :3].reshape(-1, len(KITTI_COLUMNS)).tolist()
     lines = [" ".join(map(repr, row)) + "\n" for row in rows]
     return "".join(lines)
 
 
 def format_times(t_ns: Stamps) -> str:
-    """KITTI's file of times (N,): seconds with 9 decimals, exact."""
+    """Stamps (N,) as the text of KITTI's times file: seconds, exact with 9 decimals."""
     return "".join(f"{seconds(t)}\n" for t in t_ns.tolist())
 
 
 def parse_times(text: str, *, name: str) -> Stamps:
-    """Stamps (N,) of a file with one time in seconds per line. Raises TrajectoryError."""
+    """The stamps (N,) in the text of a times file, one time in seconds per line. Raises TrajectoryError."""
     table = read_table(content(text), name=name, columns=("t",), row="a line of times")
     return stamps_ns(table, "s")
 
 
 def _require_rotations(table: TrajectoryTable, R: Array) -> None:
-    """Raise TrajectoryError for the first matrix (N, 3, 3) that is no rotation."""
+    """Raise TrajectoryError for the first of the matrices (N, 3, 3) that is not a rotation."""
     with np.errstate(over="ignore", invalid="ignore"):
-        residual = se3.transposed(R) @ R - np.eye(3)
-    skew = np.abs(residual).max(axis=(1, 2), initial=0.0)
-    bad = np.flatnonzero(~(skew <= SKEW_TOLERANCE))
-    if bad.size:
+        residuals = se3.transposed(R) @ R - np.eye(3)
+    skews = np.abs(residuals).max(axis=(1, 2), initial=0.0)
+    skewed_rows = np.flatnonzero(~(skews <= SKEW_TOLERANCE))  # includes NaN
+    if skewed_rows.size:
+        row = skewed_rows[0]
         raise TrajectoryError(
-            f"{table.place(bad[0])}: the first three columns of the matrix should be a rotation "
-            f"within {SKEW_TOLERANCE}, but R^T R is {skew[bad[0]]:.3g} off the identity"
+            f"{table.place(row)}: the first three columns of the matrix should be a rotation "
+            f"within {SKEW_TOLERANCE}, but R^T R is {skews[row]:.3g} off the identity"
         )
-    mirrored = np.flatnonzero(np.linalg.det(R) < 0)
-    if mirrored.size:
+    mirrored_rows = np.flatnonzero(np.linalg.det(R) < 0)
+    if mirrored_rows.size:
         raise TrajectoryError(
-            f"{table.place(mirrored[0])}: the rotation is mirrored (its determinant is -1): "
+            f"{table.place(mirrored_rows[0])}: the rotation is mirrored (its determinant is -1): "
             f"these axes are left-handed, a pose's are right-handed"
         )
 
@@ -384,9 +423,13 @@ FORMS = (
 
 @dataclass(frozen=True, slots=True)
 class ParsedTrajectory:
-    """Poses (N, 4, 4) and how they were read; stamps, unit and order are None for a format without them.
+    """Poses and how they were read from a file.
 
-    `form_unit` is the unit of the format; `frames` (N,) are the frame numbers of poses in a file without stamps;
+    `t_ns` (N,) are the stamps, None for a format without stamps.
+    `T` (N, 4, 4) are the poses.
+    `unit` is the unit in which the stamps were read, and `form_unit` the one that the format has by default.
+    `order` is the order in which quaternions were read, None for a format without quaternions.
+    `frames` (N,) are the frame numbers, if the file has them instead of stamps.
     `notes` are sentences about rows that were left out.
     """
 
@@ -399,20 +442,26 @@ class ParsedTrajectory:
     notes: tuple[str, ...] = ()
 
     def stamped_by(self, frames_ns: Stamps) -> Stamps | None:
-        """Stamps (N,) for poses without any, from the stamps of all frames; None if their numbers do not match."""
+        """Stamps (N,) for poses that have none, taken from the stamps (F,) of all frames.
+
+        None if a frame number has no stamp, or, without frame numbers, if there are more or fewer stamps than poses.
+        """
         if self.frames is None:
-            has_all = len(frames_ns) == len(self.T)
-            return frames_ns if has_all else None
-        is_covered = self.frames[-1] < len(frames_ns)
-        return frames_ns[self.frames] if is_covered else None
+            is_one_each = len(frames_ns) == len(self.T)
+            return frames_ns if is_one_each else None
+        has_every_frame = self.frames[-1] < len(frames_ns)
+        return frames_ns[self.frames] if has_every_frame else None
 
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryReading:
-    """A trajectory and how it was read: the unit of its stamps and the order of its quaternions, if they have one.
+    """A trajectory and how its file was read.
 
-    `form_unit` is the unit of the format; `says_truth`, whether the file is named as ground truth;
-    `is_unit_told`, whether the user gave the unit.
+    `unit` is the unit in which the stamps were read, None if the file has no stamps.
+    `form_unit` is the unit that the file's format has by default, None for a format without stamps.
+    `order` is the order in which quaternions were read, None if the file has none.
+    `says_truth` is True if the file's name or a comment in it mentions ground truth.
+    `is_unit_told` is True if the user specified the unit.
     """
 
     trajectory: Trajectory
@@ -430,73 +479,82 @@ def parse_any(
     unit: StampUnit | None = None,
     order: QuaternionOrder | None = None,
 ) -> ParsedTrajectory:
-    """The poses in TUM, KITTI, TartanAir or EuRoC text.
+    """The poses in TUM, KITTI, TartanAir or EuRoC text; `name` is the file's name, for messages.
 
-    `unit` and `order` override those of the format for stamps and quaternions. Of rows that repeat a stamp the first
-    counts. Raises TrajectoryError for a text without poses, an unknown format, or a wrong row.
+    `unit` and `order` override the format's unit of stamps and order of quaternions. If rows repeat a stamp, the first
+    of them is used. Raises TrajectoryError for a text without poses, an unknown format or a wrong row.
     """
-    first = _first_row(written, name)
-    if "," in first:
-        rows, header_unit, header_order = csv_layout(written)
-        table = read_table(rows, name=name, columns=EUROC_COLUMNS, separator=",")
-        return _stamped(table, unit or header_unit, header_unit, order or header_order)
+    first_row = _first_row(written, name)
+    if "," in first_row:
+        layout = _csv_layout(written)
+        table = read_table(layout.rows, name=name, columns=EUROC_COLUMNS, separator=",")
+        return _parse_stamped(table, unit or layout.unit, layout.unit, order or layout.order)
 
-    columns = FORMS_BY_COLUMNS[len(first.split())]
+    columns = FORMS_BY_COLUMNS[len(first_row.split())]
     table = read_table(content(written), name=name, columns=columns)
     order = order or "xyzw"
     if columns is TARTANAIR_COLUMNS:
-        R = rotations(table, table.values[:, 3:], order)
-        T = se3.transform(R, table.values[:, :3])
-        return ParsedTrajectory(None, T, order=order)
+        return _parse_unstamped(table, order)
     if columns is COLUMNS:
-        return _stamped(table, unit or "s", "s", order)
-    return _matrices(table)
+        return _parse_stamped(table, unit or "s", "s", order)
+    if columns is NUMBERED_COLUMNS:
+        return _parse_numbered_matrices(table)
+    return ParsedTrajectory(None, _matrix_poses(table))
 
 
-def _matrices(table: TrajectoryTable) -> ParsedTrajectory:
-    """KITTI's poses, the first three rows of each matrix, kept as given; the frame's number may come first."""
-    frames = None
-    rows = np.arange(len(table.values))
-    notes = tuple[str, ...]()
-    if table.values.shape[1] == NUMBERED:
-        frames, rows, notes = first_of_equal(table, _frame_numbers(table), "frame number")
+def _parse_unstamped(table: TrajectoryTable, order: QuaternionOrder) -> ParsedTrajectory:
+    """The poses of rows with a position and a quaternion."""
+    R = rotations(table, table.values[:, 3:], order)
+    T = se3.transform(R, table.values[:, :3])
+    return ParsedTrajectory(None, T, order=order)
+
+
+def _parse_numbered_matrices(table: TrajectoryTable) -> ParsedTrajectory:
+    """The poses of rows with a frame number and a matrix."""
+    distinct = _distinct_rows(table, _frame_numbers(table), "frame number")
+    T = _matrix_poses(table)[distinct.rows]
+    return ParsedTrajectory(None, T, frames=distinct.numbers, notes=distinct.notes)
+
+
+def _matrix_poses(table: TrajectoryTable) -> Array:
+    """The poses (N, 4, 4) whose first three matrix rows are the last 12 columns; rotations are not normalised."""
     matrices = table.values[:, -KITTI:].reshape(-1, 3, 4)
     R = matrices[:, :, :3]
     positions_m = matrices[:, :, 3]
     _require_rotations(table, R)
-    T = se3.transform(R[rows], positions_m[rows])
-    return ParsedTrajectory(None, T, frames=frames, notes=notes)
+    return se3.transform(R, positions_m)
 
 
 def _frame_numbers(table: TrajectoryTable) -> Stamps:
-    """The first column (N,) as numbers of frames. Raises TrajectoryError for other numbers."""
+    """The first column (N,) as frame numbers. Raises TrajectoryError unless they are whole and from 0 to MAX_FRAME."""
     numbers = table.values[:, 0]
     is_whole = numbers == np.floor(numbers)
     is_in_range = (numbers >= 0) & (numbers <= MAX_FRAME)
-    bad = np.flatnonzero(~(is_whole & is_in_range))
-    if bad.size:
+    wrong_rows = np.flatnonzero(~(is_whole & is_in_range))
+    if wrong_rows.size:
+        row = wrong_rows[0]
         raise TrajectoryError(
-            f"{table.place(bad[0])}: the first of 13 columns should be the number of a frame, whole and from 0 on, "
-            f"but is {table.first[bad[0]]}"
+            f"{table.place(row)}: the first of 13 columns should be the number of a frame, whole and from 0 on, "
+            f"but is {table.first[row]}"
         )
     return numbers.astype(np.int64)
 
 
-def _stamped(
+def _parse_stamped(
     table: TrajectoryTable,
     unit: StampUnit,
     form_unit: StampUnit,
     order: QuaternionOrder,
 ) -> ParsedTrajectory:
     """The poses of rows with a stamp, a position and a quaternion."""
-    t_ns, rows, notes = first_of_equal(table, _all_ns(table, unit), "stamp")
+    distinct = _distinct_rows(table, _first_column_ns(table, unit), "stamp")
     R = rotations(table, table.values[:, 4:8], order)
     T = se3.transform(R, table.values[:, 1:4])
-    return ParsedTrajectory(t_ns, T[rows], unit, form_unit, order, notes=notes)
+    return ParsedTrajectory(distinct.numbers, T[distinct.rows], unit, form_unit, order, notes=distinct.notes)
 
 
 def _first_row(written: str, name: str) -> str:
-    """The first line with content. Raises TrajectoryError if it has none of the formats."""
+    """The first line with content. Raises TrajectoryError if there is none, or if it has no known format."""
     start = written.lstrip()
     if start.startswith(LFS_POINTER):
         raise TrajectoryError(f"a Git-LFS pointer, not the file itself; fetch it with git lfs pull: {name}")
@@ -504,8 +562,9 @@ def _first_row(written: str, name: str) -> str:
     if not rows:
         reason = "all lines are comments" if start else "the file is empty"
         raise TrajectoryError(f"no pose, for {reason}: {name}")
-    number, first = rows[0]
-    columns = len(first.split())
-    if "," not in first and columns not in FORMS_BY_COLUMNS:
-        raise TrajectoryError(f"{name}:{number}: no form of trajectory has {columns} columns: {FORMS}")
-    return first
+    line_number, first_row = rows[0]
+    columns = len(first_row.split())
+    is_csv = "," in first_row
+    if not is_csv and columns not in FORMS_BY_COLUMNS:
+        raise TrajectoryError(f"{name}:{line_number}: no form of trajectory has {columns} columns: {FORMS}")
+    return first_row
