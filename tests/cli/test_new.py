@@ -44,7 +44,7 @@ def test_a_broken_one_ends_with_1_and_says_where(vobench, here):
     file.write_text(file.read_text().replace("self.T_odom_left.copy()", "2 * self.T_odom_left"))
     tried = vobench("try", "mine")
     assert tried.code == 1
-    assert "BROKEN    rigid poses in time: invalid_output after 1 frames: frame 1: the pose is no rigid" in tried.out
+    assert "BROKEN    rigid poses in time: invalid_output after 1 frames: frame 1: the pose is not a rigid" in tried.out
 
 
 DRIFTS = """

@@ -84,7 +84,7 @@ PLACES = {
     "rendering.raster.RasterRenderer": "radiance",
     "estimator.process.EstimatorProcess": "process",
     "runner.score": "score_trial",
-    "report.page": "html",
+    "report.page": "board_page",
     "runner.folder.RunFolder": "estimate",
     "cli.board": "print_board",
 }

@@ -15,6 +15,7 @@ from vobench.suite.catalog import builtin_root
 from vobench.suite.maker import made_by
 from vobench.suite.maker_message import encode
 
+pytestmark = pytest.mark.slow  # each starts a process; run by `pytest -m slow`, and by CI
 needs_a_sandbox = pytest.mark.skipif(
     sys.platform != "linux" or isolation.FILES in sandbox_here().sees, reason="this machine has no sandbox"
 )
@@ -50,7 +51,6 @@ def test_it_gets_the_seed_and_its_scene_arrives(make) -> None:
     assert [thing.name for thing in made.things] == ["wall"]
 
 
-@pytest.mark.slow
 def test_one_of_ours_makes_the_same_in_the_sandbox(monkeypatch) -> None:
     ramp = builtin_root() / "scenes" / "ramp" / "maker.py"
     in_this_process = encode(made_by(ramp, seed=2, scene="ramp"))
