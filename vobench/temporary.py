@@ -49,14 +49,25 @@ def locked_folder() -> tuple[Path, int]:
         _sweep_once(base)
         try:
             folder = Path(tempfile.mkdtemp(prefix=f"{os.getpid()}-", dir=base))
-            lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | FOLLOW_NOTHING)
-        except FileNotFoundError:  # another process has removed the base, or swept this folder
+        except FileNotFoundError:  # another process has removed the base
             continue
-        with suppress(OSError):  # a file system without locks has no sweeping either
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        if folder.is_dir():
+        lock = lock_new_folder(folder)
+        if lock is not None:
             return folder, lock
-        os.close(lock)
+
+
+def lock_new_folder(folder: Path) -> int | None:
+    """The descriptor that locks a folder made just now; None if another process swept it before it had a lock."""
+    try:
+        lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | FOLLOW_NOTHING)
+    except FileNotFoundError:
+        return None
+    with suppress(OSError):  # a file system without locks has no sweeping either
+        fcntl.flock(lock, fcntl.LOCK_EX)
+    if folder.is_dir():
+        return lock
+    os.close(lock)
+    return None
 
 
 def _base() -> Path:
@@ -77,14 +88,19 @@ def _base() -> Path:
 def _sweep_once(base: Path) -> None:
     """Remove the folders of processes that were killed. Once a process."""
     for folder in base.glob("*-*"):
-        with suppress(OSError):
-            lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | FOLLOW_NOTHING)
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                remove_below(lock)
-                folder.rmdir()
-            finally:
-                os.close(lock)
+        remove_if_abandoned(folder)
+
+
+def remove_if_abandoned(folder: Path) -> None:
+    """Remove a folder whose process was killed: a living one holds a lock."""
+    with suppress(OSError):
+        lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | FOLLOW_NOTHING)
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            remove_below(lock)
+            folder.rmdir()
+        finally:
+            os.close(lock)
 
 
 def remove_below(folder: int) -> list[str]:

@@ -6,6 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.estimator.textures import grid, shifted, texture
 from vobench.errors import VobenchError
 from vobench.estimator.stereo import Eye, coarse_disparity, predicted, small_size, stereo_pair
 from vobench.estimator.tracking import corners_per_cell
@@ -24,23 +25,6 @@ def wild(name):
 
 def bulging():
     return stereo_rig(DoubleSphere(512, 512, 158.0, 157.0, 254.9, 256.9, -0.18, 0.59), pitch_deg=15)
-
-
-def texture(seed=0, size=(480, 720)):
-    """Grain of every size from 4 px on."""
-    rng = np.random.default_rng(seed)
-    grains = [rng.uniform(-1, 1, (size[0] // k, size[1] // k)).astype(np.float32) for k in (4, 8, 16, 32)]
-    summed = sum(cv2.resize(grain, size[::-1], interpolation=cv2.INTER_CUBIC) for grain in grains)
-    return np.clip(128 + 45 * summed, 0, 255).astype(np.uint8)
-
-
-def shifted(image, dx, dy):
-    moving = np.float32([[1, 0, dx], [0, 1, dy]])
-    return cv2.warpAffine(image, moving, image.shape[::-1], flags=cv2.INTER_CUBIC, borderMode=cv2.BORDER_REFLECT)
-
-
-def grid(n=9):
-    return np.stack(np.meshgrid(np.linspace(60, 660, n), np.linspace(60, 420, n)), -1).reshape(-1, 2).astype(np.float32)
 
 
 @pytest.mark.parametrize("rig", [STRAIGHT, wild("euroc"), wild("fisheye"), wild("zed2i"), bulging()], ids=str)

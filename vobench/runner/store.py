@@ -21,6 +21,7 @@ from vobench import stop
 from vobench.errors import InputError
 from vobench.runner.entry import MANIFEST, States, fault, remember, seal
 from vobench.runner.key import canonical, digest
+from vobench.temporary import lock_new_folder, remove_if_abandoned
 
 PREFIX = ".unfinished-"
 BAD = ".bad-"
@@ -60,28 +61,16 @@ def _locked_folder(parent: Path) -> tuple[Path, int]:
     """A new folder, and the descriptor whose lock ends with this process, however that ends."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
-        try:
-            folder.chmod(0o755)
-            lock = os.open(folder, os.O_RDONLY)
-        except FileNotFoundError:  # another process swept it before it had a lock
-            continue
-        with suppress(OSError):  # a file system without locks has no sweeping either
-            fcntl.flock(lock, fcntl.LOCK_EX)
-        if folder.is_dir():
+        lock = lock_new_folder(folder)
+        if lock is not None:
+            os.fchmod(lock, 0o755)
             return folder, lock
-        os.close(lock)  # another process swept it between its making and its lock
 
 
 def sweep(parent: Path) -> None:
     """Remove what killed processes left unfinished in a folder: a living one holds a lock."""
     for folder in parent.glob(f"{PREFIX}*"):
-        with suppress(OSError):
-            lock = os.open(folder, os.O_RDONLY)
-            try:
-                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-                shutil.rmtree(folder, ignore_errors=True)
-            finally:
-                os.close(lock)
+        remove_if_abandoned(folder)
 
 
 @contextmanager
