@@ -45,10 +45,14 @@ EDGE_QUANTILE = 0.25
 
 
 def gradients(picture: Image) -> Array:
-    """Magnitudes (H, W) of the gradient in grey values per pixel, by Sobel's 3 x 3 kernel."""
-    along_x = cv2.Sobel(picture, cv2.CV_32F, 1, 0, ksize=3) / SOBEL_GAIN
-    along_y = cv2.Sobel(picture, cv2.CV_32F, 0, 1, ksize=3) / SOBEL_GAIN
-    return np.asarray(cv2.magnitude(along_x, along_y), float)
+    """Magnitudes (H, W) of the gradient in grey values per pixel, by Sobel's 3 x 3 kernel.
+
+    NumPy takes the root: the last bits of `cv2.magnitude` depend on where in memory an image lies.
+    """
+    along_x = cv2.Sobel(picture, cv2.CV_64F, 1, 0, ksize=3) / SOBEL_GAIN
+    along_y = cv2.Sobel(picture, cv2.CV_64F, 0, 1, ksize=3) / SOBEL_GAIN
+    squared: Array = along_x**2 + along_y**2
+    return np.sqrt(squared)
 
 
 def _kurtosis(values: Array) -> float:
