@@ -76,8 +76,8 @@ def write_run() -> Callable[..., RunFolder]:
 def mixed() -> list[TrialScore]:
     """Two cases; one estimator survives both, one loses a case, one dies twice; names and reasons that need care."""
     return [
-        make_score("good_one", ate_m=0.2),
-        make_score("good_one", ate_m=0.1, case="ahead"),
+        make_score("good_one", ate_m=0.002),
+        make_score("good_one", ate_m=0.001, case="ahead"),
         make_score("mad", "diverged", ate_m=1e-9),
         make_score("mad", ate_m=1e-9, case="ahead"),
         make_score("dead", "crashed", ate_m=None, coverage=0.0, reason="ValueError: <b>|x|</b> & ° \\n 100 %"),

@@ -44,9 +44,9 @@ def several(scored, estimators, cases, **changes):
 def test_whichever_are_fewer_are_the_columns(scored):
     tall = rows_of(latex(make_board(several(scored, 2, 3), {})))
     assert tall[0] == ["", "e0", "e1"]
-    assert [row[0] for row in tall[1:]] == ["c0", "c1", "c2", "score", "place"]
+    assert [row[0] for row in tall[1:]] == ["c0", "c1", "c2", "score", "rank"]
     wide = rows_of(latex(make_board(several(scored, 3, 2), {})))
-    assert wide[0] == ["", "c0", "c1", "score", "place"]
+    assert wide[0] == ["", "c0", "c1", "score", "rank"]
     assert [row[0] for row in wide[1:]] == ["e0", "e1", "e2"]
     square = rows_of(latex(make_board(several(scored, 2, 2), {})))
     assert square[0] == ["", "e0", "e1"]

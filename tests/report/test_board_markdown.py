@@ -28,10 +28,10 @@ def test_words_are_left_aligned_and_numbers_right_aligned(scored):
     rules = [line for line in lines if line.startswith("|---")]
     assert rules == [
         "|---|---:|---:|",
-        "|---|---|---:|---:|---:|---:|---:|---:|",
+        "|---|---|---:|---:|---:|---:|---:|",
     ]
     assert lines[0] == "## ATE % of path"
-    assert "## Totals: 1 case" in lines
+    assert "## Totals: 1 case, 1 drive, 1 place" in lines
 
 
 def test_sentences_on_access_and_origin_follow_the_legend(scored, placed):

@@ -35,7 +35,7 @@ def test_csv_is_read_by_pandas_with_gaps_where_there_is_no_number(made):
     assert list(read["estimator"]) == [cell.estimator for cell in (*made.cells, *made.totals)]
     errors = [math.nan if (s := cell.spread("ate")) is None else s[0] for cell in made.cells]
     assert list(read["ate"])[: len(errors)] == pytest.approx(errors, rel=1e-12, nan_ok=True)
-    assert list(read["place"].dropna()) == [total.place for total in made.totals]
+    assert list(read["rank"].dropna()) == [total.rank for total in made.totals]
 
 
 def test_in_csv_the_origin_is_columns_of_every_row(placed):
@@ -77,10 +77,10 @@ def test_a_record_of_a_total_has_its_intervals_as_columns_and_the_case_all(score
     record = records(made)[-1]
     total = made.totals[-1]
     assert (record["case"], record["estimator"], record["ate"]) == ("all", "b", total.ate_percent)
-    assert (record["places_min"], record["places_max"]) == total.places
-    assert total.ratio_interval is not None
-    assert (record["ratio_min"], record["ratio_max"]) == total.ratio_interval
-    assert not {"claims", "places", "ratio_interval", "ate_percent", "repeats", "cases"} & set(record)
+    assert (record["rank_min"], record["rank_max"]) == total.ranks
+    assert total.error_interval is not None
+    assert (record["ratio_min"], record["ratio_max"]) == total.error_interval
+    assert not {"claims", "ranks", "error_interval", "ate_percent", "cases"} & set(record)
     first = records(made)[-2]
     assert first["ratio_min"] is first["ratio_max"] is None
 
@@ -88,9 +88,9 @@ def test_a_record_of_a_total_has_its_intervals_as_columns_and_the_case_all(score
 def test_whole_numbers_stay_whole_in_csv(scored):
     made = make_board([scored("a"), scored("b", drift_m=0.1)], {})
     rows = list(csv.DictReader(io.StringIO(as_csv(made))))
-    assert [row["place"] for row in rows if row["case"] == "all"] == ["1", "2"]
+    assert [row["rank"] for row in rows if row["case"] == "all"] == ["1", "2"]
     assert {row["trials"] for row in rows} == {"1"}
-    assert {row["place"] for row in rows if row["case"] != "all"} == {""}
+    assert {row["rank"] for row in rows if row["case"] != "all"} == {""}
 
 
 @pytest.mark.parametrize("beginning", ["=", "+", "-", "@", "|"])

@@ -17,7 +17,7 @@ from vobench.report.board_table import (
     named,
     number,
     origin,
-    place,
+    rank,
     remarks,
     total_score,
     totals,
@@ -124,8 +124,9 @@ def test_a_score_has_as_many_decimals_as_its_loss_needs(total, score, text):
 
 
 def test_a_rank_has_its_interval_where_that_is_wider_than_one_rank(total):
-    assert place(replace(total, place=2, places=(2, 2))) == "2"
-    assert place(replace(total, place=2, places=(1, 3))) == "2 (1–3)"
+    assert rank(replace(total, rank=2, ranks=(2, 2))) == "2"
+    assert rank(replace(total, rank=2, ranks=(1, 3))) == "2 (1–3)"
+    assert rank(replace(total, rank=None, ranks=None)) == ""
 
 
 def test_claims_stand_behind_a_name():
@@ -140,25 +141,23 @@ def rows_of(made):
 
 def test_the_columns_of_a_total(total, scored):
     made = make_board([scored("a"), scored("b", "lost")], {})
-    first = replace(made.totals[0], ratio_interval=(0.5, 2.0), cpu_ms=1.5, memory_mib=30.0, is_efficient=True)
-    second = replace(made.totals[1], p_above=0.01, decided_above=True, mean_place=1.25)
+    first = replace(made.totals[0], error_interval=(0.5, 2.0), cpu_ms=1.5, memory_mib=30.0, is_efficient=True)
+    second = replace(made.totals[1], p_above=0.01, decided_above=True)
     rows = rows_of(replace(made, totals=(first, second)))
     assert rows[0] | {"score": ""} == {
         "#": "1 (1–2)",
         "estimator": "a",
         "score": "",
-        "× first": "1.00 [0.500, 2.00]",
-        "decided": "–",
-        "failed": "0/1",
         "ATE %": "10.0",
-        "mean place": "1.0",
+        "× best": "1.00 [0.500, 2.00]",
+        "lost": "0 of 1",
+        "decided": "–",
         "CPU ms/frame": "1.50 ◆",
         "MiB": "30.0",
     }
-    chosen = [rows[1][heading] for heading in ("decided", "failed", "ATE %", "mean place", "CPU ms/frame", "MiB")]
-    assert chosen == ["yes", "1/1", "–", "1.2", "–", "–"]
-    assert rows_of(replace(made, totals=(first, replace(second, decided_above=False))))[1]["decided"] == "not decided"
-    assert rows_of(replace(made, totals=(first, replace(second, mean_place=None))))[1]["mean place"] == "–"
+    chosen = [rows[1][heading] for heading in ("decided", "lost", "ATE %", "× best", "CPU ms/frame", "MiB")]
+    assert chosen == ["yes", "1 of 1", "–", "–", "–", "–"]
+    assert rows_of(replace(made, totals=(first, replace(second, decided_above=False))))[1]["decided"] == "no"
 
 
 def test_costs_have_columns_only_where_one_is_known(scored):
@@ -168,15 +167,15 @@ def test_costs_have_columns_only_where_one_is_known(scored):
     assert {"CPU ms/frame", "MiB"} <= set(rows_of(make_board(scores, one))[0])
 
 
-def test_a_table_of_totals_is_named_by_its_cases_and_its_group_where_there_are_several(scored):
+def test_a_table_of_totals_is_named_by_its_cases_and_its_division_where_there_are_several(scored):
     one = make_board([scored("a")], {})
-    assert [scope for scope, _ in totals(one)] == ["1 case"]
+    assert [scope for scope, _ in totals(one)] == ["1 case, 1 drive, 1 place"]
     two = make_board([scored("a"), scored("a", case="ahead")], {})
-    assert [scope for scope, _ in totals(two)] == ["2 cases"]
-    groups = tuple(replace(two.totals[0], group=group) for group in ("", "worn"))
+    assert [scope for scope, _ in totals(two)] == ["2 cases, 2 drives, 2 places"]
+    groups = tuple(replace(two.totals[0], group=f"calibration {level}") for level in ("none", "worn"))
     assert [scope for scope, _ in totals(replace(two, totals=groups))] == [
-        "calibration none, 2 cases",
-        "calibration worn, 2 cases",
+        "calibration none, 2 cases, 2 drives, 2 places",
+        "calibration worn, 2 cases, 2 drives, 2 places",
     ]
 
 
@@ -186,22 +185,17 @@ def test_an_undecided_order_says_what_would_decide_it(scored):
     first = made.totals[0]
 
     def sentences(**changes):
-        second = replace(made.totals[1], decided_above=False, **changes)
+        second = replace(made.totals[1], decided_above=False, p_above=0.25, smallest_ratio=1.84, places=12, **changes)
         return remarks(replace(made, totals=(first, second), remarks=("known",)))
 
-    order = "The order of a and b is not decided"
-    assert sentences(p_above=0.25, repeats=3) == [
-        "known",
-        f"{order} (p = 0.25); 3 repeats of each case would detect a difference of 10 %",
-    ]
-    assert sentences(p_above=None, repeats=None) == [
-        "known",
-        f"{order} (p = 1); more cases, rather than more repeats, would detect a difference of 10 %",
-    ]
-    assert sentences(p_above=0.25, repeats=3, trials=1) == ["known"]
-    assert sentences(p_above=0.25, repeats=3, group="worn") == ["known"]
-    decided = replace(made.totals[1], decided_above=True)
-    assert remarks(replace(made, totals=(first, decided), remarks=())) == []
+    order = "The order of a and b is not decided (p = 0.25); a ratio of losses of 1.84 would have been"
+    assert sentences(places_needed=31) == ["known", f"{order}, and 1.5 takes about 19 more places"]
+    assert sentences(places_needed=13) == ["known", f"{order}, and 1.5 takes about 1 more place"]
+    assert sentences(places_needed=12) == ["known", order]
+    assert sentences(places_needed=None) == ["known", order]
+    for decided in (True, None):
+        second = replace(made.totals[1], decided_above=decided)
+        assert remarks(replace(made, totals=(first, second), remarks=())) == []
 
 
 def test_a_note_on_several_cells_is_written_once_with_its_first_case(scored):

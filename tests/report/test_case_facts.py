@@ -37,6 +37,25 @@ def test_scenario_and_severity_are_read(facts):
     assert facts({"severity": "much"}).severity is None
 
 
+def test_the_place_is_the_scene_and_its_seed_whatever_a_scenario_changes(facts):
+    assert facts({"scene": {"name": "room", "seed": 0}}).place == "room"
+    assert facts({"scene": {"name": "flat", "seed": 3}}).place == "flat 3"
+    assert facts({"scene": None}).place == facts({"scene": {}}).place == ""
+
+
+def test_a_drive_is_its_trajectory_with_its_poses_and_frames(facts):
+    circle = {"kind": "circle", "radius_m": 2.0}
+    same = [facts({"trajectory": circle, "frames": None}).drive for _ in range(2)]
+    others = [
+        facts({"trajectory": {**circle, "radius_m": 1.0}}).drive,
+        facts({"trajectory": circle, "frames": [0, 9]}).drive,
+        facts({"trajectory": circle, "replayed": "0 0 0 0 0 0 0 1"}).drive,
+    ]
+    assert same[0] == same[1]
+    assert len({same[0], *others}) == 4
+    assert facts({}).drive == ""
+
+
 @pytest.mark.parametrize(
     ("noise", "text"),
     [
@@ -48,3 +67,4 @@ def test_scenario_and_severity_are_read(facts):
 )
 def test_the_noise_of_the_ground_truth_is_in_words(facts, noise, text):
     assert facts({"truth_noise": noise}).truth_noise == text
+    assert facts({"truth_noise": noise}).truth_noise_m == noise.get("position_m", 0.0)

@@ -15,7 +15,7 @@ def test_the_best_of_a_case_is_marked_and_whoever_is_not_decided_against_it(scor
     assert marks(few, "ate") == {("down", "a"): "*~"}
     near = trials("b", [0.0105, 0.0125, 0.0135, 0.0145])
     many = make_board([*trials("a", [0.01, 0.011, 0.012, 0.013]), *near, *trials("c", [0.2, 0.3, 0.4, 0.5])], {})
-    assert marks(many, "ate") == {("down", "a"): "*~", ("down", "b"): "~"}
+    assert marks(many, "ate") == {("down", "a"): "*~", ("down", "b"): "~", ("down", "c"): "~"}
     assert marks(
         make_board([s for s in near if s.estimator == "b"] + trials("c", [0.2, 0.3, 0.4, 0.5]), {}), "ate"
     ) == {("down", "b"): "*"}

@@ -79,7 +79,7 @@ def test_without_a_script_the_matrix_and_the_totals_can_be_read(outline):
 
 def test_each_cell_has_its_number_its_path_and_files_that_exist(data, run):
     assert data["estimators"][0] == "good_one"
-    assert data["metrics"]["ate"]["text"][data["cases"].index("down")][0][0] == "20.0"
+    assert data["metrics"]["ate"]["text"][data["cases"].index("down")][0][0] == "0.200"
     assert len(data["details"]) == 6
     detail = data["details"][f"{data['cases'].index('down')}|0"]
     assert len(detail["path"]) == 3 == len(data["truths"]["0"])

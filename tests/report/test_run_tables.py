@@ -8,17 +8,19 @@ from vobench.report.run_tables import FIRST_COLUMNS, board_frame, cell_frame, fr
 
 
 def test_the_board_has_a_row_per_estimator_the_best_first(scored):
-    scores = [scored("a", case=f"c{k}", ate_m=0.02 + 0.001 * k, claims=("Sim(3)", "not causal")) for k in range(8)]
+    scores = [
+        scored("a", case=f"c{k}", ate_m=0.02 + 0.001 * k, claims=("not causal", "whole recording")) for k in range(8)
+    ]
     made = make_board([*scores, *(scored("b", case=f"c{k}", ate_m=0.01) for k in range(8))], {})
     table = board_frame(made)
     assert tuple(table.columns[: len(FIRST_COLUMNS)]) == FIRST_COLUMNS
     assert list(table["estimator"]) == ["b", "a"]
-    assert list(table["claims"]) == ["", "Sim(3), not causal"]
+    assert list(table["claims"]) == ["", "not causal, whole recording"]
     second = made.totals[1]
-    assert (table["place_low"][1], table["place_high"][1]) == second.places
-    assert (table["loss_ratio_low"][1], table["loss_ratio_high"][1]) == second.ratio_interval
-    assert table["loss_ratio_low"].isna()[0]
-    assert not {"places", "ratio_interval"} & set(table.columns)
+    assert (table["rank_low"][1], table["rank_high"][1]) == second.ranks
+    assert (table["error_ratio_low"][1], table["error_ratio_high"][1]) == second.error_interval
+    assert table["error_ratio_low"].isna()[0]
+    assert not {"ranks", "error_interval"} & set(table.columns)
 
 
 def test_tables_of_nothing_are_empty(tmp_path):

@@ -23,7 +23,7 @@ from vobench.report.board_table import (
 from vobench.report.leaderboard import Board
 
 # Columns of the totals that a narrow terminal omits, in this order; written reports have all of them.
-LEAST_FIRST = ("MiB", "mean place", "CPU ms/frame", "ATE %", "failed", "decided", "× first")
+LEAST_FIRST = ("MiB", "CPU ms/frame", "score", "decided", "lost", "ATE %", "× best")
 
 UNLIMITED_WIDTH = 10_000  # columns
 HEADING_WIDTH = 12  # of an estimator's name above a column

@@ -44,7 +44,10 @@ def _key_of(name: str) -> str:
 
 @settings()
 class Manifest:
-    """One estimator: its name, how it is run, the sensors it needs, the frame of its poses, and its claims."""
+    """One estimator: its name, how it is run, the sensors it needs, the frame of its poses, and its claims.
+
+    A `baseline` is no competitor: boards show it beside the ranking.
+    """
 
     __pydantic_config__: ClassVar[dict[str, Any]] = {"alias_generator": _key_of}
 
@@ -61,6 +64,7 @@ class Manifest:
     metric: bool = True
     causal: bool = True
     deterministic: bool = True
+    baseline: bool = False
     limits: Limits = USUAL
     summary: str = ""
     paper: str = ""
@@ -110,5 +114,6 @@ class Manifest:
             "not causal": not self.causal and not self.command,
             "not deterministic": not self.deterministic,
             "oracle": self.oracle,
+            "baseline": self.baseline,
         }
         return tuple(claim for claim, holds in claims.items() if holds)

@@ -1,64 +1,94 @@
-"""Ranks of estimators and their significance: paired tests over cases and repeats, rank intervals, required repeats.
+"""Ranks of estimators and their significance: paired tests over places, and intervals of ranks and of ratios.
 
-A trial counts by its loss, 1 minus the lost-aware score, which is about the error as a share of the path. Estimators
-are ordered by the share of failed trials, then by the geometric mean of the loss, which no single case dominates.
+A trial counts by its loss, 1 minus the lost-aware score, which is about half its error relative to a tenth of the path;
+a failed trial has a loss of at least 1/2. Estimators are ordered by the geometric mean of the loss, in which no case
+outweighs another. What a test decides holds for other places and drives of the same kind: see `unit`.
 
-Symbols: E estimators, C cases, R repeats. A unit is one case and one repeat; estimators are compared in pairs on units.
+Symbols: E estimators, C cases, R repeats, P places.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
-from math import ceil
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import special
 
 from vobench.geometry.se3 import Array
+from vobench.metric.significance import PairedDifference, holm, paired_difference, paired_p_values
+from vobench.metric.unit import Design, place_mean, repeat_means
 
-Mask = NDArray[np.bool_]
-
-ALPHA = 0.05  # significance level of intervals, and of tests within a case
-INTERVAL = (ALPHA / 2, 1 - ALPHA / 2)
-DECIDED = 0.02  # of tests of neighbours: stricter, so that at most 5 in 100 boards decide between two equal estimators
-RESAMPLES = 1000  # of the bootstrap
-FLIPS = 4095  # random sign patterns of a permutation test with too many units to try all
-EXACT_UNITS = 12  # up to here all sign patterns are tried
-MANY_UNITS = 200  # above it the sum is taken as normal
-MIN_UNITS = 7  # with fewer no permutation of signs has a p-value below 2 %
-MIN_TRIALS = 4  # of each of two on one case, for the same reason
+ALPHA = 0.05  # of the intervals of ranks and ratios, for all of a board together
+DECIDED = 0.02  # of the tests of neighbours, for all of a board together
+MIN_DRIVES = 7  # with fewer nothing is tested
+MIN_PLACES = 4
 MIN_LOSS = 1e-9
-MIN_LOSS_RATIO_RANGE = 1e-9  # an interval narrower than this is a single value
-EFFECT = 1.1  # the ratio of losses that the required repeats would detect
-POWER = 0.95
-MAX_REPEATS = 10_000
 DIGITS = 12  # decimals at which means count as equal
-ROUNDING = 1e-15  # spread of equal differences
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """The rank of one estimator and its uncertainty; what too few units cannot show is None.
+    """The rank of one estimator and its uncertainty; what too few places cannot show is None.
 
-    `place` counts from 1, and `places` is its 95 % interval. `loss_ratio` is the mean loss relative to the first's,
-    with its 95 % interval `ratio_interval`. `p_above` is the p-value of the difference to the estimator ranked above,
-    corrected for the number of such tests; `decided_above` also requires that the interval of the difference excludes
-    0. If it is not decided, `repeats` would detect a difference of 10 %, None if repeats alone cannot.
+    `place` counts from 1, and `places` is its 95 % interval. `loss` is the geometric mean of the loss. `error_ratio` is
+    the error relative to the first's, on cases where both survive, with its confidence interval `error_interval`.
+    `above` is the difference of log losses to the estimator ranked above, `p_above` its p-value after correction for
+    the number of such tests, and `level` that of each test before it.
     """
 
     index: int
     place: int
     places: tuple[int, int]
-    failed: float
     loss: float
-    loss_ratio: float
-    ratio_interval: tuple[float, float] | None
+    error_ratio: float | None
+    error_interval: tuple[float, float] | None
+    above: PairedDifference | None
     p_above: float | None
-    decided_above: bool
-    repeats: int | None
+    level: float
+
+    @property
+    def decided_above(self) -> bool | None:
+        """Whether the difference to the estimator ranked above is significant."""
+        return None if self.p_above is None else self.p_above < DECIDED
+
+    @property
+    def smallest_ratio(self) -> float | None:
+        """The smallest ratio of the losses of the two that 95 of 100 boards like this one decide."""
+        effect = self.above.detectable(self.level) if self.above else None
+        return None if effect is None else float(np.exp(effect))
+
+    def places_needed(self, ratio: float) -> int | None:
+        """The number of places that decide a ratio of the losses of the two."""
+        return self.above.units_needed(float(np.log(ratio)), self.level) if self.above else None
+
+
+@dataclass(frozen=True, slots=True)
+class TrialTable:
+    """Trials (E, C, R): the loss of each, and its error as a share of the path.
+
+    The loss is NaN where there is no such trial or it has none, as in a case whose ground truth is stationary; so is
+    the error, and that of a failed trial. All estimators have trials on all cases.
+    """
+
+    loss: Array
+    error: Array
+    design: Design
+
+    @property
+    def is_tested(self) -> bool:
+        """Whether there are enough drives and places to test any difference."""
+        return self.design.drives >= MIN_DRIVES and self.design.places >= MIN_PLACES
+
+    def log_losses_by_case(self) -> Array:
+        """The mean logarithm of the loss by estimator and case (E, C)."""
+        return repeat_means(np.log(np.maximum(self.loss, MIN_LOSS)))
+
+    def log_losses(self) -> Array:
+        """The mean logarithm of the loss by estimator and place (E, P)."""
+        return self.design.means(self.log_losses_by_case())
+
+    def log_errors_by_case(self) -> Array:
+        """The mean logarithm of the error by estimator and case (E, C), NaN where every trial failed."""
+        return repeat_means(np.log(np.maximum(self.error, MIN_LOSS)))
 
 
 def trial_loss(lost_aware: float | None, *, survived: bool) -> float:
@@ -69,328 +99,110 @@ def trial_loss(lost_aware: float | None, *, survived: bool) -> float:
     return max(1.0 - score, MIN_LOSS)
 
 
-class _Criterion(NamedTuple):
-    """Values of trials and their weights, both (E, C, R), in the means that order estimators."""
-
-    values: Array
-    weights: Array
-
-    def means(self) -> Array:
-        """The weighted mean (E,) of each estimator, rounded so that equal ones are equal."""
-        means = np.einsum("ecr,ecr->e", self.values, self.weights)
-        return np.asarray(np.round(means, DIGITS))
-
-
-class _Trials:
-    """Log losses and failures of trials (E, C, R). `exists` (E, C, R) marks the trials that were run."""
-
-    def __init__(self, loss: Array, failed: Array) -> None:
-        has_loss = ~np.isnan(loss)
-        log_loss = np.log(np.where(has_loss, np.maximum(loss, MIN_LOSS), 1.0))
-        # One more failed trial outweighs any difference of losses.
-        failure_cost = 100.0 * max(loss[0].size, 1)
-
-        self.exists = ~np.isnan(failed)
-        self.losses = _Criterion(log_loss, _weights(has_loss))
-        self.failures = _Criterion(failure_cost * np.nan_to_num(failed), _weights(self.exists))
-        self.criteria = (self.failures, self.losses)
-
-    def has_enough(self, *estimators: int) -> bool:
-        """Whether all of these estimators share enough units to decide anything."""
-        is_shared = self.exists[list(estimators)].all(axis=0)
-        return int(is_shared.sum()) >= MIN_UNITS
-
-    def resampled(self, criteria: Sequence[_Criterion], seed: int) -> Array:
-        """Bootstrap means (B, E), with the same draws for all estimators.
-
-        Cases are drawn with replacement, or repeats if there are few cases. Drawing both would count the variance
-        between repeats twice, since it also makes cases differ. scipy.stats.bootstrap can draw neither repeats within
-        cases nor weights, and would change the printed intervals.
-        """
-        rng = np.random.default_rng(seed)
-        n_cases, n_repeats = self.exists.shape[1:]
-        if n_cases >= MIN_UNITS:
-            even = np.full(n_cases, 1 / n_cases)
-            case_counts = rng.multinomial(n_cases, even, size=RESAMPLES)
-            counts = case_counts.repeat(n_repeats, axis=1)
-        else:
-            even = np.full(n_repeats, 1 / n_repeats)
-            repeat_counts = rng.multinomial(n_repeats, even, size=(RESAMPLES, n_cases))
-            counts = repeat_counts.reshape(RESAMPLES, -1)  # (B, C R)
-
-        total = np.zeros((RESAMPLES, len(self.exists)))
-        for values, weights in criteria:
-            flat_weights = weights.reshape(len(weights), -1)
-            flat_values = values.reshape(flat_weights.shape)
-            mass = counts @ flat_weights.T
-            sums = counts @ (flat_weights * flat_values).T
-            total += np.divide(sums, mass, out=np.zeros_like(mass), where=mass > 0)
-        return total
-
-    def differences(self, a: int, b: int) -> Array:
-        """How much worse b is than a on each unit (N,); the sum is the difference of their means.
-
-        A case whose repeats are all equal, as for deterministic estimators, is one unit.
-        """
-        is_shared = self.exists[a] & self.exists[b]
-        difference = np.zeros(is_shared.shape)
-        for values, weights in self.criteria:
-            has_both = (weights[a] > 0) & (weights[b] > 0)
-            pair_weights = _weights(has_both[None])[0]
-            worse = np.where(has_both, values[b] - values[a], 0.0)
-            difference += worse * pair_weights
-
-        filled = np.where(is_shared, difference, difference[:, :1])
-        is_constant = np.ptp(filled, axis=1) <= ROUNDING
-        constant_cases = difference[is_constant].sum(axis=1)
-        varying_units = difference[~is_constant][is_shared[~is_constant]]
-        return np.concatenate([constant_cases, varying_units])
-
-    def repeats(self, a: int, b: int, tests: int) -> int | None:
-        """Repeats of each case that would detect a ratio of 1.1 between the losses of two estimators."""
-        values, weights = self.losses
-        has_both = (weights[a] > 0) & (weights[b] > 0)
-        difference = np.where(has_both, values[b] - values[a], np.nan)
-        cases = difference[has_both.any(axis=1)]
-        return repeats_to_decide(cases, tests=tests) if len(cases) else None
-
-
-def rank(loss: Array, failed: Array, *, seed: int = 1) -> list[Standing]:
-    """Standings of estimators, best first, by the `loss` and `failed` (E, C, R) of their trials.
-
-    `failed` is 1 or 0, NaN if there is no such trial; `loss` is also NaN for a trial without one, as in a case whose
-    ground truth is stationary. Means are over cases, within a case over repeats: pass cases that all estimators have.
-    """
-    trials = _Trials(loss, failed)
-    failures = trials.failures.means()
-    losses = trials.losses.means()
-    order = np.lexsort([losses, failures])
-    neighbours = list(pairwise(order.tolist()))
-
-    rng = np.random.default_rng(seed)
-    p_values = holm([permutation_p(trials.differences(a, b), rng) for a, b in neighbours])
-    ranked_means = trials.resampled(trials.criteria, seed)[:, order]  # (B, E)
-    lower_ends = _interval(np.diff(ranked_means, axis=1))[0]
-    is_decided = (np.array(p_values) < DECIDED) & (lower_ends > 0)
-    decided: list[bool] = is_decided.tolist()
-    intervals = _place_intervals(ranked_means, decided, is_enough=trials.has_enough(*order))
-
-    log_losses = trials.resampled([trials.losses], seed)
-    first_log_loss = log_losses[:, order[:1]]
-    ratios = np.exp(_interval(log_losses - first_log_loss))  # (2, E)
-    failed_shares = np.einsum("ecr,ecr->e", np.nan_to_num(failed), trials.failures.weights)
+def rank(trials: TrialTable) -> list[Standing]:
+    """The standings of estimators, best first."""
+    log_losses = trials.log_losses()  # (E, P)
+    means = _means(log_losses)
+    order: list[int] = np.argsort(means, kind="stable").tolist()
+    neighbours = [_difference(log_losses, a, b) for a, b in pairwise(order)]
+    p_values = holm([difference.p for difference in neighbours])
+    intervals = [(1, len(order))] * len(order)
+    if trials.is_tested:
+        intervals = _place_intervals(log_losses, order, p_values)
+    error_ratios = _error_ratios(trials, order)
 
     standings = list[Standing]()
-    places = _shared_places(failures[order], losses[order])
-    for position, (estimator, place) in enumerate(zip(order.tolist(), places, strict=True)):
-        is_first = position == 0
-        pair = position - 1
-        low, high = ratios[:, estimator].tolist()
-        has_interval = trials.has_enough(order[0], estimator) and high - low > MIN_LOSS_RATIO_RANGE
-        first_place, last_place = intervals[position]
+    places = _shared_places(means[order])
+    for position, (estimator, place) in enumerate(zip(order, places, strict=True)):
+        has_test = trials.is_tested and position > 0
+        error_ratio, error_interval = error_ratios[position]
         standing = Standing(
             index=estimator,
             place=place,
-            places=(min(first_place, place), last_place),
-            failed=float(failed_shares[estimator]),
-            loss=float(np.exp(losses[estimator])),
-            loss_ratio=float(np.exp(losses[estimator] - losses[order[0]])),
-            ratio_interval=(low, high) if has_interval else None,
-            p_above=None if is_first else p_values[pair],
-            decided_above=not is_first and decided[pair],
-            repeats=None if is_first else trials.repeats(*neighbours[pair], len(neighbours)),
+            places=intervals[position],
+            loss=float(np.exp(means[estimator])),
+            error_ratio=error_ratio,
+            error_interval=error_interval,
+            above=neighbours[position - 1] if has_test else None,
+            p_above=p_values[position - 1] if has_test else None,
+            level=DECIDED / max(len(neighbours), 1),
         )
         standings.append(standing)
     return standings
 
 
-def _weights(has_value: Mask) -> Array:
-    """The weight of each trial (E, C, R) in its estimator's mean: equal for cases, and for repeats within a case."""
-    repeats = has_value.sum(axis=2, keepdims=True)
-    cases = (repeats > 0).sum(axis=1, keepdims=True)
-    share_of_case = has_value / np.maximum(repeats, 1)
-    weights: Array = share_of_case / np.maximum(cases, 1)
-    return weights
+def _means(log_losses: Array) -> Array:
+    """The mean (E,) over places, rounded so that equal ones are equal; 0 where no trial has a loss."""
+    means = np.nan_to_num(place_mean(log_losses))
+    return np.asarray(np.round(means, DIGITS), float)
 
 
-def _interval(draws: Array) -> Array:
-    """The ends (2, N) of the interval that holds 95 % of the draws (B, N)."""
-    ends: Array = np.quantile(draws, INTERVAL, axis=0)
-    return ends
+def beside(trials: TrialTable) -> Standing:
+    """The standing of the last estimator of a table beside the first, without a rank: its loss and its error ratio."""
+    last = len(trials.loss) - 1
+    log_loss = float(_means(trials.log_losses())[last])
+    error_ratio, error_interval = _error_ratios(trials, [0, last])[1]
+    return Standing(
+        index=last,
+        place=last + 1,
+        places=(1, last + 1),
+        loss=float(np.exp(log_loss)),
+        error_ratio=error_ratio,
+        error_interval=error_interval,
+        above=None,
+        p_above=None,
+        level=DECIDED,
+    )
 
 
-def _shared_places(failures: Array, losses: Array) -> list[int]:
-    """Places from 1 of estimators in order, with means (E,); equal ones share the first of their places."""
+def _difference(log_losses: Array, a: int, b: int) -> PairedDifference:
+    """How much worse estimator b is than a, over places."""
+    return paired_difference(log_losses[b] - log_losses[a])
+
+
+def _place_intervals(log_losses: Array, order: Sequence[int], neighbour_p: Sequence[float]) -> list[tuple[int, int]]:
+    """The first and the last place of each ranked estimator, by how many others are significantly better and worse.
+
+    All pairs are tested, with Holm's correction at 5 %, so that all intervals of a board hold together in 95 of 100.
+    Neighbours whose order is not decided, by their corrected p-values (E - 1,), may share their places besides.
+    Source: Mogstad, Romano, Shaikh and Wilhelm, Inference for ranks, 2024.
+    """
+    above, below = np.triu_indices(len(order), k=1)  # (pairs,)
+    p_values = paired_p_values(log_losses[list(order)])[above, below]
+    is_neighbour = below == above + 1
+    is_decided = ~is_neighbour | (np.array(neighbour_p)[above.clip(max=len(order) - 2)] < DECIDED)
+    is_significant = is_decided & (np.array(holm(p_values.tolist())) < ALPHA)
+    better = np.bincount(below[is_significant], minlength=len(order))
+    worse = np.bincount(above[is_significant], minlength=len(order))
+    first_places = 1 + better
+    last_places = len(order) - worse
+    return list(zip(first_places.tolist(), last_places.tolist(), strict=True))
+
+
+def _error_ratios(trials: TrialTable, order: Sequence[int]) -> list[tuple[float | None, tuple[float, float] | None]]:
+    """The error of each ranked estimator relative to the first's, and its confidence interval.
+
+    Only cases count where both have a trial that survived. The first estimator was chosen by the same trials, which
+    makes its error look small; at the level ALPHA divided by the root of the number of ratios, an interval among
+    estimators that are all alike holds in 95 of 100 boards (`benchmarks/error_rates.py`).
+    """
+    log_errors = trials.log_errors_by_case()
+    level = ALPHA / np.sqrt(max(len(order) - 1, 1))
+    ratios = list[tuple[float | None, tuple[float, float] | None]]()
+    for estimator in order:
+        by_case = log_errors[estimator] - log_errors[order[0]]
+        difference = paired_difference(trials.design.means(by_case))
+        ratio = float(np.exp(difference.mean)) if difference.units else None
+        ends = difference.interval(level) if trials.is_tested and estimator != order[0] else None
+        interval = (float(np.exp(ends[0])), float(np.exp(ends[1]))) if ends else None
+        ratios.append((ratio, interval))
+    return ratios
+
+
+def _shared_places(means: Array) -> list[int]:
+    """Places from 1 of estimators in order, with mean losses (E,); equal ones share the first of their places."""
     places = list[int]()
-    means = list(zip(failures.tolist(), losses.tolist(), strict=True))
-    for position, mean in enumerate(means):
+    for position, mean in enumerate(means.tolist()):
         is_tied = position > 0 and mean == means[position - 1]
         places.append(places[-1] if is_tied else position + 1)
     return places
-
-
-def permutation_p(differences: Array, rng: np.random.Generator) -> float:
-    """Two-sided p-value of the sum of paired differences (N,), whose signs are random under the null hypothesis.
-
-    All signs are tried up to 12 differences, otherwise 4,095 random patterns; above 200 the sum is taken as normal.
-    scipy.stats.permutation_test draws other patterns, which would change the printed p-values.
-    Source: Fisher (1935), section 21.
-    """
-    differences = differences[differences != 0]
-    n = len(differences)
-    if n > MANY_UNITS:
-        std = np.sqrt(np.sum(differences * differences))
-        z = -abs(differences.sum()) / std
-        return float(2 * special.ndtr(z))
-
-    if n <= EXACT_UNITS:
-        patterns = np.arange(2**n)[:, None]
-        is_flipped = (patterns >> np.arange(n)) & 1
-        signs = 1.0 - 2.0 * is_flipped
-    else:
-        is_flipped = rng.integers(0, 2, (FLIPS, n))
-        observed_signs = np.ones((1, n))
-        signs = np.concatenate([observed_signs, 1.0 - 2.0 * is_flipped])
-    sums = np.abs(signs @ differences)
-    observed = sums[0] * (1 - 1e-12) - 1e-300  # equal sums must count as such in spite of rounding
-    return float(np.mean(sums >= observed))
-
-
-def holm(p_values: list[float]) -> list[float]:
-    """Adjusted p-values of several tests, which bound the probability of any false positive.
-
-    Source: Holm (1979).
-    """
-    corrected = list(p_values)
-    largest = 0.0
-    for position, test in enumerate(np.argsort(p_values, kind="stable")):
-        remaining = len(p_values) - position
-        largest = max(largest, min(1.0, remaining * p_values[test]))
-        corrected[test] = largest
-    return corrected
-
-
-def _place_intervals(ranked_means: Array, decided: list[bool], *, is_enough: bool) -> list[tuple[int, int]]:
-    """First and last place of each ranked estimator, over 95 % of draws (B, E) and including undecided neighbours."""
-    n = ranked_means.shape[1]
-    if not is_enough:
-        return [(1, n)] * n
-    rounded = np.round(ranked_means, DIGITS)
-    order = np.argsort(rounded, axis=1, kind="stable")
-    places = np.argsort(order, axis=1) + 1
-    ends = np.quantile(places, INTERVAL, axis=0, method="nearest")
-    first, last = ends.astype(int).tolist()
-    for position, is_decided in enumerate(decided):
-        place = position + 1
-        if not is_decided:
-            last[position] = max(last[position], place + 1)
-            first[position + 1] = min(first[position + 1], place)
-    for position in range(n):  # the place itself is always included
-        first[position] = min(first[position], position + 1)
-        last[position] = max(last[position], position + 1)
-    return list(zip(first, last, strict=True))
-
-
-def repeats_to_decide(differences: Array, *, tests: int = 1) -> int | None:
-    """Repeats that detect a ratio of 1.1 with a power of 95 %, from differences (C, R) of log losses of a pair.
-
-    Repeats average the variance within a case, not that between cases: if an F test shows the latter and it hides
-    the ratio, more cases are needed and the result is None. NaN marks a missing trial.
-    """
-    n_cases = len(differences)
-    trials_per_case = np.sum(~np.isnan(differences), axis=1)
-    typical_trials = float(np.mean(trials_per_case))
-    degrees_of_freedom = int((trials_per_case - 1).sum())
-    case_means = np.nanmean(differences, axis=1)
-    spread = float(np.var(case_means, ddof=1)) if n_cases > 1 else 0.0
-    within = spread
-    if degrees_of_freedom:
-        residuals = differences - case_means[:, None]
-        within = float(np.nansum(residuals**2) / degrees_of_freedom)
-    between = _variance_between_cases(
-        spread,
-        within,
-        n_cases=n_cases,
-        degrees_of_freedom=degrees_of_freedom,
-        trials=typical_trials,
-    )
-
-    n_tests = max(tests, 1)
-    z = special.ndtri(POWER) - special.ndtri(DECIDED / 2 / n_tests)
-    allowed = (np.log(EFFECT) / z) ** 2  # variance of the mean difference
-    left = allowed - between / n_cases
-    if left <= 0:
-        return None
-    units = max(MIN_UNITS, np.log2(2 * n_tests / DECIDED))
-    fewest = ceil(units / n_cases)
-    needed = max(fewest, ceil(within / n_cases / left))
-    return needed if needed <= MAX_REPEATS else None
-
-
-def _variance_between_cases(
-    spread: float,
-    within: float,
-    *,
-    n_cases: int,
-    degrees_of_freedom: int,
-    trials: float,
-) -> float:
-    """The variance of case means beyond that which repeats explain; 0 if an F test does not show any."""
-    if not degrees_of_freedom:
-        return 0.0
-    if within == 0:
-        return spread
-    if n_cases == 1:
-        return 0.0
-    f_ratio = spread * trials / within
-    p = special.fdtrc(n_cases - 1, degrees_of_freedom, f_ratio)
-    return max(0.0, spread - within / trials) if p < ALPHA else 0.0
-
-
-def mean_places(loss: Array, failed: Array) -> Array:
-    """Each estimator's place (E,) in a case, by failed trials and then the median loss, averaged over cases.
-
-    Equal estimators share the mean of their places. `loss` and `failed` (E, C, R) are those of `rank`.
-    """
-    has_no_loss = np.isnan(loss).all(axis=2, keepdims=True)
-    median_loss = np.nanmedian(np.where(has_no_loss, 0.0, loss), axis=2)
-    failed_share = np.nanmean(failed, axis=2)
-    key = np.round(10.0 * failed_share + median_loss, DIGITS)  # no loss is more than 1
-    better = (key < key[:, None]).sum(axis=1)
-    equal = (key == key[:, None]).sum(axis=1)  # itself included
-    case_places = better + (equal + 1) / 2
-    places: Array = case_places.mean(axis=1)
-    return places
-
-
-def difference_p(a: Array, b: Array) -> float:
-    """Two-sided p-value of values (N,) and (M,) of two estimators on one case; 1 with fewer than four of either.
-
-    Only their order counts, so infinity may stand for a failure. Unlike scipy.stats.mannwhitneyu it is exact with ties.
-    Source: Mann and Whitney (1947).
-    """
-    if min(len(a), len(b)) < MIN_TRIALS:
-        return 1.0
-    n_pairs = len(a) * len(b)
-    wins_of_a = np.sum(a[:, None] < b)
-    ties = np.sum(a[:, None] == b)
-    wins = float(wins_of_a + 0.5 * ties)
-    fewer_wins = int(np.ceil(min(wins, n_pairs - wins)))
-    one_sided = float(_chance_of_wins(len(a), len(b))[fewer_wins])
-    return min(1.0, 2 * one_sided)
-
-
-@cache
-def _chance_of_wins(n: int, m: int) -> Array:
-    """The probability of k or fewer wins, for each k, among the n m pairs of two equal estimators.
-
-    The counts are the coefficients of the Gaussian binomial, the product of (1 - q^(m + i)) / (1 - q^i) for i to n.
-    """
-    counts = np.ones(1)
-    for i in range(1, n + 1):
-        product = np.concatenate([counts, np.zeros(m + i)])
-        product[m + i :] -= counts
-        n_wins = range(len(counts) + m)
-        counts = np.array([product[k::-i].sum() for k in n_wins])
-    chances: Array = np.cumsum(counts) / counts.sum()
-    return chances

@@ -11,7 +11,7 @@ from vobench.report.board_table import (
     matrix,
     named,
     origin,
-    place,
+    rank,
     total_score,
     totals,
 )
@@ -84,8 +84,8 @@ def _rows(board: Board, metric: str, *, has_ranges: bool) -> tuple[Row, list[Row
     if len(totals(board)) != 1 or len(ranked) < len(board.estimators):
         return head, body, []
     scores = [_escaped(total_score(total)) for total in ranked]
-    places = [_escaped(place(total)) for total in ranked]
-    return head, body, [["score", *scores], ["place", *places]]
+    ranks = [_escaped(rank(total)) for total in ranked]
+    return head, body, [["score", *scores], ["rank", *ranks]]
 
 
 def _names(board: Board) -> Row:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 Record = dict[str, Any]
 ALL_CASES = "all"
 # Fields of a total that its record has in another form, or that only the board of all records can tell.
-NOT_IN_RECORD = ("claims", "places", "ratio_interval", "ate_percent", "repeats", "cases")
+NOT_IN_RECORD = ("claims", "ranks", "error_interval", "ate_percent", "cases")
 FORMULA_BEGINNINGS = ("=", "+", "-", "@", "|")
 
 
@@ -124,6 +124,6 @@ def _metric_record(cell: Cell) -> Record:
 def _total_record(total: Total) -> Record:
     """A total with the columns of a cell where they mean the same, and each interval as two columns."""
     record = {**asdict(total), "case": ALL_CASES, "ate": total.ate_percent}
-    record["places_min"], record["places_max"] = total.places
-    record["ratio_min"], record["ratio_max"] = total.ratio_interval or (None, None)
+    record["rank_min"], record["rank_max"] = total.ranks or (None, None)
+    record["ratio_min"], record["ratio_max"] = total.error_interval or (None, None)
     return {name: value for name, value in record.items() if name not in NOT_IN_RECORD}

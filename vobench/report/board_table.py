@@ -9,7 +9,7 @@ from vobench.report.cell import Cell
 from vobench.report.cell_notes import notes
 from vobench.report.leaderboard import Board
 from vobench.report.marks import marks
-from vobench.report.total import Total
+from vobench.report.total import CHOSEN_RATIO, Total
 
 NO_VALUE = "–"
 DEFAULT_METRIC = "ate"
@@ -19,11 +19,12 @@ LEAST_SCORE_DECIMALS = 3
 MOST_SCORE_DECIMALS = 7
 LEAST_MAGNITUDE = 1e-9  # smaller numbers are printed like this one, as log10(0) does not exist
 LEGEND = (
-    "* best of its case; ~ not decided against the best, which takes at least four trials per cell. With several "
-    "trials: median and range. ATE: RMSE of position after SE(3) alignment, or Sim(3) alignment where marked. Totals "
-    "are ordered by the share of failed trials, then by the lost-aware score (1 is perfect). × first: loss "
-    "(1 − score) relative to the first-ranked estimator, with a paired-bootstrap confidence interval. Ranks in "
-    "brackets: their 95 % interval. Decided: against the estimator above, by a permutation test (2 %, Holm)."
+    "* best of its case; ~ not decided against the best on this very case, which takes at least four trials per cell. "
+    "With several trials: median and range. ATE: RMSE of position after SE(3) alignment, or Sim(3) alignment where "
+    "marked; the median over cases. × best: error relative to the first-ranked estimator where both survive, with its "
+    "95 % interval for other places and drives of this kind. Lost: failed trials. Estimators are ordered by the score "
+    "(1 is perfect), in which a failed trial loses at least 1/2. Ranks in brackets: their 95 % interval. Decided: "
+    "against the estimator above, by a t test over places (2 %, Holm). Baselines and oracles have no rank."
 )
 
 
@@ -99,10 +100,12 @@ def named(estimator: str, claims: Sequence[str]) -> str:
     return f"{estimator} [{', '.join(claims)}]" if claims else estimator
 
 
-def place(total: Total) -> str:
-    """The rank of an estimator, with its interval if that is wider than one rank."""
-    low, high = total.places
-    return f"{total.place}" if low == high else f"{total.place} ({low}–{high})"
+def rank(total: Total) -> str:
+    """The rank of an estimator, with its interval if that is wider than one rank; empty if it has none."""
+    if total.rank is None or total.ranks is None:
+        return ""
+    low, high = total.ranks
+    return f"{total.rank}" if low == high else f"{total.rank} ({low}–{high})"
 
 
 def total_score(total: Total) -> str:
@@ -121,29 +124,25 @@ def _name(total: Total) -> str:
     return named(total.estimator, total.claims)
 
 
-def _loss_ratio(total: Total) -> str:
-    if total.ratio_interval is None:
-        return number(total.loss_ratio)
-    low, high = total.ratio_interval
-    return f"{number(total.loss_ratio)} [{number(low)}, {number(high)}]"
+def _error_ratio(total: Total) -> str:
+    if total.error_interval is None:
+        return number(total.error_ratio)
+    low, high = total.error_interval
+    return f"{number(total.error_ratio)} [{number(low)}, {number(high)}]"
 
 
 def _decided(total: Total) -> str:
-    if total.p_above is None:
+    if total.decided_above is None:
         return NO_VALUE
-    return "yes" if total.decided_above else "not decided"
+    return "yes" if total.decided_above else "no"
 
 
-def _failed(total: Total) -> str:
-    return f"{total.failed}/{total.trials}"
+def _lost(total: Total) -> str:
+    return f"{total.failed} of {total.trials}"
 
 
 def _ate(total: Total) -> str:
     return number(total.ate_percent)
-
-
-def _mean_place(total: Total) -> str:
-    return NO_VALUE if total.mean_place is None else f"{total.mean_place:.1f}"
 
 
 def _cpu(total: Total) -> str:
@@ -159,14 +158,13 @@ COST = "CPU ms/frame"
 MEMORY = "MiB"
 # The columns of the totals: the heading of each, and the text of its cells.
 COLUMNS: dict[str, Callable[[Total], str]] = {
-    "#": place,
+    "#": rank,
     "estimator": _name,
-    "score": total_score,
-    "× first": _loss_ratio,
-    "decided": _decided,
-    "failed": _failed,
     "ATE %": _ate,
-    "mean place": _mean_place,
+    "× best": _error_ratio,
+    "lost": _lost,
+    "decided": _decided,
+    "score": total_score,
     COST: _cpu,
     MEMORY: _memory,
 }
@@ -174,7 +172,7 @@ HEADINGS = tuple(COLUMNS)
 
 
 def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
-    """The title of each calibration group, with a row of headings and the rows of its estimators.
+    """The title of each division, with a row of headings and the rows of its estimators.
 
     The columns of costs are left out if no cost is known.
     """
@@ -184,8 +182,9 @@ def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
     tables = []
     for group in groups:
         members = [total for total in board.totals if total.group == group]
-        cases = _counted(members[0].cases, "case")
-        scope = f"calibration {group or 'none'}, {cases}" if len(groups) > 1 else cases
+        first = members[0]
+        counts = [_counted(first.cases, "case"), _counted(first.drives, "drive"), _counted(first.places, "place")]
+        scope = ", ".join([group, *counts] if group else counts)
         rows = [_total_row(total, headings) for total in members]
         tables.append((scope, [headings, *rows]))
     return tables
@@ -203,19 +202,19 @@ def remarks(board: Board) -> list[str]:
     """Sentences on the totals: what they cover, how undecided orders could be decided, and breakdowns."""
     sentences = list(board.remarks)
     for above, total in zip(board.totals, board.totals[1:], strict=False):
-        is_same_group = above.group == total.group
-        has_several_trials = total.trials > 1
-        if is_same_group and has_several_trials and not total.decided_above:
+        if total.decided_above is False:
             sentences.append(_undecided(above, total))
     return sentences + [curve.sentence for curve in board.curves]
 
 
 def _undecided(above: Total, total: Total) -> str:
-    """How many more trials would decide the order of two neighbours."""
-    order = f"The order of {above.estimator} and {total.estimator} is not decided (p = {total.p_above or 1:.2g})"
-    if total.repeats:
-        return f"{order}; {total.repeats} repeats of each case would detect a difference of 10 %"
-    return f"{order}; more cases, rather than more repeats, would detect a difference of 10 %"
+    """What the board could have decided of two neighbours, and what a chosen ratio would take."""
+    order = f"The order of {above.estimator} and {total.estimator} is not decided (p = {total.p_above:.2g})"
+    found = f"a ratio of losses of {number(total.smallest_ratio)} would have been"
+    more = (total.places_needed or 0) - total.places
+    if more <= 0:
+        return f"{order}; {found}"
+    return f"{order}; {found}, and {CHOSEN_RATIO:g} takes about {_counted(more, 'more place')}"
 
 
 def cell_notes(board: Board) -> list[str]:

@@ -6,22 +6,31 @@ from math import inf, nan
 from statistics import fmean, median
 
 from vobench.metric import ranking
-from vobench.report.board_metric import METRICS, MM_PER_M, PERCENT, lost_aware
+from vobench.report.board_metric import FAIL_RATIO, METRICS, MM_PER_M, PERCENT, lost_aware
 from vobench.report.frame_statistics import EstimatorStatistics
 from vobench.runner.consistency import CovarianceConsistency
 from vobench.runner.folder import STATUSES, SURVIVED, TrialScore, seen_by, value_of
 
 ONLY_ITS_OWN = "only its own files"
+LEAST_ERROR_M = 1e-3
+LOSS_OF_ERROR = 0.5 / FAIL_RATIO  # the loss of a survivor whose error is this share of the path everywhere
 
 
 @dataclass(frozen=True, slots=True)
 class CaseFacts:
-    """Facts from the file of a case: calibration group, scenario, its severity, and noise of the ground truth."""
+    """Facts from the file of a case: its calibration group, scenario and severity, place and drive, and truth noise.
+
+    `place` and `drive` are empty if they are unknown; a drive is told apart from others by its text.
+    `truth_noise_m` is the standard deviation of the position of the ground truth that scores are computed with.
+    """
 
     group: str = ""
     scenario: str = ""
     severity: int | None = None
+    place: str = ""
+    drive: str = ""
     truth_noise: str = ""
+    truth_noise_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,9 +38,10 @@ class Cell:
     """All trials of one estimator on one case.
 
     failures: whether each trial failed.
-    status, reason, claims: of the trial with the most severe status.
+    status, reason, claims, sensors: of the trial with the most severe status.
     values: each metric by name, with a value per trial: infinite if the trial failed, None if it has no such value.
     losses: 1 minus the lost-aware score of each trial; NaN if it has none.
+    errors: the position error of each trial as a share of the path; NaN if it failed or has none.
     answered: statistics of the frames of all trials.
     consistency, scale_gap, revised_…, scale_drift_…: from the trials that did not fail.
     saw: which files the estimator could access.
@@ -45,8 +55,10 @@ class Cell:
     reason: str
     values: Mapping[str, tuple[float | None, ...]]
     losses: tuple[float, ...]
+    errors: tuple[float, ...]
     answered: EstimatorStatistics
     claims: tuple[str, ...] = ()
+    sensors: tuple[str, ...] = ()
     drift_mm: float | None = None
     scale_gap: float | None = None
     consistency: str = ""
@@ -90,9 +102,11 @@ def make_cell(trials: Sequence[TrialScore], answered: EstimatorStatistics, facts
         status=most_severe.status,
         reason=most_severe.reason,
         values=_values(trials, answered),
-        losses=tuple(_loss(trial) for trial in trials),
+        losses=tuple(_loss(trial, facts) for trial in trials),
+        errors=tuple(_error(trial, facts) for trial in trials),
         answered=answered,
         claims=most_severe.claims,
+        sensors=most_severe.sensors,
         drift_mm=max(drifts_mm, default=None),
         scale_gap=consistency.scale_gap if consistency else None,
         consistency=consistency.sentence if consistency else "",
@@ -113,12 +127,28 @@ def _values(trials: Sequence[TrialScore], answered: EstimatorStatistics) -> dict
     return values
 
 
-def _loss(trial: TrialScore) -> float:
+def _loss(trial: TrialScore, facts: CaseFacts) -> float:
     """The loss of a trial, 1 minus its lost-aware score; NaN if it has none."""
     score = lost_aware(trial)
     if score is None:
         return nan
-    return max(1.0 - score, ranking.MIN_LOSS)
+    least_loss = LOSS_OF_ERROR * _least_error(trial, facts)
+    return min(max(1.0 - score, least_loss, ranking.MIN_LOSS), 1.0)
+
+
+def _error(trial: TrialScore, facts: CaseFacts) -> float:
+    """The position error of a trial as a share of the path; NaN if it failed or has none."""
+    percent = METRICS["ate"].value(trial)
+    if percent is None or percent == inf:
+        return nan
+    return max(percent / PERCENT, _least_error(trial, facts))
+
+
+def _least_error(trial: TrialScore, facts: CaseFacts) -> float:
+    """The error as a share of the path below which estimators are alike: a millimetre, or the noise of the truth."""
+    if trial.path_m <= 0:
+        return 0.0
+    return max(LEAST_ERROR_M, facts.truth_noise_m) / trial.path_m
 
 
 def _median_consistency(trials: Sequence[TrialScore]) -> CovarianceConsistency | None:

@@ -1,20 +1,28 @@
-"""Two runs compared: whether each estimator, and each of its cells, got better or worse, and by how much."""
+"""Two runs compared: whether each estimator, and each of its cells, got better or worse, and by how much.
+
+An estimator that states that it is deterministic gives the same answer to the same sequence, so every change is one of
+the code, and only its size is judged. If the machine changed, too, so may the last digits of pictures and estimates,
+and what follows from them. An estimator that is not deterministic is judged by tests on its repeats and cases.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import exp, isnan, log
+from math import exp, isnan
 
 import numpy as np
+from scipy import stats
 
 from vobench.errors import InputError
 from vobench.geometry.se3 import Array
-from vobench.metric import ranking
-from vobench.metric.ranking import ALPHA, difference_p, holm
+from vobench.metric.repeat_test import ALPHA, MIN_TRIALS, difference_p
+from vobench.metric.significance import PairedDifference, holm, paired_difference
 from vobench.report.cell import Cell
 from vobench.report.leaderboard import Board
 from vobench.runner.environment import differences
 
 SAME = "same"
+ALIKE = "alike"  # differs by less than the limit
+OTHER_MACHINE = "as another machine may"
 BETTER = "better"
 WORSE = "worse"
 UNDECIDED = "not decided"
@@ -25,7 +33,10 @@ GONE = "gone"
 NOT_MADE = "no sequence"  # the case could not be simulated or imported in one of the runs
 REGRESSIONS = (WORSE, FAILS)
 MOST_NAMED = 3  # estimators and cases in a message
-LEAST_INTERVAL = 1e-9  # a narrower interval comes from trials that are all alike
+LIMIT = 1.05  # ratio of losses of a deterministic estimator beyond which it is better or worse
+MACHINE_LIMIT = 3.0  # the same if the machine changed: processors alone change single cells by up to 2.6 times
+MIN_CASES = 4  # for a test over cases
+NOT_DETERMINISTIC = "not deterministic"
 
 CellKey = tuple[str, str]
 
@@ -61,11 +72,35 @@ class CellPair:
         has_same_losses = self.old.losses == self.new.losses
         return has_same_losses and self.old.failures == self.new.failures
 
+    @property
+    def is_deterministic(self) -> bool:
+        """Whether the estimator states that it is deterministic, in both runs."""
+        return NOT_DETERMINISTIC not in (*self.old.claims, *self.new.claims)
+
+    @property
+    def log_ratio(self) -> float:
+        """The logarithm of the new loss relative to the old one; NaN if one of them has none."""
+        old_losses = _known_losses(self.old)
+        new_losses = _known_losses(self.new)
+        if not old_losses or not new_losses:
+            return float("nan")
+        return float(np.mean(np.log(new_losses)) - np.mean(np.log(old_losses)))
+
+
+def _known_losses(cell: Cell) -> list[float]:
+    return [loss for loss in cell.losses if not isnan(loss)]
+
+
+def _is_deterministic(pairs: Sequence[CellPair]) -> bool:
+    return all(pair.is_deterministic for pair in pairs)
+
 
 def compare(old: Board, new: Board, *, at_most: float | None = None) -> list[ScoreChange]:
-    """The change of every estimator, then of every cell; a ratio above `at_most` is worse, decided or not.
+    """The change of every estimator, then of every cell.
 
-    Raises InputError if the two boards have no cell in common.
+    `at_most` is the ratio of losses that still counts as alike, LIMIT by default. An estimator that is not
+    deterministic is worse if its loss is significantly higher, and by more than `at_most` if that is given. Raises
+    InputError if the two boards have no cell in common.
     """
     keys = _cell_keys(old, new)
     pairs = _pairs(keys, old, new)
@@ -74,21 +109,25 @@ def compare(old: Board, new: Board, *, at_most: float | None = None) -> list[Sco
             "the two runs have no estimator on the same case: "
             f"the old run has {_contents(old)}, the new run has {_contents(new)}"
         )
-    p_values = _corrected_p_values(pairs)
+    is_same_machine = not environment_differences(old, new)
+    judge = _Judge(at_most, is_same_machine=is_same_machine)
+    random_pairs = {key: pair for key, pair in pairs.items() if not pair.is_deterministic}
+    p_values = _corrected_p_values(random_pairs)
     not_made = _cases_not_made(old) | _cases_not_made(new)
     changes = []
     for key in keys:
         if key in pairs:
-            changes.append(_cell_change(pairs[key], p_values[key], at_most))
+            changes.append(judge.cell(pairs[key], p_values.get(key)))
         else:
             case, estimator = key
             change = _unpaired_change(case, estimator, old.cell(case, estimator), new.cell(case, estimator))
             changes.append(replace(change, verdict=NOT_MADE) if case in not_made else change)
 
-    totals = []
-    for name in sorted({estimator for _, estimator in pairs}):
-        of_estimator = [pair for (_, estimator), pair in pairs.items() if estimator == name]
-        totals.append(_total_change(name, of_estimator, at_most))
+    pairs_of: dict[str, list[CellPair]] = {}
+    for (_, estimator), pair in sorted(pairs.items(), key=lambda item: item[0][1]):
+        pairs_of.setdefault(estimator, []).append(pair)
+    random_count = sum(not _is_deterministic(of_estimator) for of_estimator in pairs_of.values())
+    totals = [judge.total(name, of_estimator, tests=random_count) for name, of_estimator in pairs_of.items()]
     return totals + changes
 
 
@@ -161,105 +200,145 @@ def _unpaired_change(case: str, estimator: str, old: Cell | None, new: Cell | No
     return ScoreChange(case, estimator, verdict, _summary(old), _summary(new))
 
 
-def _cell_change(pair: CellPair, p: float, at_most: float | None) -> ScoreChange:
-    old_losses = [loss for loss in pair.old.losses if not isnan(loss)]
-    new_losses = [loss for loss in pair.new.losses if not isnan(loss)]
-    ratio = None
-    if old_losses and new_losses:
-        log_ratio = np.mean(np.log(new_losses)) - np.mean(np.log(old_losses))
-        ratio = exp(float(log_ratio))
-    verdict = _cell_verdict(pair, p, is_beyond_limit=_exceeds(ratio, at_most))
+@dataclass(frozen=True, slots=True)
+class _Judge:
+    """Gives verdicts on changes, by the largest ratio of losses that still counts as alike."""
 
-    interval = None
-    fewest_trials = min(len(old_losses), len(new_losses))
-    if verdict != SAME and fewest_trials >= ranking.MIN_TRIALS:
-        interval = _ratio_interval(old_losses, new_losses)
-    return ScoreChange(
-        pair.old.case,
-        pair.old.estimator,
-        verdict,
-        _summary(pair.old),
-        _summary(pair.new),
-        ratio,
-        interval,
-        p,
-    )
+    at_most: float | None
+    is_same_machine: bool
 
+    def cell(self, pair: CellPair, p: float | None) -> ScoreChange:
+        """The change of a cell; `p` is the corrected p-value of its repeats if the estimator is not deterministic."""
+        log_ratio = pair.log_ratio
+        ratio = None if isnan(log_ratio) else exp(log_ratio)
+        verdict = self._of_deterministic_cell(pair, ratio) if p is None else self._of_random_cell(pair, p, ratio)
+        return ScoreChange(
+            case=pair.old.case,
+            estimator=pair.old.estimator,
+            verdict=verdict,
+            old=_summary(pair.old),
+            new=_summary(pair.new),
+            ratio=ratio,
+            interval=None if verdict == SAME else _repeat_interval(pair),
+            p=p,
+        )
 
-def _exceeds(ratio: float | None, at_most: float | None) -> bool:
-    return bool(ratio and at_most and ratio > at_most)
+    def total(self, name: str, pairs: Sequence[CellPair], *, tests: int) -> ScoreChange:
+        """The change of an estimator over all cases; `tests` estimators are tested."""
+        log_ratios = np.array([pair.log_ratio for pair in pairs])
+        over_cases = paired_difference(log_ratios)
+        ratio = exp(over_cases.mean) if over_cases.units else None
+        p = None
+        interval = None
+        if all(pair.is_same for pair in pairs):
+            verdict = SAME
+        elif _is_deterministic(pairs):
+            verdict = self._of_ratio(ratio)
+        else:
+            difference = _difference_on_these_cases(pairs, over_cases)
+            p = min(1.0, tests * difference.p) if difference else None
+            verdict = self._of_random_total(pairs, p, ratio, tests)
+            ends = difference.interval(ALPHA) if difference else None
+            interval = (exp(ends[0]), exp(ends[1])) if ends else None
+        old_score = _total_score([pair.old for pair in pairs])
+        new_score = _total_score([pair.new for pair in pairs])
+        return ScoreChange("", name, verdict, old_score, new_score, ratio, interval, p)
 
+    def _of_ratio(self, ratio: float | None) -> str:
+        """The verdict on a deterministic estimator, by the ratio of its losses."""
+        if ratio is None:
+            return ALIKE
+        size = max(ratio, 1 / ratio)
+        if size <= (self.at_most or LIMIT):
+            return ALIKE
+        if not self.is_same_machine and size <= MACHINE_LIMIT:
+            return OTHER_MACHINE
+        return _direction(is_worse=ratio > 1)
 
-def _cell_verdict(pair: CellPair, p: float, *, is_beyond_limit: bool) -> str:
-    old = pair.old
-    new = pair.new
-    if pair.is_same:
-        return SAME
-    if not old.failed and new.failed == new.trials:
-        return FAILS
-    if old.failed == old.trials and not new.failed:
-        return MENDED
-    if p < ALPHA:
-        old_median = float(np.median(_ranked_losses(old)))
-        new_median = float(np.median(_ranked_losses(new)))
-        return _direction(is_worse=new_median > old_median)
-    return WORSE if is_beyond_limit else UNDECIDED
+    def _of_deterministic_cell(self, pair: CellPair, ratio: float | None) -> str:
+        if pair.is_same:
+            return SAME
+        if pair.old.failed < pair.new.failed:
+            return FAILS
+        if pair.old.failed > pair.new.failed:
+            return MENDED
+        return self._of_ratio(ratio)
+
+    def _of_random_cell(self, pair: CellPair, p: float, ratio: float | None) -> str:
+        if pair.is_same:
+            return SAME
+        if p >= ALPHA:
+            return UNDECIDED
+        old_median = float(np.median(_ranked_losses(pair.old)))
+        new_median = float(np.median(_ranked_losses(pair.new)))
+        if new_median == np.inf and old_median < np.inf:
+            return FAILS
+        return self._of_significant(ratio, is_worse=new_median > old_median)
+
+    def _of_random_total(self, pairs: Sequence[CellPair], p: float | None, ratio: float | None, tests: int) -> str:
+        if tests * _failure_p(pairs) < ALPHA:
+            return FAILS
+        if p is None or ratio is None or p >= ALPHA:
+            return UNDECIDED
+        return self._of_significant(ratio, is_worse=ratio > 1)
+
+    def _of_significant(self, ratio: float | None, *, is_worse: bool) -> str:
+        """The verdict on a significant change, which counts if it is larger than the limit that was given."""
+        if self.at_most and ratio and max(ratio, 1 / ratio) <= self.at_most:
+            return ALIKE
+        return _direction(is_worse=is_worse)
 
 
 def _direction(*, is_worse: bool) -> str:
     return WORSE if is_worse else BETTER
 
 
-def _ratio_interval(old: Sequence[float], new: Sequence[float]) -> tuple[float, float] | None:
-    """The bootstrap confidence interval of the ratio of mean losses; trials of both are drawn with replacement."""
-    rng = np.random.default_rng(1)
-    old_means = _resampled_log_means(old, rng)
-    new_means = _resampled_log_means(new, rng)
-    tail = ALPHA / 2
-    quantiles = np.quantile(new_means - old_means, [tail, 1 - tail])
-    low, high = np.exp(quantiles).tolist()
-    return (low, high) if high - low > LEAST_INTERVAL else None
+def _difference_on_these_cases(pairs: Sequence[CellPair], over_cases: PairedDifference) -> PairedDifference | None:
+    """The mean difference of log losses and its uncertainty by chance alone; None if there are too few trials.
+
+    With repeats, the variance within each cell tells what chance does. Without, the differences on several cases do.
+    """
+    if over_cases.units >= MIN_CASES:
+        return over_cases
+    variances = []
+    degrees_of_freedom = 0
+    for pair in pairs:
+        for cell in (pair.old, pair.new):
+            log_losses = np.log(_known_losses(cell))
+            if len(log_losses) < MIN_TRIALS:
+                return None
+            variances.append(float(np.var(log_losses, ddof=1)) / len(log_losses))
+            degrees_of_freedom += len(log_losses) - 1
+    standard_error = float(np.sqrt(sum(variances))) / len(pairs)
+    units = degrees_of_freedom + 1
+    return PairedDifference(units, over_cases.mean, standard_error * float(np.sqrt(units)))
 
 
-def _resampled_log_means(losses: Sequence[float], rng: np.random.Generator) -> Array:
-    """The mean logarithms (RESAMPLES,) of losses drawn with replacement."""
-    drawn = rng.choice(np.log(losses), (ranking.RESAMPLES, len(losses)))
-    means: Array = drawn.mean(1)
-    return means
+def _failure_p(pairs: Sequence[CellPair]) -> float:
+    """The p-value of more failed trials in the new run, by Fisher's exact test over all cells."""
+    old_failed = sum(pair.old.failed for pair in pairs)
+    new_failed = sum(pair.new.failed for pair in pairs)
+    old_trials = sum(pair.old.trials for pair in pairs)
+    new_trials = sum(pair.new.trials for pair in pairs)
+    table = [[new_failed, new_trials - new_failed], [old_failed, old_trials - old_failed]]
+    return float(stats.fisher_exact(table, alternative="greater").pvalue)
 
 
-def _total_change(name: str, pairs: Sequence[CellPair], at_most: float | None) -> ScoreChange:
-    """The change of an estimator over all cases: the old and the new one are ranked as two estimators of a board."""
-    losses, failures = _trial_arrays(pairs)
-    first, second = ranking.rank(losses, failures)
-    is_worse = second.index == 1
-    sign = 1 if is_worse else -1  # the ratios are of the second to the first
-    ratio = second.loss_ratio**sign
-    verdict = UNDECIDED
-    if all(pair.is_same for pair in pairs):
-        verdict = SAME
-    elif second.decided_above:
-        verdict = _direction(is_worse=is_worse)
-    elif _exceeds(ratio, at_most):
-        verdict = WORSE
-
-    interval = None
-    if second.ratio_interval and verdict != SAME:
-        low, high = sorted(exp(sign * log(end)) for end in second.ratio_interval)
-        interval = low, high
-    score_of = {standing.index: f"{1 - standing.loss:.4f}" for standing in (first, second)}
-    return ScoreChange("", name, verdict, score_of[0], score_of[1], ratio, interval, second.p_above)
+def _repeat_interval(pair: CellPair) -> tuple[float, float] | None:
+    """The confidence interval of the ratio of losses on a case, by its repeats; None with fewer than four of either."""
+    old_losses = np.log(_known_losses(pair.old))
+    new_losses = np.log(_known_losses(pair.new))
+    if min(len(old_losses), len(new_losses)) < MIN_TRIALS:
+        return None
+    if np.ptp(old_losses) == 0 and np.ptp(new_losses) == 0:
+        return None
+    found = stats.ttest_ind(new_losses, old_losses, equal_var=False).confidence_interval(1 - ALPHA)
+    return exp(float(found.low)), exp(float(found.high))
 
 
-def _trial_arrays(pairs: Sequence[CellPair]) -> tuple[Array, Array]:
-    """Losses and failures of the old and the new trials, both (2, cases, repeats), NaN for no trial."""
-    most_old = max(pair.old.trials for pair in pairs)
-    most_new = max(pair.new.trials for pair in pairs)
-    repeats = max(most_old, most_new)
-    losses = np.full((2, len(pairs), repeats), np.nan)
-    failures = losses.copy()
-    for case, pair in enumerate(pairs):
-        for run, cell in enumerate((pair.old, pair.new)):
-            losses[run, case, : cell.trials] = cell.losses
-            failures[run, case, : cell.trials] = cell.failures
-    return losses, failures
+def _total_score(cells: Sequence[Cell]) -> str:
+    """The lost-aware score over cells, 1 minus the geometric mean of the losses."""
+    log_losses = [float(np.mean(np.log(_known_losses(cell)))) for cell in cells if _known_losses(cell)]
+    if not log_losses:
+        return "–"
+    return f"{1 - exp(float(np.mean(log_losses))):.4f}"

@@ -7,8 +7,9 @@ from itertools import groupby
 from vobench.report.board_metric import METRICS
 from vobench.report.breakdown import BreakdownCurve, breakdown_curves
 from vobench.report.cell import CaseFacts, Cell, make_cell
+from vobench.report.division import divisions
 from vobench.report.frame_statistics import Answered, EstimatorStatistics
-from vobench.report.total import Total, rank_group
+from vobench.report.total import Total, rank_division
 from vobench.runner.environment import Environment
 from vobench.runner.folder import TrialScore, UnavailableCases, unavailable_cases, visible_to, with_sequence
 
@@ -73,15 +74,14 @@ def make_board(
     cells = _cells(trials, answered, facts or {})
     remarks = _unmade_remark(unmade, cases=len({score.case for score in scores}))
 
-    groups = sorted({cell.facts.group for cell in cells})
+    cells_of = divisions(cells)
     totals = []
-    for group in groups:
-        group_cells = [cell for cell in cells if cell.facts.group == group]
-        group_totals, group_remarks = rank_group(group, group_cells)
-        totals += group_totals
-        suffix = f" (calibration {group or 'none'})" if len(groups) > 1 else ""
-        remarks += [f"{remark}{suffix}" for remark in group_remarks]
-    remarks += _group_remark(groups)
+    for division, division_cells in cells_of.items():
+        label = division.label(list(cells_of))
+        division_totals, division_remarks = rank_division(label, division_cells)
+        totals += division_totals
+        suffix = f" ({label})" if label else ""
+        remarks += [f"{remark}{suffix}" for remark in division_remarks]
     remarks += _truth_noise_remarks(cells)
     return Board(
         title=title,
@@ -116,13 +116,6 @@ def _unmade_remark(unmade: Sequence[UnavailableCases], *, cases: int) -> list[st
     count = sum(len(group.cases) for group in unmade)
     causes = "; ".join(f"{group.names}: {group.cause}" for group in unmade)
     return [f"{count} of {cases} cases could not be simulated or imported and count for no estimator: {causes}"]
-
-
-def _group_remark(groups: Sequence[str]) -> list[str]:
-    if len(groups) < 2:
-        return []
-    names = ", ".join(group or "none" for group in groups)
-    return [f"Totals are computed separately for each calibration group: {names}"]
 
 
 def _truth_noise_remarks(cells: Iterable[Cell]) -> list[str]:

@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.metric import ranking
+from vobench.metric.repeat_test import MIN_TRIALS, worse_than_best
 from vobench.report.board_metric import COSTS, METRICS
 from vobench.report.cell import Cell
 from vobench.report.leaderboard import Board
@@ -44,9 +44,10 @@ def _marks_of_case(cells: Sequence[Cell], metric: str) -> dict[str, str]:
 
     best = min(medians, key=lambda name: (medians[name], name))
     others = [name for name in losses if name != best]
-    tied = [name for name in others if ranking.difference_p(losses[best], losses[name]) >= ranking.ALPHA]
+    worse = worse_than_best(losses, best)
+    tied = [name for name in others if name not in worse]
     marked = {best: BEST + NOT_DECIDED if tied else BEST}
-    if len(losses[best]) < ranking.MIN_TRIALS:
+    if len(losses[best]) < MIN_TRIALS:
         return marked  # with so few trials nothing is decided, and a mark would say nothing
     for name in tied:
         is_as_good = medians.get(name) == medians[best]

@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 Record = dict[str, Any]
 # The columns that a notebook shows if it has room for few.
-FIRST_COLUMNS = ("place", "estimator", "score", "ate_percent", "failed", "trials", "cases")
+FIRST_COLUMNS = ("rank", "estimator", "score", "ate_percent", "failed", "trials", "cases")
 # The intervals of a total, which are two columns each, and the names of these.
-INTERVALS = {"places": "place", "ratio_interval": "loss_ratio"}
+INTERVALS = {"ranks": "rank", "error_interval": "error_ratio"}
 
 
 def board_frame(board: Board) -> "pd.DataFrame":
-    """One row per estimator over all cases, the best first; the column `group` tells calibration groups apart."""
+    """One row per estimator over all cases, the best first; the column `group` tells divisions apart."""
     import pandas as pd
 
     table = pd.DataFrame([_total_record(total) for total in board.totals])

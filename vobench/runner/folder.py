@@ -76,9 +76,9 @@ class TrialScore(BaseModel):
     """One estimator on one case: its status and, where there is any estimate, its score.
 
     `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
-    `claims` are the manifest's, such as Sim(3); `consistency` is of the covariances that were stated, and `revised`
-    the score of the poses that came after the last frame, where there were some. `sandbox` is what the estimator could
-    see; None where none was started, and in runs of an older vobench.
+    `claims` are the manifest's, such as Sim(3), and `sensors` those that it needs; `consistency` is of the covariances
+    that were stated, and `revised` the score of the poses that came after the last frame, where there were some.
+    `sandbox` is what the estimator could see; None where none was started, and in runs of an older vobench.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -96,6 +96,7 @@ class TrialScore(BaseModel):
     score: dict[str, Any] | None
     drift_m: float | None = None
     claims: tuple[str, ...] = ()
+    sensors: tuple[str, ...] = ()
     consistency: CovarianceConsistency | None = None
     revised: dict[str, Any] | None = None
     sandbox: Sandbox | None = None

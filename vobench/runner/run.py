@@ -223,6 +223,7 @@ def _write_failed(task: Task, failure: _Failure, folder: RunFolder) -> TrialScor
         path_m=0.0,
         score=None,
         claims=task.inputs["claims"],
+        sensors=task.inputs["sensors"],
     )
     target = folder.estimate(score.case, score.estimator, score.repeat)
     target.mkdir(parents=True)

@@ -62,6 +62,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         score=scored.as_dict() if scored else None,
         drift_m=drift_m(est, gt, scored),
         claims=claims,
+        sensors=trial.entrant.manifest.needs,
         consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale_of(scored)),
         revised=_revised_score(estimate, gt, claims),
         sandbox=outcome.sandbox,

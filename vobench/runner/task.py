@@ -157,6 +157,7 @@ def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
         "variant": trial.case.variant,
         "estimator": trial.entrant.label,
         "claims": trial.entrant.claims,
+        "sensors": trial.entrant.manifest.needs,
         **_noise(trial.case),
         "repeat": trial.repeat,
         **_made_by("score", (sequence, estimate)),

@@ -1,0 +1,277 @@
+"""How often the conclusions of a board are wrong, on boards whose truth is known.
+
+    python benchmarks/error_rates.py [--boards 1000] [--seed 1]
+
+The logarithm of a trial's loss is drawn as: case + estimator + estimator × place + estimator × drive + repeat, with
+the standard deviations that a row names. Over the ten built-in places, the logarithm of the ratio of two real
+estimators has a standard deviation of 0.62 between places, so that 0.3 for each of two is a mild assumption. Promised:
+false decisions in 2 % of boards, intervals that hold in 95 %, rows of a matrix with a false mark in 5 %.
+"""
+
+import argparse
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+from scipy import stats
+
+from vobench.geometry.se3 import Array
+from vobench.metric.ranking import DECIDED, TrialTable, rank
+from vobench.metric.repeat_test import worse_than_best
+from vobench.metric.unit import make_design
+
+CASE_STD = 1.5
+NOISE = 0.3
+MIDDLE = -5.0  # the logarithm of a loss of 0.7 %
+FAILED_LOSS = (0.5, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """How the losses of a board come about: numbers of places, drives, cases and repeats, and standard deviations.
+
+    drives in each place, cases on each drive. tail: the degrees of freedom of Student's t distribution that the
+    interaction with the place follows, None for a normal one. failures: the share of failed trials, by repeat or, if
+    `by_case`, all repeats of a case at once. fewer: repeats of every other case.
+    """
+
+    places: int
+    drives: int = 1
+    cases: int = 1
+    repeats: int = 4
+    place_std: float = 0.0
+    drive_std: float = 0.0
+    noise: float = NOISE
+    tail: float | None = None
+    failures: float = 0.0
+    by_case: bool = False
+    fewer: int | None = None
+
+    @property
+    def name(self) -> str:
+        """The model in one cell of a table."""
+        parts = [f"{self.places} places × {self.drives} drives × {self.cases} cases × {self.repeats}"]
+        if self.place_std:
+            parts.append(f"place {self.place_std:g}")
+        if self.drive_std:
+            parts.append(f"drive {self.drive_std:g}")
+        if self.tail:
+            parts.append(f"t{self.tail:g} tails")
+        if self.failures:
+            unit = "case" if self.by_case else "trial"
+            parts.append(f"{self.failures:.0%} of {unit}s fail")
+        if self.fewer:
+            parts.append(f"half of the cases {self.fewer} repeats")
+        return ", ".join(parts)
+
+
+def board(model: Model, ratios: Array, rng: Generator) -> TrialTable:
+    """The trials of estimators whose losses have these true ratios (E,)."""
+    place = np.repeat(np.arange(model.places), model.drives * model.cases)
+    drive = np.repeat(np.arange(model.places * model.drives), model.cases)
+    estimators = len(ratios)
+    case_count = len(place)
+    case = rng.normal(MIDDLE, CASE_STD, case_count)
+    of_place = _interaction(model, estimators, rng)[:, place]
+    of_drive = model.drive_std * rng.standard_normal((estimators, model.places * model.drives))[:, drive]
+    by_case = np.log(ratios)[:, None] + case + of_place + of_drive
+    repeats = model.noise * rng.standard_normal((estimators, case_count, model.repeats))
+    loss = np.exp(np.minimum(by_case[..., None] + repeats, np.log(0.5)))
+    error = 2 * loss
+
+    fails = rng.random((estimators, case_count, 1 if model.by_case else model.repeats)) < model.failures
+    fails = np.broadcast_to(fails, loss.shape)
+    loss = np.where(fails, rng.uniform(*FAILED_LOSS, loss.shape), loss)
+    error = np.where(fails, np.nan, error)
+    if model.fewer:
+        loss[:, ::2, model.fewer :] = np.nan
+        error[:, ::2, model.fewer :] = np.nan
+    return TrialTable(loss, error, make_design(place.tolist(), drive.tolist()))
+
+
+def _interaction(model: Model, estimators: int, rng: Generator) -> Array:
+    """What each place adds to the logarithm of each estimator's loss (E, P)."""
+    shape = estimators, model.places
+    draws = rng.standard_t(model.tail, shape) if model.tail else rng.standard_normal(shape)
+    return model.place_std * draws
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """Shares of boards: any neighbours decided, all intervals of ratios right, single intervals right, best first."""
+
+    decided: float
+    all_covered: float
+    covered: float
+    is_first: float
+    t_test: float
+
+
+def rates(model: Model, ratios: Array, boards: int, rng: Generator) -> Rates:
+    """How often the conclusions of boards under a model are what they should be."""
+    decided = 0
+    first = 0
+    by_t_test = 0
+    boards_covered = []
+    covered = []
+    for _ in range(boards):
+        trials = board(model, ratios, rng)
+        standings = rank(trials)
+        decided += any(standing.decided_above for standing in standings)
+        best = standings[0].index
+        first += ratios[best] == ratios.min()
+        by_t_test += _t_test(trials) < DECIDED
+        is_covered = []
+        for standing in standings[1:]:
+            if standing.error_interval:
+                low, high = standing.error_interval
+                is_covered.append(low <= ratios[standing.index] / ratios[best] <= high)
+        covered += is_covered
+        if is_covered:
+            boards_covered.append(all(is_covered))
+    return Rates(
+        decided=decided / boards,
+        all_covered=float(np.mean(boards_covered)) if boards_covered else np.nan,
+        covered=float(np.mean(covered)) if covered else np.nan,
+        is_first=first / boards,
+        t_test=by_t_test / boards,
+    )
+
+
+def _t_test(trials: TrialTable) -> float:
+    """The p-value of a plain t test over places, of the first two estimators."""
+    first, second = trials.log_losses()[:2]
+    return float(stats.ttest_rel(first, second).pvalue)
+
+
+ALIKE = np.ones(2)
+FIVE_ALIKE = np.ones(5)
+NULL_MODELS = [
+    Model(1, repeats=10),
+    Model(1, repeats=20, place_std=0.3),
+    Model(2, repeats=20, place_std=0.3),
+    Model(4, repeats=10, place_std=0.3),
+    Model(6, repeats=4, place_std=0.3),
+    Model(7, repeats=1),
+    Model(7, repeats=1, place_std=0.3),
+    Model(7, repeats=4, place_std=0.3),
+    Model(7, repeats=20, place_std=0.3),
+    Model(12, repeats=1),
+    Model(12, repeats=4),
+    Model(12, repeats=4, place_std=0.3),
+    Model(20, repeats=4, place_std=0.3),
+    Model(3, cases=4, place_std=0.3),
+    Model(2, cases=6, place_std=0.3),
+    Model(3, cases=8, place_std=0.3),
+    Model(5, cases=4, place_std=0.3),
+    Model(4, drives=3, place_std=0.3, drive_std=0.2),
+    Model(8, drives=3, cases=4, place_std=0.3, drive_std=0.2),
+    Model(12, repeats=4, place_std=0.3, tail=2),
+    Model(12, repeats=4, place_std=0.3, failures=0.1),
+    Model(12, repeats=4, place_std=0.3, failures=0.1, by_case=True),
+    Model(7, repeats=20, place_std=0.3, failures=0.2, by_case=True),
+    Model(12, repeats=20, place_std=0.3, fewer=1),
+]
+POWER_MODELS = [
+    Model(7, place_std=0.3),
+    Model(12, place_std=0.3),
+    Model(20, place_std=0.3),
+    Model(12, drives=3, place_std=0.3, drive_std=0.2),
+    Model(50, repeats=1, place_std=0.3),
+]
+
+
+def false_decisions(boards: int, rng: Generator) -> Iterator[list[str]]:
+    """Of estimators that are equally good: how often an order is decided, and how often intervals hold."""
+    yield ["model", "two alike: decided", "interval holds", "five alike: any decided", "all intervals hold"]
+    for model in NULL_MODELS:
+        two = rates(model, ALIKE, boards, rng)
+        five = rates(model, FIVE_ALIKE, boards, rng)
+        yield [
+            model.name,
+            f"{two.decided:.3f}",
+            _share(two.covered),
+            f"{five.decided:.3f}",
+            _share(five.all_covered),
+        ]
+
+
+def power(boards: int, rng: Generator) -> Iterator[list[str]]:
+    """Of two estimators that differ: how often the order is decided, and by a plain t test, and intervals hold."""
+    yield ["model", "true ratio", "decided", "t test over places", "interval holds", "better one first"]
+    for model in POWER_MODELS:
+        for ratio in (1.3, 1.5, 2.0):
+            found = rates(model, np.array([1.0, ratio]), boards, rng)
+            yield [
+                model.name,
+                f"{ratio:g}",
+                f"{found.decided:.3f}",
+                f"{found.t_test:.3f}",
+                _share(found.covered),
+                f"{found.is_first:.3f}",
+            ]
+
+
+def advice(boards: int, rng: Generator) -> Iterator[list[str]]:
+    """Of boards that name a number of places for a ratio: how often that many places decide it, for the better one."""
+    yield ["model", "ratio", "places named: 10 %, median, 90 %", "found when done", "for the worse one"]
+    for model in (Model(7, place_std=0.3), Model(12, place_std=0.3), Model(20, place_std=0.2)):
+        for ratio in (1.5, 1.2):
+            ratios = np.array([1.0, ratio])
+            named = []
+            found = 0
+            wrong = 0
+            tried = 0
+            for _ in range(boards):
+                second = rank(board(model, ratios, rng))[1]
+                places = second.places_needed(ratio)
+                if places is None:
+                    continue
+                named.append(places)
+                best, other = rank(board(replace(model, places=max(places, 7)), ratios, rng))
+                tried += 1
+                found += bool(other.decided_above and best.index == 0)
+                wrong += bool(other.decided_above and best.index == 1)
+            low, middle, high = np.percentile(named, [10, 50, 90])
+            counts = f"{low:.0f}, {middle:.0f}, {high:.0f}"
+            yield [model.name, f"{ratio:g}", counts, f"{found / tried:.3f}", f"{wrong / tried:.3f}"]
+
+
+def false_marks(boards: int, rng: Generator) -> Iterator[list[str]]:
+    """Of estimators that are alike on one case: how often any of them is marked as worse than the best."""
+    yield ["estimators", "trials of each", "rows with a false mark"]
+    for estimators in (2, 5, 10):
+        for trials in (4, 5, 10, 20):
+            marked = 0
+            for _ in range(boards):
+                values = {str(name): rng.random(trials) for name in range(estimators)}
+                best = min(values, key=lambda name: float(np.median(values[name])))
+                marked += bool(worse_than_best(values, best))
+            yield [str(estimators), str(trials), f"{marked / boards:.3f}"]
+
+
+def _share(value: float) -> str:
+    return "not tested" if np.isnan(value) else f"{value:.3f}"
+
+
+TABLES: list[Callable[[int, Generator], Iterator[list[str]]]] = [false_decisions, power, advice, false_marks]
+
+
+def main() -> None:
+    """Print the tables in Markdown."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--boards", type=int, default=1000)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    for number, table in enumerate(TABLES):
+        rng = np.random.default_rng([arguments.seed, number])
+        print(f"\n{table.__doc__}\n")
+        for row, cells in enumerate(table(arguments.boards, rng)):
+            print("| " + " | ".join(cells) + " |", flush=True)
+            if row == 0:
+                print("|" + "---|" * len(cells))
+
+
+if __name__ == "__main__":
+    main()
