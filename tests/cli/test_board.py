@@ -62,8 +62,8 @@ def test_estimators_that_do_not_fit_are_named_and_one_always_remains(monkeypatch
 
 
 def test_a_narrow_terminal_omits_the_least_important_columns_of_the_totals_first(monkeypatch):
-    headings = ["estimator", "failed", "score", "decided", "× first"]
-    rows = [["stand_still", "0", "0.5", "yes", "1.00"]]
+    headings = ["estimator", "× best", "lost", "decided", "score"]
+    rows = [["stand_still", "1.00", "0 of 9", "yes", "0.5"]]
     width_by_omitted = {}
     for width in range(80, 10, -1):
         console = Console(file=io.StringIO(), width=width)
@@ -73,9 +73,10 @@ def test_a_narrow_terminal_omits_the_least_important_columns_of_the_totals_first
         assert columns == [heading for heading in headings if heading not in fitted.omitted]
     assert list(width_by_omitted) == [
         (),
-        ("failed",),
-        ("failed", "decided"),
-        ("failed", "decided", "× first"),
+        ("score",),
+        ("decided", "score"),
+        ("lost", "decided", "score"),
+        ("× best", "lost", "decided", "score"),
     ]
 
 

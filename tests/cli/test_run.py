@@ -228,7 +228,7 @@ def test_only_what_matches_is_run_and_values_take_the_place_of_the_suites(vobenc
         (("-c", "long"), "no case named 'long'. Known: short"),
         (("--set", "seed"), "--set should be key=value, as in rigs.ahead.pitch_deg=20, got 'seed'"),
         (("--set", "name.x=1"), "--set name.x=1: there are no keys below 'name'"),
-        (("--fail-if", "ate > x"), "no metric named 'ate'. Did you mean"),
+        (("--fail-if", "ate > x"), "should be compared with a number, got 'x' in 'ate > x'"),
         (
             ("--fail-if", "much"),
             "should be a metric, a comparison and a number, as in 'ate_trans.rmse > 0.2', got 'much'",

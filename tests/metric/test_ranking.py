@@ -38,7 +38,7 @@ def test_estimators_are_ordered_by_the_geometric_mean_of_their_losses(loss):
     assert [each.loss for each in found] == pytest.approx(sorted(means))
     assert sorted(each.index for each in found) == [0, 1, 2, 3]
     assert all(above.place <= below.place for above, below in pairwise(found))
-    assert all(each.places[0] <= each.place <= each.places[1] for each in found)
+    assert {each.places for each in found} == {None}  # three places are too few for a test
 
 
 @given(st.floats(0, 1), st.floats(0, 1))
@@ -93,7 +93,7 @@ def test_repeats_in_one_place_decide_nothing_however_many():
     loss = losses_of(np.random.default_rng(0), [1, 50], cases=1, repeats=100)
     second = ranked(loss)[1]
     assert (second.decided_above, second.p_above, second.error_interval) == (None, None, None)
-    assert second.places == (1, 2)
+    assert second.places is None
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ def test_words_are_left_aligned_and_numbers_right_aligned(scored):
     rules = [line for line in lines if line.startswith("|---")]
     assert rules == [
         "|---|---:|---:|",
-        "|---|---|---:|---:|---:|---:|---:|",
+        "|---|---|---:|---:|---:|---:|",
     ]
     assert lines[0] == "## ATE % of path"
     assert "## Totals: 1 case, 1 drive, 1 place" in lines

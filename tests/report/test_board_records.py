@@ -27,7 +27,7 @@ def test_json_holds_every_cell_and_total_in_full(made):
         (cell.case, cell.estimator, cell.status) for cell in made.cells
     ]
     assert [(t["estimator"], t["score"]) for t in read["totals"]] == [(t.estimator, t.score) for t in made.totals]
-    assert next(c["ate"] for c in read["cells"] if c["estimator"] == "good_one") == pytest.approx(10)
+    assert next(c["ate"] for c in read["cells"] if c["estimator"] == "good_one") == pytest.approx(0.1)
 
 
 def test_csv_is_read_by_pandas_with_gaps_where_there_is_no_number(made):

@@ -145,7 +145,7 @@ def test_the_columns_of_a_total(total, scored):
     second = replace(made.totals[1], p_above=0.01, decided_above=True)
     rows = rows_of(replace(made, totals=(first, second)))
     assert rows[0] | {"score": ""} == {
-        "#": "1 (1–2)",
+        "#": "1",
         "estimator": "a",
         "score": "",
         "ATE %": "10.0",

@@ -6,6 +6,8 @@ from vobench.report.board_metric import METRICS
 from vobench.report.leaderboard import make_board
 from vobench.report.run_tables import FIRST_COLUMNS, board_frame, cell_frame, frames_frame, trial_frame
 
+CLAIMS = ("not causal", "whole recording")
+
 
 def test_the_board_has_a_row_per_estimator_the_best_first(scored):
     scores = [

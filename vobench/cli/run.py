@@ -171,7 +171,7 @@ def run_command(
 
     broken_limits = list[str]()
     for threshold in thresholds:
-        broken_limits += threshold.broken_by(scores)
+        broken_limits += threshold.broken_by(scores, board)
     for sentence in broken_limits:
         terminal.warn(sentence)
     failure = total_failure(scores)

@@ -37,7 +37,7 @@ class Standing:
 
     index: int
     place: int
-    places: tuple[int, int]
+    places: tuple[int, int] | None
     loss: float
     error_ratio: float | None
     error_interval: tuple[float, float] | None
@@ -106,9 +106,7 @@ def rank(trials: TrialTable) -> list[Standing]:
     order: list[int] = np.argsort(means, kind="stable").tolist()
     neighbours = [_difference(log_losses, a, b) for a, b in pairwise(order)]
     p_values = holm([difference.p for difference in neighbours])
-    intervals = [(1, len(order))] * len(order)
-    if trials.is_tested:
-        intervals = _place_intervals(log_losses, order, p_values)
+    intervals = _place_intervals(log_losses, order, p_values) if trials.is_tested else None
     error_ratios = _error_ratios(trials, order)
 
     standings = list[Standing]()
@@ -119,7 +117,7 @@ def rank(trials: TrialTable) -> list[Standing]:
         standing = Standing(
             index=estimator,
             place=place,
-            places=intervals[position],
+            places=intervals[position] if intervals else None,
             loss=float(np.exp(means[estimator])),
             error_ratio=error_ratio,
             error_interval=error_interval,
@@ -145,7 +143,7 @@ def beside(trials: TrialTable) -> Standing:
     return Standing(
         index=last,
         place=last + 1,
-        places=(1, last + 1),
+        places=None,
         loss=float(np.exp(log_loss)),
         error_ratio=error_ratio,
         error_interval=error_interval,

@@ -101,10 +101,10 @@ def named(estimator: str, claims: Sequence[str]) -> str:
 
 
 def rank(total: Total) -> str:
-    """The rank of an estimator, with its interval if that is wider than one rank; empty if it has none."""
-    if total.rank is None or total.ranks is None:
+    """The rank of an estimator, with its interval if there is one wider than one rank; empty if it has no rank."""
+    if total.rank is None:
         return ""
-    low, high = total.ranks
+    low, high = total.ranks or (total.rank, total.rank)
     return f"{total.rank}" if low == high else f"{total.rank} ({low}–{high})"
 
 
@@ -156,6 +156,7 @@ def _memory(total: Total) -> str:
 
 COST = "CPU ms/frame"
 MEMORY = "MiB"
+DECIDED = "decided"
 # The columns of the totals: the heading of each, and the text of its cells.
 COLUMNS: dict[str, Callable[[Total], str]] = {
     "#": rank,
@@ -163,7 +164,7 @@ COLUMNS: dict[str, Callable[[Total], str]] = {
     "ATE %": _ate,
     "× best": _error_ratio,
     "lost": _lost,
-    "decided": _decided,
+    DECIDED: _decided,
     "score": total_score,
     COST: _cpu,
     MEMORY: _memory,
@@ -174,10 +175,14 @@ HEADINGS = tuple(COLUMNS)
 def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
     """The title of each division, with a row of headings and the rows of its estimators.
 
-    The columns of costs are left out if no cost is known.
+    The columns of costs are left out if no cost is known, and that of decisions if nothing is tested.
     """
-    has_costs = any(total.cpu_ms is not None for total in board.totals)
-    headings = [heading for heading in HEADINGS if has_costs or heading not in (COST, MEMORY)]
+    omitted = set[str]()
+    if all(total.cpu_ms is None for total in board.totals):
+        omitted |= {COST, MEMORY}
+    if all(total.decided_above is None for total in board.totals):
+        omitted.add(DECIDED)
+    headings = [heading for heading in HEADINGS if heading not in omitted]
     groups = list(dict.fromkeys(total.group for total in board.totals))
     tables = []
     for group in groups:

@@ -74,14 +74,8 @@ def make_board(
     cells = _cells(trials, answered, facts or {})
     remarks = _unmade_remark(unmade, cases=len({score.case for score in scores}))
 
-    cells_of = divisions(cells)
-    totals = []
-    for division, division_cells in cells_of.items():
-        label = division.label(list(cells_of))
-        division_totals, division_remarks = rank_division(label, division_cells)
-        totals += division_totals
-        suffix = f" ({label})" if label else ""
-        remarks += [f"{remark}{suffix}" for remark in division_remarks]
+    totals, division_remarks = _rank(cells)
+    remarks += division_remarks
     remarks += _truth_noise_remarks(cells)
     return Board(
         title=title,
@@ -93,6 +87,25 @@ def make_board(
         environment=environment,
         visible=visible_to(trials),
     )
+
+
+def _rank(cells: Sequence[Cell]) -> tuple[list[Total], list[str]]:
+    """The totals of every division, and the remarks on them; a remark that holds for all of them is made once."""
+    cells_of = divisions(cells)
+    totals = list[Total]()
+    labels_of: dict[str, list[str]] = {}
+    for division, division_cells in cells_of.items():
+        label = division.label(list(cells_of))
+        division_totals, remarks = rank_division(label, division_cells)
+        totals += division_totals
+        for remark in remarks:
+            labels_of.setdefault(remark, []).append(label)
+
+    sentences = []
+    for remark, labels in labels_of.items():
+        is_general = len(labels) == len(cells_of)
+        sentences.append(remark if is_general else f"{remark} ({'; '.join(labels)})")
+    return totals, sentences
 
 
 def _cells(trials: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts]) -> list[Cell]:

@@ -1,16 +1,19 @@
-"""Thresholds on scores, as in `vobench run --fail-if`: 'ate_trans.rmse > 0.2', 'coverage < 0.9'."""
+"""Thresholds on results, as in `vobench run --fail-if`: 'ate_trans.rmse > 0.2', 'score < 0.9', 'failed > 0'."""
 
 import operator
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from vobench.errors import InputError, unknown_name_sentence
 from vobench.metric.definitions import DEFINITIONS
+from vobench.report.board_metric import COSTS, METRICS
+from vobench.report.division import UNRANKED
+from vobench.report.leaderboard import Board
 from vobench.runner.folder import SURVIVED, TrialScore, with_sequence
 
-DEFAULT_STATISTIC = "rmse"
-STATISTICS = (DEFAULT_STATISTIC, "mean", "median", "std", "min", "max")
+STATISTICS = ("rmse", "mean", "median", "std", "min", "max", "p95", "p99")
 COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,
     "<=": operator.le,
@@ -18,60 +21,107 @@ COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
 }
 FORM = re.compile(r"\s*(\w+)(?:\.(\w+))?\s*(>=|<=|>|<)\s*([-+.\w]+)\s*")
-COVERAGE = "coverage"
+FAILED = "failed"
+# The metrics of poses that every run measures; others take `vobench score --full`.
+MEASURED = tuple(name for name, metric in DEFINITIONS.items() if metric.measure and not metric.full)
 
 
 @dataclass(frozen=True, slots=True)
 class Threshold:
-    """A range that a statistic of a metric, in the unit of the metric, must not be in."""
+    """A range that a result must not be in.
+
+    `metric` is a metric of poses with a `statistic`, in its unit; or, with an empty statistic, a metric of the board,
+    or `failed`, the number of failed trials of an estimator.
+    """
 
     metric: str
     statistic: str
     comparison: str
     value: float
 
-    def broken_by(self, scores: Sequence[TrialScore]) -> Iterator[str]:
-        """A sentence for each trial that is beyond the threshold or has no value.
+    def broken_by(self, scores: Sequence[TrialScore], board: Board) -> Iterator[str]:
+        """A sentence for each trial, cell or estimator that is beyond the threshold or has no value.
 
-        A trial without a sequence is no result of its estimator, and breaks no threshold.
+        A trial without a sequence is no result of its estimator, and breaks no threshold. Baselines and oracles count
+        only if nothing else was run.
         """
-        is_beyond = COMPARISONS[self.comparison]
-        for score in with_sequence(scores):
-            trial = f"{score.estimator} on {score.case}"
-            value = self._value(score)
-            if score.status not in SURVIVED or value is None:
-                yield f"{trial}: {score.status}, so it has no {self}"
-            elif is_beyond(value, self.value):
-                yield f"{trial}: {self.name} is {value:.4g}, which is {self.comparison} {self.value:g}"
+        trials = with_sequence(scores)
+        competitors = [trial for trial in trials if not set(trial.claims) & set(UNRANKED)]
+        counted = competitors or trials
+        if self.metric == FAILED:
+            yield from self._broken_by_failures(counted)
+        elif self.metric in COSTS:
+            yield from self._broken_by_costs(counted, board)
+        else:
+            yield from self._broken_by_trials(counted)
 
-    def _value(self, score: TrialScore) -> float | None:
-        if self.metric == COVERAGE:
-            return score.coverage
-        return score.value(self.metric, self.statistic)
+    def _broken_by_trials(self, trials: Sequence[TrialScore]) -> Iterator[str]:
+        includes_failures = self.metric in METRICS and METRICS[self.metric].includes_failures
+        for trial in trials:
+            name = f"{trial.estimator} on {trial.case}"
+            value = self._value(trial)
+            has_failed = trial.status not in SURVIVED and not includes_failures
+            if has_failed or value is None:
+                yield f"{name}: {trial.status}, so it has no {self}"
+            else:
+                yield from self._broken_by_value(name, value)
 
-    @property
-    def name(self) -> str:
-        """The metric and its statistic."""
-        return self.metric if self.metric == COVERAGE else f"{self.metric}.{self.statistic}"
+    def _broken_by_failures(self, trials: Sequence[TrialScore]) -> Iterator[str]:
+        failures = Counter(trial.estimator for trial in trials if trial.status not in SURVIVED)
+        for estimator in sorted({trial.estimator for trial in trials}):
+            yield from self._broken_by_value(estimator, failures[estimator])
+
+    def _broken_by_costs(self, trials: Sequence[TrialScore], board: Board) -> Iterator[str]:
+        for case, estimator in dict.fromkeys((trial.case, trial.estimator) for trial in trials):
+            cell = board.cell(case, estimator)
+            spread = cell.spread(self.metric) if cell else None
+            if spread is None:
+                yield f"{estimator} on {case}: no {self} was measured"
+            else:
+                yield from self._broken_by_value(f"{estimator} on {case}", spread[0])
+
+    def _broken_by_value(self, name: str, value: float) -> Iterator[str]:
+        if COMPARISONS[self.comparison](value, self.value):
+            yield f"{name}: {self} is {value:.4g}, which is {self.comparison} {self.value:g}"
+
+    def _value(self, trial: TrialScore) -> float | None:
+        if self.metric in METRICS:
+            return METRICS[self.metric].read(trial)
+        return trial.value(self.metric, self.statistic)
 
     def __str__(self) -> str:
-        return self.name
+        return f"{self.metric}.{self.statistic}" if self.statistic else self.metric
 
 
 def parse_threshold(text: str) -> Threshold:
-    """The threshold in a text; without a statistic it is on the RMSE. Raises InputError or UnknownNameError."""
+    """The threshold in a text; a metric of poses without a statistic is one on its main statistic.
+
+    Raises InputError or UnknownNameError, also for a metric that a run does not measure.
+    """
     match = FORM.fullmatch(text)
     if not match:
         raise InputError(f"should be a metric, a comparison and a number, as in 'ate_trans.rmse > 0.2', got {text!r}")
     metric, stated_statistic, comparison, number = match.groups()
-    statistic = stated_statistic or DEFAULT_STATISTIC
-    _require_known("metric", metric, [COVERAGE, *DEFINITIONS])
-    _require_known("statistic", statistic, STATISTICS)
     try:
         limit = float(number)
     except ValueError:
         raise InputError(f"should be compared with a number, got {number!r} in {text!r}") from None
-    return Threshold(metric, statistic, comparison, limit)
+    return Threshold(metric, _statistic(metric, stated_statistic), comparison, limit)
+
+
+def _statistic(metric: str, stated: str | None) -> str:
+    """The statistic of a metric of poses, by default its main one; empty for a metric that has none."""
+    of_board = [*METRICS, FAILED]
+    if metric in DEFINITIONS and metric not in (*MEASURED, *of_board):
+        raise InputError(f"a run does not measure {metric}; it measures {', '.join([*of_board, *MEASURED])}")
+    _require_known("metric", metric, [*of_board, *MEASURED])
+    if metric in of_board:
+        if stated:
+            raise InputError(f"{metric} has no statistics; write '{metric}' without '.{stated}'")
+        return ""
+    statistic = stated or DEFINITIONS[metric].headline
+    _require_known("statistic", statistic, STATISTICS)
+    return statistic
 
 
 def _require_known(kind: str, name: str, known: Sequence[str]) -> None:

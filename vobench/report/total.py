@@ -23,8 +23,8 @@ class Total:
 
     `group` is the division's label. `score` is the lost-aware score, 1 minus the geometric mean of the losses.
     `ate_percent` is a median over cases. `error_ratio` is the error relative to the first-ranked estimator's on cases
-    where both survive, with its confidence interval. `rank` and `ranks`, its 95 % interval, are None for baselines and
-    oracles, which are not ranked. `decided_above` is None if nothing is tested. `smallest_ratio` of losses to the
+    where both survive, with its confidence interval. `rank` is None for baselines and oracles, which are not ranked.
+    `ranks`, its 95 % interval, and `decided_above` are None if nothing is tested. `smallest_ratio` of losses to the
     estimator above would have been decided, and `places_needed` would decide a ratio of 1.5. `is_efficient` states
     that no ranked estimator with a better score used less CPU time.
     """
@@ -191,7 +191,7 @@ def _total(label: str, cells: Sequence[Cell], standing: ranking.Standing, design
         estimator=cells[0].estimator,
         claims=cells[0].claims,
         rank=standing.place if has_rank else None,
-        ranks=standing.places if has_rank else None,
+        ranks=standing.places,
         score=1.0 - standing.loss,
         error_ratio=standing.error_ratio,
         error_interval=standing.error_interval,
