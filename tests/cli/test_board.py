@@ -137,3 +137,11 @@ def test_a_table_that_is_exactly_as_wide_as_the_terminal_fits():
     width = Measurement.get(Console(width=200), Console(width=200).options, table).maximum
     assert cli_board._fits(table, Console(width=width))
     assert not cli_board._fits(table, Console(width=width - 1))
+
+
+def test_a_terminal_has_three_notes_and_the_page_the_others(monkeypatch):
+    trials = [trial(f"case_{k}", "first") for k in range(3)]
+    trials = [each.model_copy(update={"status": "partial", "reason": f"reason {k}"}) for k, each in enumerate(trials)]
+    text = printed([*trials, trial("case_0", "second")], 200, monkeypatch)
+    assert sum(f"reason {k}" in text for k in range(3)) == 1  # after two remarks on what the totals cover
+    assert "2 more notes: see leaderboard.html, or --format md" in text

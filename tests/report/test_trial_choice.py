@@ -3,7 +3,7 @@
 import pytest
 
 from vobench.errors import InputError, UnknownNameError
-from vobench.report.trial_choice import pick, ranked
+from vobench.report.trial_choice import pick, ranked, sentence
 
 
 def names(trials):
@@ -31,6 +31,23 @@ def test_the_gravest_failure_comes_first(scored, trials):
     assert names([pick([*trials, *failures], case=None, estimator=None)]) == [("good", "dark")]
     order = names(ranked([*trials, *failures], case=None, estimator=None))
     assert order[:2] == [("good", "dark"), ("good", "far")]
+
+
+def test_an_estimator_that_sees_is_preferred_to_one_that_does_not_and_both_to_a_baseline(scored):
+    baseline = scored("still", "lost", claims=("baseline",))
+    wheels = scored("wheels", "diverged", sensors=("encoders",))
+    seeing = scored("seeing", sensors=("stereo",))
+    assert names([pick([baseline, wheels, seeing], case=None, estimator=None)]) == [("seeing", "down")]
+    assert names([pick([baseline, wheels], case=None, estimator=None)]) == [("wheels", "down")]
+    assert names([pick([baseline], case=None, estimator=None)]) == [("still", "down")]
+    assert names([pick([baseline, seeing], case=None, estimator="still")]) == [("still", "down")]
+
+
+def test_how_a_trial_went_is_a_sentence(scored):
+    assert sentence(scored("a", ate_m=0.0123)) == "a on down is off by 1.23 % of the path"
+    assert sentence(scored("a", "lost")) == "a on down: lost: it went dark"
+    assert sentence(scored("a", "lost", reason="")) == "a on down: lost"
+    assert sentence(scored("a", ate_m=None)) == "a on down: ok"
 
 
 def test_trials_are_ranked_by_error_where_none_failed(trials):

@@ -62,6 +62,15 @@ def test_the_reason_of_a_divergence_has_the_error_and_the_path():
     assert status_of(DONE, scored, gt) == ("diverged", "ATE 3 m on a path of 2 m")
 
 
+@pytest.mark.parametrize(("offset_m", "status"), [(0.19, "ok"), (0.3, "diverged")])
+def test_an_estimate_diverges_if_none_of_its_poses_is_within_a_tenth_of_the_path(offset_m, status):
+    gt = straight(2.0)
+    aside_m = offset_m * np.resize([1.0, -1.0], POSES)
+    est = path(gt.positions_m + np.stack([np.zeros(POSES), aside_m, np.zeros(POSES)], -1))
+    found = status_of(DONE, score_estimate(est, gt, ()), gt)
+    assert found == (status, "" if status == "ok" else "every pose is off by more than 0.2 m")
+
+
 @pytest.mark.parametrize(("ate_m", "status"), [(0.9 * LEAST_DIVERGED_M, "ok"), (1.1 * LEAST_DIVERGED_M, "diverged")])
 def test_on_a_path_of_less_than_a_millimetre_an_error_of_a_millimetre_is_a_divergence(ate_m, status):
     """The body turns by 90°, so that it does not stand still."""

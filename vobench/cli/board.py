@@ -21,6 +21,7 @@ from vobench.report.board_table import (
     totals,
 )
 from vobench.report.leaderboard import Board
+from vobench.runner.folder import PAGE
 
 # Columns of the totals that a narrow terminal omits, in this order; written reports have all of them.
 LEAST_FIRST = ("MiB", "CPU ms/frame", "score", "decided", "lost", "ATE %", "× best")
@@ -28,6 +29,7 @@ LEAST_FIRST = ("MiB", "CPU ms/frame", "score", "decided", "lost", "ATE %", "× b
 UNLIMITED_WIDTH = 10_000  # columns
 HEADING_WIDTH = 12  # of an estimator's name above a column
 MOST_CASES = 60  # rows on a terminal
+MOST_NOTES = 3  # lines on a terminal
 ADVICE = "use a wider terminal, or --format csv"
 
 
@@ -46,8 +48,11 @@ def print_board(board: Board, metric: str = DEFAULT_METRIC) -> None:
     for group, (headings, *rows) in totals(board):
         fitted = _fit_totals(f"totals over {group}", headings, rows, console)
         _print_fitted(fitted, console)
-    for remark in (*remarks(board), *cell_notes(board)):
-        console.print(f"  {printable(remark)}")
+    notes = [*remarks(board), *cell_notes(board)]
+    for note in notes[:MOST_NOTES]:
+        console.print(f"  {printable(note)}")
+    if len(notes) > MOST_NOTES:
+        console.print(f"  {len(notes) - MOST_NOTES} more notes: see {PAGE}, or --format md", style="dim")
     console.print(LEGEND, style="dim")
     for line in (board.visible, origin(board)):
         if line:

@@ -14,7 +14,7 @@ from vobench.cli.option import Json, SuiteName, Trust, option_group, with_option
 from vobench.cli.progress import Bars
 from vobench.cli.run_display import TerminalDisplay
 from vobench.errors import InputError
-from vobench.runner.folder import total_failure
+from vobench.runner.folder import total_failure, with_sequence
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
 from vobench.runner.preflight import summarize
@@ -24,7 +24,7 @@ from vobench.suite.suite import read_plan
 
 if TYPE_CHECKING:
     from vobench.report.leaderboard import Board
-    from vobench.runner.folder import RunFolder
+    from vobench.runner.folder import RunFolder, TrialScore
 
 INCOMPLETE_RUN = 1  # exit codes
 BROKEN_LIMIT = 3
@@ -167,7 +167,7 @@ def run_command(
     board = page.run_board(folder, scores)
     _print_board(board, as_json=json)
     if not json:
-        _print_remarks(folder, shares_time=execution.share_time or plan.suite.share_time)
+        _print_remarks(folder, scores, shares_time=execution.share_time or plan.suite.share_time)
 
     broken_limits = list[str]()
     for threshold in thresholds:
@@ -217,8 +217,9 @@ def _print_board(board: "Board", *, as_json: bool) -> None:
         print_board(board)
 
 
-def _print_remarks(folder: "RunFolder", *, shares_time: bool) -> None:
-    """Print where the results of a run are, and what affects its CPU times."""
+def _print_remarks(folder: "RunFolder", scores: "Sequence[TrialScore]", *, shares_time: bool) -> None:
+    """Print where the results of a run are, what affects its CPU times, and which trial to look at."""
+    from vobench.report.trial_choice import pick, sentence
     from vobench.runner.run import BESIDE
 
     console = terminal.console()
@@ -226,7 +227,13 @@ def _print_remarks(folder: "RunFolder", *, shares_time: bool) -> None:
         console.print(f"CPU times of this run were measured {BESIDE}.")
     is_on_path = shutil.which("vobench") is not None
     command = "vobench" if is_on_path else sys.argv[0]
-    console.print(f"Everything is in {folder.path}\nView it: {command} view {folder.path}")
+    console.print(f"Everything is in {folder.path}")
+    if with_sequence(scores):
+        trial = pick(scores, case=None, estimator=None)
+        name = f"{folder.path}/{trial.case}/{trial.estimator}"
+        console.print(f"{sentence(trial)}\nSee it: {command} view {name}")
+        if "scene" in trial.variant:  # a recording cannot be simulated again
+            console.print(f"Ask why: {command} explain {name}")
 
 
 def _split_assignments(assignments: Sequence[str]) -> dict[str, str]:

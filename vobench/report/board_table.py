@@ -204,12 +204,14 @@ def _counted(count: int, noun: str) -> str:
 
 
 def remarks(board: Board) -> list[str]:
-    """Sentences on the totals: what they cover, how undecided orders could be decided, and breakdowns."""
-    sentences = list(board.remarks)
+    """Sentences on the totals: what they cover, who breaks down where, and how undecided orders could be decided."""
+    breaking = [curve.sentence for curve in board.curves if curve.breaks_at is not None]
+    others = [curve.sentence for curve in board.curves if curve.breaks_at is None]
+    undecided = []
     for above, total in zip(board.totals, board.totals[1:], strict=False):
         if total.decided_above is False:
-            sentences.append(_undecided(above, total))
-    return sentences + [curve.sentence for curve in board.curves]
+            undecided.append(_undecided(above, total))
+    return [*board.remarks, *breaking, *undecided, *others]
 
 
 def _undecided(above: Total, total: Total) -> str:

@@ -15,7 +15,7 @@ from scipy import stats
 from vobench.errors import InputError
 from vobench.geometry.se3 import Array
 from vobench.metric.repeat_test import ALPHA, MIN_TRIALS, difference_p
-from vobench.metric.significance import PairedDifference, holm, paired_difference
+from vobench.metric.significance import ROUNDING, PairedDifference, holm, paired_difference
 from vobench.report.cell import Cell
 from vobench.report.leaderboard import Board
 from vobench.runner.environment import differences
@@ -325,15 +325,21 @@ def _failure_p(pairs: Sequence[CellPair]) -> float:
 
 
 def _repeat_interval(pair: CellPair) -> tuple[float, float] | None:
-    """The confidence interval of the ratio of losses on a case, by its repeats; None with fewer than four of either."""
+    """The confidence interval of the ratio of losses on a case, by its repeats; None with fewer than four of either.
+
+    None, too, if the repeats of both are all alike. Source: Welch (1947).
+    """
     old_losses = np.log(_known_losses(pair.old))
     new_losses = np.log(_known_losses(pair.new))
     if min(len(old_losses), len(new_losses)) < MIN_TRIALS:
         return None
-    if np.ptp(old_losses) == 0 and np.ptp(new_losses) == 0:
+    variances = np.array([np.var(losses, ddof=1) / len(losses) for losses in (old_losses, new_losses)])
+    if variances.sum() <= ROUNDING**2:
         return None
-    found = stats.ttest_ind(new_losses, old_losses, equal_var=False).confidence_interval(1 - ALPHA)
-    return exp(float(found.low)), exp(float(found.high))
+    difference = float(new_losses.mean() - old_losses.mean())
+    degrees_of_freedom = variances.sum() ** 2 / np.sum(variances**2 / [len(old_losses) - 1, len(new_losses) - 1])
+    half_width = float(stats.t.isf(ALPHA / 2, degrees_of_freedom) * np.sqrt(variances.sum()))
+    return exp(difference - half_width), exp(difference + half_width)
 
 
 def _total_score(cells: Sequence[Cell]) -> str:

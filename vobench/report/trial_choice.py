@@ -5,7 +5,10 @@ from math import inf
 from statistics import fmean
 
 from vobench.errors import InputError, UnknownNameError
+from vobench.report.division import UNRANKED
 from vobench.runner.folder import STATUSES, SURVIVED, TrialScore, with_sequence
+
+CAMERAS = ("stereo", "mono", "colour")
 
 
 def ranked(scores: Sequence[TrialScore], *, case: str | None, estimator: str | None) -> list[TrialScore]:
@@ -20,9 +23,12 @@ def ranked(scores: Sequence[TrialScore], *, case: str | None, estimator: str | N
 def pick(scores: Sequence[TrialScore], *, case: str | None, estimator: str | None) -> TrialScore:
     """The trial most worth a look: the gravest failure, or else the worst case of the best estimator.
 
-    Without a case or an estimator, of all trials. Raises as `ranked`.
+    Without a case or an estimator, of all trials; without an estimator those that see are preferred to others, and all
+    to baselines and oracles. Raises as `ranked`.
     """
     selected = _selected(scores, case, estimator)
+    if estimator is None:
+        selected = _most_telling(selected)
     failed = [score for score in selected if score.status not in SURVIVED]
     if failed:
         return max(failed, key=lambda score: STATUSES.index(score.status))
@@ -31,6 +37,13 @@ def pick(scores: Sequence[TrialScore], *, case: str | None, estimator: str | Non
         by_estimator.setdefault(score.estimator, []).append(score)
     best = min(by_estimator.values(), key=_mean_error_m)
     return max(best, key=_error_m)
+
+
+def _most_telling(scores: Sequence[TrialScore]) -> list[TrialScore]:
+    """The trials of estimators that see; without any those of estimators that are ranked, and else all."""
+    ranked_scores = [score for score in scores if not set(score.claims) & set(UNRANKED)]
+    seeing = [score for score in ranked_scores if set(score.sensors) & set(CAMERAS)]
+    return seeing or ranked_scores or list(scores)
 
 
 def _selected(scores: Sequence[TrialScore], case: str | None, estimator: str | None) -> list[TrialScore]:
@@ -68,3 +81,15 @@ def _error_m(score: TrialScore) -> float:
 
 def _mean_error_m(scores: Sequence[TrialScore]) -> float:
     return fmean(_error_m(score) for score in scores)
+
+
+def sentence(score: TrialScore) -> str:
+    """How a trial went, in a sentence: how it failed, or its error."""
+    name = f"{score.estimator} on {score.case}"
+    if score.status not in SURVIVED:
+        reason = f": {score.reason}" if score.reason else ""
+        return f"{name}: {score.status}{reason}"
+    error_m = _error_m(score)
+    if error_m == inf or score.path_m <= 0:
+        return f"{name}: {score.status}"
+    return f"{name} is off by {100 * error_m / score.path_m:.3g} % of the path"

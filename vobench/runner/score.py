@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 # The truth that a trial is scored against has one pose for each frame.
 SETTINGS = ScoreSettings(coverage_of="frames")
 NO_SCALE = "Sim(3)"
+NO_POSE_RIGHT = 0.5  # the lost-aware score of an estimate that survives with every pose wrong
 # Metrics of an estimate without a scale: those of every score, and how its scale drifts.
 OF_NO_SCALE = tuple(metric for metric in DEFINITIONS.values() if not metric.full or metric.id == "scale_drift")
 NO_SCALE_SETTINGS = replace(SETTINGS, alignment="sim3", full=True)
@@ -134,15 +135,26 @@ def status_of(outcome: EstimatorOutcome, scored: Score | None, gt: Trajectory) -
         at_the_end = " and none at the end" if coverage.ratio and coverage.ends_lost else ""
         return "lost", f"a pose for {coverage.ratio:.0%} of the frames{at_the_end}"
 
-    ate = scored.metric("ate_trans")
-    path_m = float(gt.distances_m()[-1])
-    limit_m = max(path_m, LEAST_DIVERGED_M)
-    if ate is not None and ate.statistics.rmse > limit_m and not stands_still(gt):
-        return "diverged", f"ATE {ate.statistics.rmse:.3g} m on a path of {path_m:.3g} m"
+    divergence = _divergence(scored, gt)
+    if divergence:
+        return "diverged", divergence
     if coverage.ratio < 1:
         missing = scored.association.gt_poses - scored.association.pairs
         return "partial", f"no pose for {missing} of {len(gt)} frames; the first is {coverage.first_lost_frame}"
     return "ok", ""
+
+
+def _divergence(scored: Score, gt: Trajectory) -> str:
+    """Why an estimate counts as diverged: its error exceeds the path, or no pose is right; empty if it does not."""
+    if stands_still(gt):
+        return ""
+    ate = scored.metric("ate_trans")
+    path_m = float(gt.distances_m()[-1])
+    if ate is not None and ate.statistics.rmse > max(path_m, LEAST_DIVERGED_M):
+        return f"ATE {ate.statistics.rmse:.3g} m on a path of {path_m:.3g} m"
+    if scored.failure.lost_aware == NO_POSE_RIGHT:
+        return f"every pose is off by more than {scored.failure.fail_m:.3g} m"
+    return ""
 
 
 def status_of_handed(
