@@ -23,6 +23,17 @@ def test_frames_without_a_reason_have_none_and_no_frame_no_answer():
     assert summarize_frames([[], []]) == EstimatorStatistics()
 
 
+def test_the_offset_of_disparities_is_that_of_the_last_frame_and_the_median_over_trials():
+    def trial(*stated):
+        return [replace(frame, stats=stats) for frame, stats in zip(frames(*[""] * len(stated)), stated, strict=True)]
+
+    found = [trial("{}", f'{{"offset_px": {offset_px}}}') for offset_px in (0.5, -0.1, 0.9)]
+    assert summarize_frames(found).offset_px == 0.5
+    assert summarize_frames([trial('{"offset_px": 0.5}', "{}")]).offset_px is None
+    assert summarize_frames([trial("", '{"offset_px": 0}')]).offset_px is None
+    assert summarize_frames([trial('{"offset_px": "far"}')]).offset_px is None
+
+
 def row(frame, status="ok", *, cpu_ms=None, memory_mib=None, reason=""):
     return FrameRow(frame, frame, status, reason, None, None, None, None, None, None, "", None, cpu_ms, memory_mib)
 

@@ -2,6 +2,8 @@
 
 from vobench.report.cell import Cell
 
+LEAST_OFFSET_PX = 0.05  # smaller ones are within what estimators find on a pair without an error
+
 
 def notes(cell: Cell) -> list[str]:
     """Sentences on failures, drift, dropped frames, revised poses, scale, covariances and frames of a cell."""
@@ -12,6 +14,7 @@ def notes(cell: Cell) -> list[str]:
         _revised_estimate(cell),
         _scale_drift(cell),
         cell.consistency,
+        _disparity_offset(cell),
         _frame_reason(cell),
     )
     return [f"{cell.estimator}: {sentence}" for sentence in sentences if sentence]
@@ -46,6 +49,13 @@ def _scale_drift(cell: Cell) -> str:
     if cell.scale_drift_percent_per_m is None:
         return ""
     return f"aligned with scale, which drifts by {cell.scale_drift_percent_per_m:+.2g} % per metre"
+
+
+def _disparity_offset(cell: Cell) -> str:
+    offset_px = cell.answered.offset_px
+    if offset_px is None or abs(offset_px) < LEAST_OFFSET_PX:
+        return ""
+    return f"disparities of this stereo pair look off by {offset_px:+.2g} px: check its calibration"
 
 
 def _frame_reason(cell: Cell) -> str:

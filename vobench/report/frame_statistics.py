@@ -1,15 +1,17 @@
 """Statistics over the frames of an estimator on a case: cost, memory, dropped frames and the commonest reason."""
 
+import json
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from statistics import fmean
+from statistics import fmean, median
 
 from vobench.runner.estimate import DROPPED
 from vobench.runner.frames import FrameRow
 
+OFFSET = "offset_px"  # of the disparities of a stereo pair, in the statistics that an estimator states for a frame
 NUMBER = re.compile(r"[+-]?\d+(?:\.\d+)?(?:e[+-]?\d+)?")
 
 
@@ -20,7 +22,8 @@ class EstimatorStatistics:
     `ms_per_frame` is the mean CPU time of a frame, and `memory_mib` the most that the estimator's processes held.
     `reason` is the commonest reason that the estimator gave for single frames, `count` the number of these frames and
     `first` the number of the first. Of all `frames`, `dropped` were dropped because `late` answers came after the
-    next frame.
+    next frame. `offset_px` is the offset of the stereo pair's disparities that the estimator found by the end of a
+    trial, the median over trials; None if it found none.
     """
 
     ms_per_frame: float | None = None
@@ -31,6 +34,7 @@ class EstimatorStatistics:
     frames: int = 0
     dropped: int = 0
     late: int = 0
+    offset_px: float | None = None
 
 
 # By case and estimator.
@@ -55,7 +59,19 @@ def summarize_frames(trials: Sequence[list[FrameRow]]) -> EstimatorStatistics:
         frames=len(rows),
         dropped=sum(row.status == DROPPED for row in rows),
         late=sum(_missed_deadlines(trial) for trial in trials),
+        offset_px=_disparity_offset_px(trials),
     )
+
+
+def _disparity_offset_px(trials: Sequence[list[FrameRow]]) -> float | None:
+    """The median over trials of the offset that the last frame states; None if none of them states one but 0."""
+    found_px = []
+    for trial in trials:
+        stated = json.loads(trial[-1].stats or "{}") if trial else {}
+        offset_px = stated.get(OFFSET)
+        if isinstance(offset_px, int | float) and offset_px:
+            found_px.append(float(offset_px))
+    return median(found_px) if found_px else None
 
 
 def _commonest_reason(rows: Sequence[FrameRow]) -> tuple[str, int, int | None]:
