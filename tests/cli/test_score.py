@@ -457,6 +457,22 @@ def test_stated_covariances_are_held_against_the_errors(vobench, files_scoring):
     assert "--cov should be given once for each pair of files, 2 times (got 1)" in refused.err
 
 
+def test_covariances_of_odometry_are_held_against_errors_aligned_at_the_first_pose(vobench, files_scoring):
+    """An alignment over the whole path would take away most of the drift, and the estimate would claim too little."""
+    rng, gt = np.random.default_rng(5), drive()
+    steps = 0.02 * rng.normal(size=(len(gt), 3))
+    steps[0] = 0
+    est = Trajectory(gt.t_ns, se3.transform(gt.T_world_frame[:, :3, :3], gt.positions_m + np.cumsum(steps, axis=0)))
+    Path("gt.tum").write_text(format_tum(gt))
+    Path("est.tum").write_text(format_tum(est))
+    covariances = [(t_ns, np.diag([4e-4 * max(k, 1e-3)] * 3 + [1e-6] * 3)) for k, t_ns in enumerate(gt.t_ns.tolist())]
+    Path("drift.txt").write_text(format_covariances(covariances))
+    words = ("score", "gt.tum", "est.tum", "--cov", "drift.txt", "--json")
+    fitted = vobench(*words).json["consistency"]
+    fixed = vobench(*words, "--align", "origin").json["consistency"]
+    assert fitted == fixed
+
+
 def test_several_sequences_have_a_row_each_and_one_for_all_of_their_errors(vobench, files_scoring):
     (files_scoring / "short").write_text(
         "".join((files_scoring / "e.format_tum").read_text().splitlines(keepends=True)[:60])

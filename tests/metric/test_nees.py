@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from vobench.errors import AlignmentError, TrajectoryError
 from vobench.geometry import se3
-from vobench.metric.nees import METRICS, consistency, rotation_vector
+from vobench.metric.nees import METRICS, consistency, independent_samples, median_interval, rotation_vector
 from vobench.metric.score import ScoreSettings, score
 from vobench.trajectory.align import Alignment
 from vobench.trajectory.trajectory import Trajectory
@@ -113,3 +113,19 @@ def test_a_rotation_vector_is_axis_times_angle(angle):
     axis = np.array([1.0, -2.0, 2.0]) / 3
     R = Rotation.from_rotvec(angle * axis).as_matrix()
     np.testing.assert_allclose(rotation_vector(R), angle * axis, atol=1e-15, rtol=1e-9)
+
+
+def test_independent_errors_count_nearly_all_and_correlated_ones_few():
+    rng = np.random.default_rng(0)
+    independent = rng.chisquare(6, 400)
+    assert independent_samples(independent) == pytest.approx(400, rel=0.1)
+    walk = np.cumsum(rng.standard_normal((400, 6)), axis=0)
+    assert independent_samples(np.sum(walk**2, axis=1)) < 5
+    assert independent_samples(np.full(9, 3.0)) == 1
+
+
+@pytest.mark.parametrize("samples", [1, 5, 31])
+def test_the_median_of_consistent_errors_is_in_its_interval_in_95_of_100_cases(samples):
+    low, high = median_interval(samples, 6)
+    medians = np.median(np.random.default_rng(samples).chisquare(6, (4000, samples)), axis=1)
+    assert np.mean((low <= medians) & (medians <= high)) == pytest.approx(0.95, abs=0.012)

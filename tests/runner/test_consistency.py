@@ -193,8 +193,27 @@ def test_without_stated_covariances_there_is_no_consistency(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("gap", "verdict"), [(1.99, "what it holds"), (2.01, "too much"), (0.51, "what it holds"), (0.49, "too little")]
+    ("gap", "verdict"), [(1.0, "what it holds"), (2.0, "too much"), (1.5, "too much"), (0.5, "too little")]
 )
-def test_a_gap_within_a_half_and_two_is_let_pass(gap, verdict):
-    found = CovarianceConsistency.of(np.full(3, MEDIAN * gap**2))
-    assert found.sentence.startswith(f"claims {verdict}: ")
+def test_many_independent_errors_tell_a_factor_of_one_and_a_half(gap, verdict):
+    nees = gap**2 * np.random.default_rng(0).chisquare(6, 200)
+    found = CovarianceConsistency.of(nees)
+    assert found.sentence.startswith(f"claims {verdict}: errors are {found.scale_gap:.2g} x the deviations it states")
+    assert found.gap_low < 1 < found.gap_high < 1.2
+
+
+def walk_nees(rng, poses=150):
+    """The NEES of a random walk of six errors whose covariance grows as it should."""
+    errors = np.cumsum(rng.standard_normal((poses, 6)), axis=0)
+    return np.sum(errors**2, axis=1) / np.arange(1, poses + 1)
+
+
+def test_of_consistent_random_walks_about_one_in_twelve_is_called_inconsistent_and_most_that_claim_half_are():
+    rng = np.random.default_rng(1)
+    verdicts = []
+    for _ in range(200):
+        nees = walk_nees(rng)
+        verdicts.append([CovarianceConsistency.of(factor * nees).sentence.split(":")[0] for factor in (1.0, 4.0)])
+    honest, halved = zip(*verdicts, strict=True)
+    assert honest.count("claims what it holds") >= 200 * (1 - 1 / 12) - 8
+    assert halved.count("claims too much") >= 160

@@ -2,12 +2,15 @@
 
 import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from vobench.errors import AlignmentError, InputError
+from vobench.geometry.se3 import Array
 from vobench.metric.comparison import DEFAULTS, MetricDefinition
 from vobench.metric.definitions import DEFINITIONS
 from vobench.metric.score import MetricResult, Pooled, Score, pooled, score
@@ -15,11 +18,14 @@ from vobench.metric.settings import ScoreSettings
 from vobench.runner.data_frame import data_frame
 from vobench.runner.metric_catalog import all_metrics
 from vobench.runner.trajectory_pair import TrajectorySource, read_pair
+from vobench.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from vobench.runner.consistency import CovarianceConsistency
     from vobench.runner.data_frame import DataFrame
 
+UNFITTED = ("none", "origin")  # alignments that use no pose but the first
+START_SHARE = 0.1  # of the largest variance: a smaller first one is the start of odometry
 ALL_TOGETHER = "pooled"  # what the rows of all sequences together are called
 
 
@@ -143,8 +149,26 @@ def _score_pair(
 
     covariance = read_covariances(pair.covariance, est.t_ns)
     scored = score(gt, est, settings=settings, metrics=metrics, covariance=covariance)
-    nees = next(samples.errors for samples in scored.samples if samples.of.id == "nees_pose")
-    return ScoredPair(pair, scored, CovarianceConsistency.of(nees), read.by_frame, read.notes)
+    stated = CovarianceConsistency.of(_odometry_nees(gt, est, settings, covariance))
+    return ScoredPair(pair, scored, stated, read.by_frame, read.notes)
+
+
+def _odometry_nees(gt: Trajectory, est: Trajectory, settings: ScoreSettings, covariance: Array) -> Array:
+    """The NEES (K,) of poses; those of odometry are aligned at the first one, unless the settings fit nothing.
+
+    A fit over the whole path would take away part of the drift that the covariances of odometry state.
+    """
+    if settings.alignment not in UNFITTED and _states_drift(covariance):
+        settings = replace(settings, alignment="origin")
+    samples = score(gt, est, settings=settings, metrics=(DEFINITIONS["nees_pose"],), covariance=covariance).samples
+    return samples[0].errors
+
+
+def _states_drift(covariance: Array) -> bool:
+    """Whether covariances (N, 6, 6), NaN for none, grow from nearly nothing, as those of odometry do."""
+    variances = np.trace(covariance, axis1=1, axis2=2)
+    known = variances[np.isfinite(variances)]
+    return bool(len(known) and known[0] < START_SHARE * known.max())
 
 
 def read_pair_list(path: Path) -> list[tuple[Path, Path]]:
