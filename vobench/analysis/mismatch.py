@@ -35,6 +35,7 @@ SIGNED_AXES = [
     for signs in product((1.0, -1.0), repeat=3)
     if (order, signs) != ((0, 1, 2), (1.0, 1.0, 1.0))
 ]
+MAX_SWAY = 0.03  # of a path's length, aside from a straight line
 TINY = 1e-300  # prevents 0/0
 
 
@@ -58,7 +59,7 @@ class Misfit:
 def misfit(T_gt: Array, T_est: Array) -> Misfit:
     """Measure how far matched poses (K, 4, 4) disagree, independent of their world frames and scales."""
     alignment = align(T_est, T_gt, kind="sim3")
-    aligned = alignment.apply(T_est)
+    aligned = _aligned(T_est, T_gt)
     position_errors_m = (aligned - T_gt)[:, :3, 3]
     position_error_m = np.sqrt(np.sum(position_errors_m**2, axis=1).mean())
     extent_m = np.sqrt(T_gt[:, :3, 3].var(axis=0).sum())
@@ -68,6 +69,31 @@ def misfit(T_gt: Array, T_est: Array) -> Misfit:
         rot_rad=float(np.sqrt(np.mean(angles_rad**2))),
         turned_rad=float(se3.rotation_angle(alignment.rotation)),
     )
+
+
+def _aligned(T_est: Array, T_gt: Array) -> Array:
+    """The estimate (K, 4, 4) after the best similarity of positions; along a nearly straight path, rolled about it.
+
+    Such positions hardly determine a rotation about the path, so the orientations determine it: a few metres of sway
+    would otherwise turn an estimate of a straight road by tens of degrees.
+    """
+    aligned = align(T_est, T_gt, kind="sim3").apply(T_est)
+    centre_m = T_gt[:, :3, 3].mean(axis=0)
+    _, spreads, axes = np.linalg.svd(T_gt[:, :3, 3] - centre_m, full_matrices=False)
+    if spreads[1] > MAX_SWAY * spreads[0]:
+        return aligned
+
+    path_axis = axes[0]
+    left = T_gt[:, :3, :3] @ np.swapaxes(aligned[:, :3, :3], 1, 2)  # (K, 3, 3), in the world of the truth
+    quaternion = se3.to_quaternion(left)
+    half_sines = quaternion[:, :3] @ path_axis
+    roll_rad = 2 * np.arctan2(half_sines, quaternion[:, 3])  # (K,), about the path
+    mean_roll_rad = np.arctan2(np.sin(roll_rad).mean(), np.cos(roll_rad).mean())
+    half_roll_rad = mean_roll_rad / 2
+    R_roll = se3.from_quaternion(np.append(np.sin(half_roll_rad) * path_axis, np.cos(half_roll_rad)))
+    about_centre = se3.transform(R_roll, centre_m - R_roll @ centre_m)
+    rolled: Array = about_centre @ aligned
+    return rolled
 
 
 def _rotations_between(T_est: Array, T_gt: Array) -> Array:
@@ -298,7 +324,7 @@ def _limit(iterates: list[Array]) -> Array:
 def _mean_rotation_left(T_gt: Array, T_est: Array, lever_m: Array) -> Array:
     """The mean rotation (3, 3) from the estimate, moved by a lever and aligned, to the truth."""
     moved = T_est @ se3.transform(IDENTITY, lever_m)
-    aligned = align(moved, T_gt, kind="sim3").apply(moved)
+    aligned = _aligned(moved, T_gt)
     return se3.nearest_rotation(np.mean(_rotations_between(aligned, T_gt), axis=0))
 
 
