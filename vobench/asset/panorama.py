@@ -6,17 +6,19 @@ The map of a panorama is painted from far to near. Nothing in it has parallax, s
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
-from typing import Annotated
+from itertools import product
+from typing import Annotated, Any
 from zlib import crc32
 
 import numpy as np
 from annotated_types import Ge, Le
 from numpy.typing import ArrayLike, NDArray
 
+from vobench.asset import PANORAMAS
 from vobench.asset.picture import Rng, noise
 from vobench.geometry.se3 import Array
 from vobench.scene.light import Sky
-from vobench.scene.material import LUMINANCE, WHITE, Map, Rgb, linear
+from vobench.scene.material import LUMINANCE, WHITE, Rgb, linear
 from vobench.scene.panorama import PanoramaMap
 from vobench.setting import NonNegative, OneOf, Positive, settings
 
@@ -26,6 +28,7 @@ EYE_M = 1.0  # above the floor of the scene
 CELL_SR = 4 * np.pi / (ROWS * COLUMNS)
 MOST = 6e4  # what float16 holds
 
+Floats = NDArray[Any]  # float32 where there are many
 Columns = NDArray[np.int64]
 Albedo = tuple[float, float, float]
 
@@ -38,7 +41,7 @@ class Surroundings:
     sun_lx, sun_colour: of a sun where the sky is brightest.
     """
 
-    kind: Annotated[str, OneOf("panorama", ("city", "suburb", "country"))]
+    kind: Annotated[str, OneOf("panorama", PANORAMAS)]
     seed: Annotated[int, Ge(0)] = 0
     height_m: Annotated[float, Ge(0), Le(300)] = 0.0
     distance_m: Positive = 30.0
@@ -70,7 +73,7 @@ def _painted(
 class _Daylight:
     """Illuminance by sun and sky, in lux of red, green and blue, of surfaces outside."""
 
-    def __init__(self, around: Surroundings, sky: Sky, upper: Map) -> None:
+    def __init__(self, around: Surroundings, sky: Sky, upper: Floats) -> None:
         """`upper` (ROWS / 2, COLUMNS, 3): the sky's luminance."""
         self.sun_direction = sky.sun_direction
         self.sun_lx = around.sun_lx * np.array(around.sun_colour, np.float32)
@@ -89,14 +92,14 @@ class _Daylight:
         by_azimuth = np.einsum("r,rcd->cd", cosine, coarse) * solid_angle_sr
         self._upright_lx = facing @ by_azimuth
 
-    def upright_lx(self, azimuth: float) -> Map:
+    def upright_lx(self, azimuth: float) -> Floats:
         """Illuminance (3,) of an upright surface that faces an azimuth."""
         column = int((azimuth / (2 * np.pi) + 0.5) * 64) % 64
         normal = np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
         cosine = max(float(normal @ self.sun_direction), 0.0)
         return np.asarray(self._upright_lx[column] + self._bounced_lx + cosine * self.sun_lx, np.float32)
 
-    def sky_cd_m2(self, azimuth: float, elevation: float = 0.5) -> Map:
+    def sky_cd_m2(self, azimuth: float, elevation: float = 0.5) -> Floats:
         """The sky's luminance (3,), smoothed, at an azimuth and a sine of the elevation."""
         row = min(int((1 - elevation) * 16), 15)
         return np.asarray(self._coarse[row, int((azimuth / (2 * np.pi) + 0.5) * 64) % 64], np.float32)
@@ -130,7 +133,7 @@ class _Canvas:
         self._haze = band
 
     def finished(self) -> PanoramaMap:
-        """The map, scaled so that the sky and what it lights give the sky's illuminance on level ground."""
+        """The map, in cd/m² per lux of the sky."""
         per_lux = np.clip(self.colour / np.float32(self._sky_lx), 0, MOST)
         return PanoramaMap(per_lux.astype(np.float16), self.lamps.astype(np.float16))
 
@@ -153,10 +156,10 @@ class _Canvas:
         rows: slice,
         columns: Columns,
         colour: ArrayLike,
-        cover: Map,
+        cover: Floats,
         *,
         distance_m: float,
-        lamps: Map | None = None,
+        lamps: Floats | None = None,
     ) -> None:
         """Lay colours (r, c, 3) over the map by how much they cover (r, c), in the haze of a distance."""
         place = (rows, columns % COLUMNS)
@@ -168,18 +171,18 @@ class _Canvas:
         if lamps is not None:
             self.lamps[place] += cover * lamps
 
-    def reflected(self, albedo: ArrayLike, lux: ArrayLike) -> Map:
+    def reflected(self, albedo: ArrayLike, lux: ArrayLike) -> Floats:
         """Luminance (..., 3) of diffuse surfaces."""
         return np.asarray(np.asarray(albedo, np.float32) * np.asarray(lux, np.float32) / np.pi, np.float32)
 
-    def grained(self, u: Map, v: Map) -> Map:
+    def grained(self, u: Floats, v: Floats) -> Floats:
         """Noise of unit variance at places in units of its tile, which repeats."""
         size = len(self.grain)
         row = (v * size).astype(np.int32) % size
         column = (u * size).astype(np.int32) % size
         return np.asarray(self.grain[row, column])
 
-    def grown(self, x_m: Map, y_m: Map, footprint_m: Map) -> Map:
+    def grown(self, x_m: Floats, y_m: Floats, footprint_m: Floats) -> Floats:
         """Noise as of grass at places on the ground, coarse and fine, each faded where pixels cover more of it."""
         coarse = _sampled(self.grain, x_m / 170 + y_m / 400, y_m / 170 - x_m / 400)
         fine = _sampled(self.grain, x_m / 11 - y_m / 30, y_m / 11 + x_m / 30)
@@ -198,7 +201,7 @@ CLOUD_M = 1400.0
 CLOUD_TILE_M = 9000.0
 
 
-def _paint_sky(upper: Map, directions: Map, sky: Sky, around: Surroundings, rng: Rng) -> None:
+def _paint_sky(upper: Floats, directions: Floats, sky: Sky, around: Surroundings, rng: Rng) -> None:
     """Fill the upper half of a map (r, c, 3): the sky's law, and clouds that leave its illuminance as it is."""
     luminance = sky.standard_cd_m2(directions).astype(np.float32)
     z = directions[..., 2]
@@ -231,13 +234,13 @@ def _paint_sky(upper: Map, directions: Map, sky: Sky, around: Surroundings, rng:
     upper[...] = seen[..., None] * chroma
 
 
-def _smooth(values: Map) -> Map:
+def _smooth(values: Floats) -> Floats:
     """The mean of each pixel of a periodic tile and its neighbours."""
     rows = (np.roll(values, 1, 0) + 2 * values + np.roll(values, -1, 0)) / 4
     return np.asarray((np.roll(rows, 1, 1) + 2 * rows + np.roll(rows, -1, 1)) / 4)
 
 
-def _sampled(tile: Map, u: Map, v: Map) -> Map:
+def _sampled(tile: Floats, u: Floats, v: Floats) -> Floats:
     """Values of a periodic tile (N, N) at places (...) in tiles, interpolated."""
     size = len(tile)
     x = u * size
@@ -258,7 +261,7 @@ def _sampled(tile: Map, u: Map, v: Map) -> Map:
 # Ground, hills
 
 
-def _ground_places(canvas: _Canvas) -> tuple[Map, Map, Map]:
+def _ground_places(canvas: _Canvas) -> tuple[Floats, Floats, Floats]:
     """x, y in metres and the length in metres that a row covers, of the rows (ROWS / 2) below the horizon."""
     tangent = canvas.tangent[ROWS // 2 :, None]
     distance_m = canvas.eye_m / -tangent
@@ -268,7 +271,7 @@ def _ground_places(canvas: _Canvas) -> tuple[Map, Map, Map]:
     return x_m, y_m, footprint_m
 
 
-def _paint_ground(canvas: _Canvas, albedo: Map, lamps: Map | None = None) -> None:
+def _paint_ground(canvas: _Canvas, albedo: Floats, lamps: Floats | None = None) -> None:
     """Fill what is below the horizon with ground of an albedo (ROWS / 2, COLUMNS, 3) in the haze."""
     below = canvas.colour[ROWS // 2 :]
     distance_m = canvas.eye_m / -canvas.tangent[ROWS // 2 :, None, None]
@@ -278,7 +281,7 @@ def _paint_ground(canvas: _Canvas, albedo: Map, lamps: Map | None = None) -> Non
         canvas.lamps[ROWS // 2 :] = lamps
 
 
-def _blurred_pattern(values: Map, footprint_m: Map, cell_m: float) -> Map:
+def _blurred_pattern(values: Floats, footprint_m: Floats, cell_m: float) -> Floats:
     """Values around 0 of a pattern with cells of some size, faded where a pixel covers more than a cell."""
     return np.asarray(values * np.clip(cell_m / footprint_m - 0.5, 0, 1))
 
@@ -346,7 +349,7 @@ class _Building:
         c = np.cos(self.yaw_rad)
         s = np.sin(self.yaw_rad)
         signs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-        return signs * self.half_m @ np.array([[c, s], [-s, c]]) + self.middle_m
+        return np.asarray(signs * self.half_m @ np.array([[c, s], [-s, c]]) + self.middle_m)
 
 
 @dataclass(frozen=True, slots=True)
@@ -357,9 +360,9 @@ class _Wall:
     """
 
     columns: Columns
-    distance_m: Map
-    along_m: Map
-    along_step_m: Map
+    distance_m: Floats
+    along_m: Floats
+    along_step_m: Floats
     length_m: float
     normal_azimuth: float
 
@@ -394,98 +397,133 @@ def _wall(canvas: _Canvas, first_m: Array, second_m: Array) -> _Wall | None:
     )
 
 
-def _between(values: Map, low: ArrayLike, high: ArrayLike, step: Map) -> Map:
+def _between(values: Floats, low: ArrayLike, high: ArrayLike, step: Floats) -> Floats:
     """How much (...) of pixels as wide as `step` lies between two values."""
     return np.asarray(np.clip((values - low) / step + 0.5, 0, 1) * np.clip((high - values) / step + 0.5, 0, 1))
 
 
-def _paint_wall(canvas: _Canvas, wall: _Wall, building: _Building, *, gable_m: float, lowest: float) -> None:
-    """A wall with its windows, above a tangent of the elevation.
+class _WallPatch:
+    """The pixels (r, c) of a wall, of which each is `height_m` above the ground and `along_m` from the wall's end."""
 
-    gable_m: how much higher its middle is than its ends.
-    """
+    def __init__(self, canvas: _Canvas, wall: _Wall, building: _Building, rows: slice) -> None:
+        self._canvas = canvas
+        self._wall = wall
+        self._building = building
+        distance_m = wall.distance_m[None, :]
+        self.height_m = canvas.eye_m + canvas.tangent[rows, None] * distance_m
+        self._height_step_m = canvas.tangent_step[rows, None] * distance_m
+        self.along_m = wall.along_m[None, :]
+        self._along_step_m = wall.along_step_m[None, :]
+        self._light_lx = canvas.daylight.upright_lx(wall.normal_azimuth)
+
+        facade = building.facade
+        self._bays = max(int(wall.length_m / facade.bay_m), 1)
+        self._storeys = max(int(building.height_m / facade.storey_m + 0.2), 1)
+        self._bay_m = wall.length_m / self._bays
+        self._bay = np.clip((self.along_m / self._bay_m).astype(np.int32), 0, self._bays - 1)
+        self._storey = np.clip((self.height_m / facade.storey_m).astype(np.int32), 0, self._storeys - 1)
+        self._at_bay_m = self.along_m - self._bay * self._bay_m
+        self._at_storey_m = self.height_m - self._storey * facade.storey_m
+
+    def _in_width(self, values_m: Floats, low_m: float, high_m: float) -> Floats:
+        return _between(values_m, low_m, high_m, self._along_step_m)
+
+    def _in_height(self, values_m: Floats, low_m: ArrayLike, high_m: ArrayLike) -> Floats:
+        return _between(values_m, low_m, high_m, self._height_step_m)
+
+    def cover(self, gable_m: float) -> Floats:
+        """How much of each pixel the wall covers, whose middle is higher than its ends by gable_m."""
+        length_m = self._wall.length_m
+        to_end_m = np.minimum(self.along_m, length_m - self.along_m)
+        top_m = self._building.height_m + 2 * gable_m / length_m * np.maximum(to_end_m, 0)
+        # Half a pixel wider, so that nothing shines through between walls that touch.
+        half_m = self._along_step_m / 2
+        width = _between(self.along_m, -half_m, length_m + half_m, self._along_step_m)
+        return np.asarray(self._in_height(self.height_m, 0, top_m) * width)
+
+    def masonry(self, *, has_bands: bool) -> Floats:
+        """Luminance (r, c, 3) of the wall without its windows, perhaps with a band at each storey and a cornice."""
+        building = self._building
+        facade = building.facade
+        stains = self._canvas.grained(self.along_m / 23 + building.middle_m[0], self.height_m / 31)
+        at_ground = np.clip(self.height_m / 4, 0, 1)
+        tone = (0.82 + 0.18 * at_ground) * np.exp(0.06 * stains)
+        colour = tone[..., None] * self._canvas.reflected(facade.wall, self._light_lx)
+        if has_bands:
+            bands = 0.35 * self._in_height(self.height_m % facade.storey_m, 0.0, 0.16)
+            cornice = self._in_height(self.height_m, building.height_m - 0.35, building.height_m)
+            self._lay_trim(colour, np.maximum(bands, cornice))
+        return colour
+
+    def _lay_trim(self, colour: Floats, cover: Floats) -> None:
+        trim = self._canvas.reflected(self._building.facade.trim, self._light_lx)
+        colour += cover[..., None] * (trim - colour)
+
+    def add_windows(self, colour: Floats) -> Floats:
+        """Add the windows to a wall (r, c, 3), and return the luminance (r, c) of those that are lit at night."""
+        facade = self._building.facade
+        under_eaves = self.height_m < self._building.height_m - 0.3
+        left_m = (self._bay_m - facade.window_m) / 2
+        right_m = left_m + facade.window_m
+        width = self._in_width(self._at_bay_m, left_m, right_m)
+        height = self._in_height(self._at_storey_m, facade.sill_m, facade.head_m)
+        frame_width = self._in_width(self._at_bay_m, left_m - 0.12, right_m + 0.12)
+        frame_height = self._in_height(self._at_storey_m, facade.sill_m - 0.16, facade.head_m + 0.12)
+        panes = width * height
+        frames = frame_width * frame_height
+        if facade.has_shops:
+            is_shop = self._storey == 0
+            at_shop_m = self.along_m % (2 * self._bay_m)
+            shop_width = self._in_width(at_shop_m, 0.35, 2 * self._bay_m - 0.35)
+            shop_height = self._in_height(self.height_m, 0.45, facade.storey_m - 0.75)
+            sign = self._in_height(self.height_m, facade.storey_m - 0.7, facade.storey_m - 0.1)
+            panes = np.where(is_shop, shop_width * shop_height, panes)
+            frames = np.where(is_shop, sign, frames)
+        self._lay_trim(colour, frames * under_eaves)
+        mullion = self._in_width(self._at_bay_m, self._bay_m / 2 - 0.04, self._bay_m / 2 + 0.04)
+        return self._lay_panes(colour, panes * under_eaves * (1 - 0.8 * mullion))
+
+    def _lay_panes(self, colour: Floats, panes: Floats) -> Floats:
+        """Panes mirror the sky behind the viewer, and show a dark room or a blind. Returns as `add_windows`."""
+        facade = self._building.facade
+        rng = self._canvas.rng
+        each = (self._storey, self._bay)
+        size = (self._storeys, self._bays)
+        depth = rng.random(size).astype(np.float32)
+        has_blind = rng.random(size) < 0.3
+        blind_bottom_m = facade.head_m - depth * (facade.head_m - facade.sill_m)
+        blind = (has_blind[each] & (self._at_storey_m > blind_bottom_m[each])).astype(np.float32)
+        blind_cd_m2 = self._canvas.reflected((0.3, 0.29, 0.26), self._light_lx)
+        mirrored = 0.05 + 0.16 * depth[each]
+        pane_cd_m2 = mirrored[..., None] * self._canvas.daylight.sky_cd_m2(self._wall.normal_azimuth)
+        pane_cd_m2 = pane_cd_m2 + blind[..., None] * (blind_cd_m2 - pane_cd_m2)
+        colour += panes[..., None] * (pane_cd_m2 - colour)
+
+        is_lit = rng.random(size) < facade.lit_share
+        if facade.has_shops:
+            is_lit[0] = rng.random(self._bays) < LIT_SHOPS
+        lit_cd_m2 = np.where(is_lit, 8 + 30 * depth, 0).astype(np.float32)
+        return np.asarray(panes * lit_cd_m2[each] * (1 - 0.6 * blind))
+
+
+LIT_SHOPS = 0.7
+
+
+def _paint_wall(canvas: _Canvas, wall: _Wall, building: _Building, *, gable_m: float, lowest: float) -> None:
+    """A wall with its windows, above a tangent of the elevation; its middle is higher than its ends by gable_m."""
     nearest_m = max(float(wall.distance_m.min()), 1.0)
-    top_m = building.height_m + gable_m
-    highest = (top_m - canvas.eye_m) / (nearest_m if top_m > canvas.eye_m else float(wall.distance_m.max()))
+    farthest_m = max(float(wall.distance_m.max()), 1.0)
+    rise_m = building.height_m + gable_m - canvas.eye_m
+    highest = rise_m / (nearest_m if rise_m > 0 else farthest_m)
     rows = canvas.rows(max(-canvas.eye_m / nearest_m, lowest), highest)
     if rows.stop <= rows.start:
         return
-    distance_m = wall.distance_m[None, :]
-    height_m = canvas.eye_m + canvas.tangent[rows, None] * distance_m  # (r, c)
-    height_step_m = canvas.tangent_step[rows, None] * distance_m
-    along_m = wall.along_m[None, :]
-    along_step_m = wall.along_step_m[None, :]
-
-    to_end_m = np.minimum(along_m, wall.length_m - along_m)
-    slope = 2 * gable_m / wall.length_m
-    top = building.height_m + slope * np.maximum(to_end_m, 0)
-    cover = _between(height_m, 0, top, height_step_m) * _between(along_m, 0, wall.length_m, along_step_m)
-
-    facade = building.facade
-    light = canvas.daylight.upright_lx(wall.normal_azimuth)
-    stains = canvas.grained(along_m / 23 + building.middle_m[0], height_m / 31)
-    at_ground = np.clip(height_m / 4, 0, 1)
-    tone = (0.82 + 0.18 * at_ground) * np.exp(0.06 * stains)
-    wall_cd_m2 = canvas.reflected(facade.wall, light)
-    trim_cd_m2 = canvas.reflected(facade.trim, light)
-    colour = tone[..., None] * wall_cd_m2
-
-    # A cornice at the top and a band at each storey.
-    storey_at_m = height_m % facade.storey_m
-    bands = _between(storey_at_m, 0.0, 0.16, height_step_m) * 0.35
-    cornice = _between(height_m, building.height_m - 0.35, building.height_m, height_step_m)
-    ledge = np.maximum(bands, cornice) if gable_m == 0 else bands * 0
-    colour += ledge[..., None] * (trim_cd_m2 - colour)
-
-    bays = max(int(wall.length_m / facade.bay_m), 1)
-    bay_m = wall.length_m / bays
-    storeys = max(int(building.height_m / facade.storey_m + 0.2), 1)
-    bay = np.clip((along_m / bay_m).astype(np.int32), 0, bays - 1)
-    storey = np.clip((height_m / facade.storey_m).astype(np.int32), 0, storeys - 1)
-    at_bay_m = along_m - bay * bay_m
-    left_m = (bay_m - facade.window_m) / 2
-    in_width = _between(at_bay_m, left_m, left_m + facade.window_m, along_step_m)
-    in_frame_width = _between(at_bay_m, left_m - 0.12, left_m + facade.window_m + 0.12, along_step_m)
-    at_storey_m = height_m - storey * facade.storey_m
-    in_height = _between(at_storey_m, facade.sill_m, facade.head_m, height_step_m)
-    in_frame_height = _between(at_storey_m, facade.sill_m - 0.16, facade.head_m + 0.12, height_step_m)
-    if facade.has_shops:
-        shop_width = _between(along_m % (2 * bay_m), 0.35, 2 * bay_m - 0.35, along_step_m)
-        shop_height = _between(height_m, 0.45, facade.storey_m - 0.75, height_step_m)
-        is_shop = storey == 0
-        in_width = np.where(is_shop, shop_width, in_width)
-        in_height = np.where(is_shop, shop_height, in_height)
-        in_frame_width = np.where(is_shop, 1, in_frame_width)
-        sign = _between(height_m, facade.storey_m - 0.7, facade.storey_m - 0.1, height_step_m)
-        in_frame_height = np.where(is_shop, sign, in_frame_height)
-    under_roof = height_m < building.height_m - 0.3
-    frames = in_frame_width * in_frame_height * under_roof
-    panes = in_width * in_height * under_roof
-    colour += frames[..., None] * (trim_cd_m2 - colour)
-
-    # Panes mirror the sky over the viewer, and show a dark room, a blind or a curtain.
-    glass_cd_m2 = canvas.daylight.sky_cd_m2(wall.normal_azimuth)
-    chance = canvas.rng.random((storeys, bays)).astype(np.float32)
-    own = canvas.rng.random((storeys, bays)).astype(np.float32)
-    has_blind = chance < 0.3
-    shown = 0.05 + 0.16 * own
-    pane_cd_m2 = shown[storey, bay][..., None] * glass_cd_m2
-    blind_cd_m2 = canvas.reflected((0.3, 0.29, 0.26), light)
-    blind_bottom_m = facade.head_m - own * (facade.head_m - facade.sill_m)
-    blind = (has_blind[storey, bay] & (at_storey_m > blind_bottom_m[storey, bay])).astype(np.float32)
-    pane_cd_m2 = pane_cd_m2 + blind[..., None] * (blind_cd_m2 - pane_cd_m2)
-    mullion = _between(at_bay_m, bay_m / 2 - 0.04, bay_m / 2 + 0.04, along_step_m)
-    panes = panes * (1 - 0.8 * mullion)
-    colour += panes[..., None] * (pane_cd_m2 - colour)
-
-    is_lit = canvas.rng.random((storeys, bays)) < facade.lit_share
-    if facade.has_shops:
-        is_lit[0] = canvas.rng.random(bays) < 0.7
-    lit_cd_m2 = np.where(is_lit, 8 + 30 * own, 0).astype(np.float32)
-    lamps = panes * lit_cd_m2[storey, bay] * (1 - 0.6 * blind)
-    glow = 0.12 * np.exp(-height_m / 5) * facade.wall[1]
-    distance = float(wall.distance_m.mean())
-    canvas.paint(rows, wall.columns, colour, cover, distance_m=distance, lamps=lamps + np.maximum(glow, 0))
+    patch = _WallPatch(canvas, wall, building, rows)
+    colour = patch.masonry(has_bands=gable_m == 0)
+    lamps = patch.add_windows(colour)
+    street_light = 0.12 * building.facade.wall[1] * np.exp(-np.maximum(patch.height_m, 0) / 5)
+    distance_m = float(wall.distance_m.mean())
+    canvas.paint(rows, wall.columns, colour, patch.cover(gable_m), distance_m=distance_m, lamps=lamps + street_light)
 
 
 def _paint_roof(canvas: _Canvas, wall: _Wall, building: _Building, depth_m: float) -> None:
@@ -520,7 +558,7 @@ class _Side:
     wall: _Wall
     is_eaves: bool
     depth_m: float
-    hidden_to: Map
+    hidden_to: Floats
 
     def paint(self, canvas: _Canvas) -> None:
         """Paint the wall, and the roof above it where the roof slopes up from there."""
@@ -582,9 +620,9 @@ TREE_KINDS = 6
 class _Tree:
     """The look of a tree: opacity (N, N), normals (N, N, 3) to the right, up and towards the viewer, and its shade."""
 
-    opacity: Map
-    normals: Map
-    shade: Map
+    opacity: Floats
+    normals: Floats
+    shade: Floats
 
 
 def _tree(rng: Rng) -> _Tree:
@@ -665,7 +703,7 @@ class _Trees:
         canvas.paint(rows, columns, colour, opacity, distance_m=distance_m)
 
 
-def _resampled(values: Map, row_share: Map, column_share: Map, size_px: int) -> Map:
+def _resampled(values: Floats, row_share: Floats, column_share: Floats, size_px: int) -> Floats:
     """Values (N, N, ...) at shares (r,), (c,) of its sides, from a level of about size_px pixels; 0 outside."""
     level = values
     while len(level) >= 2 * max(size_px, 4):
@@ -747,7 +785,9 @@ def _tower_facade(rng: Rng) -> _Facade:
     )
 
 
-def _row_of_buildings(canvas: _Canvas, start_m: Array, along: Array, length_m: float, height_m: float) -> list[_Building]:
+def _row_of_buildings(
+    canvas: _Canvas, start_m: Array, along: Array, length_m: float, height_m: float
+) -> list[_Building]:
     """Buildings side by side from a point on; the street is to the right of `along`."""
     rng = canvas.rng
     inward = np.array([-along[1], along[0]])
@@ -810,12 +850,12 @@ def _paint_city(canvas: _Canvas) -> None:
         towers.append(_Building(place, half, 0.0, tall_m, _tower_facade(rng)))
     blocks = []
     middles_m, halves_m = _block_places(near_m)
-    for x_m, half_x_m in zip(middles_m, halves_m, strict=True):
-        for y_m, half_y_m in zip(middles_m, halves_m, strict=True):
-            ring_m = max(abs(x_m), abs(y_m))
-            if ring_m:
-                tall_m = float(rng.uniform(13, 19)) + 0.03 * ring_m
-                blocks += _block(canvas, np.array([x_m, y_m]), np.array([half_x_m, half_y_m]), tall_m)
+    places = list(zip(middles_m, halves_m, strict=True))
+    for (east_m, half_east_m), (north_m, half_north_m) in product(places, places):
+        ring_m = max(abs(east_m), abs(north_m))
+        if ring_m:
+            tall_m = float(rng.uniform(13, 19)) + 0.03 * ring_m
+            blocks += _block(canvas, np.array([east_m, north_m]), np.array([half_east_m, half_north_m]), tall_m)
     _paint_buildings(canvas, [*towers, *blocks])
     _paint_street_side(canvas, near_m)
 
@@ -868,11 +908,43 @@ HOUSE_WALLS = ("#b9a88f", "#a06a50", "#c9bda8", "#8f7a66", "#b39a7c", "#9c9488",
 ROOFS = ("#6d3d2a", "#5b4a42", "#4a4744", "#7a4a34", "#54504c")
 
 
+class _Scenery:
+    """Trees, hedges and houses that are collected in any order, and painted from far to near."""
+
+    def __init__(self, canvas: _Canvas) -> None:
+        self._canvas = canvas
+        self._trees = _Trees(canvas)
+        self._items: list[tuple[float, Callable[[], None]]] = []
+
+    def add_tree(self, place_m: Array, height_m: float, *, sunk: float = 0.0) -> None:
+        """A tree, or a bush if a share of its height is sunk."""
+        distance_m = float(np.hypot(*place_m))
+        azimuth = float(np.arctan2(place_m[1], place_m[0]))
+        lowered_m = _least_of_sun(self._canvas, place_m, height_m) if sunk == 0 else height_m
+        self._items.append((distance_m, partial(self._trees.paint, azimuth, distance_m, lowered_m, sunk=sunk)))
+
+    def add_hedge(self, start_m: Array, along: Array, length_m: float) -> None:
+        """Bushes in a row."""
+        for step_m in np.arange(0, length_m, 1.1):
+            height_m = float(self._canvas.rng.uniform(2.6, 3.4))
+            self.add_tree(start_m + step_m * along, height_m, sunk=0.5)
+
+    def add_house(self, place_m: Array, yaw_rad: float) -> None:
+        """A house with a pitched roof."""
+        house = _house(self._canvas, place_m, yaw_rad)
+        self._items.append((house.distance_m, partial(_paint_building, self._canvas, house)))
+
+    def paint(self) -> None:
+        """Paint all that was added."""
+        for _, paint in sorted(self._items, key=lambda item: -item[0]):
+            paint()
+
+
 def _house(canvas: _Canvas, middle_m: Array, yaw_rad: float) -> _Building:
     rng = canvas.rng
     facade = _Facade(
         wall=_one(rng, HOUSE_WALLS),
-        trim=_srgb("#d9d4c8"),
+        trim=_srgb("#b9b4a8"),
         storey_m=2.8,
         bay_m=float(rng.uniform(2.4, 3.2)),
         window_m=float(rng.uniform(1.1, 1.5)),
@@ -889,7 +961,6 @@ def _house(canvas: _Canvas, middle_m: Array, yaw_rad: float) -> _Building:
 
 def _paint_suburb(canvas: _Canvas) -> None:
     """Houses with gardens and trees on streets around the scene."""
-    rng = canvas.rng
     near_m = canvas.around.distance_m
     _paint_hills(canvas, rise=0.05, distance_m=7000, albedo=(0.05, 0.075, 0.04))
     _paint_hills(canvas, rise=0.022, distance_m=2500, albedo=(0.045, 0.07, 0.03))
@@ -899,51 +970,44 @@ def _paint_suburb(canvas: _Canvas) -> None:
     is_road = np.abs(across_m - road_m) < 2.8
     is_path = np.abs(np.abs(across_m - road_m) - 3.7) < 0.9
     lawn = np.exp(canvas.grown(x_m, y_m, footprint_m))[..., None] * np.array(LAWN, np.float32)
-    albedo = np.where(is_road[..., None], ASPHALT, np.where(is_path[..., None], PAVING, lawn))
+    paved = np.where(is_path[..., None], PAVING, lawn)
+    albedo = np.where(is_road[..., None], ASPHALT, paved)
     _paint_ground(canvas, albedo.astype(np.float32))
 
-    trees = _Trees(canvas)
-    items: list[tuple[float, Callable[[], None]]] = []
-
-    def add_tree(place_m: Array, height_m: float) -> None:
-        distance_m = float(np.hypot(*place_m))
-        azimuth = float(np.arctan2(place_m[1], place_m[0]))
-        own_m = _least_of_sun(canvas, place_m, height_m)
-        items.append((distance_m, lambda: trees.paint(azimuth, distance_m, own_m)))
-
-    def add_hedge(start_m: Array, along: Array, length_m: float) -> None:
-        for step_m in np.arange(0, length_m, 1.1):
-            place_m = start_m + step_m * along
-            distance_m = float(np.hypot(*place_m))
-            azimuth = float(np.arctan2(place_m[1], place_m[0]))
-            tall_m = float(rng.uniform(2.6, 3.4))
-            items.append((distance_m, partial(trees.paint, azimuth, distance_m, tall_m, sunk=0.5)))
-
-    def add_house(place_m: Array, yaw_rad: float) -> None:
-        house = _house(canvas, place_m, yaw_rad)
-        items.append((house.distance_m, lambda: _paint_building(canvas, house)))
-
+    scenery = _Scenery(canvas)
     for ring in range(4):
-        reach_m = near_m + 6 + 32 * ring
-        for side, (c, s) in enumerate(COMPASS):
-            outward = np.array([c, s], float)
-            along = np.array([-s, c], float)
-            for along_m in np.arange(-reach_m, reach_m, 17.0):
-                shift_m = along_m + rng.uniform(-2, 2)
-                if rng.random() < 0.85:
-                    add_house(outward * reach_m + along * shift_m, np.pi / 2 * (side + 1) + rng.normal(0, 0.04))
-                if ring < 2 and rng.random() < 0.6:
-                    add_hedge(outward * (reach_m - 7.5) + along * (shift_m - 7), along, float(rng.uniform(5, 11)))
-                for _ in range(4):
-                    garden_m = outward * (reach_m + rng.uniform(-8, 14)) + along * (shift_m + rng.uniform(6, 11))
-                    if float(np.hypot(*garden_m)) > near_m - 4:
-                        add_tree(garden_m, float(rng.uniform(3.5, 9.5)))
+        for side in range(4):
+            _add_row_of_houses(canvas, scenery, ring, side)
     for _ in range(260):
-        turn = rng.uniform(-np.pi, np.pi)
-        reach_m = float(rng.uniform(near_m + 130, 600))
-        add_tree(reach_m * np.array([np.cos(turn), np.sin(turn)]), float(rng.uniform(8, 16)))
-    for _, paint in sorted(items, key=lambda item: -item[0]):
-        paint()
+        place_m = _somewhere(canvas.rng, near_m + 130, 600)
+        scenery.add_tree(place_m, float(canvas.rng.uniform(8, 16)))
+    scenery.paint()
+
+
+def _add_row_of_houses(canvas: _Canvas, scenery: _Scenery, ring: int, side: int) -> None:
+    """Houses along one side of a square around the scene, with hedges and trees between them."""
+    rng = canvas.rng
+    near_m = canvas.around.distance_m
+    reach_m = near_m + 6 + 32 * ring
+    outward = np.array(COMPASS[side], float)
+    along = np.array([-outward[1], outward[0]])
+    for along_m in np.arange(-reach_m, reach_m, 17.0):
+        shift_m = along_m + rng.uniform(-2, 2)
+        if rng.random() < 0.85:
+            scenery.add_house(outward * reach_m + along * shift_m, np.pi / 2 * (side + 1) + rng.normal(0, 0.04))
+        if ring < 2 and rng.random() < 0.6:
+            start_m = outward * (reach_m - 7.5) + along * (shift_m - 7)
+            scenery.add_hedge(start_m, along, float(rng.uniform(5, 11)))
+        for _ in range(4):
+            garden_m = outward * (reach_m + rng.uniform(-8, 14)) + along * (shift_m + rng.uniform(6, 11))
+            if float(np.hypot(*garden_m)) > near_m - 4:
+                scenery.add_tree(garden_m, float(rng.uniform(3.5, 9.5)))
+
+
+def _somewhere(rng: Rng, nearest_m: float, farthest_m: float) -> Array:
+    """A place (2,) in any direction between two distances."""
+    turn = rng.uniform(-np.pi, np.pi)
+    return rng.uniform(nearest_m, farthest_m) * np.array([np.cos(turn), np.sin(turn)])
 
 
 # Country
@@ -973,37 +1037,27 @@ def _paint_country(canvas: _Canvas) -> None:
     texture = np.exp(canvas.grown(x_m, y_m, footprint_m))[..., None]
     _paint_ground(canvas, (texture * (mean + fine * (field - mean))).astype(np.float32))
 
-    trees = _Trees(canvas)
-    items: list[tuple[float, Callable[[], None]]] = []
-
-    def add_tree(place_m: Array, height_m: float) -> None:
-        distance_m = float(np.hypot(*place_m))
-        azimuth = float(np.arctan2(place_m[1], place_m[0]))
-        own_m = _least_of_sun(canvas, place_m, height_m)
-        items.append((distance_m, lambda: trees.paint(azimuth, distance_m, own_m)))
-
-    # Rows of trees along the edges of fields, and woods.
+    scenery = _Scenery(canvas)
     for _ in range(34):
-        reach_m = float(rng.uniform(near_m + 25, 600))
-        middle = rng.uniform(-np.pi, np.pi)
-        start_m = reach_m * np.array([np.cos(middle), np.sin(middle)])
-        heading = middle + np.pi / 2 + rng.normal(0, 0.35)
-        along = np.array([np.cos(heading), np.sin(heading)])
-        for step_m in np.arange(0, rng.uniform(60, 220), rng.uniform(3.5, 8)):
-            place_m = start_m + along * step_m + rng.normal(0, 1.5, 2)
-            if float(np.hypot(*place_m)) > near_m:
-                add_tree(place_m, float(rng.uniform(5, 15)))
+        _add_row_of_trees(canvas, scenery)
     for _ in range(40):
-        turn_rad = rng.uniform(-np.pi, np.pi)
-        reach_m = float(rng.uniform(near_m, near_m + 70))
-        add_tree(reach_m * np.array([np.cos(turn_rad), np.sin(turn_rad)]), float(rng.uniform(7, 14)))
+        scenery.add_tree(_somewhere(rng, near_m, near_m + 70), float(rng.uniform(7, 14)))
     for _ in range(6):
-        turn_rad = rng.uniform(-np.pi, np.pi)
-        reach_m = float(rng.uniform(near_m + 60, 350))
-        house = _house(canvas, reach_m * np.array([np.cos(turn_rad), np.sin(turn_rad)]), rng.uniform(0, np.pi))
-        items.append((house.distance_m, partial(_paint_building, canvas, house)))
-    for _, paint in sorted(items, key=lambda item: -item[0]):
-        paint()
+        scenery.add_house(_somewhere(rng, near_m + 60, 350), rng.uniform(0, np.pi))
+    scenery.paint()
+
+
+def _add_row_of_trees(canvas: _Canvas, scenery: _Scenery) -> None:
+    """Trees along the edge of a field, more or less across the direction of sight."""
+    rng = canvas.rng
+    near_m = canvas.around.distance_m
+    start_m = _somewhere(rng, near_m + 25, 600)
+    heading = np.arctan2(start_m[1], start_m[0]) + np.pi / 2 + rng.normal(0, 0.35)
+    along = np.array([np.cos(heading), np.sin(heading)])
+    for step_m in np.arange(0, rng.uniform(60, 220), rng.uniform(3.5, 8)):
+        place_m = start_m + along * step_m + rng.normal(0, 1.5, 2)
+        if float(np.hypot(*place_m)) > near_m:
+            scenery.add_tree(place_m, float(rng.uniform(5, 15)))
 
 
 PAINTERS: dict[str, Callable[[_Canvas], None]] = {

@@ -276,7 +276,7 @@ class Sky:
     def seen_cd_m2(self, directions: Array) -> Array:
         """Linear red, green and blue (..., 3) seen along unit directions (..., 3) at level 1."""
         if self.panorama is None:
-            return self.standard_cd_m2(directions)[..., None] * np.array(self.colour)
+            return np.asarray(self.standard_cd_m2(directions)[..., None] * np.array(self.colour))
         return self.illuminance_lx * self.panorama.map_under(self).seen(directions)
 
     def standard_cd_m2(self, directions: Array) -> Array:

@@ -28,6 +28,11 @@ class PanoramaMap:
     daylight: NDArray[np.float16]
     lamps: NDArray[np.float16]
 
+    def map_under(self, sky: object) -> "PanoramaMap":
+        """This map, whatever the sky."""
+        del sky
+        return self
+
     @cached_property
     def light(self) -> Map:
         """Mean luminance (h, w) float32 of daylight in cells of LIGHT_CELL_PX, in cd/m² per lux of the sky."""
@@ -35,6 +40,12 @@ class PanoramaMap:
         size = (rows // LIGHT_CELL_PX, LIGHT_CELL_PX, columns // LIGHT_CELL_PX, LIGHT_CELL_PX)
         luminance = self.daylight.astype(np.float32) @ np.array(LUMINANCE, np.float32)
         return np.asarray(luminance.reshape(size).mean((1, 3)))
+
+    @cached_property
+    def around_horizon(self) -> Array:
+        """Mean daylight (3,) of what is less than 30 degrees from the horizon, in cd/m² per lux of the sky."""
+        quarter = len(self.daylight) // 4  # of the rows, which are even in the sine
+        return np.asarray(self.daylight[quarter:-quarter].mean((0, 1), dtype=float))
 
     def luminance(self, directions: Array) -> Array:
         """Luminance (...) along unit directions (..., 3) as it lights a scene, in cd/m² per lux of the sky."""
@@ -59,7 +70,7 @@ class PanoramaMap:
         bottom = self._mixed(upper + 1, left, right)
         return np.asarray((1 - down) * top + down * bottom)
 
-    def _mixed(self, row: Array, left: Array, right: Array) -> Array:
+    def _mixed(self, row: NDArray[np.int32], left: NDArray[np.int32], right: Array) -> Array:
         """Daylight between a column and the next one, which may be the first."""
         columns = self.daylight.shape[1]
         first = self.daylight[row, left % columns].astype(np.float32)
