@@ -732,7 +732,7 @@ def _srgb(colour: str) -> Albedo:
 
 # City
 
-CITY_WALLS = ("#8a4b38", "#9a6248", "#a8927a", "#8d8579", "#6f5a4c", "#b7a68c", "#77706b", "#94523f", "#7d8084")
+CITY_WALLS = ("#7d4636", "#8a5a45", "#8f7d69", "#7d766b", "#665347", "#99896f", "#6b6561", "#874c3b", "#6f7275")
 CITY_TRIMS = ("#aaa396", "#8f897f", "#4a4642", "#b5aea2", "#6b5a4c")
 CITY_TOWERS = ("#6d747c", "#8b8f92", "#5c6268", "#9a948a")
 STREET_M = 14.0
@@ -800,7 +800,7 @@ def _row_of_buildings(
             width_m = length_m - done_m
         depth_m = 12.0
         middle_m = start_m + (done_m + width_m / 2) * along + depth_m / 2 * inward
-        own_m = _least_of_sun(canvas, middle_m, height_m * float(rng.uniform(0.6, 1.4)))
+        own_m = _least_of_sun(canvas, middle_m, height_m * float(rng.uniform(0.75, 1.35)))
         facade = _city_facade(rng)
         place = (float(middle_m[0]), float(middle_m[1]))
         buildings.append(_Building(place, (width_m / 2, depth_m / 2), yaw, own_m, facade))
@@ -854,7 +854,7 @@ def _paint_city(canvas: _Canvas) -> None:
     for (east_m, half_east_m), (north_m, half_north_m) in product(places, places):
         ring_m = max(abs(east_m), abs(north_m))
         if ring_m:
-            tall_m = float(rng.uniform(13, 19)) + 0.03 * ring_m
+            tall_m = float(rng.uniform(15, 20)) + 0.03 * ring_m
             blocks += _block(canvas, np.array([east_m, north_m]), np.array([half_east_m, half_north_m]), tall_m)
     _paint_buildings(canvas, [*towers, *blocks])
     _paint_street_side(canvas, near_m)
@@ -904,7 +904,7 @@ def _paint_car(canvas: _Canvas, place_m: Array, yaw_rad: float) -> None:
 
 # Suburb
 
-HOUSE_WALLS = ("#b9a88f", "#a06a50", "#c9bda8", "#8f7a66", "#b39a7c", "#9c9488", "#c4b49a")
+HOUSE_WALLS = ("#a08f78", "#8f5a45", "#aba08c", "#85705d", "#9a8267", "#8a8379", "#7d4a39")
 ROOFS = ("#6d3d2a", "#5b4a42", "#4a4744", "#7a4a34", "#54504c")
 
 
