@@ -112,7 +112,6 @@ class _Canvas:
         self.around = around
         self.rng = rng
         self.eye_m = around.height_m + EYE_M
-        self._sky_lx = sky.illuminance_lx
         sine = 1 - (np.arange(ROWS) + 0.5) * (2 / ROWS)
         cosine = np.sqrt(1 - sine**2)
         self.tangent = (sine / cosine).astype(np.float32)
@@ -133,8 +132,11 @@ class _Canvas:
         self._haze = band
 
     def finished(self) -> PanoramaMap:
-        """The map, in cd/m² per lux of the sky."""
-        per_lux = np.clip(self.colour / np.float32(self._sky_lx), 0, MOST)
+        """The map in cd/m² per lux of the sky, which level ground amid it gets."""
+        upper = self.colour[: ROWS // 2] @ np.array(LUMINANCE, np.float32)
+        sine = 1 - (np.arange(ROWS // 2) + 0.5) * (2 / ROWS)
+        level_lx = float((upper.sum(1, dtype=float) * sine).sum()) * CELL_SR
+        per_lux = np.clip(self.colour / np.float32(level_lx), 0, MOST)
         return PanoramaMap(per_lux.astype(np.float16), self.lamps.astype(np.float16))
 
     def rows(self, low: float, high: float) -> slice:
@@ -746,17 +748,21 @@ def _one(rng: Rng, choices: Sequence[str]) -> Albedo:
     return _srgb(choices[int(rng.integers(len(choices)))])
 
 
-def _least_of_sun(canvas: _Canvas, middle_m: Array, height_m: float) -> float:
+HALF_DEPTH_M = 8.0  # of a building, at most
+
+
+def _below_sun(canvas: _Canvas, middle_m: Array, height_m: float) -> float:
     """The height of a building, lowered where it would hide the sun from the scene."""
     sun = canvas.daylight.sun_direction
     distance_m = float(np.hypot(*middle_m))
+    nearest_m = max(distance_m - HALF_DEPTH_M, 0.6 * distance_m)
     level = float(np.hypot(sun[0], sun[1]))
     if canvas.around.sun_lx == 0 or level < 0.05:
         return height_m
     cosine = float(middle_m @ sun[:2]) / (distance_m * level)
     if cosine < np.cos(np.deg2rad(40)):
         return height_m
-    most_m = canvas.eye_m + 0.75 * distance_m * float(sun[2]) / level
+    most_m = canvas.eye_m + 0.75 * nearest_m * float(sun[2]) / level
     return max(min(height_m, most_m), 4.0)
 
 
@@ -800,7 +806,7 @@ def _row_of_buildings(
             width_m = length_m - done_m
         depth_m = 12.0
         middle_m = start_m + (done_m + width_m / 2) * along + depth_m / 2 * inward
-        own_m = _least_of_sun(canvas, middle_m, height_m * float(rng.uniform(0.75, 1.35)))
+        own_m = _below_sun(canvas, middle_m, height_m * float(rng.uniform(0.75, 1.35)))
         facade = _city_facade(rng)
         place = (float(middle_m[0]), float(middle_m[1]))
         buildings.append(_Building(place, (width_m / 2, depth_m / 2), yaw, own_m, facade))
@@ -844,7 +850,7 @@ def _paint_city(canvas: _Canvas) -> None:
         turn = rng.uniform(-np.pi, np.pi)
         reach_m = rng.uniform(350, 2200)
         middle_m = reach_m * np.array([np.cos(turn), np.sin(turn)])
-        tall_m = _least_of_sun(canvas, middle_m, float(rng.uniform(25, 45) + 70 * rng.random() ** 3))
+        tall_m = _below_sun(canvas, middle_m, float(rng.uniform(25, 45) + 70 * rng.random() ** 3))
         half = (float(rng.uniform(9, 22)), float(rng.uniform(9, 16)))
         place = (float(middle_m[0]), float(middle_m[1]))
         towers.append(_Building(place, half, 0.0, tall_m, _tower_facade(rng)))
@@ -887,7 +893,8 @@ def _paint_street_side(canvas: _Canvas, near_m: float) -> None:
     places.sort(key=lambda place: -place[0])
     for distance_m, kind, place_m, side in places:
         if kind == "tree":
-            trees.paint(float(np.arctan2(place_m[1], place_m[0])), distance_m, float(rng.uniform(6, 10)))
+            height_m = _below_sun(canvas, place_m, float(rng.uniform(6, 10)))
+            trees.paint(float(np.arctan2(place_m[1], place_m[0])), distance_m, height_m)
         else:
             _paint_car(canvas, place_m, np.pi / 2 * (side + 1))
 
@@ -920,7 +927,7 @@ class _Scenery:
         """A tree, or a bush if a share of its height is sunk."""
         distance_m = float(np.hypot(*place_m))
         azimuth = float(np.arctan2(place_m[1], place_m[0]))
-        lowered_m = _least_of_sun(self._canvas, place_m, height_m) if sunk == 0 else height_m
+        lowered_m = _below_sun(self._canvas, place_m, height_m) if sunk == 0 else height_m
         self._items.append((distance_m, partial(self._trees.paint, azimuth, distance_m, lowered_m, sunk=sunk)))
 
     def add_hedge(self, start_m: Array, along: Array, length_m: float) -> None:
@@ -953,7 +960,7 @@ def _house(canvas: _Canvas, middle_m: Array, yaw_rad: float) -> _Building:
         lit_share=0.45,
     )
     storeys = 2 if rng.random() < 0.6 else 1
-    height_m = _least_of_sun(canvas, middle_m, 2.9 * storeys)
+    height_m = _below_sun(canvas, middle_m, 2.9 * storeys)
     half_m = (float(rng.uniform(4.5, 6.5)), float(rng.uniform(3.8, 4.6)))
     place = (float(middle_m[0]), float(middle_m[1]))
     return _Building(place, half_m, yaw_rad, height_m, facade, float(rng.uniform(2.4, 3.6)), _one(rng, ROOFS))
