@@ -455,7 +455,7 @@ class _WallPatch:
             bands = 0.35 * self._in_height(self.height_m % facade.storey_m, 0.0, 0.16)
             cornice = self._in_height(self.height_m, building.height_m - 0.35, building.height_m)
             self._lay_trim(colour, np.maximum(bands, cornice))
-        return colour
+        return np.asarray(colour)
 
     def _lay_trim(self, colour: Floats, cover: Floats) -> None:
         trim = self._canvas.reflected(self._building.facade.trim, self._light_lx)
