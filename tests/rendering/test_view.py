@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.rendering.panoramas import PANORAMA
 from tests.rendering.rectangles import Rectangle, box, rectangle, room, sheet
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
@@ -17,7 +18,6 @@ from vobench.rendering.renderer import Radiance, single_instant
 from vobench.rendering.view import Plane, visible_boxes, within
 from vobench.scene.light import Sky, Steady
 from vobench.scene.material import Material, fresnel, pane_reflectance, under_coat
-from vobench.scene.panorama import PanoramaMap
 from vobench.scene.scene import Scene
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
@@ -183,16 +183,6 @@ def test_where_nothing_stands_the_sky_shows_its_luminance(draw: Any, even_light:
     np.testing.assert_allclose(picture[inside], expected[inside], rtol=2e-3)
 
 
-def waves() -> PanoramaMap:
-    """A panorama in smooth waves, whose colours differ, without a step at azimuth 180 degrees."""
-    azimuth = 2 * np.pi * (np.arange(512) + 0.5) / 512
-    sine = 1 - 2 * (np.arange(256) + 0.5) / 256
-    waves = 1 + 0.4 * np.cos(5 * azimuth) + 0.3 * np.sin(3 * np.pi * sine)[:, None]
-    daylight = waves[..., None] * [0.3, 0.2, 0.1]
-    return PanoramaMap(daylight.astype(np.float16), np.full((256, 512), 7.0, np.float16))
-
-
-PANORAMA = Sky("sky", 1000.0, panorama=waves())
 LUMINANCE_OF_RGB = (0.2126, 0.7152, 0.0722)
 
 
