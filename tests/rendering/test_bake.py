@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from tests.rendering.panoramas import waves
 from tests.rendering.rectangles import Rectangle, box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import RenderError
@@ -30,9 +31,10 @@ from vobench.rendering.geometry import offset_from_surface
 from vobench.rendering.illumination import AmbientLight, Illumination
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.visibility import Visibility
-from vobench.scene.light import AreaLight, Flicker, Light, PointLight, SpotLight, Sun
+from vobench.scene.light import AreaLight, Flicker, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Material, Picture, fresnel
 from vobench.scene.mesh import Thing, areas_m2, flat, flipped, make_mesh, moved, quad
+from vobench.scene.panorama import PanoramaMap
 from vobench.scene.scene import Scene, ceiling_light, triangles
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
@@ -528,6 +530,27 @@ def test_textures_that_were_painted_are_loaded_as_pictures_one_for_all_that_shar
     assert loaded["floor"].texture is loaded["wall"].texture
     assert loaded["floor"].emission_texture.pixels().tobytes() == glow.pixels().tobytes()
     assert (loaded["floor"].emission_texture.tile_m, loaded["ceiling"].texture) == (2.0, kept)
+
+
+def test_a_panorama_is_saved_with_the_light_and_not_painted_again(tmp_path: Path) -> None:
+    class Painted:
+        count = 0
+
+        def map_under(self, sky: Sky) -> PanoramaMap:
+            self.count += 1
+            return waves()
+
+    painted = Painted()
+    floor = rectangle(np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), "grey")
+    scene = Scene("floor", (floor,), {"grey": Material(colour=(0.5,) * 3)}, (Sky("sky", 100.0, panorama=painted),))
+    save_baked(tmp_path, bake(scene, BakeSettings(spacing_m=0.5, indirect_rays=0, bounces=0)))
+    so_far = painted.count
+    (loaded,) = load_baked(tmp_path, scene).scene.lights
+    assert isinstance(loaded, Sky)
+    assert loaded.panorama is not None
+    assert loaded.panorama.map_under(loaded).daylight.tobytes() == waves().daylight.tobytes()
+    assert loaded.panorama.map_under(loaded).lamps.tobytes() == waves().lamps.tobytes()
+    assert painted.count == so_far
 
 
 @pytest.mark.parametrize("name", [LIGHT, PLACES, TEXTURES, "sun.1.npz"])

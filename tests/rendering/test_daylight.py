@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tests.rendering.panoramas import PANORAMA, level_illuminance_lx
 from tests.rendering.rectangles import Rectangle, rectangle
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
@@ -36,6 +37,11 @@ def floor_light(light: Light, *others: Rectangle, settings: BakeSettings = DIREC
     upper = (t > s).ravel()
     u, v = np.where(t > s, s, s - t).ravel(), np.where(t > s, t - s, t).ravel()
     return 4 * s - 2, 4 * t - 2, baked.atlas.read(baked.direct[0], upper.astype(np.int32), u, v).reshape(s.shape)
+
+
+def test_an_open_floor_gets_the_light_of_a_panorama() -> None:
+    _, _, illuminance_lx = floor_light(PANORAMA, settings=replace(DIRECT, light_rays=256))
+    assert illuminance_lx.mean() == pytest.approx(level_illuminance_lx(), rel=0.01)
 
 
 def finer(baked: BakedScene) -> int:

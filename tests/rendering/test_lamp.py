@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tests.rendering.rectangles import room
-from vobench.rendering.lamp import Lamp, lamp_of, lamps
+from vobench.rendering.lamp import Lamp, lamp_groups, lamp_of, lamps_on
 from vobench.rendering.occlusion import Bodies
 from vobench.scene.light import PointLight, Sky, SpotLight, Steady, Sun
 from vobench.scene.material import Material
@@ -58,7 +58,24 @@ def test_lamps_that_are_off_and_the_sky_are_none() -> None:
     )
     sides = tuple(room((4, 4, 3), floor="a", wall="a", ceiling="a"))
     scene = Scene("room", sides, {"a": Material()}, lights)
-    found = [lamp for lamp, _ in lamps(scene, Bodies(scene), 0)]
-    assert len(found) == 3
-    assert found[1].min_cosine == pytest.approx(np.cos(np.deg2rad(30.0)))
-    assert found[2].center_m is None
+    assert lamps_on(scene, 0) == (0, 2, 3)
+    bodies = Bodies(scene)
+    is_lit = np.ones(len(bodies.normals), bool)
+    is_lit[0] = False
+    (group,) = lamp_groups(scene, bodies, is_lit, (0, 2, 3), 0)
+    assert group.lamps[1].min_cosine == pytest.approx(np.cos(np.deg2rad(30.0)))
+    assert group.lamps[2].center_m is None
+    assert group.facing[0] == 0
+    assert group.facing[-1] == 0
+    for bit, lamp in enumerate(group.lamps):
+        is_before = lamp.is_before(bodies.normals, bodies.offsets_m) & is_lit
+        np.testing.assert_array_equal((group.facing >> np.uint32(bit)) & 1, is_before)
+
+
+def test_more_lamps_than_bits_are_several_groups() -> None:
+    bulbs = tuple(PointLight(f"bulb_{nth}", np.array([0.0, 0, 1.0]), 10.0) for nth in range(40))
+    scene = Scene("room", tuple(room((4, 4, 3), floor="a", wall="a", ceiling="a")), {"a": Material()}, bulbs)
+    bodies = Bodies(scene)
+    is_lit = np.ones(len(bodies.normals), bool)
+    groups = list(lamp_groups(scene, bodies, is_lit, range(40), 0))
+    assert [len(group.lamps) for group in groups] == [32, 8]

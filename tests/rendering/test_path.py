@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.rendering.panoramas import PANORAMA, level_illuminance_lx
 from tests.rendering.rectangles import rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import MissingDependencyError, RenderError
@@ -80,6 +81,17 @@ SLANTED = SpotLight("spot", np.array([3.0, 0.0, 4.0]), np.array([-0.6, 0.0, -0.8
 def test_a_matt_floor_shows_its_illuminance_times_its_albedo_over_pi(trace, light, illuminance_lx):
     shown = trace(floor_under(light), samples=512 if isinstance(light, Sky) else 64)
     assert shown.mean() == pytest.approx(0.5 * illuminance_lx / np.pi, rel=0.01)
+
+
+def test_a_panorama_is_seen_as_its_map_says_and_lights_a_floor(trace):
+    floor = floor_under(PANORAMA)
+    assert trace(floor, samples=512).mean() == pytest.approx(0.5 * level_illuminance_lx() / np.pi, rel=0.02)
+    camera = Pinhole(24, 16, 20.0, 20.0, 11.5, 7.5)
+    T = se3.transform(se3.rotation_z(2.8), np.zeros(3)) @ looking(pitch_deg=-45, position_m=(0, 0, 0.4))
+    shown = trace(floor, T, camera=camera, samples=64)
+    rays = camera.rays(pixel_grid(camera)) @ T[:3, :3].T
+    expected = PANORAMA.seen_cd_m2(rays) @ LUMINANCE
+    np.testing.assert_allclose(shown.squeeze(), expected, rtol=0.06)
 
 
 def test_a_spot_fades_as_its_intensity_says(trace):

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tests.rendering.panoramas import PANORAMA
 from tests.rendering.rectangles import Rectangle, box, rectangle, room, sheet
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
@@ -15,7 +16,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.rendering.view import Plane, visible_boxes, within
-from vobench.scene.light import Sky
+from vobench.scene.light import Sky, Steady
 from vobench.scene.material import Material, fresnel, pane_reflectance, under_coat
 from vobench.scene.scene import Scene
 
@@ -180,6 +181,43 @@ def test_where_nothing_stands_the_sky_shows_its_luminance(draw: Any, even_light:
     for row in horizon:
         inside[row - 1 : row + 3] = False
     np.testing.assert_allclose(picture[inside], expected[inside], rtol=2e-3)
+
+
+LUMINANCE_OF_RGB = (0.2126, 0.7152, 0.0722)
+
+
+@pytest.mark.parametrize("heading_deg", [0, 90, 180])
+def test_a_panorama_is_seen_in_all_directions_without_a_seam(draw: Any, even_light: Any, heading_deg: float) -> None:
+    floor = rectangle(np.array([0, 0, -50.0]), np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), "grey")
+    turn = se3.transform(se3.rotation_z(np.deg2rad(heading_deg)), np.zeros(3))
+    T = turn @ looking(pitch_deg=-10, position_m=(0, 0, 0))
+    renderer = draw(even_light(Scene("sky", (floor,), MATERIALS, (PANORAMA,))))
+    picture = renderer.radiance(CAMERA, single_instant(CAMERA, T), weights=None)
+    expected = PANORAMA.seen_cd_m2(pixel_rays(T))
+    np.testing.assert_allclose(picture, expected, rtol=0.01)
+    grey = renderer.radiance(CAMERA, single_instant(CAMERA, T), weights=LUMINANCE_OF_RGB)
+    np.testing.assert_allclose(grey.squeeze(), expected @ LUMINANCE_OF_RGB, rtol=0.01)
+
+
+def test_a_pane_lets_its_share_of_a_panorama_pass(draw: Any, even_light: Any) -> None:
+    walls = [s for s in room((4, 4, 3), floor="grey", wall="grey", ceiling="grey") if s.name != "wall_east"]
+    pane = rectangle(np.array([2.0, 0, 1.5]), np.array([0, 0, 3.0]), np.array([0, 4.0, 0]), "glass")
+    T = looking(pitch_deg=0, position_m=(0, 0, 1.5))
+    picture = snap(draw(even_light(Scene("room", (*walls, pane), MATERIALS, (PANORAMA,)))), T)
+    rays = pixel_rays(T)
+    R = pane_reflectance(rays[..., 0], 1.5)
+    behind = PANORAMA.seen_cd_m2(rays) @ LUMINANCE_OF_RGB
+    expected = (1 - R) * 0.7 * behind + R * LUMINANCE
+    middle = (slice(30, 90), slice(30, 150))
+    np.testing.assert_allclose(picture.squeeze()[middle], expected[middle], rtol=0.01)
+
+
+def test_the_windows_of_a_panorama_are_lit_in_the_dark_alone(draw: Any, even_light: Any) -> None:
+    floor = rectangle(np.array([0, 0, -50.0]), np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), "grey")
+    expected = PANORAMA.seen_cd_m2(pixel_rays(AHEAD)) @ LUMINANCE_OF_RGB
+    night = replace(PANORAMA, level=Steady(1e-3))
+    picture = snap(draw(even_light(Scene("sky", (floor,), MATERIALS, (night,)))), AHEAD).squeeze()
+    np.testing.assert_allclose(picture, 1e-3 * expected + 7.0, rtol=0.01)
 
 
 def test_two_skies_add_up(draw: Any, even_light: Any) -> None:

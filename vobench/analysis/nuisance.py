@@ -257,7 +257,8 @@ def _without_shadows(case: Case) -> Case:
         override = lighting.pop("sun", LightOverride())
         sun_lx = _overridden(scene.sun.illuminance_lx, override.illuminance_lx)
         sky_lx = scene.sky.illuminance_lx if scene.sky else 0.0
-        uniform_sky = SkySpec(illuminance_lx=sun_lx + sky_lx, kind="uniform")
+        panorama = scene.sky.panorama if scene.sky else None
+        uniform_sky = SkySpec(illuminance_lx=sun_lx + sky_lx, kind="uniform", panorama=panorama)
         scene = replace(scene, sun=None, sky=uniform_sky)
     return replace(case, scene=scene, lighting=lighting)
 

@@ -1,7 +1,7 @@
 """What scenes are made of: textures, shapes, furniture, rooms, and models from files."""
 
 # Names that a scene's YAML may say, for those who need no more than the names: kinds of furniture, finishes of rooms
-# (both of `asset.room`), roles of a model's nodes, endings of models' files.
+# (both of `asset.room`), kinds of panoramas, roles of a model's nodes, endings of models' files.
 # fmt: off
 FURNITURE = (
     "bench", "blind", "bollard", "book_stack", "bush", "cabinet", "cables", "car", "carton", "chair", "crate",
@@ -16,5 +16,6 @@ FINISHES = (
     "terrazzo", "white_plaster",
 )
 # fmt: on
+PANORAMAS = ("city", "suburb", "country")
 ROLES = ("mirror", "pane", "lamp", "mover", "ignored")
 MODEL_SUFFIXES = (".glb", ".gltf", ".obj", ".stl", ".ply")

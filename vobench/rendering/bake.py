@@ -29,6 +29,7 @@ from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Light, Sky, Sun
 from vobench.scene.material import Material, Picture, Texture
 from vobench.scene.mesh import Triangles, areas_m2, distinct
+from vobench.scene.panorama import PanoramaMap
 from vobench.scene.scene import Scene, triangles
 from vobench.setting import Positive, settings
 from vobench.trajectory.nanoseconds import NS_PER_S
@@ -425,6 +426,10 @@ def save_baked(folder: Path, baked: BakedScene) -> None:
     for track in baked.tracks:
         np.savez(folder / f"sun.{track.light}.npz", times_ns=track.times_ns, bounced=track.bounced)
     np.savez(folder / TEXTURES, **_painted(baked))
+    for index, light in enumerate(baked.scene.lights):
+        if isinstance(light, Sky) and light.panorama is not None:
+            shown = light.panorama.map_under(light)
+            np.savez(folder / f"panorama.{index}.npz", daylight=shown.daylight, lamps=shown.lamps)
 
 
 def _painted(baked: BakedScene) -> dict[str, Any]:
@@ -463,11 +468,23 @@ def _with_pictures(scene: Scene, pictures: Mapping[str, Any]) -> Scene:
     return replace(scene, materials=materials)
 
 
+def _with_panoramas(scene: Scene, folder: Path) -> Scene:
+    """The scene with the panoramas that were painted for its skies, which need not be painted once more."""
+    lights = list[Light]()
+    for index, light in enumerate(scene.lights):
+        if isinstance(light, Sky) and light.panorama is not None:
+            stored = _load(folder / f"panorama.{index}.npz")
+            lights.append(replace(light, panorama=PanoramaMap(stored["daylight"], stored["lamps"])))
+        else:
+            lights.append(light)
+    return replace(scene, lights=tuple(lights))
+
+
 def load_baked(folder: Path, scene: Scene) -> BakedScene:
     """The light that `save_baked` wrote, for the same scene. Raises RenderError where it is damaged."""
     try:
         settings = BakeSettings(**json.loads((folder / SETTINGS_FILE).read_text()))
-        pictured = _with_pictures(scene, _load(folder / TEXTURES))
+        pictured = _with_panoramas(_with_pictures(scene, _load(folder / TEXTURES)), folder)
         light = np.load(folder / LIGHT)
         arrays = _load(folder / PLACES)
         tracks = []

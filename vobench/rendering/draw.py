@@ -1,6 +1,6 @@
 """Draws pictures: batches of triangles, mirrors and what is seen in them, the background, panes."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from vobench.geometry import se3
 from vobench.rendering.batch import Batch, Geometry
 from vobench.rendering.culling import CullingSet, Runs
 from vobench.rendering.draw_call import LAYERS, LAYERS_UNIT, DrawCalls, probe_share
-from vobench.rendering.opengl import Canvas, FlatTarget, LightTexture, bind
+from vobench.rendering.opengl import Canvas, FlatTarget, LightTexture, PanoramaTexture, bind
 from vobench.rendering.planar_mirror import PlanarMirror
 from vobench.rendering.probe import Probe
 from vobench.rendering.render_target import MIRRORS, RenderTarget
@@ -21,8 +21,13 @@ LEAST_SHARE = 5e-4  # of the picture, times what it mirrors, that a mirror is fo
 class BatchDraw:
     """Draws batches onto targets, as long as its context is current."""
 
-    def __init__(self, geometry: Geometry, light: LightTexture) -> None:
-        self._calls = DrawCalls(geometry, light)
+    def __init__(
+        self,
+        geometry: Geometry,
+        light: LightTexture,
+        panoramas: Mapping[int, PanoramaTexture],
+    ) -> None:
+        self._calls = DrawCalls(geometry, light, panoramas)
         self._culling = CullingSet(geometry.clusters)
         self._mirrors = geometry.mirrors
         unmirrored = [batch for batch in geometry.batches if batch.mirror is None]

@@ -1,6 +1,6 @@
 """OpenGL draw calls for a batch of triangles, the sky and the mean of samples, with the uniforms that they read."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 
 import numpy as np
@@ -16,6 +16,7 @@ from vobench.rendering.opengl import (
     Elements,
     FlatTarget,
     LightTexture,
+    PanoramaTexture,
     ShaderProgram,
     SurfaceTexture,
     bind,
@@ -32,6 +33,7 @@ LIGHT_UNIT = GL.GL_TEXTURE0 + 1
 LAYERS_UNIT = GL.GL_TEXTURE0 + 2
 EMISSION_UNIT = GL.GL_TEXTURE0 + 3
 PROBE_UNIT = GL.GL_TEXTURE0 + 4
+PANORAMA_UNIT = GL.GL_TEXTURE0 + 5
 
 LAYERS = GL.GL_TEXTURE_2D_ARRAY
 CLIP_MARGIN_PX = 1 / 8
@@ -42,13 +44,21 @@ FADE = 0.1  # the range of roughness below PROBE_MOST in which the share of the 
 class DrawCalls:
     """The draw calls of a scene, and the shader programs and buffers that they share.
 
+    `panoramas` are those of the skies that have one, by the index of the sky.
+
     They can be used while the OpenGL context in which they were created is current. `abilities` are the preprocessor
     names of each batch's shader.
     """
 
-    def __init__(self, geometry: Geometry, light: LightTexture) -> None:
+    def __init__(
+        self,
+        geometry: Geometry,
+        light: LightTexture,
+        panoramas: Mapping[int, PanoramaTexture],
+    ) -> None:
         self._program = cache(ShaderProgram)
         self._light = light
+        self._panoramas = panoramas
         self._batches = geometry.batches
         self._uploaded_poses = b""
         self._textures = _textures(geometry.batches)
@@ -140,8 +150,19 @@ class DrawCalls:
         # These pixels are still black, so additive blending sums the skies.
         GL.glEnable(GL.GL_BLEND)
         GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
-        for gradation, scatter, sun, colour in view.skies:
-            is_mono = canvas.abilities != ()
+        is_mono = canvas.abilities != ()
+        for index, (gradation, scatter, sun, colour) in enumerate(view.skies):
+            if index in self._panoramas:
+                bind(PANORAMA_UNIT, self._panoramas[index].id)
+                program = self._program("background", "panorama", *canvas.abilities)
+                program.use(
+                    world_from_screen=view.world_from_screen,
+                    illuminance_lx=float(gradation[2]),
+                    lamp_share=float(gradation[3]),
+                    weights=np.array([*weights, 0.0]),
+                )
+                self._cover(canvas.layers)
+                continue
             mono_colour = np.array([colour[:3] @ weights, 0, 0, 0])
             canvas_colour = mono_colour if is_mono else colour
             program = self._program("background", "background")

@@ -13,7 +13,7 @@ from vobench.rendering.bake import BakedScene
 from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
 from vobench.rendering.illumination import AmbientLight, Background, Illumination
-from vobench.rendering.opengl import CENTRE, HALVES, TURNED, LightTexture
+from vobench.rendering.opengl import CENTRE, HALVES, TURNED, LightTexture, PanoramaTexture
 from vobench.rendering.probe import Probe, glints, room_probe
 from vobench.rendering.render_target import RenderTarget, render_target
 from vobench.rendering.renderer import Radiance, View
@@ -38,7 +38,8 @@ class FrameRenderer:
         self._lights = baked.scene.lights
         self._light = LightTexture(self._illumination.without_movers(0, 0))
         drawn = geometry(baked.faces, baked.light_uv, baked.scene.materials)
-        self._draw = BatchDraw(drawn, self._light)
+        panoramas = {index: PanoramaTexture(shown) for index, shown in self._background.panoramas.items()}
+        self._draw = BatchDraw(drawn, self._light, panoramas)
         self._target = cache(partial(render_target, in_colour=self._draw.mirrors_in_colour))
         self._warp = cache(warp)
         if self._draw.needs_probe:

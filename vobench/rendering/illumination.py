@@ -11,6 +11,7 @@ from vobench.rendering.array_types import Floats
 from vobench.rendering.bake import BakedScene, SunTrack, direct_layer, direct_points, static_scene, travelled_rad
 from vobench.rendering.mover_light import MoverLight, MoverLightAt, Views
 from vobench.scene.light import SKIES, Light, Sky, Steady, Sun
+from vobench.scene.panorama import PanoramaMap, lamp_share
 from vobench.trajectory.nanoseconds import NS_PER_S
 
 ZENITH = np.array([0.0, 0.0, 1.0])
@@ -48,18 +49,28 @@ class AmbientLight:
 
 
 class Background:
-    """The skies among a scene's lights."""
+    """The skies among a scene's lights, with the maps of those that have a panorama, by their index."""
 
     def __init__(self, lights: Sequence[Light]) -> None:
         self.skies = [light for light in lights if isinstance(light, Sky)]
+        self.panoramas = dict[int, PanoramaMap]()
+        for index, sky in enumerate(self.skies):
+            if sky.panorama is not None:
+                self.panoramas[index] = sky.panorama.map_under(sky)
         nominal = [_coefficients(sky) for sky in self.skies]
         self._nominal = np.array(nominal).reshape(-1, 3, 4)
 
     def coefficients(self, start_ns: int, end_ns: int) -> Array:
-        """(S, 3, 4): `gradation`, `scatter` and `sun` of the shader, with the mean level over an interval."""
+        """(S, 3, 4): `gradation`, `scatter` and `sun` of the shader, with the mean level over an interval.
+
+        Of a sky with a panorama, `gradation` ends in its illuminance and in the share of the panorama's lamps.
+        """
         coefficients = self._nominal.copy()
         levels = [sky.level.mean(start_ns, end_ns) for sky in self.skies]
         coefficients[:, 0, 2:] *= np.reshape(levels, (-1, 1))
+        for index in self.panoramas:
+            illuminance_lx = levels[index] * self.skies[index].illuminance_lx
+            coefficients[index, 0, 2:] = (illuminance_lx, lamp_share(illuminance_lx))
         return coefficients
 
 
@@ -71,7 +82,7 @@ def _coefficients(sky: Sky) -> Array:
     chi = np.arccos(cosine)  # from the sun to the zenith
     gradation = 1 + a * np.exp(b)
     scatter = 1 + c * (np.exp(d * chi) - scatter_across) + e * np.cos(chi) ** 2
-    zenith, ground = sky.luminance_cd_m2(np.stack([ZENITH, -ZENITH]))
+    zenith, ground = sky.standard_cd_m2(np.stack([ZENITH, -ZENITH]))
     return np.array(
         [
             [a, b, zenith / (gradation * scatter), ground],

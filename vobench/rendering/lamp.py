@@ -1,6 +1,6 @@
 """Lamps: lights as ground truth of shadows sees them, each from its middle."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,8 +9,9 @@ from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.geometry import RAY_OFFSET_M
+from vobench.rendering.lamp_shadow import LAMPS_AT_ONCE, Bits
 from vobench.rendering.occlusion import Bodies, dot
-from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun
+from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.scene import Scene
 
 SUN_DISTANCE_M = 1e4  # beyond every scene
@@ -53,29 +54,62 @@ class Lamp:
         if self.min_cosine < -1:
             return True
         backwards = (-self.axis).astype(np.float32)
-        along = np.einsum("ri,i->r", vectors_m, backwards)
+        x, y, z = (backwards[axis] * vectors_m[:, axis] for axis in range(3))
+        along = x + y + z
         if self.min_cosine == 0:
             return np.asarray(along > 0)
         length_m = np.sqrt(dot(vectors_m, vectors_m))
         return np.asarray(along > self.min_cosine * length_m)
 
 
-def lamps(
+@dataclass(frozen=True, slots=True)
+class LampGroup:
+    """Lamps with a bit each; facing (F + 1,): bits of the lamps that each face is turned to, 0 where it is not lit."""
+
+    lamps: tuple[Lamp, ...]
+    facing: Bits
+
+    def bits_before(self, normals: Array, offsets_m: Array) -> Bits:
+        """Bits (P,) of the lamps that planes (P, 3), offsets_m (P,) from the origin, are turned to."""
+        bits = np.zeros(len(normals), np.uint32)
+        for nth, lamp in enumerate(self.lamps):
+            bits |= lamp.is_before(normals, offsets_m).astype(np.uint32) << np.uint32(nth)
+        return bits
+
+
+def lamps_on(scene: Scene, t_ns: int) -> tuple[int, ...]:
+    """The indices of the lights that are on at an instant, but for the sky, which has no middle."""
+    lights = []
+    for index, light in enumerate(scene.lights):
+        if light.level.mean(t_ns, t_ns) > 0 and not isinstance(light, Sky):
+            lights.append(index)
+    return tuple(lights)
+
+
+def lamp_groups(
     scene: Scene,
     bodies: Bodies,
+    is_lit: Mask,
+    lights: Sequence[int],
     t_ns: int,
-) -> Iterator[tuple[Lamp, Mask]]:
-    """The lights that are on at an instant, but for the sky, which has no middle; and the faces turned to each."""
-    for index, light in enumerate(scene.lights):
-        is_on = light.level.mean(t_ns, t_ns) > 0
-        if is_on and not isinstance(light, Sky):
-            is_face = bodies.faces.lamp == index
-            lamp = _lamp(light, bodies.faces.corners_m[is_face], t_ns)
-            yield lamp, lamp.is_before(bodies.normals, bodies.offsets_m)
+) -> Iterator[LampGroup]:
+    """The lamps that some lights are, by their indices, at an instant.
+
+    is_lit (F + 1,): the faces that show the light that falls on them.
+    """
+    lamps = []
+    for index in lights:
+        is_face = bodies.faces.lamp == index
+        lamps.append(_lamp(scene.lights[index], bodies.faces.corners_m[is_face], t_ns))
+    for first in range(0, len(lamps), LAMPS_AT_ONCE):
+        some = tuple(lamps[first : first + LAMPS_AT_ONCE])
+        group = LampGroup(some, np.zeros(0, np.uint32))
+        facing = group.bits_before(bodies.normals, bodies.offsets_m) * is_lit
+        yield LampGroup(some, facing.astype(np.uint32))
 
 
 def _lamp(
-    light: AreaLight | PointLight | SpotLight | Sun,
+    light: Light,
     corners_m: Array,
     t_ns: int,
 ) -> Lamp:
@@ -89,6 +123,8 @@ def _lamp(
             return Lamp(light.position_m, light.direction, min_cosine)
         case AreaLight():
             return lamp_of(corners_m)
+        case Sky():
+            raise ValueError("the sky surrounds the scene and has no middle")
 
 
 def lamp_of(corners_m: Array) -> Lamp:

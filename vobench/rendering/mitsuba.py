@@ -181,6 +181,7 @@ def register() -> None:
 
 
 SKY_PX = (512, 1024)  # rows and columns of the sky's picture: a third of a degree; even, so that none is the horizon
+PANORAMA_PX = (1024, 2048)
 CUTOUT_PX = 4  # a texel's edge, in pixels of the mask of its holes
 
 Plugin = dict[str, Any]
@@ -451,7 +452,7 @@ def _emitter(mi: Any, light: Light) -> Plugin:
 
 def _sky_picture(sky: Sky) -> Map:
     """Luminance (rows, columns, 3) float32 as Mitsuba's environment map wants it: y up, from zenith to nadir."""
-    rows, columns = SKY_PX
+    rows, columns = SKY_PX if sky.panorama is None else PANORAMA_PX
     theta = np.pi * np.arange(rows)[:, None] / (rows - 1)
     phi = 2 * np.pi * (np.arange(columns) + 0.5) / columns
     # Turned upright, the map's (x, y, z) are our (x, z, -y).
@@ -459,5 +460,4 @@ def _sky_picture(sky: Sky) -> Map:
     y = np.sin(theta) * np.cos(phi)
     z = np.cos(theta)
     directions = np.stack(np.broadcast_arrays(x, y, z), -1)
-    luminance_cd_m2 = sky.luminance_cd_m2(directions)[..., None]
-    return np.asarray(luminance_cd_m2 * np.array(sky.colour), np.float32)
+    return np.asarray(sky.seen_cd_m2(directions), np.float32)

@@ -19,6 +19,7 @@ from vobench.rendering.renderer import Radiance
 from vobench.rendering.uniform_block import BLOCKS
 from vobench.rendering.view import Box
 from vobench.scene.material import linear
+from vobench.scene.panorama import PanoramaMap
 
 Floats = NDArray[np.float32]
 
@@ -98,6 +99,20 @@ def _halved(
     width = max(1, values.shape[1] >> times)
     height = max(1, values.shape[0] >> times)
     return np.asarray(cv2.resize(values, [width, height], interpolation=cv2.INTER_AREA))
+
+
+class PanoramaTexture:
+    """A panorama: daylight in its colours, the luminance of lamps in the fourth channel, with mipmaps."""
+
+    def __init__(self, panorama: PanoramaMap) -> None:
+        lamps = panorama.lamps[..., None]
+        values = np.concatenate([panorama.daylight, lamps], axis=2)
+        self.id = GL.glGenTextures(1)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
+        _upload(GL.GL_RGBA16F, GL.GL_RGBA, values, GL.GL_HALF_FLOAT)
+        GL.glGenerateMipmap(GL.GL_TEXTURE_2D)
+        _texture_parameters(GL.GL_LINEAR_MIPMAP_LINEAR, GL.GL_LINEAR, GL.GL_REPEAT)
+        GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_WRAP_T, GL.GL_CLAMP_TO_EDGE)
 
 
 # Position, normal, place on the texture, place on the map of light: by their locations in the vertex shader.

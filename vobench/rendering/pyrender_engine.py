@@ -234,12 +234,17 @@ class PyrenderScene:
             material.emissiveFactor = np.sqrt(level * nominal)
 
     def _background(self, levels: Sequence[float]) -> Array:
-        """Stored red, green, blue and alpha (4,) where nothing is: the mean of the sky above the horizon."""
+        """Stored red, green, blue and alpha (4,) where nothing is: the mean of the sky above the horizon.
+
+        Of a panorama it is the mean of what is less than 30 degrees above or below the horizon.
+        """
         colour = np.zeros(3)
         for light, level in zip(self._scene.lights, levels, strict=True):
             if isinstance(light, Sky):
-                white_share = level * light.illuminance_lx / np.pi / self._white_cd_m2
-                colour += white_share * np.array(light.colour)
+                mean_cd_m2 = light.illuminance_lx / np.pi * np.array(light.colour)
+                if light.panorama is not None:
+                    mean_cd_m2 = light.illuminance_lx * light.panorama.map_under(light).around_horizon
+                colour += level * mean_cd_m2 / self._white_cd_m2
         return np.append(np.clip(colour, 0, 1) ** (1 / GAMMA), 1.0)
 
     def _add_things(

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.rendering.array_types import Indices, Mask, Pixels
-from vobench.rendering.lamp import Lamp, lamps
-from vobench.rendering.occlusion import Bodies, dot
+from vobench.rendering.array_types import Floats, Indices, Mask, Pixels
+from vobench.rendering.lamp import Lamp, LampGroup, lamp_groups, lamps_on
+from vobench.rendering.lamp_shadow import blocks_of, hidden_lamps
+from vobench.rendering.occlusion import NO_PLANE, Bodies, dot
 from vobench.rendering.shot import CameraShot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene
@@ -43,17 +44,14 @@ class FaceIds:
 
 @dataclass(frozen=True, slots=True)
 class TruthPicture:
-    """A picture to find the ground truth of: its scene, its camera now and for the next picture, None for no next one.
-
-    lamps: each with the faces (F + 1,) turned to it.
-    """
+    """A picture to find the ground truth of: its scene, its camera now and for the next picture, if there is one."""
 
     bodies: Bodies
     ids: FaceIds
     camera: Camera
     here: ShotTransforms
     there: ShotTransforms | None
-    lamps: tuple[tuple[Lamp, Mask], ...]
+    lamps: tuple[LampGroup, ...]
 
 
 @lru_cache(maxsize=4)
@@ -131,24 +129,45 @@ class Band:
 
     def _shadow(self) -> NDArray[np.uint16]:
         """How many lamps (R,) that what is seen is turned to shine on it, hidden by nothing."""
-        count = np.zeros(len(self._face), np.uint16)
-        here = self._picture.here
+        picture = self._picture
+        here = picture.here
         rows = self._uv_px[:, 1]
-        is_diffuse = self._picture.ids.diffuse[self._face]
         T_bodies_world = at_rows(here.T_bodies_world, rows)
         normals = self._normals(at_rows(here.T_world_bodies, rows))
         lift_m = self._bodies.ray_offset_m * normals
         starts_m = (self._world_m + lift_m).astype(np.float32)
         offsets_m = dot(self._world_m, normals) if self._movers else np.empty(0)
-        for lamp, faces in self._picture.lamps:
-            is_turned = faces[self._face]
+        plane = self._bodies.plane_numbers[self._face]
+        for _, pixels in self._movers:
+            plane[pixels] = NO_PLANE
+        width = picture.camera.width_px
+        blocks = blocks_of(len(plane) // width, width)
+
+        count = np.zeros(len(self._face), np.uint16)
+        for group in picture.lamps:
+            facing = group.facing[self._face]
             for _, pixels in self._movers:
-                is_turned[pixels] = lamp.is_before(normals[pixels], offsets_m[pixels])
-            vectors_m = lamp.vectors_m(starts_m)
-            is_lit = is_diffuse & is_turned & lamp.shines(vectors_m)
-            reach = np.where(is_lit, np.float32(1 - LAMP_TOLERANCE), NO_RAY)
-            count += self._bodies.blocked(starts_m, vectors_m, T_bodies_world, reach)
+                is_diffuse = picture.ids.diffuse[self._face[pixels]]
+                facing[pixels] = np.where(is_diffuse, group.bits_before(normals[pixels], offsets_m[pixels]), 0)
+            is_hidden = partial(self._is_hidden, group.lamps, starts_m, T_bodies_world)
+            count += np.bitwise_count(hidden_lamps(blocks, plane, facing, is_hidden))
         return count
+
+    def _is_hidden(
+        self,
+        lamps: Sequence[Lamp],
+        starts_m: Floats,
+        T_bodies_world: Sequence[Array],
+        nth: int,
+        pixels: Pixels,
+    ) -> Mask:
+        """Whether something is between a lamp that shines towards pixels (P,) and what they show at starts_m (R, 3)."""
+        pixel_starts_m = starts_m[pixels]
+        vectors_m = lamps[nth].vectors_m(pixel_starts_m)
+        is_lit = np.broadcast_to(lamps[nth].shines(vectors_m), len(pixels))
+        reach = np.where(is_lit, np.float32(1 - LAMP_TOLERANCE), NO_RAY)
+        T_bodies_pixels = [of_rays(T_body_world, pixels) for T_body_world in T_bodies_world]
+        return self._bodies.blocked(pixel_starts_m, vectors_m, T_bodies_pixels, reach)
 
     def _flow(self, *, hides: bool) -> tuple[Array, Mask]:
         """Pixels (R, 2) to the place in the next picture, and whether the point is hidden or outside there (R,)."""
@@ -262,6 +281,17 @@ class TruthCaster:
             diffuse=np.array([*diffuse, False])[thing_of] & is_no_lamp,
         )
         self._pool = ThreadPoolExecutor(THREADS)
+        self._lamp_groups = lru_cache(maxsize=2)(self._lamp_groups_of)
+
+    def _lamp_groups_of(self, lights: tuple[int, ...], t_ns: int) -> tuple[LampGroup, ...]:
+        """The lamps among lights, by their indices, as they are at an instant."""
+        return tuple(lamp_groups(self._scene, self._bodies, self._ids.diffuse, lights, t_ns))
+
+    def _lamps_at(self, t_ns: int) -> tuple[LampGroup, ...]:
+        """The lamps that are on at an instant; computed again if others are on or the sun has moved."""
+        lights = lamps_on(self._scene, t_ns)
+        is_moving = any(self._scene.lights[index].moves for index in lights)
+        return self._lamp_groups(lights, t_ns if is_moving else 0)
 
     def frame(
         self,
@@ -282,14 +312,13 @@ class TruthCaster:
             values[name] = np.empty(channel.shape(height, camera.width_px), channel.dtype)
         movers = self._scene.movers
         middle_ns = int(np.mean(now.t_ns))
-        lit = lamps(self._scene, self._bodies, middle_ns) if "shadow" in wanted else ()
         picture = TruthPicture(
             bodies=self._bodies,
             ids=self._ids,
             camera=camera,
             here=shot_transforms(movers, now),
             there=shot_transforms(movers, later) if later else None,
-            lamps=tuple(lit),
+            lamps=self._lamps_at(middle_ns) if "shadow" in wanted else (),
         )
 
         def fill(rows: slice) -> None:

@@ -13,6 +13,7 @@ from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
 from vobench.scene.material import WHITE, Rgb
 from vobench.scene.mesh import areas_m2, corners
+from vobench.scene.panorama import PanoramaMap
 from vobench.setting import Positive, Share, settings
 from vobench.trajectory.nanoseconds import NS_PER_S
 
@@ -241,11 +242,19 @@ SKIES = {
 }
 
 
+class Panorama(Protocol):
+    """What surrounds a scene at infinity: buildings, trees, ground, and clouds in the sky."""
+
+    def map_under(self, sky: "Sky") -> PanoramaMap:
+        """The panorama under a sky, whose own panorama does not count."""
+
+
 @dataclass(frozen=True, slots=True)
 class Sky:
     """A sky that gives illuminance_lx on open level ground, and that ground seen below the horizon.
 
-    `kind` is one of SKIES; only the clear one depends on where the sun is (unit vector (3,)).
+    `kind` is one of SKIES; only the clear one depends on where the sun is (unit vector (3,)). A `panorama` takes the
+    place of the ground and hides the sky near the horizon.
     """
 
     name: str
@@ -255,10 +264,23 @@ class Sky:
     ground_albedo: float = 0.2
     level: Level = STEADY
     colour: Rgb = WHITE
+    panorama: Panorama | None = None
     moves: ClassVar[bool] = False
 
     def luminance_cd_m2(self, directions: Array) -> Array:
-        """Luminance (...) seen along unit directions (..., 3). Source: ISO 15469:2004, eqs 1 to 7."""
+        """Luminance (...) along unit directions (..., 3), as it lights a scene."""
+        if self.panorama is None:
+            return self.standard_cd_m2(directions)
+        return self.illuminance_lx * self.panorama.map_under(self).luminance(directions)
+
+    def seen_cd_m2(self, directions: Array) -> Array:
+        """Linear red, green and blue (..., 3) seen along unit directions (..., 3) at level 1."""
+        if self.panorama is None:
+            return np.asarray(self.standard_cd_m2(directions)[..., None] * np.array(self.colour))
+        return self.illuminance_lx * self.panorama.map_under(self).seen(directions)
+
+    def standard_cd_m2(self, directions: Array) -> Array:
+        """Luminance (...) along unit directions (..., 3) without a panorama. Source: ISO 15469:2004, eqs 1 to 7."""
         sun_direction = map(float, self.sun_direction)
         scale = self.illuminance_lx / _level_illuminance(self.kind, *sun_direction)
         sky = _relative_luminance(self.kind, self.sun_direction, directions) * scale

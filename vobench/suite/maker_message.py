@@ -26,6 +26,7 @@ from vobench.scene.light import (
     Flicker,
     Level,
     Light,
+    Panorama,
     PointLight,
     Scaled,
     Sky,
@@ -266,6 +267,7 @@ _OF_FIELDS: dict[Any, Any] = {
     _Mesh: Annotated[Any, AfterValidator(_require_mesh)],
     Level: _instance_of(*LEVELS),
     Texture | None: _instance_of(*TEXTURES, type(None)),
+    Panorama | None: _instance_of(type(None)),  # a scene's file adds it
 }
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from vobench.asset.furniture import Part
 from vobench.asset.outdoors import walker
+from vobench.asset.panorama import Surroundings
 from vobench.asset.room import FINISHES, OUTWARD, Instance, Opening, Piece, shell, things
 from vobench.asset.shape import at, block, card
 from vobench.errors import SuiteError, VobenchError
@@ -21,14 +22,14 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.scene import scene as scripted
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2
+from vobench.scene.material import LUMINANCE, WHITE, Material, emitted_cd_m2
 from vobench.scene.mesh import Thing, areas_m2, corners, moved
 from vobench.scene.scene import Scene
 from vobench.suite.maker_message import MakerScene
 from vobench.suite.scene_check import materials_used
 from vobench.suite.scene_file import scene_content
 from vobench.suite.scene_lighting import SKY, SUN, Lighting, with_lighting
-from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile, SunSpec, unit_luminance_colour
+from vobench.suite.scene_spec import ModelSpec, MoverSpec, PanoramaSpec, SceneFile, SunSpec, unit_luminance_colour
 
 
 def build(spec: SceneFile, lighting: Lighting) -> Scene:
@@ -188,9 +189,31 @@ def listed_lights(spec: SceneFile) -> Iterator[Light]:
     if spec.sky:
         # A clear sky is brightest around where the sun stands at first, or overhead without a sun.
         toward = _sun(spec.sun).direction(0) if spec.sun else np.array([0.0, 0.0, 1.0])
-        colour = unit_luminance_colour(spec.sky.colour)
-        level = spec.sky.level.build()
-        yield Sky(SKY, spec.sky.illuminance_lx, spec.sky.kind, toward, level=level, colour=colour)
+        yield Sky(
+            SKY,
+            spec.sky.illuminance_lx,
+            spec.sky.kind,
+            toward,
+            level=spec.sky.level.build(),
+            colour=unit_luminance_colour(spec.sky.colour),
+            panorama=_panorama(spec.sky.panorama, spec.sun),
+        )
+
+
+def _panorama(panorama: PanoramaSpec | None, sun: SunSpec | None) -> Surroundings | None:
+    """What surrounds a scene, in the light of its sun."""
+    if panorama is None:
+        return None
+    sun_lx = sun.illuminance_lx if sun else 0.0
+    sun_colour = unit_luminance_colour(sun.colour) if sun else WHITE
+    return Surroundings(
+        kind=panorama.kind,
+        seed=panorama.seed,
+        height_m=panorama.height_m,
+        distance_m=panorama.distance_m,
+        sun_lx=sun_lx,
+        sun_colour=sun_colour,
+    )
 
 
 def _sun(sun: SunSpec) -> Sun:

@@ -7,7 +7,7 @@ import numpy as np
 from annotated_types import Ge, Gt, Le, Lt, MinLen
 from numpy.typing import ArrayLike, NDArray
 
-from vobench.asset import FURNITURE, ROLES
+from vobench.asset import FURNITURE, PANORAMAS, ROLES
 from vobench.asset.texture import Procedural
 from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
@@ -360,6 +360,19 @@ class SunSpec:
 
 
 @settings()
+class PanoramaSpec:
+    """What surrounds a scene, too far away for parallax; another seed has other buildings, trees and clouds.
+
+    `height_m` is how high the scene's z = 0 is above the ground around. `distance_m` is how near the first things are.
+    """
+
+    kind: Annotated[str, OneOf("panorama", PANORAMAS)]
+    seed: Annotated[int, Ge(0)] = 0
+    height_m: Annotated[float, Ge(0), Le(300)] = 0.0
+    distance_m: Annotated[float, Ge(15), Le(500)] = 30.0
+
+
+@settings()
 class SkySpec:
     """A sky, as the illuminance of open horizontal ground."""
 
@@ -367,6 +380,7 @@ class SkySpec:
     kind: Annotated[str, OneOf("sky", SKIES)] = "overcast"
     colour: Hue = WHITE
     level: LevelSpec = STEADY
+    panorama: PanoramaSpec | None = None
 
 
 @settings()
