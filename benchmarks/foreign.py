@@ -11,7 +11,7 @@ import argparse
 import time
 from collections.abc import Iterator
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -27,12 +27,15 @@ from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import single_instant
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import LUMINANCE, srgb
+from vobench.scene.mesh import areas_m2
+from vobench.scene.scene import Scene, triangles
 from vobench.sequence.picture import write_png
 from vobench.suite.viewpoint import is_place, viewpoints
 from vobench.suite.white import SATURATED, ExposedShares, exposed_shares, fitting_white_cd_m2, look_around
 
 SUFFIXES = (".glb", ".gltf", ".obj")
 COARSE = BakeSettings(spacing_m=0.05, light_rays=4, indirect_spacing_m=0.2, indirect_rays=16)
+COARSE_SAMPLES = 200_000  # of light, about
 LENS = Pinhole(240, 160, 120.0, 120.0, 119.5, 79.5)
 SHOWN = 4  # pictures of each model on its sheet
 MOST_SATURATED = 0.1
@@ -68,13 +71,21 @@ def models(folder: Path) -> list[Path]:
     return sorted(path for path in folder.rglob("*") if path.suffix.lower() in SUFFIXES)
 
 
-def examine(path: Path, settings: BakeSettings, out: Path | None) -> Result:
+def coarse_settings(scene: Scene) -> BakeSettings:
+    """Settings that take seconds for any scene, however large."""
+    area_m2 = float(areas_m2(triangles(scene).corners_m).sum())
+    spacing_m = max(COARSE.spacing_m, float(np.sqrt(area_m2 / COARSE_SAMPLES)))
+    return replace(COARSE, spacing_m=spacing_m, indirect_spacing_m=4 * spacing_m)
+
+
+def examine(path: Path, out: Path | None, *, is_coarse: bool) -> Result:
     """Bake a model and draw it from its viewpoints."""
     began_s = time.monotonic()
     try:
         report = survey_scene(str(path))
     except VobenchError as error:
         return Result(path.name, f"{error}")
+    settings = coarse_settings(report.scene) if is_coarse else BakeSettings()
     baked = bake(report.scene, settings)
     seen = look_around(baked)
     white_cd_m2 = fitting_white_cd_m2(seen.luminance(report.scene.lights), seen.is_source)
@@ -128,8 +139,7 @@ def main() -> None:
     print("| model | kind | faces | lights | white, cd/m² | saturated | black | good | s |")
     print("|---|---|---|---|---|---|---|---|---|")
     for path in models(arguments.folder):
-        settings = COARSE if arguments.coarse else BakeSettings()
-        print(examine(path, settings, arguments.out).row(), flush=True)
+        print(examine(path, arguments.out, is_coarse=arguments.coarse).row(), flush=True)
 
 
 if __name__ == "__main__":

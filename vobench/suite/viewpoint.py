@@ -42,8 +42,9 @@ class Viewpoint:
         """The unit directions (H * W, 3) of a lens's pixels in the world."""
         columns, rows = np.meshgrid(np.arange(lens.width_px), np.arange(lens.height_px))
         pixels = np.stack([columns, rows], -1).reshape(-1, 2)
-        directions: Array = lens.rays(pixels) @ self.T_world_camera()[:3, :3].T
-        return directions / np.linalg.norm(directions, axis=1, keepdims=True)
+        directions = lens.rays(pixels) @ self.T_world_camera()[:3, :3].T
+        lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+        return np.asarray(directions / lengths)
 
 
 def viewpoints(faces: Triangles, caster: RayCaster) -> list[Viewpoint]:
