@@ -30,7 +30,7 @@ from vobench.scene.material import LUMINANCE, srgb
 from vobench.scene.mesh import areas_m2
 from vobench.scene.scene import Scene, triangles
 from vobench.sequence.picture import write_png
-from vobench.suite.viewpoint import is_place, viewpoints
+from vobench.suite.viewpoint import viewpoints
 from vobench.suite.white import SATURATED, ExposedShares, exposed_shares, fitting_white_cd_m2, look_around
 
 SUFFIXES = (".glb", ".gltf", ".obj")
@@ -97,7 +97,7 @@ def examine(path: Path, out: Path | None, *, is_coarse: bool) -> Result:
     is_daylit = any(isinstance(light, Sun | Sky) for light in report.scene.lights)
     return Result(
         path.name,
-        kind="place" if is_place(report.found.free) else "object",
+        kind="place" if report.found.is_place else "object",
         faces=report.found.faces,
         lights=f"{len(report.scene.lights)}{', daylight' if is_daylit else ''}",
         white_cd_m2=white_cd_m2,

@@ -46,6 +46,8 @@ class SceneReport:
             f"backs seen: {found.backs:.1%}",
             f"free circle: {self._free_circle()}",
         ]
+        if not found.is_place:
+            lines.append("an object rather than a place to drive in: put it into a scene's YAML as one of its meshes")
         lines += [f"light: {light}, {strength(self.scene, light)}" for light in found.lights]
         return lines
 

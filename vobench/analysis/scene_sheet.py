@@ -15,7 +15,7 @@ from vobench.scene.material import reflectance, srgb
 from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_way import downward_directions
-from vobench.suite.viewpoint import Viewpoint, around, is_place
+from vobench.suite.viewpoint import Viewpoint, around
 
 Rgb8 = NDArray[np.uint8]
 CELL_WIDTH_PX = 480
@@ -45,7 +45,7 @@ def sheet(
 
 def _viewpoints(found: SceneSurvey) -> list[Viewpoint]:
     free = found.free
-    if free is None or not is_place(free):
+    if free is None or not found.is_place:
         return around(found.low_m, found.high_m, count=len(VIEWS_DEG))
     eye_m = (free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M)
     return [Viewpoint(eye_m, yaw_deg, VIEW_PITCH_DEG) for yaw_deg in VIEWS_DEG]

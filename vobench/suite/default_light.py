@@ -50,7 +50,7 @@ def default_light(shape: Scene, absorption: Array) -> DefaultLight:
     caster = RayCaster(faces)
     floor = floor_map(faces, caster)
     absorption_m2 = areas_m2(faces.corners_m) * absorption[faces.thing]  # (F,)
-    if floor is None or not is_place(floor.largest_circle()):
+    if floor is None or not is_place(faces, caster, floor.largest_circle()):
         return DefaultLight((), float(absorption_m2.sum()))
 
     eyes_m = at_height(_places(floor), floor.floor_m + BODY_M)

@@ -29,6 +29,7 @@ SIDES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # (4, 3) uni
 
 # The circular path of a body.
 LEAST_RADIUS_M = 0.2  # of the free circle
+LEAST_PLACE_M = 2.0  # the longer side of what a body drives in; what is smaller is an object
 MOST_RADIUS_M = 4.0  # of the path
 SHARE_OF_CIRCLE = 0.6  # radius of the path relative to the free circle's
 MOST_LENGTH_M = 10.0
@@ -150,9 +151,12 @@ def downward_directions(count: int) -> Array:
 def circular_path(scene: Scene) -> PoseSpline:
     """A path around the centre of the scene's largest free circle, of a body that looks ahead.
 
-    Raises SuiteError if the free circle is too small, or there is no floor.
+    Raises SuiteError if the free circle or the scene is too small, or there is no floor.
     """
     faces = triangles(scene, t_ns=0)
+    longer_side_m = longer_level_side_m(faces)
+    if longer_side_m < LEAST_PLACE_M:
+        raise _no_path(scene, f"it is only {longer_side_m:.2g} m wide")
     free = largest_free_circle(faces, RayCaster(faces))
     if free is None:
         raise _no_path(scene, "it has no level floor; is another axis up?")
@@ -166,13 +170,23 @@ def circular_path(scene: Scene) -> PoseSpline:
     return PoseSpline(poses=poses, ease_s=EASE_S, rate_hz=RATE_HZ)
 
 
+def longer_level_side_m(faces: Triangles) -> float:
+    """The length of the longer level side of the box around a scene."""
+    low_m = faces.corners_m.min((0, 1))
+    high_m = faces.corners_m.max((0, 1))
+    return float((high_m - low_m)[:2].max())
+
+
 def path_radius_m(free: FreeCircle) -> float:
     """The radius of the path in a free circle."""
     return min(SHARE_OF_CIRCLE * free.radius_m, MOST_RADIUS_M)
 
 
 def _no_path(scene: Scene, reason: str) -> SuiteError:
-    return SuiteError(f"no free path was found in '{scene.name}' ({reason}); add trajectories to the suite")
+    return SuiteError(
+        f"no free path was found in '{scene.name}' ({reason}); add trajectories to the suite, or if it is an object, "
+        "put it into a scene's YAML as one of its meshes"
+    )
 
 
 def _pose_on_circle(free: FreeCircle, radius_m: float, angle_rad: float) -> Pose:

@@ -11,13 +11,23 @@ from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import Triangles
-from vobench.suite.free_way import LEAST_RADIUS_M, FreeCircle, largest_free_circle, path_radius_m
+from vobench.suite.free_way import (
+    LEAST_PLACE_M,
+    LEAST_RADIUS_M,
+    FreeCircle,
+    largest_free_circle,
+    longer_level_side_m,
+    path_radius_m,
+)
 
 # Places along the path, and how the cameras there look.
 PATH_PLACES = 8
 EYE_HEIGHTS_M = (0.4, 1.2)  # of cameras on a robot and in a hand, by turns along the path
 EYE_SHARE = 0.7  # of the free height at a place, below which cameras stay
 PATH_PITCH_DEG = 10.0
+# What shows less around its path counts as an object.
+LEAST_SHOWN = 0.5  # share of the rays from the path that should meet something
+COARSE_LENS = Pinhole(16, 10, 7.75, 7.75, 7.5, 4.5)
 # Around an object.
 ORBIT_PLACES = 8
 ORBIT_PITCH_DEG = 20.0
@@ -48,17 +58,29 @@ class Viewpoint:
 
 
 def viewpoints(faces: Triangles, caster: RayCaster) -> list[Viewpoint]:
-    """Cameras along the free path that look ahead and back, or around a scene without a free circle."""
+    """Cameras along the free path that look ahead and back, or around a scene that is an object."""
     free = largest_free_circle(faces, caster)
-    if free is not None and is_place(free):
+    if free is not None and is_place(faces, caster, free):
         return _along_path(free, caster)
     corners_m = faces.corners_m.reshape(-1, 3)
     return around(corners_m.min(0), corners_m.max(0), count=ORBIT_PLACES)
 
 
-def is_place(free: FreeCircle | None) -> bool:
-    """Whether a body can drive in a scene with this largest free circle; otherwise the scene counts as an object."""
-    return free is not None and free.radius_m >= LEAST_RADIUS_M
+def is_place(faces: Triangles, caster: RayCaster, free: FreeCircle | None) -> bool:
+    """Whether a body can drive in a scene with this largest free circle; otherwise the scene counts as an object.
+
+    A chair's seat and a flat roof have free circles, too, but from there most of what is seen is the sky.
+    """
+    if free is None or free.radius_m < LEAST_RADIUS_M:
+        return False
+    if longer_level_side_m(faces) < LEAST_PLACE_M:
+        return False
+    is_shown = list[bool]()
+    for view in _along_path(free, caster):
+        directions = view.rays(COARSE_LENS)
+        face = caster.nearest(np.tile(view.eye_m, (len(directions), 1)), directions)
+        is_shown += (face >= 0).tolist()
+    return float(np.mean(is_shown)) >= LEAST_SHOWN
 
 
 def _along_path(free: FreeCircle, caster: RayCaster) -> list[Viewpoint]:
