@@ -29,7 +29,7 @@ def bare_model_scene(path: Path) -> SceneFile:
     bounces included. A is the area of the faces that can be seen from the free space.
     """
     from vobench.asset.model import read_model
-    from vobench.suite.default_light import DAYLIGHT_SKY, DAYLIGHT_SUN, default_light
+    from vobench.suite.default_light import DAYLIGHT_SKY, DAYLIGHT_SUN, DUSK_SKY, default_light
 
     model = read_model(path)
     corners_m = np.concatenate([thing.mesh.vertices for thing in model.everything])
@@ -54,7 +54,7 @@ def bare_model_scene(path: Path) -> SceneFile:
     if own_lx >= LEAST_LX:
         return spec
     if light.lamps:
-        return replace(spec, lamps=light.lamps)
+        return replace(spec, lamps=light.lamps, sky=DUSK_SKY if light.has_windows else None)
     return replace(spec, sun=DAYLIGHT_SUN, sky=DAYLIGHT_SKY)
 
 

@@ -6,25 +6,28 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
+from vobench.rendering.array_types import Indices
 from vobench.rendering.geometry import RayCaster
-from vobench.scene.mesh import Triangles, areas_m2
+from vobench.scene.mesh import areas_m2
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import BODY_M, FloorMap, Mask, at_height, downward_directions, floor_map
+from vobench.suite.free_way import BODY_M, FloorMap, at_height, downward_directions, floor_map
 from vobench.suite.scene_spec import PanelLamp, SkySpec, SunSpec
 from vobench.suite.viewpoint import is_place
 
 DAYLIGHT_SUN = SunSpec(illuminance_lx=30_000, azimuth_deg=30, elevation_deg=50)
 DAYLIGHT_SKY = SkySpec(illuminance_lx=8_000, kind="clear")
+DUSK_SKY = SkySpec(illuminance_lx=400)  # outside the windows of a place with lamps, which would otherwise be black
 ROOM_LX = 400.0
 
 MOST_PLACES = 300  # on the floor, that lamps may hang above and should light
 LEAST_COVERED = 0.5  # share of the floor below a ceiling, from which a scene is indoors
 LOW_CEILING = 0.5  # of the usual height; what is lower is a table or a shelf
 SHELL_RAYS = 64  # from each place
+LEAST_OUTSIDE = 0.005  # share of these rays that leave a place with windows
 
 MOST_LAMPS = 16
-ENOUGH_LIGHT = 0.4  # of the illuminance straight below a lamp, that each place should have
-LEAST_GAIN = 0.01  # of ENOUGH_LIGHT, in the mean over all places, that a further lamp adds
+ENOUGH_LIGHT = 0.15  # of the illuminance straight below a lamp, that each place should have
+LEAST_GAIN = 0.03  # of ENOUGH_LIGHT, in the mean over all places, that a further lamp adds
 LAMP_GAP = 0.03  # between lamp and ceiling, in heights of the ceiling
 LAMP_SIDE = 0.2  # in heights of the ceiling
 SMALLEST_SIDE_M = 0.1
@@ -34,10 +37,14 @@ ROOM_FOR_LAMP = 0.7  # of the distance to the nearest wall or shelf, that half a
 
 @dataclass(frozen=True, slots=True)
 class DefaultLight:
-    """Either lamps, or none for daylight; and the area that absorbs light, of faces seen from the free space."""
+    """Either lamps, or none for daylight; and the area that absorbs light, of faces seen from the free space.
+
+    has_windows: whether the sky is seen from below a ceiling.
+    """
 
     lamps: tuple[PanelLamp, ...]
     absorption_m2: float
+    has_windows: bool = False
 
 
 def default_light(shape: Scene, absorption: Array) -> DefaultLight:
@@ -54,7 +61,9 @@ def default_light(shape: Scene, absorption: Array) -> DefaultLight:
         return DefaultLight((), float(absorption_m2.sum()))
 
     eyes_m = at_height(_places(floor), floor.floor_m + BODY_M)
-    shell_m2 = float(absorption_m2[_seen_faces(eyes_m, faces, caster)].sum())
+    reached = _reached_faces(eyes_m, caster)
+    shell_m2 = float(absorption_m2[np.unique(reached[reached >= 0])].sum())
+    has_windows = float((reached < 0).mean()) > LEAST_OUTSIDE
     above = caster.hits(eyes_m, -downward_directions(len(eyes_m)))
     is_covered = above.face >= 0
     if is_covered.mean() < LEAST_COVERED:
@@ -73,7 +82,7 @@ def default_light(shape: Scene, absorption: Array) -> DefaultLight:
         side_m = float(sides_m[place].round(3))
         size_m = (side_m, side_m)
         lamps.append(PanelLamp(name=f"lamp_{number}", center_m=(x_m, y_m, z_m), size_m=size_m, power_lm=power_lm))
-    return DefaultLight(tuple(lamps), shell_m2)
+    return DefaultLight(tuple(lamps), shell_m2, has_windows)
 
 
 def _places(floor: FloorMap) -> Array:
@@ -89,13 +98,10 @@ def _places(floor: FloorMap) -> Array:
     return np.column_stack([floor.x_m[columns], floor.y_m[rows]])
 
 
-def _seen_faces(eyes_m: Array, faces: Triangles, caster: RayCaster) -> Mask:
-    """The faces (F,) that rays from places (N, 3) in all directions reach."""
+def _reached_faces(eyes_m: Array, caster: RayCaster) -> Indices:
+    """The faces (R,) that rays from places (N, 3) in all directions reach, -1 for none."""
     directions = unit(np.random.default_rng(0).standard_normal((len(eyes_m) * SHELL_RAYS, 3)))
-    reached = caster.nearest(np.repeat(eyes_m, SHELL_RAYS, axis=0), directions)
-    is_seen = np.zeros(len(faces), bool)
-    is_seen[reached[reached >= 0]] = True
-    return is_seen
+    return caster.nearest(np.repeat(eyes_m, SHELL_RAYS, axis=0), directions)
 
 
 def _hung(eyes_m: Array, heights_m: Array, caster: RayCaster) -> tuple[Array, Array]:

@@ -26,7 +26,7 @@ EYE_HEIGHTS_M = (0.4, 1.2)  # of cameras on a robot and in a hand, by turns alon
 EYE_SHARE = 0.7  # of the free height at a place, below which cameras stay
 PATH_PITCH_DEG = 10.0
 # What shows less around its path counts as an object.
-LEAST_SHOWN = 0.5  # share of the rays from the path that should meet something
+LEAST_SHOWN = 0.35  # share of the rays from the path that should meet something
 COARSE_LENS = Pinhole(16, 10, 7.75, 7.75, 7.5, 4.5)
 # Around an object.
 ORBIT_PLACES = 8

@@ -28,6 +28,7 @@ BLACK = 0.009  # luminance relative to white up to which a pixel is black
 WHITE_PERCENTILE = 95.0  # of the luminance of surfaces; lamps and the sky may be brighter
 MOST_SATURATED = 0.05  # share of the pixels
 MOST_BLACK = 0.2
+TOLERANCE = 0.02  # of the share beyond these, within which the nearest white is taken
 STEPS_PER_STOP = 8
 MOST_STOPS = 6  # from the percentile
 DIGITS = 3  # of white
@@ -93,8 +94,8 @@ def exposed_shares(luminance_cd_m2: Array, white_cd_m2: float) -> ExposedShares:
 def fitting_white_cd_m2(luminance_cd_m2: Array, is_source: Mask) -> float:
     """The white for luminances (N,) in cd/m², some of which are of lamps and the sky, to three digits.
 
-    It is a high percentile of the surfaces. Where that leaves too many pixels saturated or black, the nearest white
-    is taken for which their excess is the least.
+    It is a high percentile of the surfaces. Where that leaves too many pixels saturated or black, it is the nearest
+    white whose excess is the least, to within TOLERANCE.
     """
     is_lit = luminance_cd_m2 > 0
     is_lit_surface = is_lit & ~is_source
@@ -108,7 +109,7 @@ def fitting_white_cd_m2(luminance_cd_m2: Array, is_source: Mask) -> float:
     nearest_first = np.stack([steps, -steps], axis=1).ravel()
     candidates_cd_m2 = first_cd_m2 * 2.0 ** (nearest_first / STEPS_PER_STOP)
     excess = [exposed_shares(luminance_cd_m2, white).excess for white in candidates_cd_m2.tolist()]
-    best = int(np.argmin(np.round(excess, 2)))
+    best = int(np.argmax(np.array(excess) <= min(excess) + TOLERANCE))  # the first of them
     return float(f"{candidates_cd_m2[best]:.{DIGITS}g}")
 
 
