@@ -69,11 +69,13 @@ def seen_light(baked: BakedScene, origins_m: Array, directions: Array) -> SeenLi
     rays = _Rays(np.arange(count), origins_m, directions, np.ones(count))
     for _ in range(MOST_SURFACES):
         hits = surfaces.hits(rays)
-        scattered = surfaces.scattered(rays, hits)
         for index, light in enumerate(baked.scene.lights):
-            emitted_cd_m2 = surfaces.emitted_cd_m2(index, light, rays, hits)
-            scattered_cd_m2 = scattered * surfaces.illuminance_lx(index, light, hits) / np.pi
-            luminance[index, rays.pixel] += rays.share * (emitted_cd_m2 + scattered_cd_m2)
+            luminance[index, rays.pixel] += rays.share * surfaces.emitted_cd_m2(index, light, rays, hits)
+        scattered = surfaces.scattered(rays, hits)
+        bodies = np.flatnonzero(scattered)
+        illuminance_lx = surfaces.illuminance_lx(hits.take(bodies))
+        body_share = rays.share[bodies] * scattered[bodies]
+        luminance[:, rays.pixel[bodies]] += body_share * illuminance_lx / np.pi
         has_full_share = rays.share > 1 / 2
         is_source[rays.pixel[surfaces.are_sources(hits) & has_full_share]] = True
         rays = surfaces.followed(rays, hits)
@@ -146,14 +148,16 @@ class _Surfaces:
         result[rows] = leaving * self._reflectance(hits.take(rows))
         return result
 
-    def illuminance_lx(self, index: int, light: Light, hits: Hits) -> Array:
-        """The illuminance (R,) on faces by one light alone, of the nearest texel."""
+    def illuminance_lx(self, hits: Hits) -> Array:
+        """The illuminance (L, R) on faces by each light alone at level 1, of the nearest texel."""
         baked = self._baked
         texel = baked.atlas.index(hits.at(baked.atlas.light_px))
-        weights = np.array(light.colour) * LUMINANCE
-        direct_lx = baked.direct[index].reshape(-1)[texel]
-        bounced_lx = baked.spread[texel] @ (baked.bounced[index] @ weights)
-        return np.asarray(direct_lx + bounced_lx, float)
+        spread = baked.spread[texel]
+        by_light = list[Array]()
+        for light, direct, bounced in zip(baked.scene.lights, baked.direct, baked.bounced, strict=True):
+            bounced_lx = bounced @ (np.array(light.colour) * LUMINANCE)  # (S,)
+            by_light.append(direct.reshape(-1)[texel] + spread @ bounced_lx)
+        return np.array(by_light).reshape(len(baked.scene.lights), len(texel))
 
     def _reflectance(self, hits: Hits) -> Array:
         """The luminous reflectance (R,) of bodies, under their coats."""
