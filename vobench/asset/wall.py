@@ -146,7 +146,7 @@ def planked(
     rng = np.random.default_rng(seed)
     supply = _supply(planks, tile_m, rng)
     rows = [_plank_row(supply, width_m, rng) for _ in range(len(lines_v) - 1)]
-    ends = [np.array([plank.u0 for plank in row] + [width_m]) for row in rows]
+    ends = [_ends(row) for row in rows]
 
     # Along a line between two rows, the corners of both are vertices, so that no seam opens between them.
     vertices_uv = list[Array]()
@@ -167,6 +167,11 @@ def planked(
     normals = np.tile(unit(cross(u, v)), (len(places_uv), 1))
     floor = MeshArrays(vertices_m, faces, np.concatenate(texture_uv), normals)
     return joined_arrays([floor, *_laps(corner, u, v)]).mesh()
+
+
+def _ends(row: Sequence[_Plank]) -> Array:
+    """The places along u where the planks of a row begin and end."""
+    return np.array([row[0].u0, *(plank.u1 for plank in row)])
 
 
 def _supply(planks: Planks, tile_m: float, rng: np.random.Generator) -> Iterator[tuple[float, float, float]]:
