@@ -86,12 +86,22 @@ def test_levels_weigh_the_lights(even_light) -> None:
     seen = seen_light(baked, EYE, DOWN)
     half = seen.luminance([replace(light, level=Steady(0.5))])
     np.testing.assert_allclose(half, seen.luminance([light]) / 2)
+    np.testing.assert_allclose(seen.luminance(), seen.luminance([light]))
+
+
+def test_a_light_that_is_not_given_has_the_level_that_it_had_at_first(even_light) -> None:
+    baked = even_light(floor_scene(Material()), level=Steady(0.25))
+    seen = seen_light(baked, EYE, DOWN)
+    np.testing.assert_allclose(seen.luminance(), 0.25 * seen.luminance_cd_m2[0])
 
 
 def test_what_was_saved_is_read_and_a_torn_file_is_named(tmp_path) -> None:
-    seen = SeenLight(np.arange(6, dtype=np.float32).reshape(2, 3), np.array([True, False, True]))
+    seen = SeenLight(
+        np.arange(6, dtype=np.float32).reshape(2, 3), np.array([True, False, True]), ("a", "b"), (1.0, 0.5)
+    )
     seen.save(tmp_path)
     read = read_seen_light(tmp_path)
+    assert (read.names, read.levels) == (seen.names, seen.levels)
     np.testing.assert_array_equal(read.luminance_cd_m2, seen.luminance_cd_m2)
     np.testing.assert_array_equal(read.is_source, seen.is_source)
     (tmp_path / "seen_light.npz").write_bytes(b"torn")

@@ -17,7 +17,7 @@ def light(tmp_path, monkeypatch):
     """A folder with what cameras see, which is that of every case."""
 
     def of(factor: float = 1.0):
-        SeenLight(factor * SEEN, np.zeros(500, bool)).save(tmp_path)
+        SeenLight(factor * SEEN, np.zeros(500, bool), ("lamp",), (1.0,)).save(tmp_path)
         return tmp_path
 
     monkeypatch.setattr(exposure_doubt, "_light", lambda _: tmp_path)

@@ -1,7 +1,7 @@
 """The luminance that rays through a baked scene show, by each of its lights, without drawing a picture."""
 
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,28 +30,40 @@ class SeenLight:
     """What N rays show.
 
     luminance_cd_m2 (L, N): by each light alone at level 1. is_source (N,): whether a ray ends at a lamp or in the sky.
+    names, levels (L,): of the lights, their mean levels at first.
     """
 
     luminance_cd_m2: Floats
     is_source: Mask
+    names: tuple[str, ...]
+    levels: tuple[float, ...]
 
-    def luminance(self, lights: Sequence[Light]) -> Array:
-        """The luminance (N,) in cd/m² by all lights at their levels."""
+    def luminance(self, lights: Iterable[Light] = ()) -> Array:
+        """The luminance (N,) in cd/m² by all lights: those given at their levels, the others at the stored ones."""
+        level_by_name = {light.name: light.level.mean(0, LEVELS_NS) for light in lights}
         total = np.zeros(self.luminance_cd_m2.shape[1])
-        for light, by_light in zip(lights, self.luminance_cd_m2, strict=True):
-            total += light.level.mean(0, LEVELS_NS) * by_light
+        for name, level, by_light in zip(self.names, self.levels, self.luminance_cd_m2, strict=True):
+            total += level_by_name.get(name, level) * by_light
         return total
 
     def save(self, folder: Path) -> None:
         """Write it into the folder of the scene's light."""
-        np.savez(folder / FILE, luminance_cd_m2=self.luminance_cd_m2, is_source=self.is_source)
+        np.savez(
+            folder / FILE,
+            luminance_cd_m2=self.luminance_cd_m2,
+            is_source=self.is_source,
+            names=np.array(self.names, str),
+            levels=np.array(self.levels, float),
+        )
 
 
 def read_seen_light(folder: Path) -> SeenLight:
     """What `SeenLight.save` wrote. Raises RenderError if it is damaged."""
     try:
         with (folder / FILE).open("rb") as file, np.load(file) as stored:
-            return SeenLight(stored["luminance_cd_m2"], stored["is_source"])
+            names = tuple(stored["names"].tolist())
+            levels = tuple(stored["levels"].tolist())
+            return SeenLight(stored["luminance_cd_m2"], stored["is_source"], names, levels)
     except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
         raise RenderError(f"the scene's light cannot be read ({error}); delete this folder: {folder}") from error
 
@@ -81,7 +93,9 @@ def seen_light(baked: BakedScene, origins_m: Array, directions: Array) -> SeenLi
         rays = surfaces.followed(rays, hits)
         if not len(rays.pixel):
             break
-    return SeenLight(luminance.astype(np.float32), is_source)
+    names = tuple(light.name for light in baked.scene.lights)
+    levels = tuple(light.level.mean(0, LEVELS_NS) for light in baked.scene.lights)
+    return SeenLight(luminance.astype(np.float32), is_source, names, levels)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,13 @@ from vobench.rendering.seen_light import read_seen_light
 from vobench.runner.folder import SEQUENCE, RunFolder, UnavailableCases
 from vobench.runner.key import cache_folder
 from vobench.runner.task import bake_task, is_done
+from vobench.scene.light import Light
 from vobench.suite.case import Case
 from vobench.suite.plan import Plan
-from vobench.suite.scene_build import build
+from vobench.suite.scene_build import listed_lights
+from vobench.suite.scene_lighting import with_lighting
 from vobench.suite.scene_spec import SceneFile
+from vobench.suite.suite_case import scene_lights
 from vobench.suite.white import BLACK_DN, SATURATED_DN, ExposedShares, Remedy, doubt_sentence, exposed_shares, white_of
 
 FIRST_PICTURES = 3  # of a case, that a run looks at
@@ -25,7 +28,7 @@ def exposure_doubts(spec: SceneFile, light: Path) -> list[str]:
     `light` is the folder with the scene's light.
     """
     seen = read_seen_light(light)
-    luminance_cd_m2 = seen.luminance(build(spec, {}).lights)
+    luminance_cd_m2 = seen.luminance(listed_lights(spec))
     remedy = Remedy(white_cd_m2=white_of(spec, light))
     shares = exposed_shares(luminance_cd_m2, remedy.effective_white_cd_m2)
     if not shares.is_doubtful:
@@ -46,7 +49,7 @@ def doubts_of_plan(plan: Plan) -> list[str]:
         if light is None:
             continue
         seen = read_seen_light(light)
-        luminance_cd_m2 = seen.luminance(case.build_scene().lights)
+        luminance_cd_m2 = seen.luminance(_lights(case))
         remedy = _remedy(case, light)
         shares = exposed_shares(luminance_cd_m2, remedy.effective_white_cd_m2)
         if shares.is_doubtful:
@@ -66,7 +69,7 @@ def doubts_of_run(plan: Plan, folder: RunFolder) -> list[str]:
             sentences[case.name] = f"{shares}; change the camera's exposure_gain, or use auto_exposure"
             continue
         seen = read_seen_light(light)
-        luminance_cd_m2 = seen.luminance(case.build_scene().lights)
+        luminance_cd_m2 = seen.luminance(_lights(case))
         sentences[case.name] = doubt_sentence(shares, luminance_cd_m2, seen.is_source, _remedy(case, light))
     return [f"{names}: {sentence} (in its first pictures)" for sentence, names in _grouped(sentences).items()]
 
@@ -80,6 +83,11 @@ def _light(case: Case) -> Path | None:
     task = bake_task(case.scene)
     root = cache_folder()
     return root / task.key if is_done(task, root) else None
+
+
+def _lights(case: Case) -> tuple[Light, ...]:
+    """The lights of a case whose levels may differ from those that its scene's light is stored with."""
+    return with_lighting(scene_lights(case.scene, case.lighting.keys()), case.lighting)
 
 
 def _remedy(case: Case, light: Path) -> Remedy:

@@ -11,7 +11,7 @@ from vobench.rendering.array_types import Mask
 from vobench.rendering.bake import BakedScene
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.seen_light import SeenLight, read_seen_light, seen_light
-from vobench.suite.scene_build import build
+from vobench.suite.scene_build import listed_lights
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.viewpoint import viewpoints
 
@@ -59,7 +59,7 @@ def white_of(spec: SceneFile, light: Path | None) -> float:
     if light is None:
         raise ValueError("a scene without white_cd_m2 needs its light")
     seen = read_seen_light(light)
-    return fitting_white_cd_m2(seen.luminance(build(spec, {}).lights), seen.is_source)
+    return fitting_white_cd_m2(seen.luminance(listed_lights(spec)), seen.is_source)
 
 
 @dataclass(frozen=True, slots=True)
