@@ -159,7 +159,8 @@ def _load(rng, high_m):
         turn = rng.normal(0, 0.8) + 180 * rng.integers(2)
         place = at((i - (nx - 1) / 2) * 1.16 / nx + dx, (j - (ny - 1) / 2) * 0.78 / ny + dy, z0 + r * size[2], yaw=turn)
         tile = max(size)
-        boxes.append(moved(block(size, bevel_m=0, uv_m=(tile / 2, tile / 2), transform=at(z_m=size[2] / 2)), place))
+        box = block(size, bevel_m=0, uv_m=(tile / 2, tile / 2), upright=True, transform=at(z_m=size[2] / 2))
+        boxes.append(moved(box, place))
     tint = picture.one_of(rng, "#ffffff", "#f3ead9", "#e5e9ea", "#fff3dc")
     return [Part(joined(boxes), matt(tint, picture.carton(seed, max(size))))]
 

@@ -44,3 +44,33 @@ def test_faces_without_area_in_a_model_are_told_of(tmp_path: Path) -> None:
 def test_a_misspelt_name_gets_the_nearest() -> None:
     with pytest.raises(UnknownNameError, match="Did you mean 'office'"):
         survey_scene("offise")
+
+
+def test_white_is_known_once_the_light_of_a_scene_without_it_is_computed(tmp_path: Path, monkeypatch) -> None:
+    make_cheap(monkeypatch)
+    monkeypatch.setenv("VOBENCH_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "closet.yaml").write_text(CLOSET.replace("white_cd_m2: 50\n", ""))
+    report = survey_scene(str(tmp_path / "closet.yaml"))
+    assert report.as_dict()["white_cd_m2"] is None
+    assert report.doubts() == []
+    report.save_picture(tmp_path / "look.png")
+    assert report.as_dict()["white_cd_m2"] > 0
+    assert report.doubts() == []
+
+
+def test_a_wrong_white_is_doubted_once_the_light_is_computed(tmp_path: Path, monkeypatch) -> None:
+    make_cheap(monkeypatch)
+    monkeypatch.setenv("VOBENCH_CACHE", str(tmp_path / "cache"))
+    (tmp_path / "closet.yaml").write_text(CLOSET.replace("white_cd_m2: 50\n", "white_cd_m2: 1\n"))
+    report = survey_scene(str(tmp_path / "closet.yaml"))
+    assert report.doubts() == []
+    report.save_picture(tmp_path / "look.png")
+    (doubt,) = report.doubts()
+    assert "raise white_cd_m2 of the scene from 1 to about" in doubt
+
+
+def test_an_object_is_called_one(tmp_path: Path) -> None:
+    (tmp_path / "tile.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nf 1 2 3\nf 1 3 4\n")
+    report = survey_scene(str(tmp_path / "tile.obj"))
+    assert not report.found.is_place
+    assert any(line.startswith("an object rather than a place") for line in report.lines())

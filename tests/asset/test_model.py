@@ -777,11 +777,17 @@ def test_an_obj_stands_upright_with_the_colour_of_its_material(read: Reader, tmp
 
 def test_an_obj_whose_picture_is_lost_is_refused(read: Reader, tmp_path: Path) -> None:
     text = b"mtllib paint.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n"
-    with pytest.raises(ModelError, match=r"needs 'paint.mtl', which is not beside it"):
-        read(text, "thing.obj")
     (tmp_path / "paint.mtl").write_text("newmtl red\nmap_Kd wood.png\n")
     with pytest.raises(ModelError, match=r"needs 'wood.png', which is not beside it; put it there, or export one .glb"):
         read(text, "thing.obj")
+
+
+def test_an_obj_without_its_material_file_is_grey_with_a_note(read: Reader) -> None:
+    text = b"mtllib paint.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl red\nf 1 2 3\n"
+    model = read(text, "thing.obj")
+    (material,) = model.materials.values()
+    assert material.colour == (0.5, 0.5, 0.5)
+    assert "its material file 'paint.mtl' is not beside it: read as grey and diffuse" in model.notes
 
 
 def test_a_picture_of_an_obj_has_its_first_row_at_v_0(read: Reader, tmp_path: Path) -> None:

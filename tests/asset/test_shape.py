@@ -157,3 +157,14 @@ def test_a_plate_without_thickness_has_no_normals_on_its_rim() -> None:
     lengths = np.linalg.norm(plate.vertex_normals, axis=1)
     assert sorted(set(lengths.round(9))) == [0, 1]
     assert (lengths > 0.5).sum() == 12
+
+
+def test_an_upright_block_shows_a_picture_upright_on_all_sides() -> None:
+    """Seen from outside, u grows to the right and v downwards."""
+    box = shape.block((0.4, 0.3, 0.5), bevel_m=0, uv_m=(0.5, 0.5), upright=True)
+    for face, normal in zip(box.faces, box.face_normals, strict=True):
+        up = np.array([0.0, 1.0, 0.0]) if abs(normal[2]) > 0.5 else np.array([0.0, 0.0, 1.0])
+        right = np.cross(up, normal)
+        corners = box.vertices[face]
+        expected = np.stack([corners @ right, -corners @ up], -1) + 0.5
+        np.testing.assert_allclose(box.visual.uv[face], expected, atol=1e-12)

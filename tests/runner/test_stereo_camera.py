@@ -65,7 +65,7 @@ def case(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 def shot(case: Case, renderer: Recorder, t_ns: int = 2_000_000_000):
     """The views of the left picture taken at a time, and where the body was, as a function."""
     scene, motion = case.build_scene(), body_motion(case).motion
-    StereoCamera(case, World(scene, renderer, motion)).shoot(t_ns)
+    StereoCamera(case, World(scene, renderer, motion, 50.0)).shoot(t_ns)
     return renderer.asked[0], lambda t_ns: motion.at(t_ns).T_world_body
 
 
@@ -132,7 +132,7 @@ def test_under_changing_light_strips_of_a_rolling_shutter_are_thin(case) -> None
 def settled(case: Case, luminance_cd_m2: float, frames: int) -> list[float]:
     """Shares of full scale of the left picture's mean, frame after frame."""
     scene, motion = case.build_scene(), body_motion(case).motion
-    camera = StereoCamera(case, World(scene, Recorder(luminance_cd_m2), motion))
+    camera = StereoCamera(case, World(scene, Recorder(luminance_cd_m2), motion, WHITE_CD_M2))
     chip = case.camera.chip
     return [float(chip.signal_of_grey[camera.shoot(t).left].mean()) for t in range(frames)]
 

@@ -2,12 +2,13 @@
 
 import pickle
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from multiprocessing import get_context
 
 import pytest
 
 from vobench.runner.entry import MANIFEST, seal
-from vobench.runner.task import is_done, missing, perform, plan
+from vobench.runner.task import is_done, missing, perform, plan, sequence_tasks
 
 
 @pytest.fixture
@@ -80,3 +81,13 @@ def test_a_case_of_stock_pyrender_needs_no_light_and_counts_its_release(bench):
     sequence = next(task for task in stock if task.stage == "sequence")
     assert {"PyOpenGL", "pyrender2"} <= set(sequence.inputs["libraries"])
     assert "mitsuba" not in sequence.inputs["libraries"]
+
+
+@pytest.mark.parametrize("engine", ["path", "pyrender"])
+def test_whatever_the_engine_a_scene_without_white_needs_its_light(bench, engine):
+    drawn = bench.plan(("seed: 1", f"seed: 1\nrendering: {{engine: {engine}}}")).simulated[0]
+    assert [task.stage for task in sequence_tasks(drawn, {})] == ["sequence"]
+    unstated = replace(drawn, scene=replace(drawn.scene, white_cd_m2=None))
+    bake, sequence = sequence_tasks(unstated, {})
+    assert bake.stage == "bake"
+    assert sequence.needs == (bake.key,)

@@ -7,18 +7,15 @@ from vobench.asset.shape import at, block
 from vobench.errors import SuiteError
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flipped, moved, quad
+from vobench.scene.mesh import Thing, moved, quad
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_way import (
-    BODY_M,
     CELL_M,
     FLOOR_STEP_M,
-    LAMP_BELOW,
     MOST_LENGTH_M,
     RATE_HZ,
     SPEED_MPS,
     FreeCircle,
-    ceiling_above,
     circular_path,
     downward_directions,
     largest_free_circle,
@@ -193,69 +190,19 @@ def test_a_floor_too_small_for_a_path_is_refused_with_its_radius(side_m: float, 
     with pytest.raises(
         SuiteError, match=rf"no free path was found in 'yard' \(.* has a radius of {radius} m\); add tra"
     ):
-        circular_path(scene(floor(side_m, side_m)))
+        circular_path(scene(floor(2.5, side_m)))
 
 
 def test_the_smallest_floor_with_a_path_has_one() -> None:
-    path = circular_path(scene(floor(0.6, 0.6)))
-    assert path.poses[0].position_m[0] == pytest.approx(-0.05 + 0.6 * 0.25)
+    path = circular_path(scene(floor(2.5, 0.6)))
+    first_m, second_m = (np.array(path.poses[k].position_m) for k in (0, len(path.poses) // 2))
+    assert np.linalg.norm(first_m - second_m) == pytest.approx(2 * 0.6 * 0.25, rel=0.02)
 
 
 def test_a_scene_without_a_floor_is_refused_with_a_guess_at_the_reason() -> None:
     wall = Thing("wall", quad((0, -1, 0), (0, 2, 0), (0, 0, 2)), "grey")
     with pytest.raises(SuiteError, match="it has no level floor; is another axis up"):
         circular_path(scene(wall))
-
-
-def hall(length_m: float, width_m: float, *, height_m: float = 2.5) -> Scene:
-    """A closed hall, seen from inside."""
-    walls = moved(flipped(block((length_m, width_m, height_m), bevel_m=0)), at(z_m=height_m / 2))
-    return scene(Thing("hall", walls, "grey"))
-
-
-def test_all_of_the_sky_is_seen_without_a_roof_and_none_in_a_hall() -> None:
-    assert ceiling_above(scene(floor(4, 4)))[0] == 1
-    assert ceiling_above(hall(4, 4))[0] == 0
-
-
-def test_half_a_roof_hides_part_of_the_sky() -> None:
-    roof = quad((0, 3, 2.5), (60, 0, 0), (0, -6, 0))
-    wide = quad((0, 60, 2.5), (60, 0, 0), (0, -120, 0))
-    narrow_share, _ = ceiling_above(scene(floor(8, 6), Thing("roof", roof, "grey")))
-    wide_share, _ = ceiling_above(scene(floor(8, 6), Thing("roof", wide, "grey")))
-    assert 0.3 < wide_share < narrow_share < 1
-    assert wide_share == pytest.approx(0.5, abs=0.25)
-
-
-def test_a_low_room_gets_one_lamp_above_the_free_circle() -> None:
-    room = hall(4, 4)
-    faces = triangles(room, t_ns=0)
-    free = largest_free_circle(faces, RayCaster(faces))
-    assert free is not None
-    ((x_m, y_m, z_m),) = ceiling_above(room)[1]
-    assert (x_m, y_m) == (free.x_m, free.y_m)
-    assert z_m == pytest.approx(BODY_M + (1 - LAMP_BELOW) * (2.5 - BODY_M))
-
-
-def test_a_wide_hall_gets_a_grid_of_lamps_all_below_its_ceiling() -> None:
-    lamps_m = np.array(ceiling_above(hall(20, 12))[1])
-    # 20 m and 12 m are about 3 and 2 times 2.5 heights of the ceiling.
-    assert len(lamps_m) == 6
-    assert len(np.unique(lamps_m[:, 0].round(6))) == 3
-    assert len(np.unique(lamps_m[:, 1].round(6))) == 2
-    np.testing.assert_allclose(sorted(set(lamps_m[:, 0].round(6))), [-20 / 3, 0, 20 / 3], atol=CELL_M)
-    np.testing.assert_allclose(sorted(set(lamps_m[:, 1].round(6))), [-3, 3], atol=CELL_M)
-    np.testing.assert_allclose(lamps_m[:, 2], BODY_M + (1 - LAMP_BELOW) * (2.5 - BODY_M))
-
-
-def test_a_huge_hall_gets_at_most_four_lamps_along_a_side() -> None:
-    lamps_m = np.array(ceiling_above(hall(58, 6))[1])
-    assert len(lamps_m) == 4
-
-
-def test_a_scene_without_a_floor_gets_a_lamp_at_the_origin_and_all_of_the_sky() -> None:
-    wall = Thing("wall", quad((0, -1, 0), (0, 2, 0), (0, 0, 2)), "grey")
-    assert ceiling_above(scene(wall)) == (1.0, [(0.0, 0.0, 0.0)])
 
 
 def test_the_path_of_ten_metres_takes_twenty_seconds_at_ten_frames_a_second() -> None:
@@ -272,6 +219,7 @@ def test_a_thin_sheet_at_any_height_of_a_body_blocks_it(low_m: float, high_m: fl
     assert abs(free.x_m - 0.03) >= free.radius_m
 
 
-def test_a_lamp_hangs_a_third_below_the_ceiling_of_a_low_room() -> None:
-    ((_, _, z_m),) = ceiling_above(hall(4, 4))[1]
-    assert z_m == pytest.approx(0.6 + 0.65 * 1.9)
+def test_what_is_smaller_than_a_body_drives_in_is_refused_as_an_object() -> None:
+    with pytest.raises(SuiteError, match=r"it is only 1\.9 m wide.*if it is an object, put it into a scene's YAML"):
+        circular_path(scene(floor(1.9, 1.5)))
+    assert circular_path(scene(floor(2.1, 1.5))).poses

@@ -334,14 +334,16 @@ def _fit_camera(
     """
     from vobench.runner.simulate import open_renderer
     from vobench.runner.stereo_camera import World, exposed_by
+    from vobench.suite.white import white_of
 
     case = read_plan(str(file)).simulated[0]
     motion = body_motion(case)
     scene = case.build_scene()
     light = perform(bake_task(case.scene), cache_folder(), progress=progress)
     fitted_t_ns = _evenly(motion.t_ns.tolist())
-    with closing(open_renderer(scene, case.rendering, light, white_cd_m2=case.scene.white_cd_m2)) as renderer:
-        develop = exposed_by(case, World(scene, renderer, motion.motion), fitted_t_ns)
+    white_cd_m2 = white_of(case.scene, light)
+    with closing(open_renderer(scene, case.rendering, light, white_cd_m2=white_cd_m2)) as renderer:
+        develop = exposed_by(case, World(scene, renderer, motion.motion, white_cd_m2), fitted_t_ns)
         settings, _ = fit_camera(_look(recording), develop)
     return _camera_settings(settings, gain=gain)
 

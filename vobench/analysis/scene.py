@@ -12,6 +12,7 @@ from vobench.scene.material import Texture
 from vobench.scene.mesh import Triangles, distinct, open_edges, welded
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_way import FreeCircle, largest_free_circle
+from vobench.suite.viewpoint import is_place
 
 EYE_HEIGHT_M = 1.2
 DIRECTIONS = 4096  # in which a survey looks for the backs of faces
@@ -25,7 +26,7 @@ class SceneSurvey:
     `open_edges` are edges of a single face, of all objects but rectangles. `twins` are faces with the corners of
     another face. `backs` is the share of directions in which a viewer sees the back of a face first; backs are not
     drawn. The viewer is in the free circle, or in the centre of the scene if there is none. `free` is None if there is
-    no floor.
+    no floor. `is_place` is whether a body can drive there; otherwise the scene is an object.
     """
 
     things: int
@@ -39,6 +40,7 @@ class SceneSurvey:
     twins: int
     backs: float
     free: FreeCircle | None
+    is_place: bool
 
 
 def survey(scene: Scene) -> SceneSurvey:
@@ -65,6 +67,7 @@ def survey(scene: Scene) -> SceneSurvey:
         twins=_twins(point_ids),
         backs=_share_of_backs(faces, caster, eye_m),
         free=free,
+        is_place=is_place(faces, caster, free),
     )
 
 

@@ -9,10 +9,11 @@ from typing import Any
 from vobench.analysis.scene import SceneSurvey, strength, survey
 from vobench.analysis.scene_sheet import sheet
 from vobench.asset import MODEL_SUFFIXES
+from vobench.runner.exposure_doubt import exposure_doubts
 from vobench.runner.key import cache_folder
 from vobench.runner.simulate import open_renderer
 from vobench.runner.store import SILENT, Progress
-from vobench.runner.task import bake_task, perform
+from vobench.runner.task import bake_task, is_done, perform
 from vobench.scene.scene import Scene
 from vobench.sequence.picture import write_png
 from vobench.suite import catalog
@@ -20,6 +21,7 @@ from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 from vobench.suite.scene_spec import ModelSpec, SceneFile
 from vobench.suite.suite_spec import Rendering
+from vobench.suite.white import white_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +46,8 @@ class SceneReport:
             f"backs seen: {found.backs:.1%}",
             f"free circle: {self._free_circle()}",
         ]
+        if not found.is_place:
+            lines.append("an object rather than a place to drive in: put it into a scene's YAML as one of its meshes")
         lines += [f"light: {light}, {strength(self.scene, light)}" for light in found.lights]
         return lines
 
@@ -55,13 +59,30 @@ class SceneReport:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, as `vobench scene --json` prints them."""
-        return {**asdict(self.found), "notes": list(self.notes), "white_cd_m2": self.spec.white_cd_m2}
+        return {**asdict(self.found), "notes": list(self.notes), "white_cd_m2": self.white_cd_m2()}
+
+    def white_cd_m2(self) -> float | None:
+        """The white that cameras are exposed for; None if the scene does not state it and its light is not computed."""
+        if self.spec.white_cd_m2 is None and self._light() is None:
+            return None
+        return white_of(self.spec, self._light())
+
+    def doubts(self) -> list[str]:
+        """What is doubtful in the exposure of cameras on the free path, if the light is in the cache."""
+        light = self._light()
+        return exposure_doubts(self.spec, light) if light else []
+
+    def _light(self) -> Path | None:
+        """The folder of the scene's light, if it is in the cache."""
+        task = bake_task(self.spec)
+        root = cache_folder()
+        return root / task.key if is_done(task, root) else None
 
     def save_picture(self, path: Path, *, progress: Progress = SILENT) -> None:
         """Draw a plan, these lines and four views to a PNG; the light is computed unless it is in the cache."""
         light = perform(bake_task(self.spec), cache_folder(), progress=progress)
         with closing(open_renderer(self.scene, Rendering(), light)) as renderer:
-            picture = sheet(self.scene, self.found, renderer, self.spec.white_cd_m2, self.lines())
+            picture = sheet(self.scene, self.found, renderer, white_of(self.spec, light), self.lines())
         write_png(path, picture)
 
 

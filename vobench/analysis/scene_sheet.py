@@ -7,16 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.analysis.scene import EYE_HEIGHT_M, SceneSurvey
-from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
-from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.renderer import Renderer, single_instant
 from vobench.scene.material import reflectance, srgb
 from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import FreeCircle, downward_directions
+from vobench.suite.free_way import downward_directions
+from vobench.suite.viewpoint import Viewpoint, around
 
 Rgb8 = NDArray[np.uint8]
 CELL_WIDTH_PX = 480
@@ -34,20 +33,27 @@ def sheet(
     white_cd_m2: float,
     lines: Sequence[str],
 ) -> Rgb8:
-    """Draw a picture (640, 1440, 3): the plan, lines of text, and views in four directions from the free circle."""
-    free = found.free or FreeCircle(0.0, 0.0, found.low_m[2], 0.0)
-    views = [_view(renderer, free, yaw_deg, white_cd_m2) for yaw_deg in VIEWS_DEG]
+    """Draw a picture (640, 1440, 3): the plan, lines of text, and four views.
+
+    They are in four directions from the free circle, or from around a scene that has none.
+    """
+    views = [_view(renderer, viewpoint, white_cd_m2) for viewpoint in _viewpoints(found)]
     upper = np.hstack([plan(scene, found), views[0], views[1]])
     lower = np.hstack([_text(lines), views[2], views[3]])
     return np.vstack([upper, lower])
 
 
-def _view(renderer: Renderer, free: FreeCircle, yaw_deg: float, white_cd_m2: float) -> Rgb8:
-    """A view (H, W, 3) from the centre of the free circle."""
-    eye_m = [free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M]
-    T_world_body = se3.transform(se3.rotation_z(np.deg2rad(yaw_deg)), eye_m)
-    T_world_camera = T_world_body @ looking(pitch_deg=VIEW_PITCH_DEG, position_m=(0, 0, 0))
-    radiance = renderer.radiance(LENS, single_instant(LENS, T_world_camera), weights=None)
+def _viewpoints(found: SceneSurvey) -> list[Viewpoint]:
+    free = found.free
+    if free is None or not found.is_place:
+        return around(found.low_m, found.high_m, count=len(VIEWS_DEG))
+    eye_m = (free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M)
+    return [Viewpoint(eye_m, yaw_deg, VIEW_PITCH_DEG) for yaw_deg in VIEWS_DEG]
+
+
+def _view(renderer: Renderer, viewpoint: Viewpoint, white_cd_m2: float) -> Rgb8:
+    """A view (H, W, 3)."""
+    radiance = renderer.radiance(LENS, single_instant(LENS, viewpoint.T_world_camera()), weights=None)
     return srgb(radiance / (VIEW_WHITE * white_cd_m2))
 
 

@@ -506,7 +506,7 @@ def plant(
 def carton(_: Rng, size_m: tuple[float, float, float] = (0.36, 0.46, 0.3), seed: int = 0) -> list[Part]:
     """A cardboard box with tape and a label."""
     tile_m = max(size_m)
-    box = block(size_m, bevel_m=0.002, uv_m=(tile_m / 2, tile_m / 2))
+    box = block(size_m, bevel_m=0.002, uv_m=(tile_m / 2, tile_m / 2), upright=True)
     standing = moved(box, at(0, 0, size_m[2] / 2))
     return [Part(standing, matt(texture=picture.carton(seed, tile_m)))]
 

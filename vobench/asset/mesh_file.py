@@ -1,27 +1,29 @@
 """OBJ, STL and PLY files, converted to .glb by trimesh."""
 
 import re
-from collections.abc import Iterator
 from pathlib import Path
 
 from vobench.asset.gltf_file import MOST_FACES
 from vobench.errors import ModelError
 
 
-def read_as_glb(path: Path) -> bytes:
-    """The file converted to .glb. No material is a metal, and textures are not tinted.
+def read_as_glb(path: Path) -> tuple[bytes, list[str]]:
+    """The file converted to .glb, and notes on what it lacks. No material is a metal, and textures are not tinted.
 
-    Raises ModelError if trimesh cannot read the file, if it has too many faces, or if a file that it needs is missing.
+    Surfaces of an OBJ whose material file is missing have no material. Raises ModelError if trimesh cannot read the
+    file, if it has too many faces, or if a picture is missing.
     """
     import trimesh
 
-    _require_readable(path)
+    notes = _require_readable(path)
     try:
         scene = trimesh.load_scene(path, process=False)
         for mesh in scene.geometry.values():
-            if mesh.visual.kind == "texture":
+            if notes:
+                mesh.visual = trimesh.visual.ColorVisuals()
+            elif mesh.visual.kind == "texture":
                 _without_metal(mesh.visual)
-        return bytes(trimesh.exchange.gltf.export_glb(scene))  # type: ignore[no-untyped-call]
+        return bytes(trimesh.exchange.gltf.export_glb(scene)), notes  # type: ignore[no-untyped-call]
     except Exception as error:  # trimesh raises all kinds
         raise ModelError(f"trimesh cannot read it ({error or type(error).__name__}); export it as .glb") from error
 
@@ -37,13 +39,17 @@ def _without_metal(visual: object) -> None:
     visual.material = physical  # type: ignore[attr-defined]
 
 
-def _require_readable(path: Path) -> None:
-    """Raise ModelError for too many faces, before trimesh reads any, and for an OBJ with missing files."""
+def _require_readable(path: Path) -> list[str]:
+    """Notes on material files that an OBJ lacks.
+
+    Raises ModelError for too many faces, before trimesh reads any, and for an OBJ whose pictures are missing.
+    """
     data = path.read_bytes()
     kind = path.suffix.lower()
+    notes = list[str]()
     if kind == ".obj":
         faces = data.count(b"\nf ")
-        _require_beside(path.parent, data)
+        notes = _notes_on_missing(path.parent, data)
     elif kind == ".stl":
         faces = data.count(b"facet normal") or int.from_bytes(data[80:84], "little")
     elif kind == ".ply":
@@ -55,24 +61,26 @@ def _require_readable(path: Path) -> None:
     if faces > MOST_FACES:
         advice = "make them fewer, as by Blender's Decimate"
         raise ModelError(f"has {faces:,} faces, more than {MOST_FACES:,}; {advice}")
+    return notes
 
 
-def _require_beside(folder: Path, obj: bytes) -> None:
-    """Raise ModelError for an OBJ if one of its material files or pictures is missing."""
-    for name in _files_needed(folder, obj):
-        if not (folder / name).is_file():
-            raise ModelError(f"needs '{name}', which is not beside it; put it there, or export one .glb")
+def _notes_on_missing(folder: Path, obj: bytes) -> list[str]:
+    """Notes on the material files that an OBJ names and that are missing.
 
-
-def _files_needed(folder: Path, obj: bytes) -> Iterator[str]:
-    """The names of the material files of an OBJ, then of the pictures that each of them uses."""
+    Raises ModelError if a picture is missing that one of the others uses.
+    """
     libraries = [_text(name) for name in re.findall(rb"^mtllib\s+(.+?)\s*$", obj, re.M)]
-    yield from libraries
+    notes = list[str]()
     for library in libraries:
         file = folder / library
-        if file.is_file():
-            pictures = re.findall(rb"^\s*map_Kd\s+(?:.*\s)?(\S+)\s*$", file.read_bytes(), re.M)
-            yield from map(_text, pictures)
+        if not file.is_file():
+            notes.append(f"its material file '{library}' is not beside it: read as grey and diffuse")
+            continue
+        for picture in re.findall(rb"^\s*map_Kd\s+(?:.*\s)?(\S+)\s*$", file.read_bytes(), re.M):
+            name = _text(picture)
+            if not (folder / name).is_file():
+                raise ModelError(f"needs '{name}', which is not beside it; put it there, or export one .glb")
+    return notes
 
 
 def _text(name: bytes) -> str:

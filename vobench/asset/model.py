@@ -103,7 +103,11 @@ def read_model(
 
         is_gltf = kind in GLTF_SUFFIXES
         notes = [] if is_gltf else [f"{kind} has no unit and no axes: read as {scale:g} m each, {axis} up"]
-        data = path.read_bytes() if is_gltf else read_as_glb(path)
+        if is_gltf:
+            data = path.read_bytes()
+        else:
+            data, missing = read_as_glb(path)
+            notes += missing
         file = read_gltf(data, path.parent, has_srgb_vertices=not is_gltf)
 
         nodes = sorted(file.nodes(T_model_file), key=lambda node: node.names)

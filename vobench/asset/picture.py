@@ -131,10 +131,15 @@ WORDS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LazyTexture:
-    """A texture whose pixels are computed when they are first needed."""
+    """A texture whose pixels are computed when they are first needed.
+
+    `planks` is not empty for a floor of planks along u: for each row of planks in the tile, the places along u where
+    the row is cut, as shares of the tile. A floor can then lay the planks in another order.
+    """
 
     pixels: Callable[[], NDArray[Any]]
     tile_m: float
+    planks: tuple[tuple[float, ...], ...] = ()
 
 
 def painted(paint: Callable[..., Picture]) -> Callable[..., Texture]:
@@ -284,7 +289,7 @@ def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
     return cell[row], to_joint.astype(np.float32)
 
 
-@painted
+@cache
 def boards(
     tones: str,
     seed: int = 0,
@@ -293,13 +298,27 @@ def boards(
     *,
     rows: int = 8,
     joint_m: float = 0,
-) -> Picture:
+) -> Texture:
     """Planks along u with growth rings, pores, fibres and scratches; each plank has its own tone."""
+    pixels = cache(lambda: _boards(tones, seed, px, tile_m, rows=rows, joint_m=joint_m))
+    if not joint_m:
+        return LazyTexture(pixels, tile_m)
+    cuts = np.sort(_plank_cuts(np.random.default_rng(seed), rows, joint_m), axis=1)
+    return LazyTexture(pixels, tile_m, tuple(tuple(row) for row in cuts.tolist()))
+
+
+def _plank_cuts(rng: Rng, rows: int, joint_m: float) -> Array:
+    """The places (rows, K) where each row of planks is cut, as shares of its length."""
+    return rng.uniform(0, 1, (rows, 2 if joint_m else 1))
+
+
+def _boards(tones: str, seed: int, px: int, tile_m: float, *, rows: int, joint_m: float) -> Bytes:
+    """The pixels of `boards`."""
     rng = np.random.default_rng(seed)
-    cuts = 2 if joint_m else 1
     variety = 0.08 if joint_m else 0.05
-    planks = rows * cuts
-    cell, to_joint = _cells(px, rng.uniform(0, 1, (rows, cuts)))
+    cuts = _plank_cuts(rng, rows, joint_m)
+    planks = cuts.size
+    cell, to_joint = _cells(px, cuts)
 
     # Each plank is cut lengthwise at some depth beside the heart of its trunk. Late wood is the dark end of a ring.
     row_share = (np.arange(px) / px * rows) % 1
@@ -330,7 +349,7 @@ def boards(
         joint_px = joint_m / tile_m * px
         joint_shade = np.minimum(0.3 + 0.7 * to_joint / joint_px, 1)
     light = hue[cell] * (wear * joint_shade)[..., None]
-    return Picture(_scaled(_ramp(tone, tones), light), tile_m)
+    return _scaled(_ramp(tone, tones), light)
 
 
 @painted

@@ -3,18 +3,23 @@
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import ModuleType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 from zlib import crc32
 
 import numpy as np
 
 from vobench.asset import fitting, furniture, household, outdoors, picture
 from vobench.asset.furniture import Part, matt
+from vobench.asset.picture import LazyTexture
 from vobench.asset.shape import at
-from vobench.asset.wall import Hole, pierced, reveal
+from vobench.asset.wall import Hole, pierced, planked, reveal
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material
 from vobench.scene.mesh import MeshArrays, Thing, joined_arrays, quad_arrays
+from vobench.setting import Triple
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 Instance = tuple[str, Sequence[Part]]
 Wall = Literal["east", "north", "west", "south"]
@@ -132,7 +137,7 @@ def shell(
     its pane.
     """
     x, y, z = size_m
-    floor_mesh = pierced((-x / 2, -y / 2, 0), (x, 0, 0), (0, y, 0))
+    floor_mesh = _floor((-x / 2, -y / 2, 0), (x, 0, 0), (0, y, 0), floor)
     ceiling_mesh = pierced((-x / 2, -y / 2, z), (0, y, 0), (x, 0, 0))
     yield "floor", [Part(floor_mesh, floor)]
     yield "ceiling", [Part(ceiling_mesh, ceiling)]
@@ -155,6 +160,14 @@ def shell(
             pane_mesh = quad_arrays(pane_corner, pane_edge, (0, 0, v1 - v0))
             reveal_mesh = reveal(corner, edge, up, hole, depth)
             yield f"window_{k}", [Part(reveal_mesh, frame), Part(pane_mesh, pane)]
+
+
+def _floor(corner: Triple, edge_u: Triple, edge_v: Triple, material: Material) -> "Trimesh":
+    """A rectangle, in planks where the texture has some."""
+    texture = material.texture
+    if isinstance(texture, LazyTexture) and texture.planks:
+        return planked(corner, edge_u, edge_v, texture.planks, texture.tile_m)
+    return pierced(corner, edge_u, edge_v)
 
 
 def _hole(opening: Opening, edge_m: Array) -> Hole:

@@ -51,13 +51,15 @@ def block(
     *,
     bevel_m: float = 0.003,
     uv_m: ArrayLike = (0.0, 0.0),
+    upright: bool = False,
     transform: Array | None = None,
 ) -> "Trimesh":
     """A box around the origin with bevelled edges, shaded as round; u runs along the longer side of each face.
 
-    uv_m: the texture coordinates at its centre. transform: the pose (4, 4) of the box; the identity by default.
+    uv_m: the texture coordinates at its centre. upright: on the sides, u runs to the right and v down instead, as on a
+    printed carton. transform: the pose (4, 4) of the box; the identity by default.
     """
-    arrays = block_arrays(size_m, bevel_m=bevel_m, uv_m=uv_m)
+    arrays = block_arrays(size_m, bevel_m=bevel_m, uv_m=uv_m, upright=upright)
     return arrays.mesh() if transform is None else arrays.moved(transform).mesh()
 
 
@@ -66,6 +68,7 @@ def block_arrays(
     *,
     bevel_m: float = 0.003,
     uv_m: ArrayLike = (0.0, 0.0),
+    upright: bool = False,
 ) -> MeshArrays:
     """The arrays of `block`."""
     half_m = np.asarray(size_m, float) / 2
@@ -82,14 +85,33 @@ def block_arrays(
     # The rim of a plate without thickness has no area, so that its normals are 0.
     normals = cube.normals if has_thickness else _flat_normals(corners_m)
 
-    longest_first = tuple(np.argsort(-half_m, kind="stable").tolist())
-    uv = corners_m[cube.uv_index(longest_first)] + np.asarray(uv_m, float)
+    if upright:
+        uv = _upright_uv(corners_m)
+    else:
+        longest_first = tuple(np.argsort(-half_m, kind="stable").tolist())
+        uv = corners_m[cube.uv_index(longest_first)]
+    uv = uv + np.asarray(uv_m, float)
     return MeshArrays(
         corners_m.reshape(-1, 3),
         np.arange(3 * len(corners_m)).reshape(-1, 3),
         uv.reshape(-1, 2),
         normals.reshape(-1, 3),
     )
+
+
+def _upright_uv(corners_m: Array) -> Array:
+    """The texture coordinates (F, 3, 2) of faces (F, 3, 3) of a box: u to the right and v down, seen from outside.
+
+    Upwards is z on the sides, and y on the top and the bottom.
+    """
+    axis = _projection_axes(corners_m)
+    normals = np.eye(3)[axis] * np.sign(np.take_along_axis(face_normals(corners_m), axis[:, None], axis=1))
+    is_side = axis < 2
+    up = np.where(is_side[:, None], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0])
+    right = cross(up, normals)
+    u = np.einsum("fij,fj->fi", corners_m, right)
+    v = -np.einsum("fij,fj->fi", corners_m, up)
+    return np.stack([u, v], axis=-1)
 
 
 def _flat_normals(corners_m: Array) -> Array:
@@ -102,11 +124,15 @@ def _uv_axes(corners_m: Array, order: Sequence[int]) -> NDArray[np.int64]:
 
     The axis of projection is the one closest to the normal of the face. u and v run along the other two, in `order`.
     """
+    uv_axes = np.array([_without(order, axis) for axis in range(3)])
+    return np.asarray(uv_axes[_projection_axes(corners_m)])
+
+
+def _projection_axes(corners_m: Array) -> NDArray[np.int64]:
+    """The axis (F,) that is closest to the normal of each face (F, 3, 3)."""
     prefers_x = np.array([2e-6, 1e-6, 0])  # so that faces at 45° have the same axis on every machine
     alignment = np.abs(face_normals(corners_m)) + prefers_x
-    projection_axis = np.argmax(alignment, axis=1)
-    uv_axes = np.array([_without(order, axis) for axis in range(3)])
-    return np.asarray(uv_axes[projection_axis])
+    return np.asarray(np.argmax(alignment, axis=1))
 
 
 def _without(axes: Sequence[int], excluded: int) -> list[int]:

@@ -32,6 +32,8 @@ def print_summary(summary: PlanSummary, *, as_json: bool) -> None:
     for case in summary.cases:
         for note in case.notes or ():
             console.print(f"{case.case}: {note}")
+    for doubt in summary.doubts:
+        console.print(doubt, highlight=False)
     if summary.stages is not None:
         _print_stages(summary.tasks(), console)
     counts = f"{len(summary.cases)} cases, {len(summary.estimators())} estimators, {summary.trials} trials"

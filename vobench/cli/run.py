@@ -14,6 +14,7 @@ from vobench.cli.option import Json, SuiteName, Trust, option_group, with_option
 from vobench.cli.progress import Bars
 from vobench.cli.run_display import TerminalDisplay
 from vobench.errors import InputError
+from vobench.runner.exposure_doubt import doubts_of_run
 from vobench.runner.folder import total_failure, with_sequence
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
@@ -168,6 +169,8 @@ def run_command(
     _print_board(board, as_json=json)
     if not json:
         _print_remarks(folder, scores, shares_time=execution.share_time or plan.suite.share_time)
+        for doubt in doubts_of_run(plan, folder):
+            terminal.warn(doubt)
 
     broken_limits = list[str]()
     for threshold in thresholds:

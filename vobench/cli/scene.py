@@ -33,4 +33,4 @@ def scene_command(
     if json:
         terminal.print_json(report.as_dict())
     else:
-        print("\n".join([*report.lines(), *report.notes]))
+        print("\n".join([*report.lines(), *report.notes, *report.doubts()]))

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from vobench.runner.exposure_doubt import doubts_of_plan
 from vobench.runner.key import cache_folder
 from vobench.runner.motion import BodyMotion, body_motions
 from vobench.runner.task import is_done, plan, sequence_tasks
@@ -48,11 +49,15 @@ class CaseSummary:
 
 @dataclass(frozen=True, slots=True)
 class PlanSummary:
-    """A valid plan: its cases, and stage by stage the work that is left where that was asked for."""
+    """A valid plan: its cases, and stage by stage the work that is left where that was asked for.
+
+    `doubts` are about the exposure of cases whose light is in the cache.
+    """
 
     plan: Plan
     cases: tuple[CaseSummary, ...]
     stages: "tuple[ToDo, ...] | None" = None
+    doubts: tuple[str, ...] = ()
 
     @property
     def trials(self) -> int:
@@ -92,6 +97,7 @@ class PlanSummary:
             "estimators": self.estimators(),
             "trials": self.trials,
             "found": self.found(),
+            "doubts": list(self.doubts),
         }
         if self.stages is not None:
             content["tasks"] = self.tasks()
@@ -128,13 +134,14 @@ def summarize(planned: Plan, *, with_stages: bool = False) -> PlanSummary:
     """
     checked = preflight(planned)
     cases = tuple(_case_summary(case, checked) for case in planned.cases)
+    doubts = tuple(doubts_of_plan(planned))
     if not with_stages:
-        return PlanSummary(planned, cases)
+        return PlanSummary(planned, cases, doubts=doubts)
 
     from vobench.runner.dry_run import to_do
 
     stages = to_do(plan(planned, checked.recordings), cache_folder())
-    return PlanSummary(planned, cases, tuple(stages))
+    return PlanSummary(planned, cases, tuple(stages), doubts)
 
 
 def is_in_cache(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> bool:

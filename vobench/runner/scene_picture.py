@@ -28,6 +28,7 @@ from vobench.suite import catalog
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 from vobench.suite.suite_spec import Rendering
+from vobench.suite.white import white_of
 from vobench.trajectory.nanoseconds import NS_PER_S
 
 LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
@@ -108,11 +109,12 @@ def render_scene(
 
     built = build(spec, {})
     light = None
-    if rendering.needs_bake:
+    if rendering.needs_bake or spec.white_cd_m2 is None:
         light = perform(bake_task(spec), cache_folder(), progress=progress)
-    with closing(open_renderer(built, rendering, light, white_cd_m2=spec.white_cd_m2)) as renderer:
+    white_cd_m2 = white_of(spec, light)
+    with closing(open_renderer(built, rendering, light, white_cd_m2=white_cd_m2)) as renderer:
         radiance = renderer.radiance(lens, single_instant(lens, T_world_camera, t_ns=t_ns), weights=None)
-    rgb = _exposed(radiance / np.float32(spec.white_cd_m2), CameraSettings(chip=chip, exposure_gain=gain))
+    rgb = _exposed(radiance / np.float32(white_cd_m2), CameraSettings(chip=chip, exposure_gain=gain))
 
     truth: dict[str, NDArray[Any]] = {}
     if with_truth:

@@ -52,18 +52,21 @@ def content(case: "Case") -> dict[str, Any]:
 
 
 def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
-    """Compute the light of a scene, under whatever levels, into a folder.
+    """Compute the light of a scene, under whatever levels, and what cameras see of it, into a folder.
 
     Raises MissingDependencyError where this machine cannot draw, before any light is computed.
     """
     from vobench.rendering.bake import BakeSettings, bake, save_baked
     from vobench.rendering.raster import require_drawing
     from vobench.suite.scene_build import build
+    from vobench.suite.white import look_around
 
     require_drawing()
     scene = build(spec, {})
     with progress.step(f"light of {scene.name}") as tell:
-        save_baked(folder, bake(scene, BakeSettings(), tell))
+        baked = bake(scene, BakeSettings(), tell)
+        save_baked(folder, baked)
+        look_around(baked).save(folder)
 
 
 def open_renderer(
@@ -98,13 +101,15 @@ def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progr
     """Record a case's sequence in a folder, drawn by its engine, with the light of its scene where that needs it."""
     from vobench.runner.sensors import PixelTruth, SensorFeed
     from vobench.runner.stereo_camera import StereoCamera, World
+    from vobench.suite.white import white_of
 
     travel = body_motion(case)
     scene = case.build_scene()
     truth = PixelTruth(case, scene, travel.motion) if case.truth else None
-    renderer = open_renderer(scene, case.rendering, light, white_cd_m2=case.scene.white_cd_m2)
+    white_cd_m2 = white_of(case.scene, light)
+    renderer = open_renderer(scene, case.rendering, light, white_cd_m2=white_cd_m2)
     try:
-        camera = StereoCamera(case, World(scene, renderer, travel.motion))
+        camera = StereoCamera(case, World(scene, renderer, travel.motion, white_cd_m2))
         camera.skip(travel.first)
         frames = frames_of(case, travel)
         watched = progress.track(_pairs(camera, frames), f"simulate {case.name}", total=len(frames.t_ns))

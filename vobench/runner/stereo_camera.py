@@ -104,6 +104,7 @@ class World:
     scene: Scene
     renderer: Renderer
     motion: Motion
+    white_cd_m2: float
 
 
 class StereoCamera:
@@ -151,7 +152,7 @@ class SimulatedCamera:
         self._displacement = displacement
         self._light_changes = not all(isinstance(light.level, Steady) for light in world.scene.lights)
         self._settings = case.camera.eye(side)
-        self._white_cd_m2 = np.float32(case.scene.white_cd_m2)
+        self._white_cd_m2 = np.float32(world.white_cd_m2)
         self._lens = lens_maps(self._settings, self._camera, stream("dirt"))
         self._noise = NoiseStreams(stream("shot"), stream("read"))
         shape = (self._camera.height_px, self._camera.width_px)

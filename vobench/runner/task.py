@@ -36,7 +36,7 @@ KINDS: dict[Stage, str] = {
 }
 # The modules that a stage enters, of which its key hashes all that they import; a room stands for all of its modules.
 ENTRIES: dict[Stage, tuple[str, ...]] = {
-    "bake": ("vobench.rendering.bake", "vobench.suite.scene_build"),
+    "bake": ("vobench.rendering.bake", "vobench.suite.scene_build", "vobench.suite.white"),
     "sequence": ("vobench.runner.simulate", "vobench.runner.ground_truth"),
     "import": ("vobench.runner.import_recording", "vobench.runner.ground_truth", "vobench.dataset"),
     "estimate": ("vobench.runner.estimate", "vobench.estimator.worker"),
@@ -104,7 +104,8 @@ def sequence_tasks(case: Case | RecordedCase, recordings: "Mapping[str, Recordin
     """What makes a case's sequence, the sequence last: its scene's light is computed before, where it is drawn with."""
     if isinstance(case, RecordedCase):
         return [_import_task(case, recordings[case.name])]
-    before = [bake_task(case.scene)] if case.rendering.needs_bake else []
+    needs_light = case.rendering.needs_bake or case.scene.white_cd_m2 is None
+    before = [bake_task(case.scene)] if needs_light else []
     needs = tuple(task.key for task in before)
     used = library_versions(*libraries(case.rendering))
     inputs = {"case": content(case), **_made_by("sequence", needs), "libraries": used}

@@ -1,4 +1,4 @@
-"""A model file as a scene: with the model's own lights or suitable ones, and an exposure for their light."""
+"""A model file as a scene, with the model's own lights or suitable ones."""
 
 import re
 from collections.abc import Sequence
@@ -11,30 +11,25 @@ from vobench.scene.light import Light, Sky, Sun
 from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2, reflectance
 from vobench.scene.mesh import areas_m2, corners
 from vobench.scene.scene import Scene
-from vobench.suite.scene_spec import ModelSpec, PointLamp, SceneFile, SkySpec, SunSpec
+from vobench.suite.scene_spec import ModelSpec, SceneFile
 
 # A larger model is taken to be in centimetres.
 LARGEST_M = 300.0
 CENTIMETRE = 0.01
 
-# The light of models that have none.
-DAYLIGHT_SUN = SunSpec(illuminance_lx=30_000, azimuth_deg=30, elevation_deg=50)
-DAYLIGHT_SKY = SkySpec(illuminance_lx=8_000, kind="clear")
-LEAST_OPEN = 0.1  # share of the sky that is visible from the floor of an outdoor scene
-ROOM_LX = 400.0
-
 WHITEST = 0.9  # largest mean reflectance: at 1, light would be reflected for ever
 OTHER_REFLECTANCE = 0.5  # of mirrors and panes
-LEAST_WHITE_CD_M2 = 1.0
+LEAST_LX = 5.0  # mean illuminance by the model's own lights, below which others are added
 
 
 def bare_model_scene(path: Path) -> SceneFile:
-    """A model as a scene, exposed for a white wall in the mean light of the model.
+    """A model as a scene, with lights if its own give less than LEAST_LX; white follows from the light that is seen.
 
     In a closed room of area A and mean reflectance r, lamps of total power P give an illuminance of P / (A (1 - r)),
-    bounces included.
+    bounces included. A is the area of the faces that can be seen from the free space.
     """
     from vobench.asset.model import read_model
+    from vobench.suite.default_light import DAYLIGHT_SKY, DAYLIGHT_SUN, DUSK_SKY, default_light
 
     model = read_model(path)
     corners_m = np.concatenate([thing.mesh.vertices for thing in model.everything])
@@ -43,23 +38,24 @@ def bare_model_scene(path: Path) -> SceneFile:
     if scale != 1:
         model = read_model(path, scale=scale)
 
+    name = re.sub(r"[^a-z0-9_]+", "_", path.stem.lower()).strip("_") or "model"
+    whole_model = ModelSpec(file=str(path.resolve()), scale=scale)
+    spec = SceneFile(name=name, meshes=(whole_model,))
+
     properties = {name: _optical_properties(material) for name, material in model.materials.items()}
     properties_by_thing = np.array([properties[thing.material] for thing in model.everything])  # (T, 2)
     emission_cd_m2 = properties_by_thing[:, 0]
-    reflectances = properties_by_thing[:, 1]
+    absorption = 1 - properties_by_thing[:, 1]
+    light = default_light(Scene(name, tuple(model.everything), {}, ()), absorption)
+
     area_m2 = np.array([areas_m2(corners(thing.mesh)).sum() for thing in model.everything])  # (T,)
-
-    absorption_m2 = float(area_m2 @ (1 - reflectances))
-    emitted_lm = _lamp_power_lm(model.lights) + np.pi * area_m2 @ emission_cd_m2
-    illuminance_lx = _daylight_lx(model.lights) + float(emitted_lm) / absorption_m2
-
-    name = re.sub(r"[^a-z0-9_]+", "_", path.stem.lower()).strip("_") or "model"
-    white_cd_m2 = max(float(illuminance_lx / np.pi), LEAST_WHITE_CD_M2)
-    whole_model = ModelSpec(file=str(path.resolve()), scale=scale)
-    spec = SceneFile(name=name, white_cd_m2=white_cd_m2, meshes=(whole_model,))
-    if illuminance_lx:
+    emitted_lm = _lamp_power_lm(model.lights) + float(np.pi * area_m2 @ emission_cd_m2)
+    own_lx = _daylight_lx(model.lights) + emitted_lm / light.absorption_m2
+    if own_lx >= LEAST_LX:
         return spec
-    return _with_default_light(spec, Scene(name, tuple(model.everything), {}, ()), absorption_m2)
+    if light.lamps:
+        return replace(spec, lamps=light.lamps, sky=DUSK_SKY if light.has_windows else None)
+    return replace(spec, sun=DAYLIGHT_SUN, sky=DAYLIGHT_SKY)
 
 
 def _optical_properties(material: Material) -> tuple[float, float]:
@@ -76,20 +72,3 @@ def _lamp_power_lm(lights: Sequence[Light]) -> float:
 
 def _daylight_lx(lights: Sequence[Light]) -> float:
     return sum(light.illuminance_lx for light in lights if isinstance(light, Sun | Sky))
-
-
-def _with_default_light(spec: SceneFile, shape: Scene, absorption_m2: float) -> SceneFile:
-    """The scene in daylight if its floor sees the sky, else with lamps below its ceiling."""
-    from vobench.suite.free_way import ceiling_above
-
-    sky_share, lamp_positions_m = ceiling_above(shape)
-    if sky_share >= LEAST_OPEN:
-        sine = np.sin(np.deg2rad(DAYLIGHT_SUN.elevation_deg or 90))
-        illuminance_lx = DAYLIGHT_SUN.illuminance_lx * sine + DAYLIGHT_SKY.illuminance_lx
-        return replace(spec, sun=DAYLIGHT_SUN, sky=DAYLIGHT_SKY, white_cd_m2=float(illuminance_lx / np.pi))
-
-    power_lm = ROOM_LX * absorption_m2 / len(lamp_positions_m)
-    lamps = list[PointLamp]()
-    for number, position_m in enumerate(lamp_positions_m, 1):
-        lamps.append(PointLamp(name=f"lamp_{number}", center_m=position_m, power_lm=power_lm))
-    return replace(spec, lamps=tuple(lamps), white_cd_m2=float(ROOM_LX / np.pi))

@@ -29,6 +29,7 @@ SIDES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # (4, 3) uni
 
 # The circular path of a body.
 LEAST_RADIUS_M = 0.2  # of the free circle
+LEAST_PLACE_M = 2.0  # the longer side of what a body drives in; what is smaller is an object
 MOST_RADIUS_M = 4.0  # of the path
 SHARE_OF_CIRCLE = 0.6  # radius of the path relative to the free circle's
 MOST_LENGTH_M = 10.0
@@ -36,12 +37,6 @@ CORNERS = 16
 SPEED_MPS = 0.5
 RATE_HZ = 10.0
 EASE_S = 1.0
-
-# Lamps below a ceiling.
-SKY_RAYS = 512
-LAMP_BELOW = 0.35  # of the ceiling's height; a lamp near the ceiling overexposes the ceiling
-LAMP_SPACING = 2.5  # in heights of the ceiling
-MOST_LAMPS = 4  # along one side
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +50,7 @@ class FreeCircle:
 
 
 @dataclass(frozen=True, slots=True)
-class _FloorMap:
+class FloorMap:
     """A grid on the floor: cell centres x (W,) and y (H,), and which cells (H, W) are free."""
 
     x_m: Array
@@ -83,11 +78,11 @@ def largest_free_circle(faces: Triangles, caster: RayCaster) -> FreeCircle | Non
 
     The floor is the lowest height with much level area, because roofs and upper storeys may have more of it.
     """
-    floor = _floor_map(faces, caster)
+    floor = floor_map(faces, caster)
     return floor.largest_circle() if floor else None
 
 
-def _floor_map(faces: Triangles, caster: RayCaster) -> _FloorMap | None:
+def floor_map(faces: Triangles, caster: RayCaster) -> FloorMap | None:
     """The map of the floor; None if the scene has no level face."""
     is_level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
     if not is_level.any():
@@ -109,12 +104,12 @@ def _floor_map(faces: Triangles, caster: RayCaster) -> _FloorMap | None:
 
     # A cell is free if a ray from a body's height meets the floor first, and no wall is near.
     centres_m = np.stack(np.meshgrid(x_m, y_m), -1).reshape(-1, 2)  # (H * W, 2)
-    starts_m = _at_height(centres_m, floor_m + BODY_M)
+    starts_m = at_height(centres_m, floor_m + BODY_M)
     hits = caster.hits(starts_m, downward_directions(len(starts_m)))
     meets_floor = np.abs(hits.distance - BODY_M) < FLOOR_STEP_M
     is_free = meets_floor & (faces.plane[hits.face, 2] > 0)
     is_free[is_free] = _away_from_walls(centres_m[is_free], floor_m, cell_m, faces, caster)
-    return _FloorMap(x_m, y_m, is_free.reshape(len(y_m), len(x_m)), floor_m, cell_m)
+    return FloorMap(x_m, y_m, is_free.reshape(len(y_m), len(x_m)), floor_m, cell_m)
 
 
 def _floor_height_m(level_corners_m: Array, height_steps: NDArray[np.int_]) -> float:
@@ -125,7 +120,7 @@ def _floor_height_m(level_corners_m: Array, height_steps: NDArray[np.int_]) -> f
     return float((large_steps[0] + lowest_step) * FLOOR_STEP_M)
 
 
-def _at_height(places_m: Array, z_m: float) -> Array:
+def at_height(places_m: Array, z_m: float) -> Array:
     """Points (N, 3) at one height above places (N, 2)."""
     return np.column_stack([places_m, np.full(len(places_m), z_m)])
 
@@ -137,7 +132,7 @@ def _away_from_walls(centres_m: Array, floor_m: float, cell_m: float, faces: Tri
     """
     is_clear = np.ones(len(centres_m), bool)
     for height_m in WALL_HEIGHTS_M:
-        starts_m = _at_height(centres_m, floor_m + height_m)
+        starts_m = at_height(centres_m, floor_m + height_m)
         is_inside = np.ones(len(centres_m), bool)
         for direction in SIDES:
             hits = caster.hits(starts_m, np.tile(direction, (len(starts_m), 1)))
@@ -156,24 +151,42 @@ def downward_directions(count: int) -> Array:
 def circular_path(scene: Scene) -> PoseSpline:
     """A path around the centre of the scene's largest free circle, of a body that looks ahead.
 
-    Raises SuiteError if the free circle is too small, or there is no floor.
+    Raises SuiteError if the free circle or the scene is too small, or there is no floor.
     """
     faces = triangles(scene, t_ns=0)
+    longer_side_m = longer_level_side_m(faces)
+    if longer_side_m < LEAST_PLACE_M:
+        raise _no_path(scene, f"it is only {longer_side_m:.2g} m wide")
     free = largest_free_circle(faces, RayCaster(faces))
     if free is None:
         raise _no_path(scene, "it has no level floor; is another axis up?")
     if free.radius_m < LEAST_RADIUS_M:
         raise _no_path(scene, f"the largest free circle on its floor has a radius of {free.radius_m:.2f} m")
 
-    radius_m = min(SHARE_OF_CIRCLE * free.radius_m, MOST_RADIUS_M)
+    radius_m = path_radius_m(free)
     share_of_turn = min(1.0, MOST_LENGTH_M / (2 * np.pi * radius_m))
     angles_rad = np.linspace(0, 2 * np.pi * share_of_turn, CORNERS)
     poses = tuple(_pose_on_circle(free, radius_m, angle_rad) for angle_rad in angles_rad)
     return PoseSpline(poses=poses, ease_s=EASE_S, rate_hz=RATE_HZ)
 
 
+def longer_level_side_m(faces: Triangles) -> float:
+    """The length of the longer level side of the box around a scene."""
+    low_m = faces.corners_m.min((0, 1))
+    high_m = faces.corners_m.max((0, 1))
+    return float((high_m - low_m)[:2].max())
+
+
+def path_radius_m(free: FreeCircle) -> float:
+    """The radius of the path in a free circle."""
+    return min(SHARE_OF_CIRCLE * free.radius_m, MOST_RADIUS_M)
+
+
 def _no_path(scene: Scene, reason: str) -> SuiteError:
-    return SuiteError(f"no free path was found in '{scene.name}' ({reason}); add trajectories to the suite")
+    return SuiteError(
+        f"no free path was found in '{scene.name}' ({reason}); add trajectories to the suite, or if it is an object, "
+        "put it into a scene's YAML as one of its meshes"
+    )
 
 
 def _pose_on_circle(free: FreeCircle, radius_m: float, angle_rad: float) -> Pose:
@@ -185,55 +198,3 @@ def _pose_on_circle(free: FreeCircle, radius_m: float, angle_rad: float) -> Pose
         position_m=(x_m, y_m, free.floor_m),
         yaw_deg=float(np.rad2deg(angle_rad)) + 90,
     )
-
-
-def ceiling_above(scene: Scene) -> tuple[float, list[tuple[float, float, float]]]:
-    """The share of the sky that a body on the floor sees, and the positions of lamps below the ceiling.
-
-    There is one lamp above the free circle, or in a hall that is much wider than high a grid of them. In a scene
-    without a floor, all of the sky is visible.
-    """
-    faces = triangles(scene, t_ns=0)
-    caster = RayCaster(faces)
-    floor = _floor_map(faces, caster)
-    free = floor.largest_circle() if floor else None
-    if floor is None or free is None:
-        return 1.0, [(0.0, 0.0, 0.0)]
-
-    eye_m = np.array([free.x_m, free.y_m, free.floor_m + BODY_M])
-    hit_faces = caster.nearest(np.tile(eye_m, (SKY_RAYS, 1)), _upward_directions())
-    sky_share = float((hit_faces < 0).mean())
-
-    overhead = caster.hits(eye_m[None], -downward_directions(1))
-    height_m = float(overhead.distance[0]) if overhead.face[0] >= 0 else BODY_M
-    places_m = _grid_places(floor, LAMP_SPACING * (BODY_M + height_m))
-    starts_m = _at_height(places_m, eye_m[2]) if len(places_m) > 1 else eye_m[None]
-
-    # Where no ceiling is above a place, the one above the circle counts.
-    ceiling = caster.hits(starts_m, -downward_directions(len(starts_m)))
-    clearance_m = np.where(ceiling.face < 0, height_m, ceiling.distance)
-    lamps_m = starts_m - (1 - LAMP_BELOW) * clearance_m[:, None] * downward_directions(1)
-    return sky_share, [(x, y, z) for x, y, z in lamps_m.tolist()]
-
-
-def _upward_directions() -> Array:
-    """Random directions (SKY_RAYS, 3) of the upper hemisphere, the same in every run."""
-    directions = np.abs(np.random.default_rng(0).standard_normal((SKY_RAYS, 3)))
-    signs = np.sign(np.random.default_rng(1).standard_normal((SKY_RAYS, 2)))
-    directions[:, :2] *= signs
-    return directions
-
-
-def _grid_places(floor: _FloorMap, spacing_m: float) -> Array:
-    """Free places (N, 2) on a regular grid of about some spacing: in each part of the floor, the most central cell."""
-    cells = np.argwhere(floor.free)[:, ::-1]  # (N, 2) column and row
-    size_cells = np.array(floor.free.shape[::-1])
-    part_count = np.clip(np.rint(size_cells * floor.cell_m / spacing_m), 1, MOST_LAMPS)  # along x and y
-
-    position = cells / size_cells * part_count  # in parts
-    part = np.floor(position)
-    off_centre = np.abs(position - part - 0.5).max(1)
-    order = np.lexsort((off_centre, part[:, 1], part[:, 0]))
-    first_of_each_part = np.unique(part[order], axis=0, return_index=True)[1]
-    chosen = order[first_of_each_part]
-    return np.column_stack([floor.x_m[cells[chosen, 0]], floor.y_m[cells[chosen, 1]]])

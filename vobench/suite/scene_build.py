@@ -130,8 +130,10 @@ def _boxes(spec: SceneFile, of: Callable[[str], Material]) -> Iterator[Instance]
         mesh = block(box.size_m, bevel_m=0, transform=at(*box.center_m, yaw=box.yaw_deg))
         yield box.name or f"box_{index}", [Part(mesh, of(box.material))]
     for index, board in enumerate(spec.boards):
-        mesh = moved(card(board.size_m), at(*board.center_m, yaw=board.yaw_deg))
-        yield board.name or f"board_{index}", [Part(mesh, of(board.material))]
+        material = of(board.material)
+        whole_tile = (0.0, material.tile_m, 0.0, material.tile_m)
+        mesh = moved(card(board.size_m, cell=whole_tile), at(*board.center_m, yaw=board.yaw_deg))
+        yield board.name or f"board_{index}", [Part(mesh, material)]
 
 
 def _from_maker(spec: SceneFile) -> Iterator[Contents]:

@@ -422,13 +422,15 @@ class MoverSpec:
 class SceneFile:
     """A scene, and the luminance of diffuse white that cameras are exposed for.
 
+    Without `white_cd_m2`, white follows from the light that cameras on the free path see.
+
     It contains a room, boxes, boards, furniture, models, and what the Python file `maker` creates. Paths are relative
     to the scene's file. `seed` determines the random details of furniture and makers. `scale` multiplies all lengths.
     """
 
     name: Name
     summary: str = ""
-    white_cd_m2: Positive
+    white_cd_m2: Positive | None = None
     materials: dict[Name, MaterialSpec] = field(default_factory=dict)
     room: RoomSpec | None = None
     boxes: tuple[BoxSpec, ...] = ()
