@@ -141,7 +141,7 @@ class FrameRenderer:
             target = targets[index % len(targets)]
             target.canvas.clear(around)
             for view, box in zip(views, boxes, strict=True):
-                self._draw.draw(self._lit_view(camera, view, index), target, box)
+                self._draw.draw(self._lit_view(camera, view, index, box), target, box)
             self._draw.add(target, total, around, 1 / frame_count)
 
     def _lit_view(
@@ -149,6 +149,7 @@ class FrameRenderer:
         camera: Pinhole,
         view: View,
         index: int,
+        box: Box,
     ) -> PinholeView:
         """A sub-frame of a view, whose light is then in the texture."""
         start_ns = int(view.start_ns[index])
@@ -168,10 +169,11 @@ class FrameRenderer:
             ambient_cd_m2=np.broadcast_to(self._ambient.cd_m2(light), 3),
             glints=shown_glints,
         )
-        self._light.update(light)
         if isinstance(self._light, ShadedLight):
             colours, suns_ns = self._illumination.lights_at(start_ns, end_ns)
-            self._light.shade(middle_ns, suns_ns, colours)
+            self._light.shade(light, middle_ns, suns_ns, colours, self._draw.views(pinhole, box))
+        else:
+            self._light.update(light)
         return pinhole
 
 

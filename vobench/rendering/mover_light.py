@@ -1,7 +1,7 @@
 """Moving bodies as light meets them: shapes that cast their shade, light samples, and probes of the light around them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import groupby
 
 import numpy as np
@@ -17,6 +17,7 @@ from vobench.rendering.geometry import BoundingSphere, are_panes, sample_points,
 from vobench.rendering.indirect_light import Gatherer, response
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_owner import Owners
+from vobench.rendering.uniform_block import MOST_MAPS, MOST_REACHES, MOST_SAMPLES
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.mesh import Triangles, areas_m2, distinct, face_normals
@@ -27,30 +28,33 @@ STEEPEST = 0.999  # sine of the angle of a frustum that is as good as open to al
 SKY_REACH = 10  # radii beyond which a body hides less than a hundredth of an open sky
 
 
-def may_shade(mover: BoundingSphere, emitter: BoundingSphere, points: BoundingSphere) -> Mask:
-    """Whether a ray from within each of `points` (N,) to within the emitter's sphere can pass the mover's.
+def may_shade(movers: BoundingSphere, emitter: BoundingSphere, points: BoundingSphere) -> Mask:
+    """Whether (N,) a ray from within each of `points` (N,) to within the emitter's sphere can pass one of the movers'.
 
     All rays lie in a cone frustum about the line between the two spheres, here one a little wider.
     """
-    to_mover_m = mover.centre_m - points.centre_m
-    squared_m2 = np.einsum("ij,ij->i", to_mover_m, to_mover_m)
+    to_mover_m = movers.centre_m[:, None] - points.centre_m  # (S, N, 3)
+    radius_m = np.reshape(movers.radius_m, (-1, 1))
+    squared_m2 = np.einsum("sij,sij->si", to_mover_m, to_mover_m)
     if np.isinf(emitter.radius_m):
-        reach_m = SKY_REACH * mover.radius_m + points.radius_m
-        return np.asarray(squared_m2 <= reach_m**2)
-    near_m = mover.radius_m + points.radius_m
+        reach_m = SKY_REACH * radius_m + points.radius_m
+        return np.asarray((squared_m2 <= reach_m**2).any(0))
+    near_m = radius_m + points.radius_m
     to_emitter_m = emitter.centre_m - points.centre_m
     emitter_distance_m = np.maximum(np.sqrt(np.einsum("ij,ij->i", to_emitter_m, to_emitter_m)), 1e-9)
-    along_m = np.einsum("ij,ij->i", to_mover_m, to_emitter_m) / emitter_distance_m
+    along_m = np.einsum("sij,ij->si", to_mover_m, to_emitter_m) / emitter_distance_m
     aside_m = np.sqrt(np.maximum(squared_m2 - along_m**2, 0))
     sine = np.minimum((emitter.radius_m + points.radius_m) / emitter_distance_m, STEEPEST)
     cone_radius_m = near_m + sine * np.maximum(along_m, 0)
     is_in_cone = aside_m * np.sqrt(1 - sine**2) <= cone_radius_m
     is_before_emitter = along_m <= emitter_distance_m + emitter.radius_m + near_m
     is_ahead = along_m >= -near_m
-    return np.asarray((squared_m2 <= near_m**2) | (is_in_cone & is_before_emitter & is_ahead))
+    is_shading = (squared_m2 <= near_m**2) | (is_in_cone & is_before_emitter & is_ahead)
+    return np.asarray(is_shading.any(0))
 
 
-HULL_DIRECTIONS = 40
+HULL_DIRECTIONS = 20
+SMALL = 1 / 32  # of a body, a thing that casts no shade of its own
 HULL_FILLED = 1.4  # volume of a hull over that of the shape, above which the shape is not taken for its hull
 CELL = 1 / 24  # of the size of a shape that is no hull: vertices so close are merged
 
@@ -103,13 +107,14 @@ class Body:
     """Movers of one name, that is a thing or all limbs of a person.
 
     corners_m (K, 3, 3): what casts their shade, each face in the frame of its mover (K,). probes_m (N, 3): places
-    along the body, in the frame of its first mover.
+    along the body, in the frame of its first mover; part (K,): the one that each face is near at the start.
     """
 
     movers: tuple[int, ...]
     corners_m: Array
     mover: Rows
     probes_m: Array
+    part: Rows
 
     def placed(self, T_world_movers: Array) -> Array:
         """Its faces (K, 3, 3) in the world."""
@@ -132,22 +137,37 @@ def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mas
     result = []
     for _, members in groupby(range(len(scene_movers)), key=lambda nth: scene_movers[nth].name):
         movers = tuple(members)
+        body_rows = np.flatnonzero(is_solid & np.isin(faces.mover, movers))
+        small_m = SMALL * _size_m(faces.corners_m[body_rows])
         shapes_m = []
         shape_movers = []
         for mover in movers:
             rows = np.flatnonzero(is_solid & (faces.mover == mover))
             for thing in np.unique(faces.thing[rows]):
-                shape_m = occluder(faces.corners_m[rows[faces.thing[rows] == thing]])
+                thing_m = faces.corners_m[rows[faces.thing[rows] == thing]]
+                if _size_m(thing_m) < small_m:
+                    continue
+                shape_m = occluder(thing_m)
                 shapes_m.append(shape_m)
                 shape_movers.append(np.full(len(shape_m), mover))
         if not shapes_m:
             continue
-        body = Body(movers, np.concatenate(shapes_m), np.concatenate(shape_movers), np.zeros((1, 3)))
+        no_part = np.zeros(0, np.int64)
+        body = Body(movers, np.concatenate(shapes_m), np.concatenate(shape_movers), np.zeros((1, 3)), no_part)
         T_world_movers = np.array([mover.path.pose(0) for mover in scene_movers])
         T_first_world = se3.inverse(T_world_movers[movers[0]])
         points_m = se3.apply(T_first_world, body.placed(T_world_movers).reshape(-1, 3))
-        result.append(Body(movers, body.corners_m, body.mover, _probes_m(points_m)))
+        body = replace(body, probes_m=_probes_m(points_m))
+        middles_m = points_m.reshape(-1, 3, 3).mean(1)
+        result.append(replace(body, part=np.rint(body.probe_place(middles_m)).astype(np.int64)))
     return result
+
+
+def _size_m(corners_m: Array) -> float:
+    """The longest side of the box around faces (K, 3, 3)."""
+    if not len(corners_m):
+        return 0.0
+    return float(np.ptp(corners_m.reshape(-1, 3), axis=0).max())
 
 
 def _probes_m(points_m: Array) -> Array:
@@ -161,10 +181,12 @@ def _probes_m(points_m: Array) -> Array:
     return np.asarray(low_m + shares * size_m)
 
 
-PER_RADIUS_M = 16  # samples of an emitter, for each metre of its radius
+# Samples of a panel for each metre of its radius, at least and at most; of a pane; of the open sky.
+PER_RADIUS_M = 14
 FEWEST_SAMPLES = 2
-MOST_SAMPLES = 12
-OPEN_SKY_SAMPLES = 24
+PANEL_SAMPLES = 8
+PANE_SAMPLES = 6
+OPEN_SKY_SAMPLES = MOST_SAMPLES
 GOLDEN = (0.7548776662, 0.5698402910)  # steps that fill the unit square evenly: Roberts (2018), R2
 
 
@@ -185,7 +207,9 @@ class SampledEmitter:
     is_hard: bool = False
 
 
-def sampled_emitters(lights: Sequence[Light], visibility: Visibility, suns_ns: Sequence[float]) -> list[SampledEmitter]:
+def sampled_emitters(
+    lights: Sequence[Light], visibility: Visibility, suns_ns: Sequence[float], most_samples: int = MOST_SAMPLES
+) -> list[SampledEmitter]:
     """All that shines, in the order of the lights; suns_ns (L,): the instant of each sun that moves."""
     result = []
     for index, light in enumerate(lights):
@@ -203,7 +227,18 @@ def sampled_emitters(lights: Sequence[Light], visibility: Visibility, suns_ns: S
                 result.append(SampledEmitter(index, emitter.ball, place, np.zeros((1, 4)), np.ones(1), is_hard=True))
             case Sky():
                 result += _sampled_sky(index, light, visibility)
-    return result
+    return [_with_fewer(emitter, most_samples) for emitter in result]
+
+
+def _with_fewer(emitter: SampledEmitter, most: int) -> SampledEmitter:
+    """The emitter with no more samples than so many."""
+    count = len(emitter.places)
+    if count <= most:
+        return emitter
+    rows = np.linspace(0, count - 1, most).astype(int)
+    return replace(
+        emitter, places=emitter.places[rows], axes=emitter.axes[rows], strength=emitter.strength[rows] * count / most
+    )
 
 
 def _square(count: int) -> tuple[Array, Array]:
@@ -214,7 +249,7 @@ def _square(count: int) -> tuple[Array, Array]:
 
 
 def _sample_count(radius_m: float) -> int:
-    return int(np.clip(np.rint(PER_RADIUS_M * radius_m), FEWEST_SAMPLES, MOST_SAMPLES))
+    return int(np.clip(np.rint(PER_RADIUS_M * radius_m), FEWEST_SAMPLES, PANEL_SAMPLES))
 
 
 def _ball(corners_m: Array) -> BoundingSphere:
@@ -241,7 +276,7 @@ def _sampled_sky(index: int, light: Sky, visibility: Visibility) -> list[Sampled
     result = []
     for pane in visibility.sky_panes:
         ball = _ball(pane.corners_m)
-        count = _sample_count(ball.radius_m)
+        count = PANE_SAMPLES
         places = np.column_stack([sample_points(pane.corners_m, *_square(count)), np.ones(count)])
         strength = np.full(count, areas_m2(pane.corners_m).sum() / count)
         result.append(SampledEmitter(index, ball, places, np.tile([*pane.normal, 1.0], (count, 1)), strength))
@@ -255,26 +290,30 @@ def _sampled_sky(index: int, light: Sky, visibility: Visibility) -> list[Sampled
 NEAR_M = 0.05  # nearness in shadow maps is this over the distance
 MARGIN = 1.08  # of the radius that a shadow map shows, so that its rim is empty
 WIDEST = 0.95  # sine of half the angle of a shadow map
-GATHER_RAYS = 64
+GATHER_RAYS = 36
 AXES = np.concatenate([np.eye(3), -np.eye(3)])
 FAR_M = 1e3
+SHARE_SAMPLES = 4  # of an emitter, that tell how much of a sky's light comes by it
+LIFT_M = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
 class MoverLightAt:
     """Movers at one instant, as tables of the shaders `occluder` and `shade`.
 
-    occluders_m: of each body (B) its faces (K, 3, 3). maps (B, K, 4, 4): from the world to what each of all samples
-    (K) sees of each body. spheres (B, 4) around bodies. samples (K, 2, 4): places and axes. reach (N + B, K): the
-    strength of each sample as it arrives at each probe, and its mean at those of each body. cubes (N, 6, L, 3):
-    illuminance of faces along ±x, ±y and ±z by bounces, under each light at level 1. points (P, 2, 4): places and
-    between which probes, normals and eta of the coat; hard (H, P): illuminance by each emitter with hard shadows.
+    occluders_m: of each body (B) its faces (K, 3, 3). maps (M, 4, 4): from the world to what a sample sees of a body,
+    body by body, for those of all samples (K) that reach it; map_of (B, K) is the map's number, -1 for none. spheres
+    (S,): around their parts. samples (K, 2, 4): places and axes. reach (N + B, K): the strength of each sample as it
+    arrives at each probe, and its mean at those of each body. cubes (N, 6, L, 3): illuminance of faces along ±x, ±y
+    and ±z by bounces, under each light at level 1. points (P, 2, 4): places and between which probes, normals and
+    eta of the coat; hard (H, P): illuminance by each emitter with hard shadows.
     """
 
     emitters: Sequence[SampledEmitter]
     occluders_m: Sequence[Array]
     maps: Floats
-    spheres: Floats
+    map_of: Indices
+    spheres: BoundingSphere
     samples: Floats
     reach: Floats
     cubes: Floats
@@ -286,6 +325,30 @@ class MoverLightAt:
         before = [len(other.places) for other in self.emitters[:emitter]]
         return sum(before), len(self.emitters[emitter].places)
 
+    def gathered(self, colours: Floats) -> Floats:
+        """Illuminance (P, 3) of the points by bounces, in lights of colours (L, 3)."""
+        cubes = np.einsum("nslc,lc->nsc", self.cubes, colours)
+        place = self.points[:, 0, 3]
+        first = place.astype(np.int64)
+        share = (place - first)[:, None]
+        after = np.minimum(first + 1, len(cubes) - 1)
+        normals = self.points[:, 1, :3]
+        total = np.zeros((len(normals), 3), np.float32)
+        for axis in range(3):
+            side = np.where(normals[:, axis] < 0, axis + 3, axis)
+            light = (1 - share) * cubes[first, side] + share * cubes[after, side]
+            total += normals[:, axis, None] ** 2 * light
+        return total
+
+
+def _part_spheres(bodies: Sequence[Body], occluders_m: Sequence[Array]) -> BoundingSphere:
+    """Spheres (S,) around the parts of all bodies."""
+    balls = []
+    for body, corners_m in zip(bodies, occluders_m, strict=True):
+        balls += [_ball(corners_m[body.part == part]) for part in np.unique(body.part)]
+    centres_m = np.array([ball.centre_m for ball in balls]).reshape(-1, 3)
+    return BoundingSphere(centres_m, np.array([ball.radius_m for ball in balls]))
+
 
 class MoverLight:
     """The movers of a baked scene: bodies, the texels (P,) of theirs on the map, and the stationary part as rays."""
@@ -294,7 +357,6 @@ class MoverLight:
         faces = baked.faces
         materials = baked.scene.materials
         self._scene = baked.scene
-        self.scene_movers = baked.scene.movers
         self._radiosity = baked.patches.radiosity
         self._rays = GATHER_RAYS if baked.settings.bounces else 0
         is_solid = (faces.mover >= 0) & ~are_panes(faces, materials)
@@ -325,7 +387,7 @@ class MoverLight:
 
     def _probe_places(self) -> Floats:
         """Between which of all probes each point (P,) lies."""
-        T_world_movers = self._poses(0)
+        T_world_movers = self.poses(0)
         first = 0
         result = np.zeros(len(self._mover), np.float32)
         for body in self.bodies:
@@ -339,23 +401,33 @@ class MoverLight:
             first += len(body.probes_m)
         return result
 
-    def _poses(self, t_ns: float) -> Array:
+    def poses(self, t_ns: float) -> Array:
+        """T_world_mover (M, 4, 4) of all movers at an instant."""
         return np.array([mover.path.pose(t_ns) for mover in self._scene.movers])
+
+    def emitters(self, suns_ns: Sequence[float]) -> list[SampledEmitter]:
+        """All that shines; suns_ns (L,): the instant of each sun that moves."""
+        probe_count = sum(len(body.probes_m) for body in self.bodies)
+        most = min(MOST_MAPS // max(len(self.bodies), 1), MOST_REACHES // max(probe_count, 1))
+        return sampled_emitters(self._scene.lights, self._visibility, suns_ns, min(most, MOST_SAMPLES))
 
     def at(self, t_ns: float, suns_ns: Sequence[float]) -> MoverLightAt:
         """The movers at an instant; suns_ns (L,): that of each sun that moves."""
-        T_world_movers = self._poses(t_ns)
-        sampled = sampled_emitters(self._scene.lights, self._visibility, suns_ns)
+        T_world_movers = self.poses(t_ns)
+        sampled = self.emitters(suns_ns)
         places = np.concatenate([np.zeros((0, 4)), *(emitter.places for emitter in sampled)])
         axes = np.concatenate([np.zeros((0, 4)), *(emitter.axes for emitter in sampled)])
         occluders_m = [body.placed(T_world_movers) for body in self.bodies]
         balls = [_ball(corners_m) for corners_m in occluders_m]
-        maps = [shadow_matrices(places, ball) for ball in balls]
         probes_m = [se3.apply(T_world_movers[body.movers[0]], body.probes_m) for body in self.bodies]
         all_probes_m = np.concatenate(probes_m)
         arriving = self._arriving(sampled, all_probes_m)
         counts = [len(body) for body in probes_m]
         by_body = [part.mean(0) for part in np.split(arriving, np.cumsum(counts)[:-1])]
+
+        is_reaching = np.array(by_body) > 0
+        map_of = np.where(is_reaching, np.cumsum(is_reaching).reshape(is_reaching.shape) - 1, -1)
+        maps = [shadow_matrices(places[rows], ball) for rows, ball in zip(is_reaching, balls, strict=True)]
 
         T = T_world_movers[self._mover]
         points_m = np.einsum("nij,nj->ni", T[:, :3, :3], self._points_m) + T[:, :3, 3]
@@ -366,14 +438,52 @@ class MoverLight:
         return MoverLightAt(
             emitters=sampled,
             occluders_m=occluders_m,
-            maps=np.array(maps, np.float32),
-            spheres=np.array([[*ball.centre_m, ball.radius_m] for ball in balls], np.float32),
+            maps=np.concatenate(maps).astype(np.float32),
+            map_of=map_of.astype(np.int32),
+            spheres=_part_spheres(self.bodies, occluders_m),
             samples=np.stack([places, axes], 1).astype(np.float32),
             reach=np.concatenate([arriving, by_body]).astype(np.float32),
             cubes=self._cubes(all_probes_m),
             points=points.astype(np.float32),
             hard=self._hard(points_m, normals, suns_ns),
         )
+
+    def sky_shares(self, sampled: Sequence[SampledEmitter], places_m: Floats, normals: Floats) -> Floats:
+        """Share (P, E) of the direct light of each emitter's sky at points that comes by it, by few rays; 1 of others."""
+        weights = np.ones((len(places_m), len(sampled)), np.float32)
+        is_sky = np.zeros(len(sampled), bool)
+        for nth, emitter in enumerate(sampled):
+            is_sky[nth] = isinstance(self._scene.lights[emitter.light], Sky)
+            if is_sky[nth]:
+                few = np.linspace(0, len(emitter.places) - 1, SHARE_SAMPLES).astype(int)
+                weights[:, nth] = 0
+                for sample in few:
+                    weights[:, nth] += self._seen(emitter, sample, places_m, normals)
+                weights[:, nth] *= len(emitter.places) / SHARE_SAMPLES
+        for light in np.unique([emitter.light for emitter in sampled]):
+            members = np.array([emitter.light == light for emitter in sampled]) & is_sky
+            total = np.maximum(weights[:, members].sum(1, keepdims=True), 1e-30)
+            weights[:, members] /= total
+        return weights
+
+    def _seen(self, emitter: SampledEmitter, sample: int, places_m: Floats, normals: Floats) -> Floats:
+        """Illuminance (P,) of points by one sample of the sky."""
+        place = emitter.places[sample]
+        axis = emitter.axes[sample, :3]
+        vectors_m = place[:3] - place[3] * places_m
+        distance_m = np.linalg.norm(vectors_m, axis=1)
+        directions = vectors_m / distance_m[:, None]
+        light = emitter.strength[sample] * np.maximum(np.einsum("ij,ij->i", directions, normals), 0)
+        if place[3]:
+            light = light * np.abs(directions @ axis) / distance_m**2
+        rows = np.flatnonzero(light > 0)
+        origins_m = (places_m + LIFT_M * normals)[rows].astype(np.float32)
+        ends_m = (FAR_M * directions[rows]).astype(np.float32)
+        passing = self._visibility.clear(origins_m, ends_m)
+        if not place[3]:
+            passing = passing & ~self._visibility.crosses_sky_pane(origins_m, ends_m)
+        light[rows] *= passing
+        return np.asarray(light, np.float32)
 
     def _arriving(self, sampled: Sequence[SampledEmitter], probes_m: Array) -> Array:
         """The strength (N, K) of all samples as it arrives at probes (N, 3); of hard light as if nothing hid it."""

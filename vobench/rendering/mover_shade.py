@@ -1,295 +1,148 @@
 """The map of light as it is drawn: that of the stationary part, with the shade of movers and the light on them."""
 
+import ctypes
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from OpenGL import GL
 
-from vobench.geometry.vector import unit
-from vobench.rendering.array_types import Floats, Indices, Mask
+from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.bake import BakedScene
+from vobench.rendering.batch import morton
+from vobench.rendering.culling import bounds
 from vobench.rendering.geometry import BoundingSphere
 from vobench.rendering.mover_light import MoverLight, MoverLightAt, SampledEmitter, may_shade
-from vobench.rendering.opengl import LightTexture, ShaderProgram, bind
-from vobench.rendering.texel_owner import owners
+from vobench.rendering.opengl import Blocks, ShaderProgram, bind
+from vobench.rendering.texel_owner import Owners, owners
+from vobench.rendering.uniform_block import MOST_SPHERES, SHADE
+from vobench.rendering.view import Box, PinholeView
+from vobench.scene.light import Steady
 
-TILE_PX = 32  # of the map of light, culled together
+Views = Sequence[tuple[PinholeView, Box]]
+BLOCK = 64  # texels near one another, all of which are drawn or none
+CLUSTER = 16  # blocks that are culled together before each is
+READ_M = 0.1  # from what a picture shows, as far as it reads light
 SHADOW_PX = 64  # along a side of one shadow map
 COLUMNS = 32  # of shadow maps in their atlas
-BITS = 24  # bodies that a mask tells apart, as in the shader
-UNNOTICED = 1 / 300  # share of a light's largest, less than a step of 8 bits
+UNNOTICED = 1 / 150  # share of a place's direct light, about a step of 8 bits
 FLOAT16_STEP = 2.0**-11  # so much too small at most, once it is rounded down
+PLACED = 100_000  # texels at once
+FLOAT_BYTES = 4
 
 # Texture units; the shaders use the same numbers.
-MAPS, TILES, ATLAS, SAMPLES, REACH, EMITTERS, BODIES, BASE, PLACES, NORMALS, DIRECT, MOVER_TEXEL, POINTS, CUBES, HARD = (
-    GL.GL_TEXTURE0 + unit for unit in range(15)
-)
+ATLAS = GL.GL_TEXTURE0
+MAPS = GL.GL_TEXTURE0 + 1
+
+SITE = np.dtype([("place", np.float32, 3), ("normal", np.int8, 4), ("texel", np.uint16, 2)])
+# Place, normal and eta, texel, hard light, probe, gathered light: as the shader's locations.
+POINT_FLOATS = (3, 4, 2, 1, 1, 3)
 
 
-class BufferTexture:
-    """Rows (N, 4) or numbers (N,) float32 that shaders read by index."""
+@dataclass(frozen=True, slots=True)
+class Sites:
+    """The texels (P,) of the stationary part, block by block of near ones; spheres around blocks and clusters."""
+
+    texels: Rows
+    places_m: Floats
+    normals: Floats
+    blocks: BoundingSphere
+    clusters: BoundingSphere
+
+    def shaded(self, movers: BoundingSphere, emitter: BoundingSphere, is_lit: Mask) -> Indices:
+        """The blocks among the lit ones (N,) where movers may take some of an emitter's light."""
+        clusters = np.flatnonzero(may_shade(movers, emitter, self.clusters))
+        blocks = (clusters[:, None] * CLUSTER + np.arange(CLUSTER)).ravel()
+        blocks = blocks[blocks < len(is_lit)]
+        blocks = blocks[is_lit[blocks]]
+        return blocks[may_shade(movers, emitter, self.blocks.take(blocks))]
+
+    def seen(self, views: Views) -> Mask:
+        """The blocks (N,) that some of the views show, or read light beside."""
+        result = np.zeros(len(self.blocks.radius_m), bool)
+        for view, box in views:
+            planes = bounds(view, box)
+            planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+            heights_m = planes[:, :3] @ self.blocks.centre_m.T + planes[:, 3:]
+            result |= heights_m.min(0) > -self.blocks.radius_m - READ_M
+        return result
+
+
+def _sites(baked: BakedScene, owner: Owners) -> Sites:
+    texels = np.flatnonzero((owner.face >= 0) & (baked.faces.mover[owner.face] < 0))
+    places_m = np.zeros((len(texels), 3), np.float32)
+    for start in range(0, len(texels), PLACED):
+        part = texels[start : start + PLACED]
+        weights = np.column_stack([1 - owner.uv[part].sum(1), owner.uv[part]])
+        corners_m = baked.faces.corners_m[owner.face[part]]
+        places_m[start : start + PLACED] = np.einsum("ni,nij->nj", weights, corners_m)
+    if len(texels):
+        order = np.argsort(morton(places_m), kind="stable")
+        texels = texels[order]
+        places_m = places_m[order]
+    low_m, high_m = _boxes(places_m, places_m, BLOCK)
+    cluster_low_m, cluster_high_m = _boxes(low_m, high_m, CLUSTER)
+    return Sites(
+        texels=texels,
+        places_m=places_m,
+        normals=baked.faces.plane[owner.face[texels]].astype(np.float32),
+        blocks=_around(low_m, high_m),
+        clusters=_around(cluster_low_m, cluster_high_m),
+    )
+
+
+def _boxes(low_m: Floats, high_m: Floats, count: int) -> tuple[Floats, Floats]:
+    """Boxes around so many boxes (N, 3) each, in their order."""
+    if not len(low_m):
+        return low_m, high_m
+    starts = np.arange(0, len(low_m), count)
+    return np.minimum.reduceat(low_m, starts), np.maximum.reduceat(high_m, starts)
+
+
+def _around(low_m: Floats, high_m: Floats) -> BoundingSphere:
+    centre_m = (low_m + high_m).astype(float) / 2
+    return BoundingSphere(centre_m, np.linalg.norm(high_m - low_m, axis=1) / 2)
+
+
+def sky_shares(movers: MoverLight, sampled: Sequence[SampledEmitter], sites: Sites) -> Floats:
+    """Share (E, P) of its light that comes by each emitter to all texels; those of one block have the same."""
+    middles = np.minimum(np.arange(len(sites.blocks.radius_m)) * BLOCK + BLOCK // 2, len(sites.texels) - 1)
+    shares = movers.sky_shares(sampled, sites.places_m[middles], sites.normals[middles])
+    return np.repeat(shares.T, BLOCK, axis=1)[:, : len(sites.texels)]
+
+
+class _ShadowAtlas:
+    """Moving bodies as all samples of emitters see them: nearness, one tile a map."""
 
     def __init__(self) -> None:
-        self._buffer = GL.glGenBuffers(1)
-        self.id = GL.glGenTextures(1)
-
-    def update(self, values: NDArray[Any]) -> None:
-        """Replace all values."""
-        data = np.ascontiguousarray(values, np.float32)
-        if not data.size:
-            data = np.zeros(4, np.float32)
-        GL.glBindBuffer(GL.GL_TEXTURE_BUFFER, self._buffer)
-        GL.glBufferData(GL.GL_TEXTURE_BUFFER, data.nbytes, data, GL.GL_STREAM_DRAW)
-        internal = GL.GL_R32F if data.ndim == 1 else GL.GL_RGBA32F
-        GL.glBindTexture(GL.GL_TEXTURE_BUFFER, self.id)
-        GL.glTexBuffer(GL.GL_TEXTURE_BUFFER, internal, self._buffer)
-
-
-class ShadedLight:
-    """A light texture for scenes with movers: `update` sets the light without them, `shade` puts them in."""
-
-    def __init__(self, baked: BakedScene, values: Floats) -> None:
-        owner = owners(baked.atlas)
-        self.movers = MoverLight(baked, owner)
-        self._height, self._width = baked.direct.shape[1:]
-        self._shown: object = None
-        self._dirty = np.zeros(0, np.int64)
-        self._program = {name: ShaderProgram("shade", "shade", name) for name in ("IS_BASE", "IS_SHADE", "IS_MOVER")}
-        self._occluder = ShaderProgram("occluder", "occluder")
-        units = (MAPS, TILES, SAMPLES, REACH, EMITTERS, BODIES, POINTS, CUBES, HARD)
-        self._buffers = {unit: BufferTexture() for unit in units}
-        self._textures: dict[Any, tuple[int, Any]] = {}
-
-        faces = baked.faces
-        is_static = (owner.face >= 0) & (faces.mover[owner.face] < 0)
-        places_m = np.zeros((len(owner.face), 4), np.float32)
-        normals = np.zeros((len(owner.face), 4), np.int8)
-        texels = np.flatnonzero(is_static)
-        weights = np.column_stack([1 - owner.uv[texels].sum(1), owner.uv[texels]])
-        for part in np.array_split(np.arange(len(texels)), 1 + len(texels) // 100_000):
-            face = owner.face[texels[part]]
-            places_m[texels[part], :3] = np.einsum("ni,nij->nj", weights[part], faces.corners_m[face])
-            normals[texels[part], :3] = np.rint(127 * faces.plane[face])
-        self._texture_2d(PLACES, GL.GL_RGBA32F, GL.GL_RGBA, GL.GL_FLOAT, places_m)
-        self._texture_2d(NORMALS, GL.GL_RGBA8_SNORM, GL.GL_RGBA, GL.GL_BYTE, normals)
-        point = np.full(len(owner.face), -1, np.int32)
-        point[self.movers.texels] = np.arange(len(self.movers.texels))
-        self._texture_2d(MOVER_TEXEL, GL.GL_R32I, GL.GL_RED_INTEGER, GL.GL_INT, point)
-
-        self._tiles_px = (-(-self._width // TILE_PX), -(-self._height // TILE_PX))
-        rows, columns = np.divmod(np.arange(len(owner.face)), self._width)
-        tile = rows // TILE_PX * self._tiles_px[0] + columns // TILE_PX
-        self._mover_tiles = np.unique(tile[self.movers.texels])
-        self._tile_balls = self._balls(places_m[texels, :3], tile[texels])
-        self._largest = np.array([layer.max() for layer in baked.direct])
-        self._lit_tiles = [self._lit(layer, tile) for layer in baked.direct]
-        self._texture_direct(baked.direct)
-
-        self._base = LightTexture(values)
-        self.id = self._colour_target()
-        self._atlas_rows = 0
+        self.rows = 0
+        self._program = ShaderProgram("occluder", "occluder")
+        self._maps = _BufferTexture()
         self._vertex_array = GL.glGenVertexArrays(1)
         self._vertices = GL.glGenBuffers(1)
-        self._empty_vertex_array = GL.glGenVertexArrays(1)
-        self._restore_all()
-
-    def _balls(self, places_m: Floats, tile: Indices) -> BoundingSphere:
-        """Spheres around the places (N, 3) in each tile (N,); those of tiles without any have a negative radius."""
-        count = self._tiles_px[0] * self._tiles_px[1]
-        low_m = np.full((count, 3), np.inf)
-        high_m = np.full((count, 3), -np.inf)
-        order = np.argsort(tile, kind="stable")
-        starts = np.flatnonzero(np.diff(tile[order], prepend=-1))
-        tiles = tile[order][starts]
-        low_m[tiles] = np.minimum.reduceat(places_m[order], starts)
-        high_m[tiles] = np.maximum.reduceat(places_m[order], starts)
-        with np.errstate(invalid="ignore"):
-            return BoundingSphere((low_m + high_m) / 2, np.linalg.norm(high_m - low_m, axis=1) / 2)
-
-    def _lit(self, layer: Floats, tile: Indices) -> Indices:
-        """The tiles in which a light's direct light (H, W) is noticed."""
-        noticed = np.flatnonzero(layer.ravel() > UNNOTICED * layer.max(initial=0))
-        tiles = np.unique(tile[noticed])
-        return tiles[np.isfinite(self._tile_balls.radius_m[tiles])]
-
-    def _texture_2d(self, unit: Any, internal: int, form: int, kind: int, values: NDArray[Any]) -> None:
-        texture = GL.glGenTextures(1)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
-        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-        data = np.ascontiguousarray(values)
-        GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, self._width, self._height, 0, form, kind, data)
-        _nearest(GL.GL_TEXTURE_2D)
-        self._textures[unit] = (GL.GL_TEXTURE_2D, texture)
-
-    def _texture_direct(self, direct: Floats) -> None:
-        """Each light's layer over its largest value, rounded down so that no more is taken than there is."""
-        texture = GL.glGenTextures(1)
-        kind = GL.GL_TEXTURE_2D_ARRAY
-        GL.glBindTexture(kind, texture)
-        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-        size = (self._width, self._height, len(direct))
-        GL.glTexImage3D(kind, 0, GL.GL_R16F, *size, 0, GL.GL_RED, GL.GL_HALF_FLOAT, None)
-        self._textures[DIRECT] = (kind, texture)
-        for index in range(len(direct)):
-            self.set_direct(index, direct[index])
-        _nearest(kind)
-
-    def set_direct(self, index: int, layer: Floats) -> None:
-        """Replace a light's direct light (H, W)."""
-        self._largest[index] = layer.max(initial=0)
-        values = layer * np.float32((1 - FLOAT16_STEP) / max(self._largest[index], 1e-30))
-        kind, texture = self._textures[DIRECT]
-        GL.glBindTexture(kind, texture)
-        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-        data = np.ascontiguousarray(values, np.float16)
-        size = (self._width, self._height, 1)
-        GL.glTexSubImage3D(kind, 0, 0, 0, index, *size, GL.GL_RED, GL.GL_HALF_FLOAT, data)
-
-    def _colour_target(self) -> Any:
-        texture = GL.glGenTextures(1)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
-        size = (self._width, self._height)
-        GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, GL.GL_RGBA32F, *size, 0, GL.GL_RGBA, GL.GL_FLOAT, None)
-        for side in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
-            GL.glTexParameteri(GL.GL_TEXTURE_2D, side, GL.GL_LINEAR)
-        for axis in (GL.GL_TEXTURE_WRAP_S, GL.GL_TEXTURE_WRAP_T):
-            GL.glTexParameteri(GL.GL_TEXTURE_2D, axis, GL.GL_CLAMP_TO_EDGE)
         self._framebuffer = GL.glGenFramebuffers(1)
+        self.id = GL.glGenTextures(1)
+
+    @property
+    def size_px(self) -> tuple[int, int]:
+        """Width and height."""
+        return COLUMNS * SHADOW_PX, self.rows * SHADOW_PX
+
+    def draw(self, at: MoverLightAt) -> None:
+        """Draw each body as every sample that reaches it sees it."""
+        self._require_rows(max(-(-at.map_of.size // COLUMNS), 1))
+        self._maps.update(at.maps.reshape(-1, 4))
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._framebuffer)
-        GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, texture, 0)
-        return texture
-
-    def update(self, values: Floats) -> None:
-        """Show a map (H, W, 3) without movers; the very array that is there already costs nothing."""
-        if values is self._base.values:
-            return
-        self._base.update(values)
-        self._shown = None
-        self._restore_all()
-
-    def _restore_all(self) -> None:
-        self._begin()
-        self._tiles("IS_BASE", np.arange(self._tiles_px[0] * self._tiles_px[1]), None)
-        self._end()
-        self._dirty = np.zeros(0, np.int64)
-
-    def shade(self, t_ns: float, suns_ns: Sequence[float], colours: Floats) -> None:
-        """Put in the movers as they are at an instant, in lights of colours (L, 3) times their levels."""
-        poses = [mover.path.pose(t_ns).tobytes() for mover in self.movers.scene_movers]
-        key = (tuple(poses), tuple(suns_ns), colours.tobytes())
-        if key == self._shown:
-            return
-        self._shown = key
-        at = self.movers.at(t_ns, suns_ns)
-        self._upload(at, colours)
-        self._draw_atlas(at)
-        self._begin()
-        self._tiles("IS_BASE", self._dirty, None)
-        dirty = [self._mover_tiles]
-        GL.glEnable(GL.GL_BLEND)
-        GL.glBlendEquation(GL.GL_FUNC_REVERSE_SUBTRACT)
-        GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
-        for nth, emitter in enumerate(at.emitters):
-            tiles, masks = self._shaded_tiles(at, nth, emitter, colours)
-            if len(tiles):
-                of_light = [i for i, other in enumerate(at.emitters) if other.light == emitter.light]
-                self._program["IS_SHADE"].use(
-                    emitter=nth,
-                    largest=float(self._largest[emitter.light]),
-                    first_sibling=of_light[0],
-                    end_sibling=of_light[-1] + 1,
-                )
-                self._tiles("IS_SHADE", tiles, masks)
-                dirty.append(tiles)
-        GL.glBlendEquation(GL.GL_FUNC_ADD)
-        GL.glDisable(GL.GL_BLEND)
-        self._tiles("IS_MOVER", self._mover_tiles, None)
-        self._end()
-        self._dirty = np.unique(np.concatenate(dirty))
-
-    def _shaded_tiles(
-        self, at: MoverLightAt, nth: int, emitter: SampledEmitter, colours: Floats
-    ) -> tuple[Indices, Indices]:
-        """The tiles in which bodies may take light of an emitter, and which bodies, as masks."""
-        first, count = at.sample_range(nth)
-        reaches = at.reach[len(at.cubes) :, first : first + count].max(1)
-        candidates = self._lit_tiles[emitter.light]
-        masks = np.zeros(len(candidates), np.int64)
-        if not colours[emitter.light].any():
-            return candidates[:0], masks[:0]
-        balls = self._tile_balls.take(candidates)
-        for body, (sphere, most) in enumerate(zip(at.spheres.astype(float), reaches, strict=True)):
-            if most > 0:
-                ball = BoundingSphere(sphere[:3][None], sphere[3:])
-                masks |= may_shade(ball, emitter.ball, balls).astype(np.int64) << body % BITS
-        return candidates[masks > 0], masks[masks > 0]
-
-    def _upload(self, at: MoverLightAt, colours: Floats) -> None:
-        hard_row = 0
-        rows = []
-        for nth, emitter in enumerate(at.emitters):
-            first, count = at.sample_range(nth)
-            rows.append([first, count, emitter.light, hard_row if emitter.is_hard else -1])
-            rows.append([*emitter.ball.centre_m, emitter.ball.radius_m])
-            rows.append([*colours[emitter.light], 0])
-            hard_row += emitter.is_hard
-        probes = np.zeros((len(at.cubes), 6, 4), np.float32)
-        probes[..., :3] = np.einsum("nslc,lc->nsc", at.cubes, colours)
-        values = {
-            MAPS: at.maps.reshape(-1, 4),
-            SAMPLES: at.samples.reshape(-1, 4),
-            REACH: at.reach.ravel(),
-            EMITTERS: np.array(rows, np.float32).reshape(-1, 4),
-            BODIES: at.spheres,
-            POINTS: at.points.reshape(-1, 4),
-            CUBES: probes.reshape(-1, 4),
-            HARD: at.hard.ravel(),
-        }
-        for unit_of, table in values.items():
-            self._buffers[unit_of].update(table)
-        map_count = len(at.maps) * len(at.samples)
-        self._require_atlas(-(-map_count // COLUMNS))
-        for name in ("IS_SHADE", "IS_MOVER"):
-            self._program[name].use(
-                body_count=len(at.spheres),
-                sample_count=len(at.samples),
-                probe_count=len(at.cubes),
-                point_count=len(at.points),
-                emitter_count=len(at.emitters),
-                atlas_size=np.array([COLUMNS, SHADOW_PX, COLUMNS * SHADOW_PX, self._atlas_rows * SHADOW_PX]),
-            )
-
-    def _require_atlas(self, rows: int) -> None:
-        """Shadow maps in so many rows."""
-        if rows == self._atlas_rows:
-            return
-        self._atlas_rows = rows
-        texture = GL.glGenTextures(1)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
-        size = (COLUMNS * SHADOW_PX, rows * SHADOW_PX)
-        form = GL.GL_DEPTH_COMPONENT
-        GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, GL.GL_DEPTH_COMPONENT32F, *size, 0, form, GL.GL_FLOAT, None)
-        _nearest(GL.GL_TEXTURE_2D)
-        self._textures[ATLAS] = (GL.GL_TEXTURE_2D, texture)
-        self._atlas_framebuffer = GL.glGenFramebuffers(1)
-        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._atlas_framebuffer)
-        GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_DEPTH_ATTACHMENT, texture, 0)
-        GL.glDrawBuffer(GL.GL_NONE)
-
-    def _draw_atlas(self, at: MoverLightAt) -> None:
-        """Draw each body as every sample sees it."""
-        width = COLUMNS * SHADOW_PX
-        height = self._atlas_rows * SHADOW_PX
-        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._atlas_framebuffer)
-        GL.glViewport(0, 0, width, height)
-        GL.glScissor(0, 0, width, height)
+        GL.glViewport(0, 0, *self.size_px)
+        GL.glScissor(0, 0, *self.size_px)
         GL.glClear(GL.GL_DEPTH_BUFFER_BIT)
         GL.glDisable(GL.GL_CULL_FACE)
         for nth in range(4):
             GL.glEnable(GL.GL_CLIP_DISTANCE0 + nth)
-        bind(MAPS, self._buffers[MAPS].id, GL.GL_TEXTURE_BUFFER)
+        bind(MAPS, self._maps.id, GL.GL_TEXTURE_BUFFER)
         GL.glBindVertexArray(self._vertex_array)
         vertices = np.concatenate(at.occluders_m).astype(np.float32)
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._vertices)
@@ -297,47 +150,324 @@ class ShadedLight:
         GL.glEnableVertexAttribArray(0)
         GL.glVertexAttribPointer(0, 3, GL.GL_FLOAT, GL.GL_FALSE, 0, None)
         first = 0
-        sample_count = len(at.samples)
-        for body, corners_m in enumerate(at.occluders_m):
-            self._occluder.use(first_map=body * sample_count, columns=COLUMNS, rows=self._atlas_rows)
+        first_map = 0
+        for corners_m, numbers in zip(at.occluders_m, at.map_of, strict=True):
+            map_count = int((numbers >= 0).sum())
             count = 3 * len(corners_m)
-            GL.glDrawArraysInstanced(GL.GL_TRIANGLES, first, count, sample_count)
+            self._program.use(first_map=first_map, columns=COLUMNS, rows=self.rows)
+            GL.glDrawArraysInstanced(GL.GL_TRIANGLES, first, count, map_count)
             first += count
+            first_map += map_count
         for nth in range(4):
             GL.glDisable(GL.GL_CLIP_DISTANCE0 + nth)
         GL.glEnable(GL.GL_CULL_FACE)
 
-    def _begin(self) -> None:
-        """Draw onto the map of light from now on."""
+    def _require_rows(self, rows: int) -> None:
+        if rows == self.rows:
+            return
+        self.rows = rows
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
+        form = GL.GL_DEPTH_COMPONENT
+        internal = GL.GL_DEPTH_COMPONENT32F
+        GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, internal, *self.size_px, 0, form, GL.GL_FLOAT, None)
+        for side in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
+            GL.glTexParameteri(GL.GL_TEXTURE_2D, side, GL.GL_NEAREST)
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._framebuffer)
+        GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_DEPTH_ATTACHMENT, self.id, 0)
+        GL.glDrawBuffer(GL.GL_NONE)
+
+
+class _BufferTexture:
+    """Rows (N, 4) float32 that shaders read by index."""
+
+    def __init__(self) -> None:
+        self._buffer = GL.glGenBuffers(1)
+        self.id = GL.glGenTextures(1)
+
+    def update(self, values: Floats) -> None:
+        data = np.ascontiguousarray(values if len(values) else np.zeros((1, 4)), np.float32)
+        GL.glBindBuffer(GL.GL_TEXTURE_BUFFER, self._buffer)
+        GL.glBufferData(GL.GL_TEXTURE_BUFFER, data.nbytes, data, GL.GL_STREAM_DRAW)
+        GL.glBindTexture(GL.GL_TEXTURE_BUFFER, self.id)
+        GL.glTexBuffer(GL.GL_TEXTURE_BUFFER, GL.GL_RGBA32F, self._buffer)
+
+
+class _Map:
+    """A map of light in colour that can be drawn onto."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self.id = GL.glGenTextures(1)
+        self.framebuffer = GL.glGenFramebuffers(1)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
+        GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, GL.GL_RGBA32F, width, height, 0, GL.GL_RGBA, GL.GL_FLOAT, None)
+        for side in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
+            GL.glTexParameteri(GL.GL_TEXTURE_2D, side, GL.GL_LINEAR)
+        for axis in (GL.GL_TEXTURE_WRAP_S, GL.GL_TEXTURE_WRAP_T):
+            GL.glTexParameteri(GL.GL_TEXTURE_2D, axis, GL.GL_CLAMP_TO_EDGE)
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self.framebuffer)
+        GL.glFramebufferTexture(GL.GL_FRAMEBUFFER, GL.GL_COLOR_ATTACHMENT0, self.id, 0)
+
+
+class ShadedLight:
+    """A light texture for scenes with movers: `update` sets the light without them, `shade` puts them in.
+
+    The shade is drawn where views lead, when they do; what is drawn at a texel depends on nothing but the instant.
+    """
+
+    def __init__(self, baked: BakedScene, values: Floats) -> None:
+        owner = owners(baked.atlas)
+        self._movers = MoverLight(baked, owner)
+        self._height, self._width = baked.direct.shape[1:]
+        self._sites = _sites(baked, owner)
+        lights = baked.scene.lights
+        sampled = self._movers.emitters(tuple(0.0 for _ in lights))
+        shares = sky_shares(self._movers, sampled, self._sites)
+        direct = baked.direct.reshape(len(lights), -1)[:, self._sites.texels]
+        self._steady_lx = np.zeros(len(self._sites.texels), np.float32)
+        for light, layer in zip(lights, direct, strict=True):
+            if isinstance(light.level, Steady) and not light.moves:
+                self._steady_lx += np.float32(light.level.mean(0, 0)) * layer
+
+        self._shade = ShaderProgram("shade", "shade")
+        self._show = ShaderProgram("shade", "shade", "IS_MOVER")
+        self._give = ShaderProgram("shade", "shade", "IS_GIVEN")
+        self._atlas = _ShadowAtlas()
+        self._values = np.zeros((), SHADE.dtype)
+        self._block = Blocks(SHADE.binding, self._values[None])
+        self._site_buffer = self._site_vertices()
+        self._site_arrays = [GL.glGenVertexArrays(1) for _ in sampled]
+        self._layers = [GL.glGenBuffers(1) for _ in sampled]
+        self._unit_lx = np.ones(len(sampled))
+        self._is_lit = np.zeros((len(sampled), len(self._sites.blocks.radius_m)), bool)
+        for nth, emitter in enumerate(sampled):
+            self._set_layer(nth, shares[nth] * direct[emitter.light])
+            self._bind_sites(nth)
+        self._point_array = GL.glGenVertexArrays(1)
+        self._points = GL.glGenBuffers(1)
+
+        self._base_values: Floats | None = None
+        self._base = _Map(self._width, self._height)
+        self._drawn = _Map(self._width, self._height)
+        self.id = self._drawn.id
+        self._at: MoverLightAt | None = None
+        self._key: object = None
+        self._shaded: list[Mask] = []
+        self.update(values)
+
+    def _site_vertices(self) -> Any:
+        sites = self._sites
+        vertices = np.zeros(len(sites.texels), SITE)
+        vertices["place"] = sites.places_m
+        vertices["normal"][:, :3] = np.rint(127 * sites.normals)
+        row, column = np.divmod(sites.texels, self._width)
+        vertices["texel"] = np.column_stack([column, row])
+        buffer = GL.glGenBuffers(1)
+        GL.glBindBuffer(GL.GL_ARRAY_BUFFER, buffer)
+        GL.glBufferData(GL.GL_ARRAY_BUFFER, vertices.nbytes, vertices, GL.GL_STATIC_DRAW)
+        return buffer
+
+    def _bind_sites(self, nth: int) -> None:
+        """Lay out the vertices of an emitter: all texels, with its direct light."""
+        GL.glBindVertexArray(self._site_arrays[nth])
+        GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._site_buffer)
+        columns = (
+            ("place", 3, GL.GL_FLOAT, GL.GL_FALSE),
+            ("normal", 4, GL.GL_BYTE, GL.GL_TRUE),
+            ("texel", 2, GL.GL_UNSIGNED_SHORT, GL.GL_FALSE),
+        )
+        offsets = SITE.fields or {}
+        for location, (name, count, kind, is_normalized) in enumerate(columns):
+            offset = ctypes.c_void_p(offsets[name][1])
+            GL.glEnableVertexAttribArray(location)
+            GL.glVertexAttribPointer(location, count, kind, is_normalized, SITE.itemsize, offset)
+        GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._layers[nth])
+        GL.glEnableVertexAttribArray(3)
+        GL.glVertexAttribPointer(3, 1, GL.GL_HALF_FLOAT, GL.GL_FALSE, 0, None)
+
+    def _set_layer(self, nth: int, light_lx: Floats) -> None:
+        """Replace an emitter's direct light (P,) at level 1, where it is noticed.
+
+        It is stored over its largest value, rounded down so that no more is taken than there is.
+        """
+        is_noticed = light_lx > UNNOTICED * (self._steady_lx + light_lx)
+        starts = np.arange(0, len(light_lx), BLOCK)
+        self._is_lit[nth] = np.logical_or.reduceat(is_noticed, starts) if len(starts) else False
+        self._unit_lx[nth] = max(light_lx.max(initial=0), 1e-30)
+        layer = np.where(is_noticed, light_lx * ((1 - FLOAT16_STEP) / self._unit_lx[nth]), 0).astype(np.float16)
+        GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._layers[nth])
+        GL.glBufferData(GL.GL_ARRAY_BUFFER, layer.nbytes, layer, GL.GL_DYNAMIC_DRAW)
+
+    def update(self, values: Floats) -> None:
+        """Show a map (H, W, 3) without movers; the very array that is there already costs nothing."""
+        if values is self._base_values and self._key is None:
+            return
+        if values is not self._base_values:
+            self._base_values = values
+            GL.glBindTexture(GL.GL_TEXTURE_2D, self._base.id)
+            GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
+            size = (self._width, self._height)
+            data = np.ascontiguousarray(values, np.float32)
+            GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, 0, 0, *size, GL.GL_RGB, GL.GL_FLOAT, data)
+        self._key = None
+        self._restore()
+
+    def _restore(self) -> None:
+        """Show the light without movers."""
+        size = (self._width, self._height)
+        GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._base.framebuffer)
+        GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self._drawn.framebuffer)
+        GL.glScissor(0, 0, *size)
+        GL.glBlitFramebuffer(0, 0, *size, 0, 0, *size, GL.GL_COLOR_BUFFER_BIT, GL.GL_NEAREST)
+
+    def shade(
+        self,
+        values: Floats,
+        t_ns: float,
+        suns_ns: Sequence[float],
+        colours: Floats,
+        views: Views,
+    ) -> None:
+        """Put movers as they are at an instant into a map (H, W, 3), in lights of colours (L, 3) times their levels.
+
+        Their shade may be missing where none of the views leads.
+        """
+        key = (self._movers.poses(t_ns).tobytes(), tuple(suns_ns), colours.tobytes(), id(values))
+        if key != self._key:
+            self.update(values)
+            self._key = key
+            self._begin_moment(self._movers.at(t_ns, suns_ns), colours)
+        if self._at is None:
+            return
+        is_seen = self._sites.seen(views)
+        self._begin()
+        GL.glBlendEquation(GL.GL_FUNC_REVERSE_SUBTRACT)
+        for nth, is_shaded in enumerate(self._shaded):
+            blocks = np.flatnonzero(is_shaded & is_seen)
+            is_shaded[blocks] = False
+            if len(blocks):
+                self._use(self._shade, nth)
+                GL.glBindVertexArray(self._site_arrays[nth])
+                firsts, counts = _runs(blocks, len(self._sites.texels))
+                GL.glMultiDrawArrays(GL.GL_POINTS, firsts, counts, len(firsts))
+        self._end()
+
+    def _begin_moment(self, at: MoverLightAt, colours: Floats) -> None:
+        """Draw the shadow maps and the light on movers, and find where they may shade."""
+        self._at = at
+        self._shaded = []
+        self._atlas.draw(at)
+        blocks = []
+        for nth, emitter in enumerate(at.emitters):
+            first, count = at.sample_range(nth)
+            reaches = at.reach[-len(at.map_of) :, first : first + count]
+            is_shaded = np.zeros(self._is_lit.shape[1], bool)
+            if colours[emitter.light].any() and reaches.any():
+                is_shaded[self._sites.shaded(at.spheres, emitter.ball, self._is_lit[nth])] = True
+            self._shaded.append(is_shaded)
+            blocks.append(self._uniforms(nth, colours[emitter.light]))
+        self._block = Blocks(SHADE.binding, np.array(blocks)) if blocks else self._block
+        self._show_movers(colours)
+
+    def _show_movers(self, colours: Floats) -> None:
+        """Draw the light on movers."""
+        at = self._at
+        if at is None:
+            return
+        count = len(at.points)
+        columns = np.zeros((count, sum(POINT_FLOATS)), np.float32)
+        row, column = np.divmod(self._movers.texels, self._width)
+        columns[:, :3] = at.points[:, 0, :3]
+        columns[:, 3:7] = at.points[:, 1]
+        columns[:, 7:9] = np.column_stack([column, row])
+        columns[:, 10] = at.points[:, 0, 3]
+        columns[:, 11:] = at.gathered(colours)
+        GL.glBindVertexArray(self._point_array)
+        GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._points)
+        offset = 0
+        for location, width in enumerate(POINT_FLOATS):
+            GL.glEnableVertexAttribArray(location)
+            stride = columns.strides[0]
+            GL.glVertexAttribPointer(location, width, GL.GL_FLOAT, GL.GL_FALSE, stride, ctypes.c_void_p(offset))
+            offset += FLOAT_BYTES * width
+        GL.glBufferData(GL.GL_ARRAY_BUFFER, columns.nbytes, columns, GL.GL_STREAM_DRAW)
+        self._begin()
+        GL.glBindVertexArray(self._point_array)
+        self._use(self._give, 0)
+        GL.glDrawArrays(GL.GL_POINTS, 0, count)
+        hard_row = 0
+        for nth, emitter in enumerate(at.emitters):
+            first, sample_count = at.sample_range(nth)
+            if emitter.is_hard:
+                columns[:, 9] = at.hard[hard_row]
+                hard_row += 1
+                GL.glBufferData(GL.GL_ARRAY_BUFFER, columns.nbytes, columns, GL.GL_STREAM_DRAW)
+            if colours[emitter.light].any() and at.reach[:, first : first + sample_count].any():
+                self._use(self._show, nth)
+                GL.glDrawArrays(GL.GL_POINTS, 0, count)
+        self._end()
+
+    def _uniforms(self, nth: int, colour: Floats) -> NDArray[np.void]:
+        """The values of an emitter's block."""
+        at = self._at
+        values = np.zeros((), SHADE.dtype)
+        if at is None:
+            return values
+        emitter = at.emitters[nth]
+        first, count = at.sample_range(nth)
+        samples = slice(first, first + count)
+        body_count = len(at.map_of)
+        numbers = at.map_of[:, samples].ravel()
+        spheres = np.column_stack([at.spheres.centre_m, at.spheres.radius_m])
+        if len(spheres) > MOST_SPHERES:
+            centre_m = spheres[:, :3].mean(0)
+            reach_m = np.linalg.norm(spheres[:, :3] - centre_m, axis=1) + spheres[:, 3]
+            spheres = np.array([[*centre_m, reach_m.max()]])
+        values["colour"] = colour
+        values["is_hard"] = emitter.is_hard
+        values["ball"][:3] = emitter.ball.centre_m
+        values["ball"][3] = emitter.ball.radius_m if np.isfinite(emitter.ball.radius_m) else -1
+        values["size_px"] = (*self._atlas.size_px, self._width, self._height)
+        values["tile_px"] = SHADOW_PX
+        values["sample_count"] = count
+        values["body_count"] = body_count
+        values["probe_count"] = len(at.cubes)
+        values["sphere_count"] = len(spheres)
+        values["places"][:count] = at.samples[samples, 0]
+        values["axes"][:count] = at.samples[samples, 1]
+        values["strengths"][:count, 0] = at.reach[-body_count:, samples].mean(0)
+        values["maps"].reshape(-1, 4, 4)[: len(numbers)] = at.maps[numbers]
+        values["tiles"][: len(numbers), 0] = SHADOW_PX * (numbers % COLUMNS)
+        values["tiles"][: len(numbers), 1] = SHADOW_PX * (numbers // COLUMNS)
+        values["tiles"][: len(numbers), 2] = numbers >= 0
+        values["spheres"][: len(spheres)] = spheres
+        reach = at.reach[:-body_count, samples].ravel()
+        values["reach"].reshape(-1)[: len(reach)] = reach
+        return values
+
+    def _use(self, program: ShaderProgram, nth: int) -> None:
+        program.use()
+        self._block.use(nth)
+
+    def _begin(self) -> None:
+        """Add to the map of light from now on."""
+        GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._drawn.framebuffer)
         GL.glViewport(0, 0, self._width, self._height)
         GL.glScissor(0, 0, self._width, self._height)
         GL.glDisable(GL.GL_DEPTH_TEST)
-        GL.glDisable(GL.GL_CULL_FACE)
-        GL.glBindVertexArray(self._empty_vertex_array)
-        for unit_of, buffer in self._buffers.items():
-            bind(unit_of, buffer.id, GL.GL_TEXTURE_BUFFER)
-        for unit_of, (kind, texture) in self._textures.items():
-            bind(unit_of, texture, kind)
-        bind(BASE, self._base.id)
+        GL.glEnable(GL.GL_BLEND)
+        GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
+        bind(ATLAS, self._atlas.id)
 
     def _end(self) -> None:
+        GL.glBlendEquation(GL.GL_FUNC_ADD)
+        GL.glDisable(GL.GL_BLEND)
         GL.glEnable(GL.GL_DEPTH_TEST)
-        GL.glEnable(GL.GL_CULL_FACE)
-
-    def _tiles(self, name: str, tiles: Indices, masks: Indices | None) -> None:
-        """Draw some tiles by a program."""
-        if not len(tiles):
-            return
-        row, column = np.divmod(tiles, self._tiles_px[0])
-        mask = np.zeros(len(tiles)) if masks is None else masks
-        self._buffers[TILES].update(np.column_stack([column, row, mask, mask]))
-        bind(TILES, self._buffers[TILES].id, GL.GL_TEXTURE_BUFFER)
-        self._program[name].use(map_size=np.array([self._width, self._height, TILE_PX, 0]))
-        GL.glDrawArraysInstanced(GL.GL_TRIANGLE_STRIP, 0, 4, len(tiles))
 
 
-def _nearest(kind: int) -> None:
-    """Read texels of the texture that is bound as they are."""
-    for side in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
-        GL.glTexParameteri(kind, side, GL.GL_NEAREST)
+def _runs(blocks: Indices, count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """First and number (K,) of the texels, of so many, in blocks (N,); those of neighbours joined."""
+    begins = np.flatnonzero(np.diff(blocks, prepend=-2) != 1)
+    ends = np.append(begins[1:], len(blocks)) - 1
+    firsts = blocks[begins] * BLOCK
+    lasts = np.minimum((blocks[ends] + 1) * BLOCK, count)
+    return firsts.astype(np.int32), (lasts - firsts).astype(np.int32)

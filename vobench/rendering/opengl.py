@@ -30,15 +30,15 @@ class LightTexture:
     """
 
     def __init__(self, values: Floats) -> None:
-        self.values: Floats | None = None
+        self._values: Floats | None = None
         self.id = GL.glGenTextures(1)
         self.update(values)
 
     def update(self, values: Floats) -> None:
         """Replace the map by another; the very array that is there already costs nothing."""
-        if values is self.values:
+        if values is self._values:
             return
-        self.values = values
+        self._values = values
         GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
         is_grey = values.ndim == 2 or bool((values[..., :1] == values[..., 1:]).all())
         if is_grey:

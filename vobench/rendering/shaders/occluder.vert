@@ -2,7 +2,7 @@
 #extension GL_ARB_shading_language_420pack : require
 // A moving body as one sample of an emitter sees it, in its tile of the shadow atlas.
 layout(location = 0) in vec3 position;
-layout(binding = 0) uniform samplerBuffer maps;
+layout(binding = 1) uniform samplerBuffer maps;
 uniform int first_map;
 uniform int columns;
 uniform int rows;
