@@ -25,6 +25,7 @@ from vobench.scene.light import Steady
 Views = Sequence[tuple[PinholeView, Box]]
 BLOCK = 64  # texels near one another, all of which are drawn or none
 CLUSTER = 16  # blocks that are culled together before each is
+WIDEST_M = 0.022  # between texels that are one to soft light: its shadows need no finer ones
 READ_M = 0.1  # from what a picture shows, as far as it reads light
 SHADOW_PX = 64  # along a side of one shadow map
 COLUMNS = 32  # of shadow maps in their atlas
@@ -32,63 +33,113 @@ UNNOTICED = 1 / 150  # share of a place's direct light, about a step of 8 bits
 FLOAT16_STEP = 2.0**-11  # so much too small at most, once it is rounded down
 PLACED = 100_000  # texels at once
 FLOAT_BYTES = 4
+STEPS_PER_OCTAVE = 6  # of the light at a site, in its eight bits; the shader has the same
 
 # Texture units; the shaders use the same numbers.
 ATLAS = GL.GL_TEXTURE0
 MAPS = GL.GL_TEXTURE0 + 1
 
-SITE = np.dtype([("place", np.float32, 3), ("normal", np.int8, 4), ("texel", np.uint16, 2)])
+SITE = np.dtype([("place", np.float32, 3), ("normal", np.int8, 4), ("texel", np.uint16, 2), ("width", np.float32)])
 # Place, normal and eta, texel, hard light, probe, gathered light: as the shader's locations.
 POINT_FLOATS = (3, 4, 2, 1, 1, 3)
 
 
 @dataclass(frozen=True, slots=True)
 class Sites:
-    """The texels (P,) of the stationary part, block by block of near ones; spheres around blocks and clusters."""
+    """Texels (P,) of the stationary part, block by block of near ones; spheres around blocks and clusters.
+
+    places_m, normals (P, 3). width_px (P,) is 2 where a site stands for its texel and those right, below and both.
+    """
 
     texels: Rows
     places_m: Floats
     normals: Floats
+    width_px: Indices
     blocks: BoundingSphere
     clusters: BoundingSphere
 
-    def shaded(self, movers: BoundingSphere, emitter: BoundingSphere, is_lit: Mask) -> Indices:
-        """The blocks among the lit ones (N,) where movers may take some of an emitter's light."""
-        clusters = np.flatnonzero(may_shade(movers, emitter, self.clusters))
+    def of_site(self, values: Floats, map_width: int) -> Floats:
+        """The least value (P,) of a map (H·W,) in each site's texels."""
+        least = values[self.texels]
+        wide = np.flatnonzero(self.width_px == 2)
+        for step in (1, map_width, map_width + 1):
+            least[wide] = np.minimum(least[wide], values[self.texels[wide] + step])
+        return least
+
+    def shaded(self, movers: BoundingSphere, emitter: BoundingSphere, among: Mask) -> Indices:
+        """The blocks among some (N,) where movers may take some of an emitter's light."""
+        starts = np.arange(0, len(among), CLUSTER)
+        clusters = np.flatnonzero(np.logical_or.reduceat(among, starts)) if len(starts) else starts
+        clusters = clusters[may_shade(movers, emitter, self.clusters.take(clusters))]
         blocks = (clusters[:, None] * CLUSTER + np.arange(CLUSTER)).ravel()
-        blocks = blocks[blocks < len(is_lit)]
-        blocks = blocks[is_lit[blocks]]
+        blocks = blocks[blocks < len(among)]
+        blocks = blocks[among[blocks]]
         return blocks[may_shade(movers, emitter, self.blocks.take(blocks))]
 
     def seen(self, views: Views) -> Mask:
         """The blocks (N,) that some of the views show, or read light beside."""
+        seen_clusters = _seen(self.clusters, views)
+        blocks = np.flatnonzero(np.repeat(seen_clusters, CLUSTER)[: len(self.blocks.radius_m)])
         result = np.zeros(len(self.blocks.radius_m), bool)
-        for view, box in views:
-            planes = bounds(view, box)
-            planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
-            heights_m = planes[:, :3] @ self.blocks.centre_m.T + planes[:, 3:]
-            result |= heights_m.min(0) > -self.blocks.radius_m - READ_M
+        result[blocks] = _seen(self.blocks.take(blocks), views)
         return result
 
 
-def _sites(baked: BakedScene, owner: Owners) -> Sites:
-    texels = np.flatnonzero((owner.face >= 0) & (baked.faces.mover[owner.face] < 0))
-    places_m = np.zeros((len(texels), 3), np.float32)
+def _seen(balls: BoundingSphere, views: Views) -> Mask:
+    """Which spheres (N,) some of the views show, or read light beside."""
+    result = np.zeros(len(balls.radius_m), bool)
+    for view, box in views:
+        planes = bounds(view, box)
+        planes /= np.linalg.norm(planes[:, :3], axis=1, keepdims=True)
+        heights_m = np.einsum("pj,nj->pn", planes[:, :3], balls.centre_m) + planes[:, 3:]
+        result |= heights_m.min(0) > -balls.radius_m - READ_M
+    return result
+
+
+def _sites(baked: BakedScene, owner: Owners, *, widest_m: float) -> Sites:
+    """All texels of the stationary part; four neighbours in one plane are one if they are no farther apart."""
+    faces = baked.faces
+    width = baked.atlas.width
+    texels = np.flatnonzero((owner.face >= 0) & (faces.mover[owner.face] < 0))
+    places_m = np.zeros((len(owner.face), 3), np.float32)
     for start in range(0, len(texels), PLACED):
         part = texels[start : start + PLACED]
         weights = np.column_stack([1 - owner.uv[part].sum(1), owner.uv[part]])
-        corners_m = baked.faces.corners_m[owner.face[part]]
-        places_m[start : start + PLACED] = np.einsum("ni,nij->nj", weights, corners_m)
+        places_m[part] = np.einsum("ni,nij->nj", weights, faces.corners_m[owner.face[part]])
+    width_px = np.ones(len(texels), np.int64)
+    if widest_m:
+        row, column = np.divmod(texels, width)
+        is_first = (row % 2 == 0) & (column % 2 == 0) & (row + 1 < baked.atlas.height) & (column + 1 < width)
+        first = texels[is_first]
+        is_whole = np.ones(len(first), bool)
+        thing = np.where(owner.face >= 0, faces.thing[owner.face], -1)
+        for step in (1, width, width + 1):
+            other = first + step
+            is_whole &= (thing[other] == thing[first]) & (faces.plane[owner.face[other]] == faces.plane[owner.face[first]]).all(1)
+            apart_m = np.linalg.norm(places_m[other] - places_m[first], axis=1)
+            is_whole &= apart_m <= widest_m
+        first = first[is_whole]
+        is_covered = np.zeros(len(owner.face), bool)
+        for step in (1, width, width + 1):
+            is_covered[first + step] = True
+        is_wide = np.zeros(len(owner.face), bool)
+        is_wide[first] = True
+        texels = texels[~is_covered[texels]]
+        width_px = np.where(is_wide[texels], 2, 1)
+        places_m[first] = (places_m[first] + places_m[first + width + 1]) / 2
+    places_m = places_m[texels]
     if len(texels):
         order = np.argsort(morton(places_m), kind="stable")
         texels = texels[order]
         places_m = places_m[order]
+        width_px = width_px[order]
     low_m, high_m = _boxes(places_m, places_m, BLOCK)
     cluster_low_m, cluster_high_m = _boxes(low_m, high_m, CLUSTER)
     return Sites(
         texels=texels,
         places_m=places_m,
-        normals=baked.faces.plane[owner.face[texels]].astype(np.float32),
+        normals=faces.plane[owner.face[texels]].astype(np.float32),
+        width_px=width_px,
         blocks=_around(low_m, high_m),
         clusters=_around(cluster_low_m, cluster_high_m),
     )
@@ -218,29 +269,34 @@ class ShadedLight:
         owner = owners(baked.atlas)
         self._movers = MoverLight(baked, owner)
         self._height, self._width = baked.direct.shape[1:]
-        self._sites = _sites(baked, owner)
         lights = baked.scene.lights
         sampled = self._movers.emitters(tuple(0.0 for _ in lights))
-        shares = sky_shares(self._movers, sampled, self._sites)
-        direct = baked.direct.reshape(len(lights), -1)[:, self._sites.texels]
-        self._steady_lx = np.zeros(len(self._sites.texels), np.float32)
+        soft_sites = _sites(baked, owner, widest_m=WIDEST_M)
+        is_any_hard = any(emitter.is_hard for emitter in sampled)
+        hard_sites = _sites(baked, owner, widest_m=0) if is_any_hard else soft_sites
+        self._site_sets = (soft_sites, hard_sites)
+        self._is_hard = [int(emitter.is_hard) for emitter in sampled]
+        shares = sky_shares(self._movers, sampled, soft_sites)
+        direct = baked.direct.reshape(len(lights), -1)
+        self._steady_lx = np.zeros(direct.shape[1], np.float32)
         for light, layer in zip(lights, direct, strict=True):
             if isinstance(light.level, Steady) and not light.moves:
                 self._steady_lx += np.float32(light.level.mean(0, 0)) * layer
 
-        self._shade = ShaderProgram("shade", "shade")
+        self._shade = ShaderProgram("shade", "shade", "IS_SHADE")
         self._show = ShaderProgram("shade", "shade", "IS_MOVER")
         self._give = ShaderProgram("shade", "shade", "IS_GIVEN")
         self._atlas = _ShadowAtlas()
         self._values = np.zeros((), SHADE.dtype)
         self._block = Blocks(SHADE.binding, self._values[None])
-        self._site_buffer = self._site_vertices()
+        self._site_buffers = [self._site_vertices(sites) for sites in self._site_sets]
         self._site_arrays = [GL.glGenVertexArrays(1) for _ in sampled]
         self._layers = [GL.glGenBuffers(1) for _ in sampled]
         self._unit_lx = np.ones(len(sampled))
-        self._is_lit = np.zeros((len(sampled), len(self._sites.blocks.radius_m)), bool)
+        self._is_lit = [np.zeros(0, bool)] * len(sampled)
         for nth, emitter in enumerate(sampled):
-            self._set_layer(nth, shares[nth] * direct[emitter.light])
+            share = 1.0 if emitter.is_hard else shares[nth]
+            self._set_layer(nth, direct[emitter.light], share)
             self._bind_sites(nth)
         self._point_array = GL.glGenVertexArrays(1)
         self._points = GL.glGenBuffers(1)
@@ -251,16 +307,19 @@ class ShadedLight:
         self.id = self._drawn.id
         self._at: MoverLightAt | None = None
         self._key: object = None
-        self._shaded: list[Mask] = []
+        self._colours = np.zeros((len(lights), 3), np.float32)
+        self._is_drawn = [np.zeros(0, bool)] * 2
         self.update(values)
 
-    def _site_vertices(self) -> Any:
-        sites = self._sites
+    def _site_vertices(self, sites: Sites) -> Any:
         vertices = np.zeros(len(sites.texels), SITE)
         vertices["place"] = sites.places_m
         vertices["normal"][:, :3] = np.rint(127 * sites.normals)
         row, column = np.divmod(sites.texels, self._width)
         vertices["texel"] = np.column_stack([column, row])
+        vertices["width"] = sites.width_px
+        total_lx = sites.of_site(self._steady_lx, self._width)
+        vertices["normal"][:, 3] = np.clip(STEPS_PER_OCTAVE * np.log2(1 + total_lx), 0, 127)
         buffer = GL.glGenBuffers(1)
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, buffer)
         GL.glBufferData(GL.GL_ARRAY_BUFFER, vertices.nbytes, vertices, GL.GL_STATIC_DRAW)
@@ -269,14 +328,15 @@ class ShadedLight:
     def _bind_sites(self, nth: int) -> None:
         """Lay out the vertices of an emitter: all texels, with its direct light."""
         GL.glBindVertexArray(self._site_arrays[nth])
-        GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._site_buffer)
+        GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._site_buffers[self._is_hard[nth]])
         columns = (
             ("place", 3, GL.GL_FLOAT, GL.GL_FALSE),
             ("normal", 4, GL.GL_BYTE, GL.GL_TRUE),
             ("texel", 2, GL.GL_UNSIGNED_SHORT, GL.GL_FALSE),
+            ("width", 1, GL.GL_FLOAT, GL.GL_FALSE),
         )
         offsets = SITE.fields or {}
-        for location, (name, count, kind, is_normalized) in enumerate(columns):
+        for location, (name, count, kind, is_normalized) in zip((0, 1, 2, 4), columns, strict=True):
             offset = ctypes.c_void_p(offsets[name][1])
             GL.glEnableVertexAttribArray(location)
             GL.glVertexAttribPointer(location, count, kind, is_normalized, SITE.itemsize, offset)
@@ -284,16 +344,18 @@ class ShadedLight:
         GL.glEnableVertexAttribArray(3)
         GL.glVertexAttribPointer(3, 1, GL.GL_HALF_FLOAT, GL.GL_FALSE, 0, None)
 
-    def _set_layer(self, nth: int, light_lx: Floats) -> None:
-        """Replace an emitter's direct light (P,) at level 1, where it is noticed.
+    def _set_layer(self, nth: int, light_lx: Floats, share: Floats | float) -> None:
+        """Replace an emitter's direct light (H·W,) at level 1, the share of a light's (P,), where it is noticed.
 
         It is stored over its largest value, rounded down so that no more is taken than there is.
         """
-        is_noticed = light_lx > UNNOTICED * (self._steady_lx + light_lx)
-        starts = np.arange(0, len(light_lx), BLOCK)
-        self._is_lit[nth] = np.logical_or.reduceat(is_noticed, starts) if len(starts) else False
-        self._unit_lx[nth] = max(light_lx.max(initial=0), 1e-30)
-        layer = np.where(is_noticed, light_lx * ((1 - FLOAT16_STEP) / self._unit_lx[nth]), 0).astype(np.float16)
+        sites = self._site_sets[self._is_hard[nth]]
+        site_lx = share * sites.of_site(light_lx, self._width)
+        is_noticed = site_lx > UNNOTICED * (sites.of_site(self._steady_lx, self._width) + site_lx)
+        starts = np.arange(0, len(site_lx), BLOCK)
+        self._is_lit[nth] = np.logical_or.reduceat(is_noticed, starts) if len(starts) else np.zeros(0, bool)
+        self._unit_lx[nth] = max(site_lx.max(initial=0), 1e-30)
+        layer = np.where(is_noticed, site_lx * ((1 - FLOAT16_STEP) / self._unit_lx[nth]), 0).astype(np.float16)
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._layers[nth])
         GL.glBufferData(GL.GL_ARRAY_BUFFER, layer.nbytes, layer, GL.GL_DYNAMIC_DRAW)
 
@@ -338,33 +400,43 @@ class ShadedLight:
             self._begin_moment(self._movers.at(t_ns, suns_ns), colours)
         if self._at is None:
             return
-        is_seen = self._sites.seen(views)
         self._begin()
+        GL.glEnable(GL.GL_PROGRAM_POINT_SIZE)
         GL.glBlendEquation(GL.GL_FUNC_REVERSE_SUBTRACT)
-        for nth, is_shaded in enumerate(self._shaded):
-            blocks = np.flatnonzero(is_shaded & is_seen)
-            is_shaded[blocks] = False
-            if len(blocks):
-                self._use(self._shade, nth)
-                GL.glBindVertexArray(self._site_arrays[nth])
-                firsts, counts = _runs(blocks, len(self._sites.texels))
-                GL.glMultiDrawArrays(GL.GL_POINTS, firsts, counts, len(firsts))
+        for kind, sites in enumerate(self._site_sets):
+            new = sites.seen(views) & ~self._is_drawn[kind]
+            self._is_drawn[kind] |= new
+            for nth in range(len(self._is_hard)):
+                if self._is_hard[nth] == kind and new.any():
+                    self._draw_shade(nth, sites, new)
+        GL.glDisable(GL.GL_PROGRAM_POINT_SIZE)
         self._end()
 
+    def _draw_shade(self, nth: int, sites: Sites, among: Mask) -> None:
+        """Draw what movers take of an emitter's light at some of the blocks (N,)."""
+        at = self._at
+        if at is None:
+            return
+        emitter = at.emitters[nth]
+        first, count = at.sample_range(nth)
+        reaches = at.reach[-len(at.map_of) :, first : first + count]
+        if not self._colours[emitter.light].any() or not reaches.any():
+            return
+        blocks = sites.shaded(at.spheres, emitter.ball, among & self._is_lit[nth])
+        if not len(blocks):
+            return
+        self._use(self._shade, nth)
+        GL.glBindVertexArray(self._site_arrays[nth])
+        firsts, counts = _runs(blocks, len(sites.texels))
+        GL.glMultiDrawArrays(GL.GL_POINTS, firsts, counts, len(firsts))
+
     def _begin_moment(self, at: MoverLightAt, colours: Floats) -> None:
-        """Draw the shadow maps and the light on movers, and find where they may shade."""
+        """Draw the shadow maps and the light on movers."""
         self._at = at
-        self._shaded = []
+        self._colours = colours
+        self._is_drawn = [np.zeros(len(sites.blocks.radius_m), bool) for sites in self._site_sets]
         self._atlas.draw(at)
-        blocks = []
-        for nth, emitter in enumerate(at.emitters):
-            first, count = at.sample_range(nth)
-            reaches = at.reach[-len(at.map_of) :, first : first + count]
-            is_shaded = np.zeros(self._is_lit.shape[1], bool)
-            if colours[emitter.light].any() and reaches.any():
-                is_shaded[self._sites.shaded(at.spheres, emitter.ball, self._is_lit[nth])] = True
-            self._shaded.append(is_shaded)
-            blocks.append(self._uniforms(nth, colours[emitter.light]))
+        blocks = [self._uniforms(nth, colours[emitter.light]) for nth, emitter in enumerate(at.emitters)]
         self._block = Blocks(SHADE.binding, np.array(blocks)) if blocks else self._block
         self._show_movers(colours)
 
@@ -423,6 +495,7 @@ class ShadedLight:
             reach_m = np.linalg.norm(spheres[:, :3] - centre_m, axis=1) + spheres[:, 3]
             spheres = np.array([[*centre_m, reach_m.max()]])
         values["colour"] = colour
+        values["unit_lx"] = self._unit_lx[nth]
         values["is_hard"] = emitter.is_hard
         values["ball"][:3] = emitter.ball.centre_m
         values["ball"][3] = emitter.ball.radius_m if np.isfinite(emitter.ball.radius_m) else -1

@@ -145,7 +145,8 @@ SHADE = UniformBlock(
     "shade",
     2,
     (
-        Field("vec3", "colour", "of the emitter's light, times its level and the unit of direct light"),
+        Field("vec3", "colour", "of the emitter's light, times its level"),
+        Field("float", "unit_lx", "of direct light in the map's texels"),
         Field("float", "is_hard", "1 where its light on bodies comes with each point"),
         Field("vec4", "ball", "around the emitter; a negative radius for what is all around"),
         Field("vec4", "size_px", "of the atlas of shadow maps, and of the map of light"),

@@ -4,15 +4,17 @@
 #include <Shade>
 layout(binding = 0) uniform sampler2D atlas;  // nearness of bodies, seen from samples of emitters
 layout(location = 0) in vec3 place;
-layout(location = 1) in vec4 normal;   // of a mover's texel with eta of its coat
+layout(location = 1) in vec4 normal;   // and the logarithm of all steady light there; on movers eta of the coat
 layout(location = 2) in vec2 texel;
 layout(location = 3) in float direct;  // illuminance by the emitter, in a unit; on movers by its hard light
-layout(location = 4) in float probe;   // between which two of the probes it lies
+layout(location = 4) in float probe;   // on movers: between which two of the probes it lies; else its width in texels
 out vec3 light;
 
 const float CLEAR_M = 0.004;  // towards the light, from where a stationary place looks for bodies
 const float OWN_M = 0.05;     // the same from a body, whose map shows it coarsely
 const float STEEPEST = 0.999;
+const float UNNOTICED = 1.0 / 400.0;  // share of the light, above which some of it that is taken shows
+const float STEPS_PER_OCTAVE = 6.0;   // of all steady light
 const float LEAST = 1e-6;     // nearness of what lies farther than a map shows
 
 // Share of a place that a body hides from a sample.
@@ -87,6 +89,8 @@ float strength(int at_sample)
 float shown()
 {
     float total = 0.0;
+    bool is_behind = shade.ball.w >= 0.0 && dot(normal.xyz, shade.ball.xyz - place) <= -shade.ball.w;
+    if (is_behind) return 0.0;
     for (int i = 0; i < int(shade.sample_count); i++) {
         vec3 towards;
         float part = arriving(i, place, normal.xyz, towards);
@@ -110,7 +114,9 @@ float shown()
         all += part;
         if (part > 0.0) taken += part * hidden_by_all(i, place + CLEAR_M * towards);
     }
-    return taken > 0.0 ? direct * taken / all : 0.0;
+    float light = taken > 0.0 ? shade.unit_lx * direct * taken / all : 0.0;
+    float steady = exp2(127.0 / STEPS_PER_OCTAVE * normal.w) - 1.0;
+    return light > UNNOTICED * (steady + light) ? light : 0.0;
 }
 #endif
 
@@ -127,5 +133,11 @@ void main()
 #endif
     bool is_any = max(light.r, max(light.g, light.b)) > 0.0;
     // Points outside the map are not drawn.
-    gl_Position = is_any ? vec4(2.0 * (texel + 0.5) / shade.size_px.zw - 1.0, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
+#ifdef IS_SHADE
+    float width = probe;
+#else
+    float width = 1.0;
+#endif
+    gl_PointSize = width;
+    gl_Position = is_any ? vec4(2.0 * (texel + 0.5 * width) / shade.size_px.zw - 1.0, 0.0, 1.0) : vec4(2.0, 2.0, 2.0, 1.0);
 }
