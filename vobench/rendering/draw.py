@@ -8,7 +8,7 @@ from vobench.geometry import se3
 from vobench.rendering.batch import Batch, Geometry
 from vobench.rendering.culling import CullingSet, Runs
 from vobench.rendering.draw_call import LAYERS, LAYERS_UNIT, DrawCalls, probe_share
-from vobench.rendering.opengl import Canvas, FlatTarget, LightTexture, bind
+from vobench.rendering.opengl import Canvas, FlatTarget, bind
 from vobench.rendering.planar_mirror import PlanarMirror
 from vobench.rendering.probe import Probe
 from vobench.rendering.render_target import MIRRORS, RenderTarget
@@ -21,7 +21,7 @@ LEAST_SHARE = 5e-4  # of the picture, times what it mirrors, that a mirror is fo
 class BatchDraw:
     """Draws batches onto targets, as long as its context is current."""
 
-    def __init__(self, geometry: Geometry, light: LightTexture) -> None:
+    def __init__(self, geometry: Geometry, light: int) -> None:
         self._calls = DrawCalls(geometry, light)
         self._culling = CullingSet(geometry.clusters)
         self._mirrors = geometry.mirrors

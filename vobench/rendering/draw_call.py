@@ -15,7 +15,6 @@ from vobench.rendering.opengl import (
     Canvas,
     Elements,
     FlatTarget,
-    LightTexture,
     ShaderProgram,
     SurfaceTexture,
     bind,
@@ -46,7 +45,7 @@ class DrawCalls:
     names of each batch's shader.
     """
 
-    def __init__(self, geometry: Geometry, light: LightTexture) -> None:
+    def __init__(self, geometry: Geometry, light: int) -> None:
         self._program = cache(ShaderProgram)
         self._light = light
         self._batches = geometry.batches
@@ -91,7 +90,7 @@ class DrawCalls:
         self._move(view)
         # A mirror swaps left and right, and with them the orientation of front faces.
         GL.glFrontFace(GL.GL_CW if view.depth % 2 else GL.GL_CCW)
-        bind(LIGHT_UNIT, self._light.id)
+        bind(LIGHT_UNIT, self._light)
 
     def _move(self, view: PinholeView) -> None:
         """Upload the poses of moving objects, if they have changed."""

@@ -40,7 +40,7 @@ class FrameRenderer:
         light_map = self._illumination.at(0, 0)
         self._light = ShadedLight(baked, light_map) if self._movers else LightTexture(light_map)
         drawn = geometry(baked.faces, baked.light_uv, baked.scene.materials)
-        self._draw = BatchDraw(drawn, self._light)
+        self._draw = BatchDraw(drawn, self._light.id)
         self._target = cache(partial(render_target, in_colour=self._draw.mirrors_in_colour))
         self._warp = cache(warp)
         if self._draw.needs_probe:

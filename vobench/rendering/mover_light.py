@@ -1,4 +1,4 @@
-"""Moving bodies as light meets them: shapes that cast their shade, light samples, and probes of the light around them."""
+"""Moving bodies as light meets them: shapes that cast shade, samples of emitters, probes of the light around."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -123,7 +123,7 @@ class Body:
         return np.asarray(turned_m + T[:, None, :3, 3])
 
     def probe_place(self, points_m: Array) -> Array:
-        """Between which probes points (P, 3) in the frame of the first mover lie: 0 (P,) at the first, 1 at the next."""
+        """Where points (P, 3) in the first mover's frame lie between the probes: 0 (P,) at the first, 1 at the next."""
         last = len(self.probes_m) - 1
         if not last:
             return np.zeros(len(points_m))
@@ -185,7 +185,7 @@ def _probes_m(points_m: Array) -> Array:
 PER_RADIUS_M = 14
 FEWEST_SAMPLES = 2
 PANEL_SAMPLES = 8
-PANE_SAMPLES = 6
+PANE_SAMPLES = 5
 OPEN_SKY_SAMPLES = MOST_SAMPLES
 GOLDEN = (0.7548776662, 0.5698402910)  # steps that fill the unit square evenly: Roberts (2018), R2
 
@@ -287,7 +287,6 @@ def _sampled_sky(index: int, light: Sky, visibility: Visibility) -> list[Sampled
     return [*result, SampledEmitter(index, around, places, np.zeros((OPEN_SKY_SAMPLES, 4)), strength)]
 
 
-NEAR_M = 0.05  # nearness in shadow maps is this over the distance
 MARGIN = 1.08  # of the radius that a shadow map shows, so that its rim is empty
 WIDEST = 0.95  # sine of half the angle of a shadow map
 GATHER_RAYS = 36
@@ -301,12 +300,12 @@ LIFT_M = 1e-3
 class MoverLightAt:
     """Movers at one instant, as tables of the shaders `occluder` and `shade`.
 
-    occluders_m: of each body (B) its faces (K, 3, 3). maps (M, 4, 4): from the world to what a sample sees of a body,
+    occluders_m: of each body (B) its faces (K, 3, 3). maps (M, 3, 4): from the world to what a sample sees of a body,
     body by body, for those of all samples (K) that reach it; map_of (B, K) is the map's number, -1 for none. spheres
-    (S,): around their parts. samples (K, 2, 4): places and axes. reach (N + B, K): the strength of each sample as it
-    arrives at each probe, and its mean at those of each body. cubes (N, 6, L, 3): illuminance of faces along ±x, ±y
-    and ±z by bounces, under each light at level 1. points (P, 2, 4): places and between which probes, normals and
-    eta of the coat; hard (H, P): illuminance by each emitter with hard shadows.
+    (S,): around parts of the bodies sphere_body (S,). samples (K, 2, 4): places and axes. reach (N + B, K): the
+    strength of each sample as it arrives at each probe, and its mean at those of each body. cubes (N, 6, L, 3):
+    illuminance of faces along ±x, ±y and ±z by bounces, under each light at level 1. points (P, 2, 4): places and
+    between which probes, normals and eta of the coat; hard (H, P): illuminance by each emitter with hard shadows.
     """
 
     emitters: Sequence[SampledEmitter]
@@ -314,6 +313,7 @@ class MoverLightAt:
     maps: Floats
     map_of: Indices
     spheres: BoundingSphere
+    sphere_body: Rows
     samples: Floats
     reach: Floats
     cubes: Floats
@@ -429,18 +429,18 @@ class MoverLight:
         map_of = np.where(is_reaching, np.cumsum(is_reaching).reshape(is_reaching.shape) - 1, -1)
         maps = [shadow_matrices(places[rows], ball) for rows, ball in zip(is_reaching, balls, strict=True)]
 
+        spheres = _part_spheres(self.bodies, occluders_m)
         T = T_world_movers[self._mover]
         points_m = np.einsum("nij,nj->ni", T[:, :3, :3], self._points_m) + T[:, :3, 3]
         normals = np.einsum("nij,nj->ni", T[:, :3, :3], self._normals)
-        points = np.stack(
-            [np.column_stack([points_m, self._probe_place]), np.column_stack([normals, self._eta])], 1
-        )
+        points = np.stack([np.column_stack([points_m, self._probe_place]), np.column_stack([normals, self._eta])], 1)
         return MoverLightAt(
             emitters=sampled,
             occluders_m=occluders_m,
             maps=np.concatenate(maps).astype(np.float32),
             map_of=map_of.astype(np.int32),
-            spheres=_part_spheres(self.bodies, occluders_m),
+            spheres=spheres,
+            sphere_body=np.repeat(np.arange(len(self.bodies)), [len(np.unique(body.part)) for body in self.bodies]),
             samples=np.stack([places, axes], 1).astype(np.float32),
             reach=np.concatenate([arriving, by_body]).astype(np.float32),
             cubes=self._cubes(all_probes_m),
@@ -449,7 +449,7 @@ class MoverLight:
         )
 
     def sky_shares(self, sampled: Sequence[SampledEmitter], places_m: Floats, normals: Floats) -> Floats:
-        """Share (P, E) of the direct light of each emitter's sky at points that comes by it, by few rays; 1 of others."""
+        """Share (P, E) of a sky's direct light at points that comes by each emitter, by few rays; 1 of others."""
         weights = np.ones((len(places_m), len(sampled)), np.float32)
         is_sky = np.zeros(len(sampled), bool)
         for nth, emitter in enumerate(sampled):
@@ -560,34 +560,28 @@ def _points(points_m: Floats, normals: Floats, eta: Floats | None = None) -> Tex
     no_step = np.zeros((count, 3), np.float32)
     bare = np.zeros(count, np.float32) if eta is None else eta
     no_uv = np.zeros((count, 2), np.float32)
-    return Texels(points_m, normals, normals, no_step, no_step, nowhere, nowhere, no_uv, bare, dither)
+    no_face = nowhere.astype(np.int32)
+    return Texels(points_m, normals, normals, no_step, no_step, nowhere, no_face, no_uv, bare, dither)
 
 
 def shadow_matrices(places: Array, ball: BoundingSphere) -> Array:
-    """Matrices (K, 4, 4) from the world to what samples (K, 4) see of a ball: -1 to 1 across it.
+    """Matrices (K, 3, 4) from the world to what samples (K, 4) see of a ball.
 
-    Depth is NEAR_M over the distance from a place, and from 0 to 1 through the ball along a direction.
+    Across it they lead from -1 to 1, times the distance ahead where a sample is a place. The last row is that distance,
+    and along a direction from 0 to 1 through the ball, 1 being nearest to the light.
     """
     is_near = places[:, 3] > 0
     radius_m = MARGIN * ball.radius_m
     to_ball_m = ball.centre_m - places[:, :3]
-    distance_m = np.linalg.norm(to_ball_m, axis=1)
-    ahead = np.where(is_near[:, None], to_ball_m / np.maximum(distance_m, 1e-6)[:, None], -places[:, :3])
+    distance_m = np.maximum(np.linalg.norm(to_ball_m, axis=1), 1e-6)
+    ahead = np.where(is_near[:, None], to_ball_m / distance_m[:, None], -places[:, :3])
     u_axis, v_axis = tangents(ahead)
-    sine = np.minimum(radius_m / np.maximum(distance_m, 1e-6), WIDEST)
-    across = np.where(is_near, np.sqrt(1 - sine**2) / sine, 1 / radius_m)
+    sine = np.minimum(radius_m / distance_m, WIDEST)
+    scale = np.where(is_near, np.sqrt(1 - sine**2) / sine, 1 / radius_m)[:, None]
     origin_m = np.where(is_near[:, None], places[:, :3], ball.centre_m)
+    along = np.where(is_near[:, None], ahead, -ahead / (2 * radius_m))
 
-    matrices = np.zeros((len(places), 4, 4))
-    for row, axis, scale in ((0, u_axis, across), (1, v_axis, across)):
-        matrices[:, row, :3] = scale[:, None] * axis
-        matrices[:, row, 3] = -scale * np.einsum("ij,ij->i", axis, origin_m)
-    along_m = np.einsum("ij,ij->i", ahead, origin_m)
-    matrices[is_near, 2, 3] = NEAR_M
-    matrices[is_near, 3, :3] = ahead[is_near]
-    matrices[is_near, 3, 3] = -along_m[is_near]
-    is_far = ~is_near
-    matrices[is_far, 2, :3] = -ahead[is_far] / (2 * radius_m)
-    matrices[is_far, 2, 3] = 0.5 + along_m[is_far] / (2 * radius_m)
-    matrices[is_far, 3, 3] = 1
-    return matrices
+    rows = np.stack([scale * u_axis, scale * v_axis, along], 1)  # (K, 3, 3)
+    offsets = -np.einsum("kij,kj->ki", rows, origin_m)
+    offsets[~is_near, 2] += 0.5
+    return np.concatenate([rows, offsets[..., None]], 2)

@@ -1,7 +1,7 @@
 """The map of light as it is drawn: that of the stationary part, with the shade of movers and the light on them."""
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from OpenGL import GL
 
-from vobench.geometry.se3 import Array
-from vobench.rendering.array_types import Floats, Indices, Mask, Rows
+from vobench.rendering.array_types import Floats, Mask, Rows
 from vobench.rendering.bake import BakedScene
 from vobench.rendering.batch import morton
 from vobench.rendering.culling import bounds
@@ -25,7 +24,7 @@ from vobench.scene.light import Steady
 Views = Sequence[tuple[PinholeView, Box]]
 BLOCK = 64  # texels near one another, all of which are drawn or none
 CLUSTER = 16  # blocks that are culled together before each is
-WIDEST_M = 0.022  # between texels that are one to soft light: its shadows need no finer ones
+WIDEST_M = 0.04  # between texels that are one to soft light: its shadows need no finer ones
 READ_M = 0.1  # from what a picture shows, as far as it reads light
 SHADOW_PX = 64  # along a side of one shadow map
 COLUMNS = 32  # of shadow maps in their atlas
@@ -54,7 +53,7 @@ class Sites:
     texels: Rows
     places_m: Floats
     normals: Floats
-    width_px: Indices
+    width_px: Rows
     blocks: BoundingSphere
     clusters: BoundingSphere
 
@@ -66,7 +65,7 @@ class Sites:
             least[wide] = np.minimum(least[wide], values[self.texels[wide] + step])
         return least
 
-    def shaded(self, movers: BoundingSphere, emitter: BoundingSphere, among: Mask) -> Indices:
+    def shaded(self, movers: BoundingSphere, emitter: BoundingSphere, among: Mask) -> Rows:
         """The blocks among some (N,) where movers may take some of an emitter's light."""
         starts = np.arange(0, len(among), CLUSTER)
         clusters = np.flatnonzero(np.logical_or.reduceat(among, starts)) if len(starts) else starts
@@ -74,7 +73,7 @@ class Sites:
         blocks = (clusters[:, None] * CLUSTER + np.arange(CLUSTER)).ravel()
         blocks = blocks[blocks < len(among)]
         blocks = blocks[among[blocks]]
-        return blocks[may_shade(movers, emitter, self.blocks.take(blocks))]
+        return np.asarray(blocks[may_shade(movers, emitter, self.blocks.take(blocks))])
 
     def seen(self, views: Views) -> Mask:
         """The blocks (N,) that some of the views show, or read light beside."""
@@ -115,7 +114,8 @@ def _sites(baked: BakedScene, owner: Owners, *, widest_m: float) -> Sites:
         thing = np.where(owner.face >= 0, faces.thing[owner.face], -1)
         for step in (1, width, width + 1):
             other = first + step
-            is_whole &= (thing[other] == thing[first]) & (faces.plane[owner.face[other]] == faces.plane[owner.face[first]]).all(1)
+            is_whole &= thing[other] == thing[first]
+            is_whole &= (faces.plane[owner.face[other]] == faces.plane[owner.face[first]]).all(1)
             apart_m = np.linalg.norm(places_m[other] - places_m[first], axis=1)
             is_whole &= apart_m <= widest_m
         first = first[is_whole]
@@ -129,7 +129,7 @@ def _sites(baked: BakedScene, owner: Owners, *, widest_m: float) -> Sites:
         places_m[first] = (places_m[first] + places_m[first + width + 1]) / 2
     places_m = places_m[texels]
     if len(texels):
-        order = np.argsort(morton(places_m), kind="stable")
+        order = np.argsort(morton(places_m.astype(float)), kind="stable")
         texels = texels[order]
         places_m = places_m[order]
         width_px = width_px[order]
@@ -185,7 +185,10 @@ class _ShadowAtlas:
     def draw(self, at: MoverLightAt) -> None:
         """Draw each body as every sample that reaches it sees it."""
         self._require_rows(max(-(-at.map_of.size // COLUMNS), 1))
-        self._maps.update(at.maps.reshape(-1, 4))
+        is_near = np.zeros((len(at.maps), 1, 4), np.float32)
+        samples = np.broadcast_to(at.samples[:, 0, 3], at.map_of.shape)
+        is_near[:, 0, 0] = samples[at.map_of >= 0]
+        self._maps.update(np.concatenate([at.maps, is_near], 1).reshape(-1, 4))
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._framebuffer)
         GL.glViewport(0, 0, *self.size_px)
         GL.glScissor(0, 0, *self.size_px)
@@ -287,8 +290,7 @@ class ShadedLight:
         self._show = ShaderProgram("shade", "shade", "IS_MOVER")
         self._give = ShaderProgram("shade", "shade", "IS_GIVEN")
         self._atlas = _ShadowAtlas()
-        self._values = np.zeros((), SHADE.dtype)
-        self._block = Blocks(SHADE.binding, self._values[None])
+        self._block = Blocks(SHADE.binding, np.zeros(max(len(sampled), 1), SHADE.dtype))
         self._site_buffers = [self._site_vertices(sites) for sites in self._site_sets]
         self._site_arrays = [GL.glGenVertexArrays(1) for _ in sampled]
         self._layers = [GL.glGenBuffers(1) for _ in sampled]
@@ -335,7 +337,7 @@ class ShadedLight:
             ("texel", 2, GL.GL_UNSIGNED_SHORT, GL.GL_FALSE),
             ("width", 1, GL.GL_FLOAT, GL.GL_FALSE),
         )
-        offsets = SITE.fields or {}
+        offsets: Mapping[str, Any] = SITE.fields or {}
         for location, (name, count, kind, is_normalized) in zip((0, 1, 2, 4), columns, strict=True):
             offset = ctypes.c_void_p(offsets[name][1])
             GL.glEnableVertexAttribArray(location)
@@ -436,8 +438,8 @@ class ShadedLight:
         self._colours = colours
         self._is_drawn = [np.zeros(len(sites.blocks.radius_m), bool) for sites in self._site_sets]
         self._atlas.draw(at)
-        blocks = [self._uniforms(nth, colours[emitter.light]) for nth, emitter in enumerate(at.emitters)]
-        self._block = Blocks(SHADE.binding, np.array(blocks)) if blocks else self._block
+        for nth, emitter in enumerate(at.emitters):
+            self._block.update(nth, self._uniforms(nth, colours[emitter.light]))
         self._show_movers(colours)
 
     def _show_movers(self, colours: Floats) -> None:
@@ -490,7 +492,10 @@ class ShadedLight:
         body_count = len(at.map_of)
         numbers = at.map_of[:, samples].ravel()
         spheres = np.column_stack([at.spheres.centre_m, at.spheres.radius_m])
+        sphere_body = at.sphere_body
         if len(spheres) > MOST_SPHERES:
+            # Then all bodies may hide what any does.
+            sphere_body = np.full(1, -1)
             centre_m = spheres[:, :3].mean(0)
             reach_m = np.linalg.norm(spheres[:, :3] - centre_m, axis=1) + spheres[:, 3]
             spheres = np.array([[*centre_m, reach_m.max()]])
@@ -508,11 +513,13 @@ class ShadedLight:
         values["places"][:count] = at.samples[samples, 0]
         values["axes"][:count] = at.samples[samples, 1]
         values["strengths"][:count, 0] = at.reach[-body_count:, samples].mean(0)
-        values["maps"].reshape(-1, 4, 4)[: len(numbers)] = at.maps[numbers]
+        if len(at.maps):
+            values["maps"].reshape(-1, 3, 4)[: len(numbers)] = at.maps[numbers]
         values["tiles"][: len(numbers), 0] = SHADOW_PX * (numbers % COLUMNS)
         values["tiles"][: len(numbers), 1] = SHADOW_PX * (numbers // COLUMNS)
         values["tiles"][: len(numbers), 2] = numbers >= 0
         values["spheres"][: len(spheres)] = spheres
+        values["sphere_bodies"][: len(spheres), 0] = sphere_body
         reach = at.reach[:-body_count, samples].ravel()
         values["reach"].reshape(-1)[: len(reach)] = reach
         return values
@@ -537,7 +544,7 @@ class ShadedLight:
         GL.glEnable(GL.GL_DEPTH_TEST)
 
 
-def _runs(blocks: Indices, count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def _runs(blocks: Rows, count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """First and number (K,) of the texels, of so many, in blocks (N,); those of neighbours joined."""
     begins = np.flatnonzero(np.diff(blocks, prepend=-2) != 1)
     ends = np.append(begins[1:], len(blocks)) - 1

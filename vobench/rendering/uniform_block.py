@@ -137,7 +137,7 @@ BATCH = UniformBlock(
 )
 MOST_SAMPLES = 24  # of one emitter
 MOST_MAPS = 512  # of one emitter: samples times bodies
-MOST_SPHERES = 256
+MOST_SPHERES = 240
 MOST_REACHES = 4096  # samples times probes
 
 SHADE = UniformBlock(
@@ -158,9 +158,10 @@ SHADE = UniformBlock(
         Field("vec4", "places", "of samples: a point and 1, or a direction and 0", count=MOST_SAMPLES),
         Field("vec4", "axes", "that samples shine along and 0, or that of a pane and 1", count=MOST_SAMPLES),
         Field("vec4", "strengths", "of samples at the bodies, on the mean", count=MOST_SAMPLES),
-        Field("vec4", "maps", "rows of a matrix from the world, for each body and sample", count=4 * MOST_MAPS),
+        Field("vec4", "maps", "from the world across and along, for each body and sample", count=3 * MOST_MAPS),
         Field("vec4", "tiles", "where each of these maps is in the atlas, and 1 if it is there", count=MOST_MAPS),
         Field("vec4", "spheres", "around parts of bodies", count=MOST_SPHERES),
+        Field("vec4", "sphere_bodies", "the bodies that they belong to", count=MOST_SPHERES),
         Field("vec4", "reach", "strength of each sample at each probe, four of them", count=MOST_REACHES // 4),
     ),
 )

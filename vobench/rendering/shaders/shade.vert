@@ -11,10 +11,12 @@ layout(location = 4) in float probe;   // on movers: between which two of the pr
 out vec3 light;
 
 const float CLEAR_M = 0.004;  // towards the light, from where a stationary place looks for bodies
-const float OWN_M = 0.05;     // the same from a body, whose map shows it coarsely
+const float OWN_M = 0.025;     // the same from a body, whose map shows it coarsely
+const int LAST_BIT = 30;
 const float STEEPEST = 0.999;
 const float UNNOTICED = 1.0 / 400.0;  // share of the light, above which some of it that is taken shows
 const float STEPS_PER_OCTAVE = 6.0;   // of all steady light
+const float NEAR_M = 0.05;    // nearness in a map is this over the distance
 const float LEAST = 1e-6;     // nearness of what lies farther than a map shows
 
 // Share of a place that a body hides from a sample.
@@ -23,14 +25,14 @@ float hidden(int body, int at_sample, vec3 from)
     int number = body * int(shade.sample_count) + at_sample;
     vec4 world = vec4(from, 1.0), tile = shade.tiles[number];
     if (tile.z == 0.0) return 0.0;
-    vec4 x = shade.maps[4 * number], y = shade.maps[4 * number + 1];
-    vec4 z = shade.maps[4 * number + 2], w = shade.maps[4 * number + 3];
-    vec4 seen = vec4(dot(x, world), dot(y, world), dot(z, world), dot(w, world));
-    if (seen.w <= 0.0 || max(abs(seen.x), abs(seen.y)) >= seen.w) return 0.0;
-    vec2 within = clamp((0.5 * seen.xy / seen.w + 0.5) * shade.tile_px, 0.5, shade.tile_px - 0.5) - 0.5;
+    float along = dot(shade.maps[3 * number + 2], world);
+    float near = shade.places[at_sample].w, w = near > 0.0 ? along : 1.0;
+    vec2 seen = vec2(dot(shade.maps[3 * number], world), dot(shade.maps[3 * number + 1], world));
+    if (w <= 0.0 || max(abs(seen.x), abs(seen.y)) >= w) return 0.0;
+    vec2 within = clamp((0.5 * seen / w + 0.5) * shade.tile_px, 0.5, shade.tile_px - 0.5) - 0.5;
     vec2 first = min(floor(within), shade.tile_px - 2.0), share = within - first;
     vec4 nearness = textureGather(atlas, (tile.xy + first + 1.0) / shade.size_px.xy);
-    vec4 stops = vec4(greaterThan(nearness, vec4(max(seen.z / seen.w, LEAST))));
+    vec4 stops = vec4(greaterThan(nearness, vec4(max(near > 0.0 ? NEAR_M / w : along, LEAST))));
     return mix(mix(stops.w, stops.z, share.x), mix(stops.x, stops.y, share.x), share.y);
 }
 
@@ -45,12 +47,23 @@ bool may_hide(vec4 body, vec3 from)
     return is_in_cone && along >= -body.w && along <= far + shade.ball.w + body.w;
 }
 
+// The bodies, as bits, of which a part may hide the emitter; the last bit stands for many, -1 for all.
+int hiding(vec3 from)
+{
+    int mask = 0;
+    for (int i = 0; i < int(shade.sphere_count); i++) {
+        int body = int(shade.sphere_bodies[i].x);
+        if (may_hide(shade.spheres[i], from)) mask |= body < 0 ? -1 : 1 << min(body, LAST_BIT);
+    }
+    return mask;
+}
+
 // The body that hides most of the light of a sample decides: bodies behind one another hide the same.
-float hidden_by_all(int at_sample, vec3 from)
+float hidden_by_all(int mask, int at_sample, vec3 from)
 {
     float result = 0.0;
     for (int i = 0; i < int(shade.body_count); i++)
-        if (result < 1.0) result = max(result, hidden(i, at_sample, from));
+        if ((mask >> min(i, LAST_BIT) & 1) == 1 && result < 1.0) result = max(result, hidden(i, at_sample, from));
     return result;
 }
 
@@ -91,11 +104,12 @@ float shown()
     float total = 0.0;
     bool is_behind = shade.ball.w >= 0.0 && dot(normal.xyz, shade.ball.xyz - place) <= -shade.ball.w;
     if (is_behind) return 0.0;
+    int mask = hiding(place);
     for (int i = 0; i < int(shade.sample_count); i++) {
         vec3 towards;
         float part = arriving(i, place, normal.xyz, towards);
         part = shade.is_hard > 0.0 ? direct : part * strength(i) * entering(max(dot(normal.xyz, towards), 0.0), normal.w);
-        if (part > 0.0) total += part * (1.0 - hidden_by_all(i, place + OWN_M * (normal.xyz + towards)));
+        if (part > 0.0) total += part * (1.0 - hidden_by_all(mask, i, place + OWN_M * (normal.xyz + towards)));
     }
     return total;
 }
@@ -103,16 +117,14 @@ float shown()
 // What bodies take.
 float shown()
 {
-    bool may_be = false;
-    if (direct > 0.0)
-        for (int i = 0; i < int(shade.sphere_count); i++) may_be = may_be || may_hide(shade.spheres[i], place);
-    if (!may_be) return 0.0;
+    int mask = direct > 0.0 ? hiding(place) : 0;
+    if (mask == 0) return 0.0;
     float all = 0.0, taken = 0.0;
     for (int i = 0; i < int(shade.sample_count); i++) {
         vec3 towards;
         float part = shade.strengths[i].x * arriving(i, place, normal.xyz, towards);
         all += part;
-        if (part > 0.0) taken += part * hidden_by_all(i, place + CLEAR_M * towards);
+        if (part > 0.0) taken += part * hidden_by_all(mask, i, place + CLEAR_M * towards);
     }
     float light = taken > 0.0 ? shade.unit_lx * direct * taken / all : 0.0;
     float steady = exp2(127.0 / STEPS_PER_OCTAVE * normal.w) - 1.0;
