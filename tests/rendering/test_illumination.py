@@ -1,4 +1,4 @@
-"""Layers add up by their levels; a moving sun and movers give the light of the same things at rest."""
+"""Layers add up by their levels; a moving sun gives the light of one at rest."""
 
 from dataclasses import replace
 
@@ -156,61 +156,3 @@ def test_a_sun_that_ends_where_it_began_moves_meanwhile():
     light = Illumination(bake(scene(sun, things=window_room()), coarse))
     north, south = light.at(0, 0), light.at(ns(5), ns(5))
     assert north.sum() > 2 * south.sum()
-
-
-def walk(*positions_m: tuple[float, float, float]) -> Mover:
-    times = np.arange(len(positions_m), dtype=float)
-    return Mover("crate", (CRATE,), WaypointMotion(times, np.array(positions_m), np.zeros(len(positions_m))))
-
-
-DAY = Sky("sky", 5_000.0, "uniform")
-
-
-@pytest.mark.parametrize("light", [PANEL, BULB, DAY], ids=["panel", "bulb", "sky"])
-def test_a_mover_shades_and_is_lit_as_the_same_thing_at_rest(light: Light) -> None:
-    place = np.array([-0.5, -0.3, 0.2])
-    things = window_room() if light is DAY else ROOM
-    moving = bake(scene(light, things=things, movers=(walk(tuple(place)),)), DIRECT)
-    lit = Illumination(moving).at(0, 0)
-    crate = replace(CRATE, mesh=moved(CRATE.mesh, se3.transform(np.eye(3), place)))
-    rest = bake(scene(light, things=(*things, crate)), DIRECT)
-    straight = layer(rest, 0)
-    for name in ("floor", "west", "south"):
-        ours, theirs = on(moving, lit, name), on(rest, straight, name)
-        assert np.abs(ours - theirs).mean() < (0.03 if light is DAY else 0.02) * theirs.mean()
-    ours, theirs = on(moving, lit, "crate").reshape(6, -1).mean(1), on(rest, straight, "crate").reshape(6, -1).mean(1)
-    np.testing.assert_allclose(ours, theirs, rtol=0.12, atol=1.0)
-
-
-def test_a_mover_takes_indirect_light_from_the_room() -> None:
-    baked = bake(scene(PANEL, movers=(walk((0.5, 0.3, 0.0)),)), COARSE)
-    lit = Illumination(baked).at(0, 0)
-    room_around = np.mean([on(baked, lit, thing.name).mean() for thing in ROOM])
-    darkest = on(baked, lit, "crate").reshape(12, -1).mean(1)
-    assert 0.1 * room_around < np.sort(darkest)[2] < 2 * room_around  # the two faces below see the floor alone
-    direct = replace(baked, bounced=0 * baked.bounced, settings=DIRECT)
-    assert on(direct, Illumination(direct).at(0, 0), "crate").min() == 0
-
-
-def test_where_a_mover_was_before_leaves_nothing_behind() -> None:
-    """Rays are kept from picture to picture: an illumination that has none gives the same light."""
-    baked = bake(scene(PANEL, BULB, DAY, things=window_room(), movers=(walk((0, 0, 0), (1, 0.5, 0)),)), DIRECT)
-    light = Illumination(baked)
-    first, *_, last = (light.at(ns(t_s), ns(t_s)) for t_s in (0, 0.1, 0.3, 0.9))
-    assert not np.array_equal(first, last)
-    np.testing.assert_allclose(last, Illumination(baked).at(ns(0.9), ns(0.9)), rtol=1e-5, atol=1e-4)
-
-
-def test_a_mover_of_glass_takes_no_light() -> None:
-    pane = replace(walk((0.5, 0.3, 0)), things=(replace(CRATE, material="pane"),))
-    baked = bake(scene(PANEL, movers=(pane,)), DIRECT)
-    np.testing.assert_allclose(Illumination(baked).at(0, 0), layer(baked, 0), rtol=1e-6)
-
-
-def test_a_mover_only_takes_light() -> None:
-    baked = bake(scene(PANEL, BULB, movers=(walk((0, 0, 0)),)), COARSE)
-    lit, empty = Illumination(baked).at(0, 0), layer(baked, 0) + layer(baked, 1)
-    for thing in ROOM:
-        assert (on(baked, lit, thing.name) <= on(baked, empty, thing.name) * (1 + 1e-5)).all()
-        assert (on(baked, lit, thing.name) >= 0).all()
-    assert on(baked, lit, "floor").sum() < on(baked, empty, "floor").sum()

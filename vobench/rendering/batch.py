@@ -181,7 +181,7 @@ def _clustered(
     key = batch * (thing.max() + 1) + thing
     _, part, count = np.unique(key, return_inverse=True, return_counts=True)
     part[count[part] < CLUSTER // 4] = -1
-    order = np.lexsort((_morton(centres_m), part, batch))
+    order = np.lexsort((morton(centres_m), part, batch))
     new_batch = np.diff(batch[order], prepend=-1) != 0
     new_part = np.diff(part[order], prepend=-2) != 0
     is_new = new_batch | new_part
@@ -190,7 +190,7 @@ def _clustered(
     return order, np.cumsum(rank % CLUSTER == 0) - 1
 
 
-def _morton(points_m: Array) -> NDArray[np.uint64]:
+def morton(points_m: Array) -> NDArray[np.uint64]:
     """Numbers (N,) that are close for points (N, 3) that are. Source: Morton (1966)."""
     low_m = points_m.min(0)
     high_m = points_m.max(0)

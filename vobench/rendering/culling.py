@@ -1,5 +1,7 @@
 """Culling: which clusters of triangles can touch a part of a picture."""
 
+from collections import OrderedDict
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +16,7 @@ from vobench.scene.mesh import WELD_M
 Indices = NDArray[np.int64]
 Runs = dict[int, list[tuple[int, int]]]
 
+RECENT = 32  # views whose clusters are known: what the light is computed for is drawn next
 MARGIN_PX = 1  # samples lie up to half a pixel from the middle
 
 
@@ -45,9 +48,21 @@ class CullingSet:
         self._radius_m = np.linalg.norm(size_m, axis=1) / 2
         movers = np.unique(clusters.mover).tolist()
         self._of_movers = {mover: np.flatnonzero(clusters.mover == mover) for mover in movers}
+        self._recent: OrderedDict[Hashable, Runs] = OrderedDict()
 
     def visible(self, view: PinholeView, box: Box) -> Runs:
         """By batch the runs (first, count) of indices that can touch a box of a picture; no others can."""
+        poses = np.array(view.T_world_movers).tobytes()
+        mirror = view.mirror.key if view.mirror else ()
+        key = (view.view_projection.tobytes(), view.eye_m.tobytes(), poses, mirror, view.camera, box)
+        if key not in self._recent:
+            self._recent[key] = self._visible(view, box)
+        self._recent.move_to_end(key)
+        if len(self._recent) > RECENT:
+            self._recent.popitem(last=False)
+        return self._recent[key]
+
+    def _visible(self, view: PinholeView, box: Box) -> Runs:
         clusters = self._clusters
         is_visible = np.zeros(len(clusters.batch), bool)
         world_planes = bounds(view, box)

@@ -8,7 +8,7 @@ from vobench.geometry import se3
 from vobench.rendering.batch import Batch, Geometry
 from vobench.rendering.culling import CullingSet, Runs
 from vobench.rendering.draw_call import LAYERS, LAYERS_UNIT, DrawCalls, probe_share
-from vobench.rendering.opengl import Canvas, FlatTarget, LightTexture, PanoramaTexture, bind
+from vobench.rendering.opengl import Canvas, FlatTarget, PanoramaTexture, bind
 from vobench.rendering.planar_mirror import PlanarMirror
 from vobench.rendering.probe import Probe
 from vobench.rendering.render_target import MIRRORS, RenderTarget
@@ -24,7 +24,7 @@ class BatchDraw:
     def __init__(
         self,
         geometry: Geometry,
-        light: LightTexture,
+        light: int,
         panoramas: Mapping[int, PanoramaTexture],
     ) -> None:
         self._calls = DrawCalls(geometry, light, panoramas)

@@ -15,7 +15,6 @@ from vobench.rendering.opengl import (
     Canvas,
     Elements,
     FlatTarget,
-    LightTexture,
     PanoramaTexture,
     ShaderProgram,
     SurfaceTexture,
@@ -53,7 +52,7 @@ class DrawCalls:
     def __init__(
         self,
         geometry: Geometry,
-        light: LightTexture,
+        light: int,
         panoramas: Mapping[int, PanoramaTexture],
     ) -> None:
         self._program = cache(ShaderProgram)
@@ -101,7 +100,7 @@ class DrawCalls:
         self._move(view)
         # A mirror swaps left and right, and with them the orientation of front faces.
         GL.glFrontFace(GL.GL_CW if view.depth % 2 else GL.GL_CCW)
-        bind(LIGHT_UNIT, self._light.id)
+        bind(LIGHT_UNIT, self._light)
 
     def _move(self, view: PinholeView) -> None:
         """Upload the poses of moving objects, if they have changed."""

@@ -13,6 +13,7 @@ from vobench.rendering.bake import BakedScene
 from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
 from vobench.rendering.illumination import AmbientLight, Background, Illumination
+from vobench.rendering.mover_shade import ShadedLight
 from vobench.rendering.opengl import CENTRE, HALVES, TURNED, LightTexture, PanoramaTexture
 from vobench.rendering.probe import Probe, glints, room_probe
 from vobench.rendering.render_target import RenderTarget, render_target
@@ -36,10 +37,11 @@ class FrameRenderer:
         self._ambient = AmbientLight(baked)
         self._movers = baked.scene.movers
         self._lights = baked.scene.lights
-        self._light = LightTexture(self._illumination.without_movers(0, 0))
+        light_map = self._illumination.at(0, 0)
+        self._light = ShadedLight(baked, light_map) if self._movers else LightTexture(light_map)
         drawn = geometry(baked.faces, baked.light_uv, baked.scene.materials)
         panoramas = {index: PanoramaTexture(shown) for index, shown in self._background.panoramas.items()}
-        self._draw = BatchDraw(drawn, self._light, panoramas)
+        self._draw = BatchDraw(drawn, self._light.id, panoramas)
         self._target = cache(partial(render_target, in_colour=self._draw.mirrors_in_colour))
         self._warp = cache(warp)
         if self._draw.needs_probe:
@@ -81,7 +83,7 @@ class FrameRenderer:
         lights = tuple(_steady(light) for light in self._lights)
         skies = _skies(Background(lights), 0, 0)
         if all(isinstance(light.level, Steady) for light in self._lights):
-            light_map = self._illumination.without_movers(0, 0)
+            light_map = self._illumination.at(0, 0)
         else:
             steady_scene = replace(baked.scene, lights=lights, movers=())
             light_map = Illumination(replace(baked, scene=steady_scene)).at(0, 0)
@@ -156,7 +158,7 @@ class FrameRenderer:
         middle_ns = (start_ns + end_ns) / 2
         T_world_camera = view.T_world_camera[index]
         T_world_movers = [mover.path.pose(middle_ns) for mover in self._movers]
-        light = self._illumination.without_movers(start_ns, end_ns)
+        light = self._illumination.at(start_ns, end_ns)
         shown_glints = NO_GLINTS
         if self._draw.needs_probe:
             shown_glints = glints(self._lights, T_world_camera[:3, 3], start_ns, end_ns)
@@ -168,10 +170,11 @@ class FrameRenderer:
             ambient_cd_m2=np.broadcast_to(self._ambient.cd_m2(light), 3),
             glints=shown_glints,
         )
-        if self._movers:
-            views = self._draw.views(pinhole, box)
-            light = self._illumination.at(start_ns, end_ns, views)
-        self._light.update(light)
+        if isinstance(self._light, ShadedLight):
+            colours, suns_ns = self._illumination.lights_at(start_ns, end_ns)
+            self._light.shade(light, middle_ns, suns_ns, colours, self._draw.views(pinhole, box))
+        else:
+            self._light.update(light)
         return pinhole
 
 

@@ -9,7 +9,6 @@ import numpy as np
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats
 from vobench.rendering.bake import BakedScene, SunTrack, direct_layer, direct_points, static_scene, travelled_rad
-from vobench.rendering.mover_light import MoverLight, MoverLightAt, Views
 from vobench.scene.light import SKIES, Light, Sky, Steady, Sun
 from vobench.scene.panorama import PanoramaMap, lamp_share
 from vobench.trajectory.nanoseconds import NS_PER_S
@@ -129,44 +128,26 @@ class Illumination:
             else:
                 self._varying.append(index)
         self._steady = self._sum(steady)
-        if self._tracks or baked.scene.movers:
+        if self._tracks:
             self._static = static_scene(baked)
-        self._movers = MoverLight(baked, self._static) if baked.scene.movers else None
         self._maps: OrderedDict[Hashable, Floats] = OrderedDict()
-        self._moments: OrderedDict[Hashable, MoverLightAt] = OrderedDict()
         self._suns: OrderedDict[Hashable, Floats] = OrderedDict()
 
-    def at(
-        self,
-        start_ns: int,
-        end_ns: int,
-        views: Views | None = None,
-    ) -> Floats:
-        """Map (H, W, 3) float32 of linear RGB: illuminance in lux, pi times their luminance on lamps.
+    def at(self, start_ns: int, end_ns: int) -> Floats:
+        """Map (H, W, 3) float32 of linear RGB without movers: illuminance in lux, pi times their luminance on lamps.
 
-        The mean from start_ns to end_ns; the very array of an earlier call where nothing differs. Movers may have
-        their shade where the views lead alone, everywhere without.
+        The mean from start_ns to end_ns; the very array of an earlier call where nothing differs.
         """
-        static_light = self.without_movers(start_ns, end_ns)
-        movers = self._movers
-        if not movers:
-            return static_light
-        levels, suns_ns = self._now(start_ns, end_ns)
-        middle_ns = (start_ns + end_ns) / 2
-        is_on = tuple(level > 0 for level in levels)
-        poses = tuple(mover.path.pose(middle_ns).tobytes() for mover in self._baked.scene.movers)
-        moment_key = (suns_ns, poses, is_on)
-        moment = _cached(self._moments, moment_key, lambda: movers.at(middle_ns, suns_ns, is_on))
-        movers.shade(moment, views)
-        map_key = (levels, suns_ns, poses, len(moment.lost))
-        return _cached(self._maps, map_key, lambda: movers.add(moment, static_light, levels))
-
-    def without_movers(self, start_ns: int, end_ns: int) -> Floats:
-        """The same map as if there were no movers."""
         levels, suns_ns = self._now(start_ns, end_ns)
         if not self._varying and not self._tracks:
             return self._steady
         return _cached(self._maps, (levels, suns_ns), lambda: self._map(levels, suns_ns))
+
+    def lights_at(self, start_ns: int, end_ns: int) -> tuple[Floats, tuple[float, ...]]:
+        """The colour of each light times its level (L, 3), and the instant of each sun that moves."""
+        levels, suns_ns = self._now(start_ns, end_ns)
+        colours = np.array([light.colour for light in self._lights], np.float32).reshape(-1, 3)
+        return colours * np.array(levels, np.float32)[:, None], suns_ns
 
     def _now(
         self,

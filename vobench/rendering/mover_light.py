@@ -1,552 +1,587 @@
-"""Light on movers, and the light that they take from the stationary part of a scene."""
+"""Moving bodies as light meets them: shapes that cast shade, samples of emitters, probes of the light around."""
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from itertools import groupby
 
 import numpy as np
-from numpy.typing import NDArray
+import scipy
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
-from vobench.rendering.atlas import doubled_areas_px2
-from vobench.rendering.bake import BakedScene, StaticScene, bodies
-from vobench.rendering.culling import bounds
-from vobench.rendering.direct_light import Rays, arriving, footprint_m, mirror_images, place_in_cell, reached
+from vobench.rendering.bake import BakedScene, bodies
 from vobench.rendering.emitter import Emitter, emitters
-from vobench.rendering.geometry import BoundingSphere, RayCaster, are_panes
-from vobench.rendering.indirect_light import FinalGather, Gatherer, blend, response, surfels
-from vobench.rendering.texel import Texels, texels
-from vobench.rendering.texel_owner import owners
-from vobench.rendering.thread_pool import chunked
-from vobench.rendering.view import Box, PinholeView
+from vobench.rendering.geometry import BoundingSphere, are_panes, sample_points, tangents
+from vobench.rendering.indirect_light import Gatherer, response
+from vobench.rendering.texel import Texels
+from vobench.rendering.texel_owner import Owners
+from vobench.rendering.uniform_block import MOST_MAPS, MOST_REACHES, MOST_SAMPLES
 from vobench.rendering.visibility import Visibility
-from vobench.scene.light import AreaLight, Light, Sky
-from vobench.scene.mesh import Triangles, areas_m2
+from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
+from vobench.scene.mesh import Triangles, areas_m2, distinct, face_normals
+from vobench.scene.mesh import corners as mesh_corners
+from vobench.scene.scene import Mover
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array, csr_matrix
-
-Views = Sequence[tuple[PinholeView, Box]]
-# rays along a side from points on movers, to an emitter and to the sky
-SIDE = 3
-SKY_SIDE = 5
-# the same from points in their shade
-SHADE_SIDE = 2
-SKY_SHADE_SIDE = 3
-SKY_REACH = 10  # radii beyond which a mover hides less than a hundredth of an open sky
-GATHER_RAYS = 64
-GATHER_M = 0.2  # between places that gather indirect light
-UNNOTICED = 1 / 300  # share of a place's light, less than a step of 8 bits
 STEEPEST = 0.999  # sine of the angle of a frustum that is as good as open to all sides
-SMOOTHINGS = 2  # of the sky's shade
-READ_TEXELS = 2  # from what is seen, as far as pictures read light
-AHEAD_M = 0.3  # beyond what a view needs: the other eye is about there
-UNSURE = 0.2  # standard deviation of the shares lost at the points around, above which a point is asked itself
+SKY_REACH = 10  # radii beyond which a body hides less than a hundredth of an open sky
 
 
-def may_shade(mover: BoundingSphere, emitter: BoundingSphere, points: BoundingSphere) -> Mask:
-    """Whether a ray from within each of `points` (N,) to within the emitter's sphere can pass the mover's.
+def may_shade(movers: BoundingSphere, emitter: BoundingSphere, points: BoundingSphere) -> Mask:
+    """Whether (N,) a ray from within each of `points` (N,) to within the emitter's sphere can pass one of the movers'.
 
     All rays lie in a cone frustum about the line between the two spheres, here one a little wider.
     """
-    to_mover_m = mover.centre_m - points.centre_m
-    squared_m2 = np.einsum("ij,ij->i", to_mover_m, to_mover_m)
+    to_mover_m = movers.centre_m[:, None] - points.centre_m  # (S, N, 3)
+    radius_m = np.reshape(movers.radius_m, (-1, 1))
+    squared_m2 = np.einsum("sij,sij->si", to_mover_m, to_mover_m)
     if np.isinf(emitter.radius_m):
-        reach_m = SKY_REACH * mover.radius_m + points.radius_m
-        return np.asarray(squared_m2 <= reach_m**2)
-    near_m = mover.radius_m + points.radius_m
+        reach_m = SKY_REACH * radius_m + points.radius_m
+        return np.asarray((squared_m2 <= reach_m**2).any(0))
+    near_m = radius_m + points.radius_m
     to_emitter_m = emitter.centre_m - points.centre_m
     emitter_distance_m = np.maximum(np.sqrt(np.einsum("ij,ij->i", to_emitter_m, to_emitter_m)), 1e-9)
-    along_m = np.einsum("ij,ij->i", to_mover_m, to_emitter_m) / emitter_distance_m
+    along_m = np.einsum("sij,ij->si", to_mover_m, to_emitter_m) / emitter_distance_m
     aside_m = np.sqrt(np.maximum(squared_m2 - along_m**2, 0))
     sine = np.minimum((emitter.radius_m + points.radius_m) / emitter_distance_m, STEEPEST)
     cone_radius_m = near_m + sine * np.maximum(along_m, 0)
     is_in_cone = aside_m * np.sqrt(1 - sine**2) <= cone_radius_m
     is_before_emitter = along_m <= emitter_distance_m + emitter.radius_m + near_m
     is_ahead = along_m >= -near_m
-    return np.asarray((squared_m2 <= near_m**2) | (is_in_cone & is_before_emitter & is_ahead))
+    is_shading = (squared_m2 <= near_m**2) | (is_in_cone & is_before_emitter & is_ahead)
+    return np.asarray(is_shading.any(0))
 
 
-class Casters:
-    """Several ray casters as one."""
-
-    def __init__(self, *casters: RayCaster) -> None:
-        self._casters = casters
-
-    def stops(self, origins_m: Floats, segments_m: Floats) -> Mask:
-        """Whether anything is between origins and origins + segments (R, 3)."""
-        is_hidden = np.zeros(len(origins_m), bool)
-        for caster in self._casters:
-            rays = np.flatnonzero(~is_hidden)
-            is_hidden[rays] = caster.stops(origins_m[rays], segments_m[rays])
-        return is_hidden
+HULL_DIRECTIONS = 20
+SMALL = 1 / 32  # of a body, a thing that casts no shade of its own
+HULL_FILLED = 1.4  # volume of a hull over that of the shape, above which the shape is not taken for its hull
+CELL = 1 / 24  # of the size of a shape that is no hull: vertices so close are merged
 
 
-@dataclass(slots=True)
-class MoverLightAt:
-    """Movers at one instant: each light's direct light (L, M) on their points.
+def occluder(corners_m: Array) -> Array:
+    """Few triangles (K, 3, 3) with nearly the silhouettes of a thing's (F, 3, 3).
 
-    gathered: what reaches their groups of points from the surfels and lamps of the stationary part. movers, balls:
-    the movers as faces that rays meet, and around their parts. known (C,): the cells whose shade has been looked for;
-    lost: of a light the points (N,) there that the movers shade, and the illuminance (N,) that these lose.
+    They are the convex hull of its outermost vertices. A shape that its hull does not resemble has close vertices
+    merged instead.
     """
+    points_m = np.unique(corners_m.reshape(-1, 3), axis=0)
+    outermost = np.unique((_spiral(HULL_DIRECTIONS) @ points_m.T).argmax(1))
+    try:
+        hull = scipy.spatial.ConvexHull(points_m[outermost])
+    except (scipy.spatial.QhullError, ValueError):  # flat, or fewer than four points
+        return _merged(corners_m)
+    a, b, c = np.moveaxis(corners_m, 1, 0)
+    volume_m3 = np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6
+    if hull.volume > HULL_FILLED * volume_m3:
+        return _merged(corners_m)
+    return np.asarray(points_m[outermost][hull.simplices])
 
-    direct: Floats
-    gathered: FinalGather
-    movers: RayCaster
-    balls: list[BoundingSphere]
-    shining: "list[list[_Lit]]"
-    known: Mask
-    lost: list[tuple[int, Rows, Floats]]
+
+def _merged(corners_m: Array) -> Array:
+    """Triangles (K, 3, 3) whose vertices in each cell of a grid are one, at their mean."""
+    points_m = corners_m.reshape(-1, 3)
+    cell_m = max(float(np.ptp(points_m, axis=0).max()) * CELL, 1e-6)
+    cell = distinct(np.rint(points_m / cell_m).astype(np.int64))[1]
+    count = np.bincount(cell)
+    sums_m = np.stack([np.bincount(cell, column) for column in points_m.T], -1)
+    merged_m = (sums_m / count[:, None])[cell].reshape(-1, 3, 3)
+    return np.asarray(merged_m[areas_m2(merged_m) > 0])
+
+
+def _spiral(count: int) -> Array:
+    """Unit vectors (count, 3) spread evenly over the sphere. Source: González (2010), the Fibonacci lattice."""
+    rows = np.arange(count) + 0.5
+    height = 1 - 2 * rows / count
+    angle = np.pi * (1 + np.sqrt(5)) * rows
+    radius = np.sqrt(1 - height**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], -1)
+
+
+PROBES_M = 0.5  # between probes along a body
+MOST_PROBES = 6
 
 
 @dataclass(frozen=True, slots=True)
-class _Lit:
-    """Stationary points that have an emitter's light, surfel by surfel: has (P,) marks them.
+class Body:
+    """Movers of one name, that is a thing or all limbs of a person.
 
-    points (N,): in the order of their cells (C,), cell by cell from starts (C + 1,) on; balls around each of these.
+    corners_m (K, 3, 3): what casts their shade, each face in the frame of its mover (K,). probes_m (N, 3): places
+    along the body, in the frame of its first mover; part (K,): the one that each face is near at the start.
     """
 
-    emitter: Emitter
-    is_soft: bool
-    has: Mask
-    points: Rows
-    cells: Indices
-    balls: BoundingSphere
-    starts: Rows
+    movers: tuple[int, ...]
+    corners_m: Array
+    mover: Rows
+    probes_m: Array
+    part: Rows
 
-    def shaded_cells(self, movers: Sequence[BoundingSphere], among: Mask) -> Mask:
-        """The cells among all (A,) of which some point may lose light to one of the movers, given as spheres."""
-        asked = np.flatnonzero(among[self.cells])
-        balls = self.balls.take(asked)
-        is_shaded = np.zeros(len(asked), bool)
-        for mover_parts in movers:
-            may_be = may_shade(_around(mover_parts), self.emitter.ball, balls)
-            rows = np.flatnonzero(~is_shaded & may_be)
-            candidates = balls.take(rows)
-            for part in range(len(mover_parts.radius_m)):
-                part_ball = mover_parts.take(slice(part, part + 1))
-                is_shaded[rows] |= may_shade(part_ball, self.emitter.ball, candidates)
-        result = np.zeros(len(among), bool)
-        result[self.cells[asked[is_shaded]]] = True
-        return result
+    def placed(self, T_world_movers: Array) -> Array:
+        """Its faces (K, 3, 3) in the world."""
+        T = T_world_movers[self.mover]
+        turned_m = np.einsum("kij,kcj->kci", T[:, :3, :3], self.corners_m)
+        return np.asarray(turned_m + T[:, None, :3, 3])
 
-    def points_in(self, among: Mask) -> Rows:
-        """Its points in the cells among all (A,)."""
-        return self.points[spans(self.starts, np.flatnonzero(among[self.cells]))]
+    def probe_place(self, points_m: Array) -> Array:
+        """Where points (P, 3) in the first mover's frame lie between the probes: 0 (P,) at the first, 1 at the next."""
+        last = len(self.probes_m) - 1
+        if not last:
+            return np.zeros(len(points_m))
+        axis_m = self.probes_m[-1] - self.probes_m[0]
+        share = (points_m - self.probes_m[0]) @ axis_m / (axis_m @ axis_m)
+        return np.asarray(last * np.clip(share, 0, 1))
 
 
-class MoverLight:
-    """The light of a baked scene's movers."""
-
-    def __init__(self, baked: BakedScene, static: StaticScene) -> None:
-        self._baked = baked
-        self._static = static
-        self._lights = baked.scene.lights
-        self._direct = [layer.ravel()[static.points.index] for layer in baked.direct]
-        faces = baked.faces
-        materials = baked.scene.materials
-
-        # What casts shade: the movers' faces but for panes.
-        is_solid = ~are_panes(faces, materials)
-        mover_count = len(baked.scene.movers)
-        mover_faces = [np.flatnonzero((faces.mover == nth) & is_solid) for nth in range(mover_count)]
-        self._solid = [nth for nth, rows in enumerate(mover_faces) if len(rows)]
-        self._bodies = faces.some(np.concatenate([NO_ROWS, *mover_faces]))
-        self._parts = [parts(faces.corners_m[mover_faces[nth]]) for nth in self._solid]
-
-        # The movers' points, and those that gather light for their neighbours.
-        is_moving_body = (faces.mover >= 0) & bodies(baked.scene, faces)
-        self._points, self._layout = texels(
-            faces, materials, baked.atlas, owners(baked.atlas), among=is_moving_body, seed=baked.settings.seed
-        )
-        self._mover = faces.mover[self._points.face]
-        self._groups, blend_table = self._grouped(faces)
-        is_mover_texel = self._layout.source < len(self._points)
-        self._mover_texels = np.flatnonzero(is_mover_texel)
-        self._blend = blend_table[self._mover_texels]
-        self._gatherer = Gatherer(
-            baked.atlas,
-            static.visibility,
-            response(faces, materials, static.visibility),
-            [light for light in self._lights if isinstance(light, Sky)],
-            baked.patches.surfel_of,
-            len(baked.patches.area_m2),
-            len(self._lights),
-        )
-
-        # The stationary points by cell, and the texels of the map by point.
-        self._by_cell = np.argsort(static.cells, kind="stable")
-        self._cells = _cells(baked, static, self._by_cell)
-        by_point = np.argsort(static.layout.source, kind="stable")
-        self._texels = by_point.astype(np.int32)
-        sources = static.layout.source[self._texels]
-        point_limits = np.arange(len(static.points) + 1)
-        self._texel_starts = np.searchsorted(sources, point_limits)
-        self._lit: dict[tuple[int, float], list[_Lit]] = {}
-
-    def _grouped(self, faces: Triangles) -> "tuple[Rows, csr_matrix]":
-        """The points that gather light for their neighbours, and the weights (H·W, S) of these at each texel."""
-        points = self._points
-        moving = np.flatnonzero(faces.mover >= 0)
-        visibility = Visibility(faces, self._baked.scene.materials, moving)
-        steps_m = np.full(len(points), GATHER_M, np.float32)
-        groups = surfels(points, faces.thing[points.face], steps_m, visibility)
-        usable = np.ones(len(groups), bool)
-        return groups.middle, blend(points, groups, self._layout, visibility, usable)
-
-    def at(
-        self,
-        t_ns: float,
-        suns_ns: Sequence[float],
-        is_on: Sequence[bool],
-    ) -> MoverLightAt:
-        """What the movers' places decide, but for their shade.
-
-        suns_ns (L,): the instant of each sun that moves; is_on (L,): which lights are on at all.
-        """
-        poses = [mover.path.pose(t_ns) for mover in self._baked.scene.movers]
-        movers = RayCaster(self._bodies.moved(poses))
-        balls = [_moved(part_balls, poses[nth]) for part_balls, nth in zip(self._parts, self._solid, strict=True)]
-        points = self._placed(poses)
-        with_movers = copy(self._static.visibility)
-        with_movers.opaque = Casters(with_movers.opaque, movers)  # type: ignore[assignment]
-
-        direct = np.zeros((len(self._lights), len(points)), np.float32)
-        shining = [self._lit_by(i, suns_ns[i]) if is_on[i] else [] for i in range(len(self._lights))]
-        for index, light_emitters in enumerate(shining):
-            for lit in light_emitters:
-                emitter = lit.emitter
-                rows = reached(emitter, points, np.arange(len(points)))
-                rays = Rays(SKY_SIDE if emitter.sky else SIDE)
-                direct[index, rows] += arriving(emitter, points, rows, with_movers, rays)[0]
-
-        ray_count = GATHER_RAYS if self._baked.settings.bounces else 0
-        gathered = self._gatherer.gather(points.take(self._groups), rays=ray_count)
-        cell_count = int(self._static.cells.max(initial=-1)) + 1
-        known = np.zeros(cell_count, bool)
-        return MoverLightAt(direct, gathered, movers, balls, shining, known, [])
-
-    def shade(self, moment: MoverLightAt, views: Views | None) -> None:
-        """Find the light that the movers take from all that views show, or from everything."""
-        inside_m = np.full(len(moment.known), np.inf)
-        if views is not None:
-            inside_m = _inside_m(self._cells, views)
-        is_missing = (inside_m > 0) & ~moment.known
-        if not is_missing.any():
-            return
-        new = (inside_m > -AHEAD_M) & ~moment.known
-        moment.known = moment.known | new
-        for index, shining in enumerate(moment.shining):
-            taken_lx = np.zeros(len(self._static.points), np.float32)
-            shaded = [NO_ROWS]
-            for lit in shining:
-                rows, lost_lx = self._lost(lit, index, moment, new)
-                taken_lx[rows] += lost_lx
-                shaded.append(rows[lost_lx > 0])
-            points = _distinct(np.concatenate(shaded))
-            # Rounding apart, nothing is taken that had not come.
-            available_lx = self._direct[index][points]
-            moment.lost.append((index, points, np.minimum(taken_lx[points], available_lx)))
-
-    def add(
-        self,
-        moment: MoverLightAt,
-        static_light: Floats,
-        levels: Sequence[float],
-    ) -> Floats:
-        """The map (H, W, 3) of the stationary part with the movers' light and shade."""
-        total = static_light.copy()
-        flat = total.reshape(-1, 3)
-        strength = np.asarray(levels, np.float32)
-        nominal_colours = np.array([light.colour for light in self._lights], np.float32)
-        colours = strength[:, None] * nominal_colours
-
-        shaded = [rows for _, rows, _ in moment.lost]
-        points = _distinct(np.concatenate([NO_ROWS, *shaded]))
-        row_of = np.zeros(len(self._static.points), np.int32)
-        row_of[points] = np.arange(len(points))
-        shade = np.zeros((len(points), 3), np.float32)
-        for index, rows, taken_lx in moment.lost:
-            shade[row_of[rows]] += taken_lx[:, None] * colours[index]
-        shaded_texels = self._texels[spans(self._texel_starts, points)]
-        texel_counts = np.diff(self._texel_starts)[points]
-        texel_shade = np.repeat(shade, texel_counts, axis=0)
-        flat[shaded_texels] = np.maximum(flat[shaded_texels] - texel_shade, 0)
-
-        point_light = moment.direct.T @ colours
-        direct = point_light[self._layout.source[self._mover_texels]]
-        indirect = self._blend @ self._indirect(moment.gathered, colours)
-        flat[self._mover_texels] = direct + indirect
-        return total
-
-    def _indirect(self, gathered: FinalGather, colours: Floats) -> Floats:
-        """Illuminance (S, 3) of the movers' groups by bounces, lamps in mirrors included."""
-        radiosity = np.einsum("lsc,lc->sc", self._baked.patches.radiosity, colours)
-        lamp_radiosity = []
-        sky_colours = []
-        for colour, light in zip(colours, self._lights, strict=True):
-            lamp_radiosity.append(np.pi * light.luminance_cd_m2 if isinstance(light, AreaLight) else 0)
-            if isinstance(light, Sky):
-                sky_colours.append(colour)
-        glow = np.array(lamp_radiosity, np.float32)[:, None] * colours
-        sent = np.concatenate([radiosity, glow])
-        sky_table = np.array(sky_colours, np.float32).reshape(-1, 3)
-        by_mirrors = gathered.sky.T @ sky_table
-        return np.asarray(gathered.table @ sent + by_mirrors, np.float32)
-
-    def _placed(self, poses: Sequence[Array]) -> Texels:
-        """The movers' points where they are."""
-        points = self._points
-        T_world_movers = np.array(poses)[self._mover]
-
-        def turned(vectors: Floats) -> Floats:
-            R_world_movers = T_world_movers[:, :3, :3]
-            return np.asarray(np.einsum("nij,nj->ni", R_world_movers, vectors), np.float32)
-
-        points_m = turned(points.points_m) + T_world_movers[:, :3, 3]
-        return replace(
-            points,
-            points_m=points_m.astype(np.float32),
-            normals=turned(points.normals),
-            planes=turned(points.planes),
-            step_u_m=turned(points.step_u_m),
-            step_v_m=turned(points.step_v_m),
-        )
-
-    def _shining(self, light: Light, sun_ns: float) -> list[Emitter]:
-        """The emitters of a light, its images in mirrors included."""
-        t_ns = sun_ns if light.moves else 0.0
-        light_emitters = emitters(light, self._static.visibility, t_ns=t_ns)
-        images = mirror_images(light, self._static.visibility, t_ns=t_ns)
-        return [*light_emitters, *images]
-
-    def _lit_by(self, index: int, sun_ns: float) -> list[_Lit]:
-        """The emitters of a light, each with the points that it may light, of a moving sun at an instant."""
-        key = index, sun_ns
-        if key not in self._lit:
-            self._lit = {other: lit for other, lit in self._lit.items() if other[0] != index}
-            light_emitters = self._shining(self._lights[index], sun_ns)
-            self._lit[key] = [self._lit_from(emitter, index) for emitter in light_emitters]
-        return self._lit[key]
-
-    def _lit_from(self, emitter: Emitter, index: int) -> _Lit:
-        points = self._static.points
-        direct_lx = self._direct[index]
-        noticed_lx = UNNOTICED * direct_lx.max(initial=0)
-        noticed = self._by_cell[direct_lx[self._by_cell] > noticed_lx]
-        rows = reached(emitter, points, noticed)
-        has = np.zeros(len(points), bool)
-        has[rows] = True
-        cells = self._static.cells[rows]
-        starts = np.flatnonzero(np.diff(cells, prepend=-1, append=-1))
-        is_soft = bool((emitter.width_rad(points.points_m[rows]) > 0).any())
-        balls = _balls(points.points_m[rows], starts)
-        return _Lit(emitter, is_soft, has, rows, cells[starts[:-1]], balls, starts)
-
-    def _lost(
-        self,
-        lit: _Lit,
-        index: int,
-        moment: MoverLightAt,
-        new: Mask,
-    ) -> tuple[Rows, Floats]:
-        """Points (N,) in new cells and the illuminance (N,) that movers take from them.
-
-        Soft shadows are asked at few points, and at others where those around differ, as light is. What is found at
-        a point does not depend on which others are asked for.
-        """
-        direct_lx = self._direct[index]
-        layout = self._static.layout
-        cells = lit.shaded_cells(moment.balls, new)
-        wanted = lit.points_in(cells)
-        if not lit.is_soft:
-            return wanted, self._traced(lit.emitter, wanted, moment.movers, SHADE_SIDE)
-        smoothings = SMOOTHINGS if lit.emitter.sky == "pane" else 0
-        side = SKY_SHADE_SIDE if lit.emitter.sky == "pane" else SHADE_SIDE
-
-        rows = wanted
-        for _ in range(smoothings):
-            with_neighbours: Rows = np.append(rows, layout.neighbours[:, rows])
-            rows = self._may_lose(lit, moment, cells, with_neighbours)
-        is_sparse = layout.is_sparse[rows]
-        rest = rows[~is_sparse]
-        weights = layout.weights[rest]
-        read: Rows = np.append(rows[is_sparse], weights.indices)
-        sparse = self._may_lose(lit, moment, cells, read)
-        share = np.zeros(len(direct_lx), np.float32)
-        sparse_lx = self._traced(lit.emitter, sparse, moment.movers, side)
-        share[sparse] = sparse_lx / direct_lx[sparse]
-
-        mean, is_unsure = _weighted_mean(weights, share, lit.has)
-        share[rest] = np.where(is_unsure, 0, mean)
-        asked = rest[is_unsure]
-        asked_lx = self._traced(lit.emitter, asked, moment.movers, side)
-        share[asked] = asked_lx / direct_lx[asked]
-        for _ in range(smoothings):
-            around = share[layout.neighbours[:, rows]].sum(0)
-            share[rows] = (4 * share[rows] + around) / 8
-        return wanted, share[wanted] * direct_lx[wanted]
-
-    def _may_lose(
-        self,
-        lit: _Lit,
-        moment: MoverLightAt,
-        shaded: Mask,
-        points: Rows,
-    ) -> Rows:
-        """Those of the points, each once, that have an emitter's light and may lose some of it.
-
-        shaded (C,): the cells of which that is known; it is asked for others.
-        """
-        points = _distinct(points[lit.has[points]])
-        cells = self._static.cells[points]
-        others = np.zeros(len(shaded), bool)
-        others[cells[~shaded[cells]]] = True
-        may_lose = shaded | lit.shaded_cells(moment.balls, others)
-        return points[may_lose[cells]]
-
-    def _traced(
-        self,
-        emitter: Emitter,
-        rows: Rows,
-        movers: RayCaster,
-        side: int,
-    ) -> Floats:
-        """The illuminance (N,) that movers take from the points at rows, by side x side rays each."""
-        return chunked(lambda part: self._lost_at(emitter, rows[part], movers, side), len(rows))
-
-    def _lost_at(
-        self,
-        emitter: Emitter,
-        rows: Rows,
-        movers: RayCaster,
-        side: int,
-    ) -> Floats:
-        points = self._static.points.take(rows)
-        towards = emitter.towards(points)
-        lost_lx = np.zeros(len(points), np.float32)
-        for cell in range(side**2):
-            a, b = place_in_cell(points, cell, side)
-            vectors_m, strength = towards(a, b)
-            cosine = points.cosine(vectors_m)
-            light_lx = strength * np.maximum(cosine, 0) * points.entering(cosine)
-            aside_m = footprint_m(points, slice(None), cell)
-            start_m = points.points_m + aside_m
-            ahead_m = vectors_m - aside_m
-            hit = np.flatnonzero(movers.stops(start_m, ahead_m) & (light_lx > 0))
-            passing = emitter.passing(self._static.visibility, start_m[hit], ahead_m[hit])
-            lost_lx[hit] += light_lx[hit] * passing
-        return lost_lx / np.float32(side**2)
+def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mask) -> list[Body]:
+    """The bodies among movers that have solid faces (F,), as they are at the start."""
+    result = []
+    for _, members in groupby(range(len(scene_movers)), key=lambda nth: scene_movers[nth].name):
+        movers = tuple(members)
+        body_rows = np.flatnonzero(is_solid & np.isin(faces.mover, movers))
+        small_m = SMALL * _size_m(faces.corners_m[body_rows])
+        shapes_m = []
+        shape_movers = []
+        for mover in movers:
+            rows = np.flatnonzero(is_solid & (faces.mover == mover))
+            for thing in np.unique(faces.thing[rows]):
+                thing_m = faces.corners_m[rows[faces.thing[rows] == thing]]
+                if _size_m(thing_m) < small_m:
+                    continue
+                shape_m = occluder(thing_m)
+                shapes_m.append(shape_m)
+                shape_movers.append(np.full(len(shape_m), mover))
+        if not shapes_m:
+            continue
+        no_part = np.zeros(0, np.int64)
+        body = Body(movers, np.concatenate(shapes_m), np.concatenate(shape_movers), np.zeros((1, 3)), no_part)
+        T_world_movers = np.array([mover.path.pose(0) for mover in scene_movers])
+        T_first_world = se3.inverse(T_world_movers[movers[0]])
+        points_m = se3.apply(T_first_world, body.placed(T_world_movers).reshape(-1, 3))
+        body = replace(body, probes_m=_probes_m(points_m))
+        middles_m = points_m.reshape(-1, 3, 3).mean(1)
+        result.append(replace(body, part=np.rint(body.probe_place(middles_m)).astype(np.int64)))
+    return result
 
 
-def _weighted_mean(
-    weights: "csr_array",
-    share: Floats,
-    has: Mask,
-) -> tuple[Floats, Mask]:
-    """The mean (N,) of shares (P,) by the rows of weights (N, P), of points that have light; and which are unsure.
-
-    A mean is unsure where the shares differ by more than UNSURE, or where there are none.
-    """
-    values = share[weights.indices]
-    value_weights = weights.data * has[weights.indices]
-    starts = weights.indptr[:-1]
-    with np.errstate(invalid="ignore", divide="ignore"):
-        total = np.add.reduceat(value_weights, starts)
-        mean = np.add.reduceat(value_weights * values, starts) / total
-        mean_square = np.add.reduceat(value_weights * values**2, starts) / total
-        deviation = np.sqrt(np.maximum(mean_square - mean**2, 0))
-        is_sure = deviation <= UNSURE
-    return mean, ~is_sure
+def _size_m(corners_m: Array) -> float:
+    """The longest side of the box around faces (K, 3, 3)."""
+    if not len(corners_m):
+        return 0.0
+    return float(np.ptp(corners_m.reshape(-1, 3), axis=0).max())
 
 
-NO_ROWS = np.zeros(0, np.int64)
-
-
-def _distinct(points: Rows) -> Rows:
-    """Each of the points (N,) once, in order."""
-    points = np.sort(points)
-    return np.asarray(points[np.diff(points, prepend=-1) > 0])
-
-
-def spans(begins: Rows, rows: Rows) -> Rows:
-    """All numbers from begins[i] to begins[i + 1] for each i among rows (N,), one after the other."""
-    count = begins[rows + 1] - begins[rows]
-    ends = np.cumsum(count)
-    total = ends[-1] if len(ends) else 0
-    shift = begins[rows] - ends + count  # from the place in the result to the number
-    return np.asarray(np.arange(total) + np.repeat(shift, count))
-
-
-def _cells(baked: BakedScene, static: StaticScene, by_cell: Rows) -> BoundingSphere:
-    """Spheres (C,) around all places that read light of the cells of the stationary part."""
-    faces = static.faces
-    with np.errstate(divide="ignore", invalid="ignore"):
-        face_px2 = np.abs(doubled_areas_px2(baked.atlas.light_px))
-        texel_m = np.sqrt(2 * areas_m2(faces.corners_m) / face_px2)
-    texel_m = np.where(np.isfinite(texel_m), texel_m, 0)
-    cells = static.cells[by_cell]
-    starts = np.flatnonzero(np.diff(cells, prepend=-1, append=-1))
-    around = _balls(static.points.points_m[by_cell], starts)
-    point_texel_m = texel_m[static.points.face[by_cell]]
-    largest_m = np.maximum.reduceat(point_texel_m, starts[:-1])
-    return BoundingSphere(around.centre_m, around.radius_m + READ_TEXELS * largest_m)
-
-
-def _inside_m(cells: BoundingSphere, views: Views) -> Floats:
-    """How far cells (C,) reach into what one of the views shows, at least; negative for how far they are from all."""
-    farthest_m = np.full(len(cells.radius_m), -np.inf)
-    for view, box in views:
-        planes = bounds(view, box)
-        normal_lengths = np.linalg.norm(planes[:, :3], axis=1)
-        planes /= normal_lengths[:, None]
-        heights_m = np.einsum("ij,kj->ik", planes[:, :3], cells.centre_m) + planes[:, 3:]
-        farthest_m = np.maximum(farthest_m, heights_m.min(0) + cells.radius_m)
-    return farthest_m
-
-
-def _balls(points_m: Floats, starts: NDArray[np.int64]) -> BoundingSphere:
-    """Spheres (C,) around points (N, 3) from each start (C + 1,) to the next."""
-    if not len(points_m):
-        return BoundingSphere(np.zeros((0, 3)), np.zeros(0))
-    count = np.diff(starts)
-    sums_m = np.add.reduceat(points_m.astype(float), starts[:-1])
-    centre_m = sums_m / count[:, None]
-    own_centre_m = np.repeat(centre_m, count, axis=0)
-    distance_m = np.linalg.norm(points_m - own_centre_m, axis=1)
-    return BoundingSphere(centre_m, np.maximum.reduceat(distance_m, starts[:-1]))
-
-
-def _around(balls: BoundingSphere) -> BoundingSphere:
-    """One sphere (1,) around several."""
-    centre_m = balls.centre_m.mean(0)
-    distance_m = np.linalg.norm(balls.centre_m - centre_m, axis=1)
-    reach_m = distance_m + balls.radius_m
-    return BoundingSphere(centre_m[None], reach_m.max(keepdims=True))
-
-
-MOST_PARTS = 8
-
-
-def parts(corners_m: Array) -> BoundingSphere:
-    """Spheres (K,) that enclose faces (F, 3, 3) together: of those in slices across the longest side of their box."""
-    points_m = corners_m.reshape(-1, 3)
+def _probes_m(points_m: Array) -> Array:
+    """Places (N, 3) along the longest side of the box around points (P, 3)."""
     low_m = points_m.min(0)
     size_m = np.ptp(points_m, axis=0)
     longest = int(size_m.argmax())
-    middle_size_m = max(np.sort(size_m)[1], 1e-3)
-    count = int(np.clip(np.ceil(size_m[longest] / middle_size_m), 1, MOST_PARTS))
-    part_m = np.where(np.arange(3) == longest, size_m / count, size_m)
-    along = np.eye(3)[longest]
-    steps_m = np.arange(count)[:, None] * along * part_m
-    centres_m = low_m + part_m / 2 + steps_m
-    radius_m = float(np.linalg.norm(part_m) / 2)
-    return BoundingSphere(centres_m, np.full(count, radius_m))
+    count = int(np.clip(np.ceil(size_m[longest] / PROBES_M), 1, MOST_PROBES))
+    shares = np.full((count, 3), 0.5)
+    shares[:, longest] = (np.arange(count) + 0.5) / count
+    return np.asarray(low_m + shares * size_m)
 
 
-def _moved(balls: BoundingSphere, T_world_body: NDArray[np.float64]) -> BoundingSphere:
-    return BoundingSphere(se3.apply(T_world_body, balls.centre_m), balls.radius_m)
+# Samples of a panel for each metre of its radius, at least and at most; of a pane; of the open sky.
+PER_RADIUS_M = 14
+FEWEST_SAMPLES = 2
+PANEL_SAMPLES = 8
+PANE_SAMPLES = 5
+OPEN_SKY_SAMPLES = MOST_SAMPLES
+GOLDEN = (0.7548776662, 0.5698402910)  # steps that fill the unit square evenly: Roberts (2018), R2
+
+
+@dataclass(frozen=True, slots=True)
+class SampledEmitter:
+    """One thing that shines, of a light, as K samples: places (K, 4), a point and 1 or a direction and 0.
+
+    axes (K, 4): the normal that it shines along and 0, or that of a pane, which shines to both sides, and 1; zeros
+    where it shines to all sides. strength (K,): illuminance times the squared distance, square to both. is_hard:
+    whether its shadows are, so that few of its rays tell where it is seen.
+    """
+
+    light: int
+    ball: BoundingSphere
+    places: Array
+    axes: Array
+    strength: Array
+    is_hard: bool = False
+
+
+def sampled_emitters(
+    lights: Sequence[Light], visibility: Visibility, suns_ns: Sequence[float], most_samples: int = MOST_SAMPLES
+) -> list[SampledEmitter]:
+    """All that shines, in the order of the lights; suns_ns (L,): the instant of each sun that moves."""
+    result = []
+    for index, light in enumerate(lights):
+        match light:
+            case AreaLight():
+                result.append(_sampled_panel(index, light))
+            case PointLight() | SpotLight():
+                place = np.array([[*light.position_m, 1.0]])
+                ball = BoundingSphere(light.position_m, 0.0)
+                result.append(SampledEmitter(index, ball, place, np.zeros((1, 4)), np.ones(1), is_hard=True))
+            case Sun():
+                direction = light.direction(suns_ns[index])
+                [emitter] = emitters(light, visibility, t_ns=suns_ns[index])
+                place = np.array([[*direction, 0.0]])
+                result.append(SampledEmitter(index, emitter.ball, place, np.zeros((1, 4)), np.ones(1), is_hard=True))
+            case Sky():
+                result += _sampled_sky(index, light, visibility)
+    return [_with_fewer(emitter, most_samples) for emitter in result]
+
+
+def _with_fewer(emitter: SampledEmitter, most: int) -> SampledEmitter:
+    """The emitter with no more samples than so many."""
+    count = len(emitter.places)
+    if count <= most:
+        return emitter
+    rows = np.linspace(0, count - 1, most).astype(int)
+    return replace(
+        emitter, places=emitter.places[rows], axes=emitter.axes[rows], strength=emitter.strength[rows] * count / most
+    )
+
+
+def _square(count: int) -> tuple[Array, Array]:
+    """Two numbers (count,) each that fill the unit square evenly."""
+    steps = np.arange(count)[:, None] * GOLDEN + 0.5
+    a, b = (steps % 1).T
+    return a, b
+
+
+def _sample_count(radius_m: float) -> int:
+    return int(np.clip(np.rint(PER_RADIUS_M * radius_m), FEWEST_SAMPLES, PANEL_SAMPLES))
+
+
+def _ball(corners_m: Array) -> BoundingSphere:
+    points_m = corners_m.reshape(-1, 3)
+    centre_m = (points_m.min(0) + points_m.max(0)) / 2
+    return BoundingSphere(centre_m, float(np.linalg.norm(points_m - centre_m, axis=1).max()))
+
+
+def _sampled_panel(index: int, light: AreaLight) -> SampledEmitter:
+    corners_m = mesh_corners(light.mesh)
+    ball = _ball(corners_m)
+    count = _sample_count(ball.radius_m)
+    a, b = _square(count)
+    face_ends_m2 = np.cumsum(areas_m2(corners_m))
+    face = np.searchsorted(face_ends_m2, a * face_ends_m2[-1], side="right")
+    normals = face_normals(corners_m)[np.minimum(face, len(corners_m) - 1)]
+    places = np.column_stack([sample_points(corners_m, a, b), np.ones(count)])
+    strength = np.full(count, light.luminance_cd_m2 * face_ends_m2[-1] / count)
+    return SampledEmitter(index, ball, places, np.column_stack([normals, np.zeros(count)]), strength)
+
+
+def _sampled_sky(index: int, light: Sky, visibility: Visibility) -> list[SampledEmitter]:
+    """The sky by each pane that shows it, and otherwise all around."""
+    result = []
+    for pane in visibility.sky_panes:
+        ball = _ball(pane.corners_m)
+        count = PANE_SAMPLES
+        places = np.column_stack([sample_points(pane.corners_m, *_square(count)), np.ones(count)])
+        strength = np.full(count, areas_m2(pane.corners_m).sum() / count)
+        result.append(SampledEmitter(index, ball, places, np.tile([*pane.normal, 1.0], (count, 1)), strength))
+    directions = _spiral(2 * OPEN_SKY_SAMPLES)[:OPEN_SKY_SAMPLES]
+    places = np.column_stack([directions, np.zeros(OPEN_SKY_SAMPLES)])
+    strength = 2 * np.pi / OPEN_SKY_SAMPLES * light.luminance_cd_m2(directions)
+    around = BoundingSphere(np.zeros(3), np.inf)
+    return [*result, SampledEmitter(index, around, places, np.zeros((OPEN_SKY_SAMPLES, 4)), strength)]
+
+
+MARGIN = 1.08  # of the radius that a shadow map shows, so that its rim is empty
+WIDEST = 0.95  # sine of half the angle of a shadow map
+GATHER_RAYS = 36
+AXES = np.concatenate([np.eye(3), -np.eye(3)])
+FAR_M = 1e3
+SHARE_SAMPLES = 4  # of an emitter, that tell how much of a sky's light comes by it
+LIFT_M = 1e-3
+
+
+@dataclass(frozen=True, slots=True)
+class MoverLightAt:
+    """Movers at one instant, as tables of the shaders `occluder` and `shade`.
+
+    occluders_m: of each body (B) its faces (K, 3, 3). maps (M, 3, 4): from the world to what a sample sees of a body,
+    body by body, for those of all samples (K) that reach it; map_of (B, K) is the map's number, -1 for none. spheres
+    (S,): around parts of the bodies sphere_body (S,). samples (K, 2, 4): places and axes. reach (N + B, K): the
+    strength of each sample as it arrives at each probe, and its mean at those of each body. cubes (N, 6, L, 3):
+    illuminance of faces along ±x, ±y and ±z by bounces, under each light at level 1. points (P, 2, 4): places and
+    between which probes, normals and eta of the coat; hard (H, P): illuminance by each emitter with hard shadows.
+    """
+
+    emitters: Sequence[SampledEmitter]
+    occluders_m: Sequence[Array]
+    maps: Floats
+    map_of: Indices
+    spheres: BoundingSphere
+    sphere_body: Rows
+    samples: Floats
+    reach: Floats
+    cubes: Floats
+    points: Floats
+    hard: Floats
+
+    def sample_range(self, emitter: int) -> tuple[int, int]:
+        """The first sample of an emitter, and how many it has."""
+        before = [len(other.places) for other in self.emitters[:emitter]]
+        return sum(before), len(self.emitters[emitter].places)
+
+    def gathered(self, colours: Floats) -> Floats:
+        """Illuminance (P, 3) of the points by bounces, in lights of colours (L, 3)."""
+        cubes = np.einsum("nslc,lc->nsc", self.cubes, colours)
+        place = self.points[:, 0, 3]
+        first = place.astype(np.int64)
+        share = (place - first)[:, None]
+        after = np.minimum(first + 1, len(cubes) - 1)
+        normals = self.points[:, 1, :3]
+        total = np.zeros((len(normals), 3), np.float32)
+        for axis in range(3):
+            side = np.where(normals[:, axis] < 0, axis + 3, axis)
+            light = (1 - share) * cubes[first, side] + share * cubes[after, side]
+            total += normals[:, axis, None] ** 2 * light
+        return total
+
+
+def _part_spheres(bodies: Sequence[Body], occluders_m: Sequence[Array]) -> BoundingSphere:
+    """Spheres (S,) around the parts of all bodies."""
+    balls = []
+    for body, corners_m in zip(bodies, occluders_m, strict=True):
+        balls += [_ball(corners_m[body.part == part]) for part in np.unique(body.part)]
+    centres_m = np.array([ball.centre_m for ball in balls]).reshape(-1, 3)
+    return BoundingSphere(centres_m, np.array([ball.radius_m for ball in balls]))
+
+
+class MoverLight:
+    """The movers of a baked scene: bodies, the texels (P,) of theirs on the map, and the stationary part as rays."""
+
+    def __init__(self, baked: BakedScene, owner: Owners) -> None:
+        faces = baked.faces
+        materials = baked.scene.materials
+        self._scene = baked.scene
+        self._radiosity = baked.patches.radiosity
+        self._rays = GATHER_RAYS if baked.settings.bounces else 0
+        is_solid = (faces.mover >= 0) & ~are_panes(faces, materials)
+        self.bodies = moving_bodies(baked.scene.movers, faces, is_solid)
+        self._visibility = Visibility(faces, materials, np.flatnonzero(faces.mover < 0))
+        self._gatherer = Gatherer(
+            baked.atlas,
+            self._visibility,
+            response(faces, materials, self._visibility),
+            [light for light in baked.scene.lights if isinstance(light, Sky)],
+            baked.patches.surfel_of,
+            len(baked.patches.area_m2),
+            len(baked.scene.lights),
+        )
+
+        is_lit = bodies(baked.scene, faces) & (faces.mover >= 0)
+        self.texels = np.flatnonzero((owner.face >= 0) & is_lit[owner.face])
+        face = owner.face[self.texels]
+        uv = owner.uv[self.texels]
+        weights = np.column_stack([1 - uv.sum(1), uv])
+        self._mover = faces.mover[face]
+        self._points_m = np.einsum("ni,nij->nj", weights, faces.corners_m[face])
+        self._normals = unit(np.einsum("ni,nij->nj", weights, faces.normals[face]))
+        kinds = [materials.get(thing.material) for thing in faces.things]
+        etas = np.array([kind.eta if kind and kind.is_coated else 0.0 for kind in kinds])
+        self._eta = etas[faces.thing[face]].astype(np.float32)
+        self._probe_place = self._probe_places()
+
+    def _probe_places(self) -> Floats:
+        """Between which of all probes each point (P,) lies."""
+        T_world_movers = self.poses(0)
+        first = 0
+        result = np.zeros(len(self._mover), np.float32)
+        for body in self.bodies:
+            rows = np.flatnonzero(np.isin(self._mover, body.movers))
+            T_first_world = se3.inverse(T_world_movers[body.movers[0]])
+            T = T_first_world @ T_world_movers[self._mover[rows]]
+            points_m = np.einsum("nij,nj->ni", T[:, :3, :3], self._points_m[rows]) + T[:, :3, 3]
+            # The last place is just short of a probe's own, so that it never leads to the next body.
+            last = len(body.probes_m) - 1
+            result[rows] = first + np.minimum(body.probe_place(points_m), max(last - 1e-3, 0))
+            first += len(body.probes_m)
+        return result
+
+    def poses(self, t_ns: float) -> Array:
+        """T_world_mover (M, 4, 4) of all movers at an instant."""
+        return np.array([mover.path.pose(t_ns) for mover in self._scene.movers])
+
+    def emitters(self, suns_ns: Sequence[float]) -> list[SampledEmitter]:
+        """All that shines; suns_ns (L,): the instant of each sun that moves."""
+        probe_count = sum(len(body.probes_m) for body in self.bodies)
+        most = min(MOST_MAPS // max(len(self.bodies), 1), MOST_REACHES // max(probe_count, 1))
+        return sampled_emitters(self._scene.lights, self._visibility, suns_ns, min(most, MOST_SAMPLES))
+
+    def at(self, t_ns: float, suns_ns: Sequence[float]) -> MoverLightAt:
+        """The movers at an instant; suns_ns (L,): that of each sun that moves."""
+        T_world_movers = self.poses(t_ns)
+        sampled = self.emitters(suns_ns)
+        places = np.concatenate([np.zeros((0, 4)), *(emitter.places for emitter in sampled)])
+        axes = np.concatenate([np.zeros((0, 4)), *(emitter.axes for emitter in sampled)])
+        occluders_m = [body.placed(T_world_movers) for body in self.bodies]
+        balls = [_ball(corners_m) for corners_m in occluders_m]
+        probes_m = [se3.apply(T_world_movers[body.movers[0]], body.probes_m) for body in self.bodies]
+        all_probes_m = np.concatenate(probes_m)
+        arriving = self._arriving(sampled, all_probes_m)
+        counts = [len(body) for body in probes_m]
+        by_body = [part.mean(0) for part in np.split(arriving, np.cumsum(counts)[:-1])]
+
+        is_reaching = np.array(by_body) > 0
+        map_of = np.where(is_reaching, np.cumsum(is_reaching).reshape(is_reaching.shape) - 1, -1)
+        maps = [shadow_matrices(places[rows], ball) for rows, ball in zip(is_reaching, balls, strict=True)]
+
+        spheres = _part_spheres(self.bodies, occluders_m)
+        T = T_world_movers[self._mover]
+        points_m = np.einsum("nij,nj->ni", T[:, :3, :3], self._points_m) + T[:, :3, 3]
+        normals = np.einsum("nij,nj->ni", T[:, :3, :3], self._normals)
+        points = np.stack([np.column_stack([points_m, self._probe_place]), np.column_stack([normals, self._eta])], 1)
+        return MoverLightAt(
+            emitters=sampled,
+            occluders_m=occluders_m,
+            maps=np.concatenate(maps).astype(np.float32),
+            map_of=map_of.astype(np.int32),
+            spheres=spheres,
+            sphere_body=np.repeat(np.arange(len(self.bodies)), [len(np.unique(body.part)) for body in self.bodies]),
+            samples=np.stack([places, axes], 1).astype(np.float32),
+            reach=np.concatenate([arriving, by_body]).astype(np.float32),
+            cubes=self._cubes(all_probes_m),
+            points=points.astype(np.float32),
+            hard=self._hard(points_m, normals, suns_ns),
+        )
+
+    def sky_shares(self, sampled: Sequence[SampledEmitter], places_m: Floats, normals: Floats) -> Floats:
+        """Share (P, E) of a sky's direct light at points that comes by each emitter, by few rays; 1 of others."""
+        weights = np.ones((len(places_m), len(sampled)), np.float32)
+        is_sky = np.zeros(len(sampled), bool)
+        for nth, emitter in enumerate(sampled):
+            is_sky[nth] = isinstance(self._scene.lights[emitter.light], Sky)
+            if is_sky[nth]:
+                few = np.linspace(0, len(emitter.places) - 1, SHARE_SAMPLES).astype(int)
+                weights[:, nth] = 0
+                for sample in few:
+                    weights[:, nth] += self._seen(emitter, sample, places_m, normals)
+                weights[:, nth] *= len(emitter.places) / SHARE_SAMPLES
+        for light in np.unique([emitter.light for emitter in sampled]):
+            members = np.array([emitter.light == light for emitter in sampled]) & is_sky
+            total = np.maximum(weights[:, members].sum(1, keepdims=True), 1e-30)
+            weights[:, members] /= total
+        return weights
+
+    def _seen(self, emitter: SampledEmitter, sample: int, places_m: Floats, normals: Floats) -> Floats:
+        """Illuminance (P,) of points by one sample of the sky."""
+        place = emitter.places[sample]
+        axis = emitter.axes[sample, :3]
+        vectors_m = place[:3] - place[3] * places_m
+        distance_m = np.linalg.norm(vectors_m, axis=1)
+        directions = vectors_m / distance_m[:, None]
+        light = emitter.strength[sample] * np.maximum(np.einsum("ij,ij->i", directions, normals), 0)
+        if place[3]:
+            light = light * np.abs(directions @ axis) / distance_m**2
+        rows = np.flatnonzero(light > 0)
+        origins_m = (places_m + LIFT_M * normals)[rows].astype(np.float32)
+        ends_m = (FAR_M * directions[rows]).astype(np.float32)
+        passing = self._visibility.clear(origins_m, ends_m)
+        if not place[3]:
+            passing = passing & ~self._visibility.crosses_sky_pane(origins_m, ends_m)
+        light[rows] *= passing
+        return np.asarray(light, np.float32)
+
+    def _arriving(self, sampled: Sequence[SampledEmitter], probes_m: Array) -> Array:
+        """The strength (N, K) of all samples as it arrives at probes (N, 3); of hard light as if nothing hid it."""
+        columns = []
+        for emitter in sampled:
+            place = emitter.places
+            vectors_m = place[None, :, :3] - place[None, :, 3:] * probes_m[:, None]
+            shape = vectors_m.shape[:2]
+            strength = np.broadcast_to(emitter.strength, shape)
+            if not emitter.is_hard:
+                light = self._scene.lights[emitter.light]
+                directions = unit(vectors_m)
+                is_endless = isinstance(light, Sky)
+                if is_endless and np.isfinite(emitter.ball.radius_m):
+                    luminance = light.luminance_cd_m2(directions.reshape(-1, 3)) if isinstance(light, Sky) else 0
+                    strength = strength * np.reshape(luminance, shape)
+                ends_m = FAR_M * directions if is_endless else vectors_m * (1 - 1e-3)
+                origins_m = np.broadcast_to(probes_m[:, None], vectors_m.shape).reshape(-1, 3)
+                passing = self._visibility.passing(
+                    origins_m.astype(np.float32), ends_m.reshape(-1, 3).astype(np.float32)
+                ).reshape(shape)
+                if is_endless and not np.isfinite(emitter.ball.radius_m) and self._visibility.sky_panes:
+                    # What comes by panes counts there.
+                    by_pane = self._visibility.crosses_sky_pane(origins_m, ends_m.reshape(-1, 3)).reshape(shape)
+                    passing = passing * ~by_pane
+                strength = strength * passing
+            columns.append(strength)
+        return np.concatenate([np.zeros((len(probes_m), 0)), *columns], 1)
+
+    def _cubes(self, probes_m: Array) -> Floats:
+        """Illuminance (N, 6, L, 3) by bounces at probes (N, 3), of faces along ± each axis, of lights at level 1."""
+        normals = np.tile(AXES, (len(probes_m), 1)).astype(np.float32)
+        lights = self._scene.lights
+        places_m = np.repeat(probes_m, 6, axis=0).astype(np.float32)
+        gathered = self._gatherer.gather(_points(places_m, normals), rays=self._rays)
+        surfel_count = self._radiosity.shape[1]
+        result = np.zeros((len(normals), len(lights), 3), np.float32)
+        sky_row = 0
+        for index, light in enumerate(lights):
+            result[:, index] = gathered.table[:, :surfel_count] @ self._radiosity[index]
+            if isinstance(light, AreaLight):
+                by_mirrors = gathered.table[:, surfel_count + index].toarray()
+                result[:, index] += np.pi * light.luminance_cd_m2 * by_mirrors
+            if isinstance(light, Sky):
+                result[:, index] += gathered.sky[sky_row][:, None]
+                sky_row += 1
+        return result.reshape(len(probes_m), 6, len(lights), 3)
+
+    def _hard(self, points_m: Array, normals: Array, suns_ns: Sequence[float]) -> Floats:
+        """Illuminance (H, P) of points by each light with hard shadows, those of the stationary part."""
+        points = _points(points_m.astype(np.float32), normals.astype(np.float32), self._eta)
+        middle = np.full(len(points), 0.5, np.float32)
+        rows = []
+        for index, light in enumerate(self._scene.lights):
+            if isinstance(light, PointLight | SpotLight | Sun):
+                [emitter] = emitters(light, self._visibility, t_ns=suns_ns[index])
+                rows.append(self._by_one_ray(emitter, points, middle))
+        return np.array(rows, np.float32).reshape(-1, len(points))
+
+    def _by_one_ray(self, emitter: Emitter, points: Texels, middle: Floats) -> Floats:
+        vectors_m, strength = emitter.towards(points)(middle, middle)
+        cosine = points.cosine(vectors_m)
+        light_lx = strength * np.maximum(cosine, 0) * points.entering(cosine)
+        rows = np.flatnonzero(light_lx > 0)
+        light_lx[rows] *= emitter.passing(self._visibility, points.points_m[rows], vectors_m[rows])
+        return np.asarray(light_lx, np.float32)
+
+
+def _points(points_m: Floats, normals: Floats, eta: Floats | None = None) -> Texels:
+    """Points (P, 3) with normals, on no face of a map."""
+    count = len(points_m)
+    nowhere = np.zeros(count, np.int64)
+    dither = np.random.default_rng(0).random((count, 2), dtype=np.float32)
+    no_step = np.zeros((count, 3), np.float32)
+    bare = np.zeros(count, np.float32) if eta is None else eta
+    no_uv = np.zeros((count, 2), np.float32)
+    no_face = nowhere.astype(np.int32)
+    return Texels(points_m, normals, normals, no_step, no_step, nowhere, no_face, no_uv, bare, dither)
+
+
+def shadow_matrices(places: Array, ball: BoundingSphere) -> Array:
+    """Matrices (K, 3, 4) from the world to what samples (K, 4) see of a ball.
+
+    Across it they lead from -1 to 1, times the distance ahead where a sample is a place. The last row is that distance,
+    and along a direction from 0 to 1 through the ball, 1 being nearest to the light.
+    """
+    is_near = places[:, 3] > 0
+    radius_m = MARGIN * ball.radius_m
+    to_ball_m = ball.centre_m - places[:, :3]
+    distance_m = np.maximum(np.linalg.norm(to_ball_m, axis=1), 1e-6)
+    ahead = np.where(is_near[:, None], to_ball_m / distance_m[:, None], -places[:, :3])
+    u_axis, v_axis = tangents(ahead)
+    sine = np.minimum(radius_m / distance_m, WIDEST)
+    scale = np.where(is_near, np.sqrt(1 - sine**2) / sine, 1 / radius_m)[:, None]
+    origin_m = np.where(is_near[:, None], places[:, :3], ball.centre_m)
+    along = np.where(is_near[:, None], ahead, -ahead / (2 * radius_m))
+
+    rows = np.stack([scale * u_axis, scale * v_axis, along], 1)  # (K, 3, 3)
+    offsets = -np.einsum("kij,kj->ki", rows, origin_m)
+    offsets[~is_near, 2] += 0.5
+    return np.concatenate([rows, offsets[..., None]], 2)
