@@ -52,6 +52,13 @@ class Batch:
         """Whether its look depends on where it is seen from."""
         return depends_on_view(self.material) and not self.is_lamp
 
+    @property
+    def has_holes(self) -> bool:
+        """Whether the opacity of its texture leaves holes."""
+        material = self.material
+        is_textured_body = material.kind == "body" and material.texture is not None and not self.is_lamp
+        return is_textured_body and bool(material.cutout)
+
 
 @dataclass(frozen=True, slots=True)
 class Geometry:

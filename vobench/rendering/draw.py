@@ -33,7 +33,9 @@ class BatchDraw:
         unmirrored = [batch for batch in geometry.batches if batch.mirror is None]
         # Small things first: they hide much of what is large, which is then not shaded there.
         opaque = [batch for batch in unmirrored if not batch.is_pane]
-        self._opaque = sorted(opaque, key=lambda batch: batch.area_m2)
+        smallest_first = sorted(opaque, key=lambda batch: batch.area_m2)
+        self._opaque = [batch for batch in smallest_first if not batch.has_holes]
+        self._with_holes = [batch for batch in smallest_first if batch.has_holes]
         self._panes = [batch for batch in unmirrored if batch.is_pane]
         self._batches_of = {mirror.index: list[Batch]() for mirror in geometry.mirrors}
         for batch in geometry.batches:
@@ -73,6 +75,7 @@ class BatchDraw:
         """Fill a box of the target's canvas for as many mirrors as the view goes by, which must be clear there."""
         visible = self._culling.visible(view, box)
         canvas = self._begin(view, target, box)
+        self._draw_unmirrored(self._with_holes, visible, view, canvas, "IS_SOLID")
         self._draw_unmirrored(self._opaque, visible, view, canvas)
 
         boxes = self._boxes(view, visible)
@@ -84,6 +87,8 @@ class BatchDraw:
                 self._draw_mirror(mirror, view, target, box=box, visible=visible, part=part)
 
         self._calls.background(view, canvas, target.weights)
+        # How much of what is behind passes between leaves does not depend on the order in which rims are blended.
+        self._draw_unmirrored(self._with_holes, visible, view, canvas, "IS_RIM")
         self._draw_unmirrored(self._panes, visible, view, canvas)
         panes = [mirror for mirror in mirrors if mirror.is_pane]
         for mirror in sorted(panes, key=lambda pane: -_distance_m(pane, view)):
@@ -112,13 +117,17 @@ class BatchDraw:
         visible: Runs,
         view: PinholeView,
         canvas: Canvas,
+        *abilities: str,
     ) -> None:
-        """Draw batches that lie in no mirror's plane, with what the probe shows."""
+        """Draw batches that lie in no mirror's plane, with what the probe shows.
+
+        `abilities` are further preprocessor names for the shader.
+        """
         for batch in batches:
             if batch.index in visible:
                 shows_probe = self._probe and batch.has_gloss and probe_share(batch) > 0
-                abilities = ("HAS_PROBE",) if shows_probe else ()
-                self._calls.surface(batch, visible, view, canvas, *abilities)
+                probe_abilities = ("HAS_PROBE",) if shows_probe else ()
+                self._calls.surface(batch, visible, view, canvas, *probe_abilities, *abilities)
 
     def _boxes(self, view: PinholeView, visible: Runs) -> dict[int, Box]:
         """Mirrors whose mirroring side is seen, all or those of which something is visible: boxes in the picture.

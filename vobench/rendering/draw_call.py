@@ -141,6 +141,8 @@ class DrawCalls:
         runs = visible.get(batch.index, ())
         if batch.is_pane:
             self._pane(runs, canvas.layers, is_grey="IS_GREY" in batch_abilities)
+        elif "IS_RIM" in abilities:
+            self._rim(runs, canvas.layers)
         else:
             self._elements.draw(runs, canvas.layers)
 
@@ -227,6 +229,18 @@ class DrawCalls:
         GL.glEnable(GL.GL_CULL_FACE)
 
 
+    def _rim(self, runs: Sequence[tuple[int, int]], copies: int) -> None:
+        """Blend the rims of holes over what is behind them, where nothing solid of their own is."""
+        GL.glDepthMask(GL.GL_FALSE)
+        GL.glDepthFunc(GL.GL_GREATER)
+        GL.glEnable(GL.GL_BLEND)
+        GL.glBlendFunc(GL.GL_SRC_ALPHA, GL.GL_ONE_MINUS_SRC_ALPHA)
+        self._elements.draw(runs, copies)
+        GL.glDisable(GL.GL_BLEND)
+        GL.glDepthFunc(GL.GL_GEQUAL)
+        GL.glDepthMask(GL.GL_TRUE)
+
+
 MOST_TEXELS = 1 << 26  # of all textures together; in colour they occupy half a gigabyte
 
 
@@ -275,7 +289,7 @@ def _abilities(batch: Batch, texture: SurfaceTexture | None) -> tuple[str, ...]:
         "HAS_METAL": material.metal > 0,
         "HAS_TEXTURE": is_body and material.texture is not None and not batch.is_lamp,
         "HAS_LIGHT": is_body or batch.is_lamp,
-        "HAS_CUTOUT": material.cutout is not None,
+        "HAS_CUTOUT": batch.has_holes,
         "HAS_EMISSION": batch.is_lamp or max(material.emission_cd_m2) > 0,
         "HAS_EMISSION_TEXTURE": material.emission_texture is not None,
     }

@@ -41,6 +41,9 @@ layout(location = 0, index = 1) out vec4 passes;
 #endif
 
 const float PI = 3.14159265358979;
+const float NARROWEST_RIM = 0.01;  // in opacity
+const float LEAST_COVERED = 0.02;  // less of a sample is not drawn
+const float SOLID = 0.98;  // more of a sample hides what is behind
 
 // Share of unpolarised light that a boundary from air to eta reflects (Born and Wolf, section 1.5), by one division.
 float fresnel(float c, float eta, float inverse_square)
@@ -95,7 +98,19 @@ void main()
     vec4 texel = texture(body_texture, at_texture, view.lod_bias[layer]);
     colour *= SHADE(texel);
 #ifdef HAS_CUTOUT
+    // The rim of a hole is as wide as a pixel, or as the mask's own ramp where a texel is larger.
+    float widest = 2.0 * min(batch.cutout, 1.0 - batch.cutout);
+    float width = max(min(fwidth(texel.a), widest), NARROWEST_RIM);
+    float covered = clamp((texel.a - batch.cutout) / width + 0.5, 0.0, 1.0);
+#ifdef IS_RIM
+    if (covered < LEAST_COVERED || covered >= SOLID) discard;
+#else
+#ifdef IS_SOLID
+    if (covered < SOLID) discard;
+#else
     if (texel.a < batch.cutout) discard;
+#endif
+#endif
 #endif
 #endif
 #ifdef HAS_LIGHT
@@ -177,6 +192,9 @@ void main()
 #endif
 #else
     frag_color = vec4(radiance, 1.0);
+#endif
+#ifdef IS_RIM
+    frag_color.a = covered;
 #endif
 #ifdef IS_PANE
 #ifdef IS_GREY
