@@ -63,6 +63,21 @@ class TexelLayout:
             values = (2 * values + values[above] + values[below]) / 4
         return values
 
+    def blurred_among(self, values: Floats, rows: Rows, counts: Mask) -> Floats:
+        """Values (N,) of the points at rows smoothed as by `blurred`, of those of them alone that count (N,)."""
+        place = np.full(len(values), -1, np.int32)
+        place[rows] = np.arange(len(rows))
+        beside = place[self.neighbours[:, rows]]
+        left, right, above, below = np.where(beside < 0, np.arange(len(rows)), beside)
+        weight = counts.astype(np.float32)
+        weighted = values[rows] * weight
+        for _ in range(BLURS):
+            weight = (2 * weight + weight[left] + weight[right]) / 4
+            weight = (2 * weight + weight[above] + weight[below]) / 4
+            weighted = (2 * weighted + weighted[left] + weighted[right]) / 4
+            weighted = (2 * weighted + weighted[above] + weighted[below]) / 4
+        return weighted / np.maximum(weight, np.float32(1e-6))
+
 
 def neighbours(index: Rows, atlas: Atlas, owner: Owners) -> Indices:
     """The points (4, P) left, right, above and below of those at flat indices (P,) in the same chart, else itself."""
