@@ -128,9 +128,7 @@ def mirror_images(
 # Steps of additive recurrences that fill the unit interval evenly: Roberts (2018), R2 and the golden ratio.
 JITTER = np.array([0.7548776662, 0.5698402910], np.float32)
 FOOTPRINT = np.array([0.6180339887, 0.3247179572], np.float32)
-# emitters that are seen narrower or wider need fewer or more rays
-NARROW_RAD = 0.15
-WIDE_RAD = 0.6
+WIDE_RAD = 0.6  # emitters that are seen wider need more rays
 MOST = 0.7  # share of rays from which on all are cast at once
 RIM = 2  # texels around a place of half shadow
 MESH_SIDE = 8  # along a side, places on a mesh whose light without shadows is sampled
@@ -325,10 +323,8 @@ def first_rays(
 ) -> NDArray[np.int64]:
     """How many rays along a side points (P, 3) need to tell whether they see an emitter: one where shadows are hard."""
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
-    narrow = max(side // 2, 1)
-    middle = max(3 * side // 4 if emitter.sky == "pane" else side // 2, 1)
-    conditions = [width_rad == 0, width_rad < NARROW_RAD, width_rad < WIDE_RAD]
-    return np.select(conditions, [1, narrow, middle], side)
+    conditions = [width_rad == 0, width_rad < WIDE_RAD]
+    return np.select(conditions, [1, max(side // 2, 1)], max(3 * side // 4, 1))
 
 
 def arriving(

@@ -82,7 +82,7 @@ class Emitter(ABC):
         return np.full(len(texels), np.nan, np.float32)
 
 
-FAR_OFF = 2.9  # radii of a rectangle, beyond which rays spread over its area tell as well what hides it
+NEAR = 2.0  # radii of a rectangle, within which rays spread over its area would be too uneven
 ENTERING_SIDE = 2  # along a side, places of a panel that tell how much of its light enters a coat
 
 
@@ -95,10 +95,20 @@ class Panel(Emitter):
     ball: BoundingSphere
 
     def towards(self, texels: Texels) -> Aim:
-        """Places spread evenly over its solid angle, or over its area where all points are far from it."""
-        distances_m = lengths(texels.points_m - self.ball.centre_m)
-        is_far = distances_m.min(initial=np.inf) > FAR_OFF * self.ball.radius_m
-        return self._by_area(texels) if is_far else self._by_solid_angle(texels)
+        """Places spread evenly over its area, from near points over its solid angle."""
+        distances_m = lengths(texels.points_m - self.ball.centre_m.astype(np.float32))
+        near = np.flatnonzero(distances_m < NEAR * self.ball.radius_m)
+        from_afar = self._by_area(texels)
+        if not len(near):
+            return from_afar
+        from_near = self._by_solid_angle(texels.take(near))
+
+        def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+            vectors_m, strength = from_afar(a, b)
+            vectors_m[near], strength[near] = from_near(a[near], b[near])
+            return vectors_m, strength
+
+        return aim
 
     def width_rad(self, points_m: Floats) -> Floats:
         return _width_rad(self.ball, points_m)
@@ -115,15 +125,16 @@ class Panel(Emitter):
 
     def _entering(self, texels: Texels) -> Floats:
         """Share (P,) of its light that passes the points' coats."""
-        aim = self._by_solid_angle(texels)
+        aim = self.towards(texels)
         arriving = np.zeros(len(texels), np.float32)
         entering = np.zeros(len(texels), np.float32)
         for column, row in np.ndindex(ENTERING_SIDE, ENTERING_SIDE):
-            a = np.full(len(texels), (column + 0.5) / ENTERING_SIDE)
-            b = np.full(len(texels), (row + 0.5) / ENTERING_SIDE)
-            cosine = texels.cosine(aim(a, b)[0])
-            arriving += cosine
-            entering += cosine * texels.entering(cosine)
+            a = np.full(len(texels), (column + 0.5) / ENTERING_SIDE, np.float32)
+            b = np.full(len(texels), (row + 0.5) / ENTERING_SIDE, np.float32)
+            vectors_m, strength = aim(a, b)
+            cosine = texels.cosine(vectors_m)
+            arriving += strength * cosine
+            entering += strength * cosine * texels.entering(cosine)
         return entering / np.maximum(arriving, np.float32(1e-30))
 
     def _by_solid_angle(self, texels: Texels) -> Aim:
