@@ -166,7 +166,7 @@ def direct_light(
     receivers = Receivers(points, layout, cells, visibility, lit)
     sides = first_rays(emitter, points.points_m[lit], side)
     if emitter.sky == "pane":
-        return receivers.pane_light(emitter, sides)
+        return receivers.pane_light(emitter, side)
     if not (sides > 1).any():
         return receivers.hard_light(emitter, side)
     return receivers.soft_light(emitter, sides, side)
@@ -182,15 +182,28 @@ class Receivers:
     visibility: Visibility
     lit: Rows
 
-    def pane_light(self, emitter: Emitter, sides: NDArray[np.int64]) -> Floats:
-        """The sky's light (P,) in a pane, by side x side (N,) rays from every other point along rows and columns."""
-        light = np.zeros(len(self.points), np.float32)
+    def pane_light(self, emitter: Emitter, side: int) -> Floats:
+        """The sky's light (P,) in a pane, by rays from every other point along rows and columns.
+
+        Between them what would arrive with nothing in the way is interpolated, and the share that rays find smoothed.
+        """
+        points = self.points
+        layout = self.layout
+        share = np.zeros(len(points), np.float32)
+        shone = np.zeros(len(points), np.float32)
+        asked = self.lit[layout.is_sparse[self.lit]]
+        few = Rays(max(side // 2, 1))
         pattern = self._pattern(stride=2)
-        for side in np.unique(sides):
-            asked = self.lit[(sides == side) & self.layout.is_sparse[self.lit]]
-            arrived = arriving(emitter, self.points, asked, self.visibility, Rays(int(side)), pattern)
-            light[asked] = arrived[0]
-        return self.layout.blurred(self.layout.interpolated(light))
+        total, _, unshaded = arriving(emitter, points, asked, self.visibility, few, pattern)
+        share[asked] = total / np.maximum(unshaded, LEAST_LX)
+        shone[asked] = unshaded > 0
+
+        shares = layout.blurred(layout.blurred(layout.interpolated(share * shone)))
+        counts = layout.blurred(layout.blurred(layout.interpolated(shone)))
+        lit = asked[shares[asked] > 0]
+        light = np.zeros(len(points), np.float32)
+        light[lit] = open_light(emitter, points, lit, few.side)
+        return layout.interpolated(light) * shares / np.maximum(counts, np.float32(1e-3))
 
     def hard_light(self, emitter: Emitter, side: int) -> Floats:
         """Light (P,) of an emitter that is so narrow that one ray tells, but for the edges of shadows."""
