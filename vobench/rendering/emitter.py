@@ -114,7 +114,7 @@ class Panel(Emitter):
         return _width_rad(self.ball, points_m)
 
     def open_light(self, texels: Texels) -> Floats:
-        """By Lambert's formula, where the whole panel is above the point's horizon; else NaN."""
+        """By Lambert's formula; NaN where the horizon of a curved shape cuts the panel."""
         seen = SeenRectangle(self.face, texels.points_m)
         projected_sr = seen.projected_sr(texels.normals, texels.planes)
         arriving_lx = self.light.luminance_cd_m2 * projected_sr

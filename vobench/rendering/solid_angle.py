@@ -6,9 +6,10 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
-from vobench.rendering.array_types import Floats, Mask
+from vobench.rendering.array_types import Floats, Mask, Rows
 
 FILLED = 1e-4  # share by which triangles may miss the rectangle that they fill
+FLAT = 1e-6  # difference of a normal from that of its plane
 LEVEL_M = 1e-6  # a point nearer than this to a rectangle's plane sees none of it
 
 
@@ -73,10 +74,10 @@ class SeenRectangle:
         return np.asarray((local_m @ self._axes).astype(np.float32))
 
     def projected_sr(self, normals: Floats, planes: Floats) -> Floats:
-        """Its solid angle (P,) weighted by the cosine to normals (P, 3); NaN where it is only in part before them.
+        """Its solid angle (P,) weighted by the cosine to normals (P, 3), of the part before the planes (P, 3).
 
-        It has to be before the planes (P, 3) as well. Half the sum over the edges of the angle that each is seen
-        under, times the normal of the plane through it and the point. Source: Lambert, Photometria, 1760.
+        NaN where it is only in part before both and these differ. Half the sum over the edges of the angle that each
+        is seen under, times the normal of the plane through it and the point. Source: Lambert, Photometria, 1760.
         """
         near_y_m = np.hypot(self.depth_m, self.y0_m)
         far_y_m = np.hypot(self.depth_m, self.y1_m)
@@ -93,8 +94,46 @@ class SeenRectangle:
 
         local = self._local(normals)
         projected = along_x * local[0] + along_y * local[1] + (across_x + across_y) * local[2]
-        is_whole = self._is_above(local) & self._is_above(self._local(planes))
-        return np.where(is_whole, projected / 2, np.nan)
+        local_planes = self._local(planes)
+        is_whole = self._is_above(local) & self._is_above(local_planes)
+        result = np.where(is_whole, projected / 2, np.nan)
+        is_flat = (np.abs(local - local_planes) < FLAT).all(0)
+        cut = np.flatnonzero(is_flat & ~is_whole)
+        result[cut] = self._cut_sr(local_planes[:, cut], cut)
+        return result
+
+    def _cut_sr(self, normals: Floats, rows: Rows) -> Floats:
+        """The weighted solid angle (N,) of what is above the planes with normals (3, N) through the points at rows."""
+        depth_m = self.depth_m[rows]
+        near_x_m = self.x0_m[rows]
+        near_y_m = self.y0_m[rows]
+        far_x_m = self.x1_m[rows]
+        far_y_m = self.y1_m[rows]
+        places = ((near_x_m, near_y_m), (far_x_m, near_y_m), (far_x_m, far_y_m), (near_x_m, far_y_m))
+        corners = [np.stack([x_m, y_m, depth_m]) for x_m, y_m in places]
+        heights = [(normals * corner).sum(0) for corner in corners]
+
+        total = np.zeros(len(rows))
+        leaves_at = np.ones((3, len(rows)))
+        enters_at = np.ones((3, len(rows)))
+        for nth in range(4):
+            start, end = corners[nth - 1], corners[nth]
+            start_height, end_height = heights[nth - 1], heights[nth]
+            rise = end_height - start_height
+            share = np.clip(-start_height / np.where(rise == 0, 1, rise), 0, 1)
+            crossing = start + share * (end - start)
+            leaves = (start_height > 0) & (end_height <= 0)
+            enters = (start_height <= 0) & (end_height > 0)
+            leaves_at = np.where(leaves, crossing, leaves_at)
+            enters_at = np.where(enters, crossing, enters_at)
+            above_start = np.where(enters, crossing, start)
+            above_end = np.where(leaves, crossing, end)
+            is_above = (start_height > 0) | (end_height > 0)
+            total += np.where(is_above, _edge_term(above_start, above_end, normals), 0)
+        is_above_in_part = np.max(heights, axis=0) > 0
+        is_cut = is_above_in_part & (np.min(heights, axis=0) <= 0)
+        total += np.where(is_cut, _edge_term(leaves_at, enters_at, normals), 0)
+        return np.where(is_above_in_part, np.abs(total) / 2, 0)
 
     def _local(self, vectors: Floats) -> Floats:
         """The parts (3, P) of vectors (P, 3) along the edges and ahead."""
@@ -112,6 +151,14 @@ class SeenRectangle:
 def _angle_between(start_m: Floats, end_m: Floats, distance_m: Floats) -> Floats:
     """The angle (P,) under which a line is seen from its start to its end, at a distance from it."""
     return np.asarray(np.arctan(end_m / distance_m) - np.arctan(start_m / distance_m))
+
+
+def _edge_term(start: Floats, end: Floats, normals: Floats) -> Floats:
+    """The angle (P,) between vectors (3, P), times the cosine of normals (3, P) to that of the plane through both."""
+    across = np.cross(start, end, axis=0)
+    length = np.sqrt((across**2).sum(0))
+    angle = np.arctan2(length, (start * end).sum(0))
+    return np.asarray(angle * (across * normals).sum(0) / np.maximum(length, 1e-30))
 
 
 class SolidAngle:
