@@ -103,7 +103,7 @@ def test_a_roof_takes_all_light_and_the_open_light_stays() -> None:
     light, clear, unshaded = arriving(emitter, points, rows, visibility, Rays(1))
     assert (light == 0).all()
     assert (clear == 0).all()
-    np.testing.assert_allclose(unshaded, open_light(emitter, points, rows, 1))
+    np.testing.assert_allclose(unshaded, open_light(emitter, points, rows, 1)[0])
     assert (unshaded > 0).all()
 
 

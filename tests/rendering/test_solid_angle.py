@@ -49,7 +49,9 @@ def test_spots_lie_on_the_rectangle_and_are_spread_evenly_over_its_solid_angle(p
 
 
 @pytest.mark.parametrize("point", POINTS)
-@pytest.mark.parametrize("tilt", [(0.0, 0.0, 1.0), (0.3, -0.2, 0.9), (0.9, 0.4, 0.1), (0.1, 0.0, -1.0), (0.0, 1.0, 0.0)])
+@pytest.mark.parametrize(
+    "tilt", [(0.0, 0.0, 1.0), (0.3, -0.2, 0.9), (0.9, 0.4, 0.1), (0.1, 0.0, -1.0), (0.0, 1.0, 0.0)]
+)
 def test_the_projected_solid_angle_is_the_integral_of_the_cosine_above_the_horizon(
     point: Array, tilt: tuple[float, float, float]
 ) -> None:

@@ -27,8 +27,8 @@ class MirrorImage(Emitter):
     ball: BoundingSphere
 
     @property
-    def is_grainy(self) -> bool:
-        return self.emitter.is_grainy
+    def open_side(self) -> int:
+        return self.emitter.open_side
 
     def width_rad(self, points_m: Floats) -> Floats:
         return self.emitter.width_rad(self.behind_m(points_m))
@@ -131,8 +131,7 @@ FOOTPRINT = np.array([0.6180339887, 0.3247179572], np.float32)
 WIDE_RAD = 0.6  # emitters that are seen wider need more rays
 MOST = 0.7  # share of rays from which on all are cast at once
 RIM = 2  # texels around a place of half shadow
-MESH_SIDE = 8  # along a side, places on a mesh whose light without shadows is sampled
-PARTIAL = 0.35  # share of the points around that see an emitter in part, from which a shadow is wider than texels
+PARTIAL = 0.2  # share of the points around that see an emitter in part, from which a shadow takes more rays
 LEAST_LX = 1e-30  # by which nothing is divided that is darker
 
 
@@ -202,7 +201,7 @@ class Receivers:
         counts = layout.blurred(layout.blurred(layout.interpolated(shone)))
         lit = asked[shares[asked] > 0]
         light = np.zeros(len(points), np.float32)
-        light[lit] = open_light(emitter, points, lit, few.side)
+        light[lit], _ = open_light(emitter, points, lit, few.side)
         return layout.interpolated(light) * shares / np.maximum(counts, np.float32(1e-3))
 
     def hard_light(self, emitter: Emitter, side: int) -> Floats:
@@ -239,23 +238,35 @@ class Receivers:
 
         half = self._half_shadow(clear, self.cells, self.lit, rim=RIM)
         rays = Rays(max(side // 2, 1), spread=True)
-        fine = self._pattern(stride=1)
-        total, clear[half], unshaded = arriving(emitter, points, half, self.visibility, rays, fine)
+        total, clear[half], unshaded = arriving(emitter, points, half, self.visibility, rays, self._pattern(stride=1))
         share[half] = total / np.maximum(unshaded, LEAST_LX)
+
+        # More rays where shadows are wide.
+        is_partial = (clear > 0) & (clear < 1)
+        density = layout.blurred_among(is_partial, half, unshaded > 0)
+        wide = half[density > PARTIAL]
+        more = Rays(max(3 * side // 4, 1), spread=True)
+        halfway = self._pattern(stride=1, turn=0.5)
+        total, more_clear, more_unshaded = arriving(emitter, points, wide, self.visibility, more, halfway)
+        weight = np.float32(more.side**2 / (rays.side**2 + more.side**2))
+        share[wide] += weight * (total / np.maximum(more_unshaded, LEAST_LX) - share[wide])
+        clear[wide] += weight * (more_clear - clear[wide])
+
         is_partial = (clear[half] > 0) & (clear[half] < 1)
-        clear[half] = is_partial
-        is_shone_at = unshaded > 0
-        is_soft = is_partial | (layout.blurred_among(clear, half, is_shone_at) > PARTIAL)
-        smooth = layout.blurred_among(share, half, is_shone_at)
-        share[half[is_soft]] = smooth[is_soft]
+        smooth = layout.blurred_among(share, half, unshaded > 0)
+        share[half[is_partial]] = smooth[is_partial]
 
         light = np.zeros(len(points), np.float32)
         shone = self.lit[share[self.lit] > 0]
-        light[shone] = share[shone] * open_light(emitter, points, shone, side)
-        return layout.blurred(light) if emitter.is_grainy else light
+        open_lx, is_grainy = open_light(emitter, points, shone, side)
+        light[shone] = share[shone] * open_lx
+        grainy = shone[is_grainy]
+        if len(grainy):
+            light[grainy] = layout.blurred(light)[grainy]
+        return light
 
-    def _pattern(self, *, stride: int) -> "EvenPattern":
-        return EvenPattern(self.layout.width, stride, self.points.dither[:1])
+    def _pattern(self, *, stride: int, turn: float = 0) -> "EvenPattern":
+        return EvenPattern(self.layout.width, stride, self.points.dither[:1] + np.float32(turn))
 
     def _half_shadow(self, clear: Floats, cells: Indices, among: Rows, *, rim: int) -> Rows:
         """Those among the points (N,) beside which an emitter is both seen and hidden, or in their cell (P,).
@@ -400,19 +411,16 @@ def open_light(
     points: Texels,
     rows: Rows,
     side: int,
-) -> Floats:
-    """Illuminance (N,) of the points at rows if nothing hid the emitter; side x side places where sampling tells."""
-    places_side = max(side, MESH_SIDE) if emitter.is_grainy else side
-
-    def open_part(part: slice) -> Floats:
-        texels = points.take(rows[part])
-        light = emitter.open_light(texels)
-        unknown = np.flatnonzero(np.isnan(light))
-        if len(unknown):
-            light[unknown] = _sampled_light(emitter, texels.take(unknown), places_side)
-        return light
-
-    return chunked(open_part, len(rows))
+) -> tuple[Floats, Mask]:
+    """Illuminance (N,) of the points at rows if nothing hid the emitter; and where it is sampled, hence grainy (N,)."""
+    light = chunked(lambda part: emitter.open_light(points.take(rows[part])), len(rows))
+    is_sampled = np.isnan(light)
+    unknown = rows[is_sampled]
+    places_side = max(side, emitter.open_side)
+    light[is_sampled] = chunked(
+        lambda part: _sampled_light(emitter, points.take(unknown[part]), places_side), len(unknown)
+    )
+    return light, is_sampled
 
 
 def _sampled_light(emitter: Emitter, texels: Texels, side: int) -> Floats:

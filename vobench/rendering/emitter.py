@@ -57,9 +57,9 @@ class Emitter(ABC):
     ball: BoundingSphere
 
     @property
-    def is_grainy(self) -> bool:
-        """Whether its light without shadows has to be sampled, and is smoothed then."""
-        return False
+    def open_side(self) -> int:
+        """How many places along a side are needed at least where its light without shadows is sampled."""
+        return 1
 
     @abstractmethod
     def towards(self, texels: Texels) -> Aim:
@@ -181,8 +181,8 @@ class MeshPanel(Emitter):
     ball: BoundingSphere
 
     @property
-    def is_grainy(self) -> bool:
-        return True
+    def open_side(self) -> int:
+        return 8
 
     def towards(self, texels: Texels) -> Aim:
         """Places on triangles in proportion to their areas."""
@@ -206,6 +206,33 @@ class MeshPanel(Emitter):
 
     def width_rad(self, points_m: Floats) -> Floats:
         return _width_rad(self.ball, points_m)
+
+    def open_light(self, texels: Texels) -> Floats:
+        """The sum over MESH_PLACES in fixed places; NaN from near, where these would show."""
+        along_curve = (np.arange(MESH_PLACES) + 0.5) / MESH_PLACES
+        across = np.arange(MESH_PLACES) * GOLDEN % 1
+        places_m = sample_points(self.corners_m, along_curve, across)
+        area_m2 = areas_m2(self.corners_m)
+        ends = np.cumsum(area_m2) / area_m2.sum()
+        triangle = np.minimum(np.searchsorted(ends, along_curve, side="right"), len(ends) - 1)
+        normals = face_normals(self.corners_m)[triangle]
+        intensity_cd = np.float32(self.light.luminance_cd_m2 * area_m2.sum() / MESH_PLACES)
+
+        distances_m = lengths(texels.points_m - self.ball.centre_m.astype(np.float32))
+        is_near = distances_m < MESH_NEAR * self.ball.radius_m
+        light = np.zeros(len(texels), np.float32)
+        for place_m, normal in zip(places_m.astype(np.float32), normals.astype(np.float32), strict=True):
+            vectors_m = place_m - texels.points_m
+            strength = _from_area(intensity_cd, vectors_m, vectors_m @ normal)
+            cosine = texels.cosine(vectors_m)
+            light += strength * np.maximum(cosine, 0) * texels.entering(cosine)
+        light[is_near] = np.nan
+        return light
+
+
+MESH_PLACES = 64
+MESH_NEAR = 3.0  # radii of a mesh, within which its places would show one by one
+GOLDEN = 0.6180339887
 
 
 def panel_emitter(light: AreaLight) -> Panel | MeshPanel:
@@ -297,6 +324,11 @@ def sun_emitter(light: Sun, t_ns: float) -> SunDisc:
     return SunDisc(light, direction, BoundingSphere(FARTHEST_M * direction, FARTHEST_M * SUN_RADIUS_RAD))
 
 
+# along a side of a pane, fixed places that tell how bright it is: without and with other panes behind or before it
+PLACES = 2
+PLACES_BEFORE_PANES = 4
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class SkyPane(Emitter):
     """The sky through one pane: only rays that cross no other pane behind it, so that none counts twice."""
@@ -309,21 +341,47 @@ class SkyPane(Emitter):
     face: Rectangle | None
 
     def towards(self, texels: Texels) -> Aim:
-        vector_and_angle = self._places(texels)
-        is_followed_behind, is_followed_before = self._followed()
+        """Places spread evenly over the pane's solid angle, or over its area where it is no rectangle."""
+        places = self._places(texels)
+        follows = self._followed()
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            vectors_m, steradian = vector_and_angle(a, b)
+            vectors_m, steradian = places(a, b)
             direction = vectors_m / lengths(vectors_m)[:, None]
-            luminance = steradian * self.light.luminance_cd_m2(direction)
-            strength = luminance * self.visibility.pane_passes(self.pane, direction)
-            is_outward = direction @ self.pane.normal > 0
-            doubtful = np.flatnonzero(np.where(is_outward, is_followed_before, is_followed_behind))
-            beyond_m = (texels.points_m + vectors_m + 2 * RAY_OFFSET_M * direction)[doubtful]
-            strength[doubtful] *= ~self.visibility.crosses_sky_pane(beyond_m, FAR_M * direction[doubtful])
+            strength = steradian * self._luminance(texels.points_m + vectors_m, direction, follows)
             return (FAR_M * direction).astype(np.float32), strength.astype(np.float32)
 
         return aim
+
+    def open_light(self, texels: Texels) -> Floats:
+        """By Lambert's formula and the mean luminance in a few fixed places; NaN where the formula does not hold."""
+        if self.face is None:
+            return np.full(len(texels), np.nan, np.float32)
+        projected_sr = SeenRectangle(self.face, texels.points_m).projected_sr(texels.normals, texels.planes)
+        places = self._places(texels)
+        follows = self._followed()
+        side = PLACES_BEFORE_PANES if any(follows) else PLACES
+        even = np.zeros(len(texels))
+        bright = np.zeros(len(texels))
+        for column, row in np.ndindex(side, side):
+            a = np.full(len(texels), (column + 0.5) / side, np.float32)
+            b = np.full(len(texels), (row + 0.5) / side, np.float32)
+            vectors_m, _ = places(a, b)
+            direction = vectors_m / lengths(vectors_m)[:, None]
+            cosine = np.maximum(texels.cosine(direction), 0)
+            luminance = self._luminance(texels.points_m + vectors_m, direction, follows)
+            even += cosine
+            bright += cosine * luminance * texels.entering(cosine)
+        return (projected_sr * bright / np.maximum(even, 1e-12)).astype(np.float32)
+
+    def _luminance(self, places_m: Floats, directions: Floats, follows: tuple[bool, bool]) -> Floats:
+        """What is seen (P,) through places (P, 3) of the pane, nothing where panes of the sky follow."""
+        luminance = self.light.luminance_cd_m2(directions) * self.visibility.pane_passes(self.pane, directions)
+        is_outward = directions @ self.pane.normal > 0
+        doubtful = np.flatnonzero(np.where(is_outward, follows[1], follows[0]))
+        beyond_m = places_m[doubtful] + 2 * RAY_OFFSET_M * directions[doubtful]
+        luminance[doubtful] *= ~self.visibility.crosses_sky_pane(beyond_m, FAR_M * directions[doubtful])
+        return luminance
 
     def width_rad(self, points_m: Floats) -> Floats:
         return _width_rad(self.ball, points_m)

@@ -208,15 +208,16 @@ def _is_sparse(index: Rows, beside: Indices, width: int) -> Mask:
 def _nearest_valid(beside: Indices, is_valid: Mask) -> Rows:
     """For each point (P,) itself if valid, else the nearest valid one by steps within its chart, or itself."""
     nearest = np.arange(len(is_valid))
+    candidate = np.full(len(is_valid), -1)
     is_known = is_valid.copy()
-    unknown = np.flatnonzero(~is_valid)
-    while len(unknown):
-        candidates = [np.where(is_known[other], nearest[other], -1) for other in beside[:, unknown]]
-        best = np.max(candidates, axis=0)
-        is_found = best >= 0
-        if not is_found.any():
-            break
-        nearest[unknown[is_found]] = best[is_found]
-        is_known[unknown[is_found]] = True
-        unknown = unknown[~is_found]
+    frontier = np.flatnonzero(is_valid)
+    while len(frontier):
+        around = beside[:, frontier]
+        is_new = ~is_known[around]
+        reached = around[is_new]
+        sources = np.broadcast_to(nearest[frontier], around.shape)[is_new]
+        np.maximum.at(candidate, reached, sources)
+        frontier = np.unique(reached)
+        nearest[frontier] = candidate[frontier]
+        is_known[frontier] = True
     return nearest
