@@ -69,4 +69,4 @@ def test_what_the_horizon_of_a_curved_shape_cuts_is_unknown() -> None:
     point = np.array([[1.5, -0.3, 2.0]])
     plane = np.array([[0.0, 0.0, 1.0]])
     curved = unit(np.array([[0.3, 0.0, 0.9]]))
-    assert np.isnan(SeenRectangle(FACE, point + [[0, 0, 0.0]]).projected_sr(curved, plane)[0])
+    assert np.isnan(SeenRectangle(FACE, point).projected_sr(curved, plane)[0])

@@ -1,6 +1,5 @@
 """Direct light at texels: stratified shadow rays, and lamps that flat mirrors show."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,12 +27,15 @@ class MirrorImage(Emitter):
 
     @property
     def open_side(self) -> int:
+        """As many as of the emitter itself."""
         return self.emitter.open_side
 
     def width_rad(self, points_m: Floats) -> Floats:
+        """As wide as the image is seen."""
         return self.emitter.width_rad(self.behind_m(points_m))
 
     def towards(self, texels: Texels) -> Aim:
+        """Places on the image."""
         aim_from_behind = self.emitter.towards(self._behind(texels))
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -43,6 +45,7 @@ class MirrorImage(Emitter):
         return aim
 
     def open_light(self, texels: Texels) -> Floats:
+        """The light of the whole image, as if the mirror had no end."""
         return np.float32(self.tint) * self.emitter.open_light(self._behind(texels))
 
     def may_light(self, points_m: Floats) -> Mask:
@@ -261,7 +264,7 @@ class Receivers:
         open_lx, is_grainy = open_light(emitter, points, shone, side)
         light[shone] = share[shone] * open_lx
         grainy = shone[is_grainy]
-        if len(grainy):
+        if emitter.open_side > 1 and len(grainy):
             light[grainy] = layout.blurred(light)[grainy]
         return light
 

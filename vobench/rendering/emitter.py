@@ -111,6 +111,7 @@ class Panel(Emitter):
         return aim
 
     def width_rad(self, points_m: Floats) -> Floats:
+        """As wide as a sphere around it, at most."""
         return _width_rad(self.ball, points_m)
 
     def open_light(self, texels: Texels) -> Floats:
@@ -182,6 +183,7 @@ class MeshPanel(Emitter):
 
     @property
     def open_side(self) -> int:
+        """As many as a mesh close by takes."""
         return 8
 
     def towards(self, texels: Texels) -> Aim:
@@ -205,6 +207,7 @@ class MeshPanel(Emitter):
         return aim
 
     def width_rad(self, points_m: Floats) -> Floats:
+        """As wide as a sphere around it, at most."""
         return _width_rad(self.ball, points_m)
 
     def open_light(self, texels: Texels) -> Floats:
@@ -272,6 +275,7 @@ class Bulb(Emitter):
     ball: BoundingSphere
 
     def towards(self, texels: Texels) -> Aim:
+        """Its place."""
         vectors_m = (self.light.position_m - texels.points_m).astype(np.float32)
         squared_m2 = np.einsum("ij,ij->i", vectors_m, vectors_m)
         from_lamp = -vectors_m / np.sqrt(squared_m2)[:, None]
@@ -279,6 +283,7 @@ class Bulb(Emitter):
         return lambda _a, _b: (vectors_m, strength)
 
     def width_rad(self, points_m: Floats) -> Floats:
+        """Zero: its shadows are hard."""
         return np.zeros(len(points_m), np.float32)
 
 
@@ -299,6 +304,7 @@ class SunDisc(Emitter):
     ball: BoundingSphere
 
     def towards(self, texels: Texels) -> Aim:
+        """Places spread evenly over its disc."""
         u_axis, v_axis = tangents(self.direction[None])
         arriving_lx = self.light.illuminance_lx * np.maximum(texels.normals @ self.direction, 0)
 
@@ -315,6 +321,7 @@ class SunDisc(Emitter):
         return aim
 
     def width_rad(self, points_m: Floats) -> Floats:
+        """Zero: its shadows are hard."""
         return np.zeros(len(points_m), np.float32)
 
 
@@ -384,6 +391,7 @@ class SkyPane(Emitter):
         return luminance
 
     def width_rad(self, points_m: Floats) -> Floats:
+        """As wide as a sphere around it, at most."""
         return _width_rad(self.ball, points_m)
 
     def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
@@ -429,6 +437,7 @@ class OpenSky(Emitter):
     ball: BoundingSphere
 
     def towards(self, texels: Texels) -> Aim:
+        """Directions as dense as their cosine."""
         around = cosine_weighted(texels.normals)
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -442,6 +451,7 @@ class OpenSky(Emitter):
         return aim
 
     def width_rad(self, points_m: Floats) -> Floats:
+        """The root of a half sphere's solid angle."""
         return np.full(len(points_m), np.sqrt(2 * np.pi), np.float32)
 
     def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
