@@ -1,16 +1,20 @@
 """What light costs: baking the built-in scenes from nothing, then each picture's share while things change.
 
     python benchmarks/bake.py [--scenes room office] [--pictures 5]
+    python benchmarks/bake.py --stages [--scenes room office]
 
-Wall clock and CPU over all threads; compare within a run only.
+Wall clock and CPU over all threads; compare within a run only. With --stages every built-in scene, or those named, is
+baked in a process of its own, and what each stage of the bake took is shown in place of what changes.
 """
 
 import argparse
+import multiprocessing
 import os
 import platform
 import resource
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -20,6 +24,7 @@ from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
+from vobench.rendering import bake as bake_module
 from vobench.rendering.bake import BakedScene, BakeSettings, bake
 from vobench.rendering.illumination import Illumination
 from vobench.rendering.mover_light import Views
@@ -38,18 +43,91 @@ NS_PER_PICTURE = 100_000_000
 def main() -> None:
     """Bake, then change; print what it took."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", nargs="+", default=["room", "office"])
+    parser.add_argument("--scenes", nargs="+")
     parser.add_argument("--pictures", type=int, default=5)
+    parser.add_argument("--stages", action="store_true", help="what each stage of a bake takes, of all built-in scenes")
     arguments = parser.parse_args()
     print(f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
-    for name in arguments.scenes:
+    if arguments.stages:
+        _print_stages(arguments.scenes or ALL_SCENES)
+        return
+    for name in arguments.scenes or ("room", "office"):
         scene = build(read_scene(catalog.find("scene", name).path), {})
         baked = _baked(scene)
         for change, light, views in _changes(baked):
             print(f"{name}: {change}: {_milliseconds(light, views, arguments.pictures)}")
 
 
+ALL_SCENES = (
+    "room",
+    "office",
+    "flat",
+    "hall",
+    "corridor",
+    "warehouse",
+    "car_park",
+    "ramp",
+    "street",
+    "park",
+)
+# stages of a bake by the functions that they consist of, as the module of the bake calls them
+STAGES = {
+    "spacings_m": "spacings",
+    "unwrap": "unwrap",
+    "static_points": "texels",
+    "surfels": "surfels",
+    "blend": "blend",
+    "albedo": "albedo",
+    "bounced": "bounces",
+}
+Timed = Callable[..., object]
+
+
+def _print_stages(names: Sequence[str]) -> None:
+    """CPU seconds of each stage, place by place, each in a new process so that its peak of memory is its own."""
+    for name in names:
+        with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
+            print(pool.submit(_stages, name).result(), flush=True)
+
+
+def _stages(name: str) -> str:
+    """Bake a place once, and what its stages took in CPU seconds."""
+    spent: dict[str, float] = {}
+
+    def timed(function: Timed, stage: Callable[..., str]) -> Timed:
+        def wrapped(*arguments: object, **keywords: object) -> object:
+            started = time.process_time()
+            result = function(*arguments, **keywords)
+            label = stage(*arguments)
+            spent[label] = spent.get(label, 0.0) + time.process_time() - started
+            return result
+
+        return wrapped
+
+    for function, stage in STAGES.items():
+        setattr(bake_module, function, timed(getattr(bake_module, function), lambda *_, stage=stage: stage))
+    gather = bake_module.Gatherer.gather
+    bake_module.Gatherer.gather = timed(gather, lambda *_: "gather")  # type: ignore[method-assign,assignment]
+    direct_light = bake_module.direct_light
+    bake_module.direct_light = timed(  # type: ignore[attr-defined]
+        direct_light, lambda emitter, *_: f"direct {type(emitter).__name__}"
+    )
+    scene = build(read_scene(catalog.find("scene", name).path), {})
+    started = time.process_time()
+    line = _baking(scene)[1]
+    spent["rest"] = time.process_time() - started - sum(spent.values())
+    parts = ", ".join(f"{stage} {cpu_s:.1f}" for stage, cpu_s in spent.items())
+    return f"{line}\n  {parts}"
+
+
 def _baked(scene: Scene) -> BakedScene:
+    baked, line = _baking(scene)
+    print(line)
+    return baked
+
+
+def _baking(scene: Scene) -> tuple[BakedScene, str]:
+    """The scene's light, and a line about what it took."""
     started = time.perf_counter()
     cpu_started = time.process_time()
     baked = bake(scene, BakeSettings())
@@ -58,8 +136,7 @@ def _baked(scene: Scene) -> BakedScene:
     texels = int((baked.patches.surfel_of >= 0).sum())
     gigabytes = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1e6
     lights = f"{len(scene.lights)} lights, {texels} samples"
-    print(f"{scene.name}: {lights}, bake {wall_s:.1f} s wall, {cpu_s:.1f} s CPU, peak {gigabytes:.2f} GB")
-    return baked
+    return baked, f"{scene.name}: {lights}, bake {wall_s:.1f} s wall, {cpu_s:.1f} s CPU, peak {gigabytes:.2f} GB"
 
 
 def _changes(baked: BakedScene) -> Iterator[tuple[str, Illumination, Views | None]]:

@@ -103,7 +103,7 @@ def test_a_roof_takes_all_light_and_the_open_light_stays() -> None:
     light, clear, unshaded = arriving(emitter, points, rows, visibility, Rays(1))
     assert (light == 0).all()
     assert (clear == 0).all()
-    np.testing.assert_allclose(unshaded, open_light(emitter, points, rows, 1))
+    np.testing.assert_allclose(unshaded, open_light(emitter, points, rows, 1)[0])
     assert (unshaded > 0).all()
 
 
@@ -125,7 +125,7 @@ def test_wide_emitters_take_more_rays_than_narrow_ones_and_points_take_one() -> 
         panel = ceiling_light("panel", np.array([0, 0, distance_m]), (0.5, 0.5), power_lm=1)
         (emitter,) = emitters(panel, open_floor()[2])
         sides.append(int(first_rays(emitter, points_m, 8)[0]))
-    assert sides == [8, 4, 4]
+    assert sides == [6, 4, 4]
     (bulb,) = emitters(BULB, open_floor()[2])
     assert isinstance(bulb, Emitter)
     assert first_rays(bulb, points_m, 8).tolist() == [1]

@@ -1,8 +1,6 @@
 """Direct light at texels: stratified shadow rays, and lamps that flat mirrors show."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,38 +15,50 @@ from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Light, Sky
 
 
-@dataclass(frozen=True, slots=True)
-class _MirrorImage:
+@dataclass(frozen=True, slots=True, eq=False)
+class MirrorImage(Emitter):
     """An emitter in a mirror: rays go straight to where its image is, through the mirror's faces."""
 
     emitter: Emitter
     mirror: PlanarPatch
     tint: float
     caster: RayCaster
+    ball: BoundingSphere
+
+    @property
+    def open_side(self) -> int:
+        """As many as of the emitter itself."""
+        return self.emitter.open_side
 
     def width_rad(self, points_m: Floats) -> Floats:
+        """As wide as the image is seen."""
         return self.emitter.width_rad(self.behind_m(points_m))
 
     def towards(self, texels: Texels) -> Aim:
-        return self._mirrored(texels, self.emitter.towards)
-
-    def evenly(self, texels: Texels) -> Aim:
-        return self._mirrored(texels, self.emitter.evenly or self.emitter.towards)
-
-    def _mirrored(self, texels: Texels, towards: Callable[[Texels], Aim]) -> Aim:
-        behind = replace(
-            texels,
-            points_m=self.behind_m(texels.points_m),
-            normals=self._reflected(texels.normals),
-            planes=self._reflected(texels.planes),
-        )
-        aim_from_behind = towards(behind)
+        """Places on the image."""
+        aim_from_behind = self.emitter.towards(self._behind(texels))
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             vectors_m, strength = aim_from_behind(a, b)
             return self._reflected(vectors_m), np.float32(self.tint) * strength
 
         return aim
+
+    def open_light(self, texels: Texels) -> Floats:
+        """The light of the whole image, as if the mirror had no end."""
+        return np.float32(self.tint) * self.emitter.open_light(self._behind(texels))
+
+    def may_light(self, points_m: Floats) -> Mask:
+        """Points (P, 3) before the mirror from which the image's sphere lies within the mirror's outline, about."""
+        outline = bounding_sphere(self.mirror.corners_m)
+        vectors_m = self.ball.centre_m - points_m.astype(float)
+        height_m = self.mirror.height_m(points_m)
+        depth_m = -(vectors_m @ self.mirror.normal)
+        share = np.clip(height_m / np.maximum(depth_m, 1e-9), 0, 1)
+        crossing_m = points_m + share[:, None] * vectors_m
+        aside_m = np.linalg.norm(crossing_m - outline.centre_m, axis=1)
+        reach_m = outline.radius_m + share * self.ball.radius_m
+        return np.asarray((height_m > 0) & (aside_m <= reach_m))
 
     def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
         """Share (R,) of light that passes what is before the mirror and, reflected, what is before the emitter."""
@@ -64,6 +74,15 @@ class _MirrorImage:
         onwards_m = self._reflected((1 - reach) * segments_m)
         share[rays] *= self.emitter.passing(occluder, met_m, onwards_m)
         return share
+
+    def _behind(self, texels: Texels) -> Texels:
+        """The images of texels behind the mirror."""
+        return replace(
+            texels,
+            points_m=self.behind_m(texels.points_m),
+            normals=self._reflected(texels.normals),
+            planes=self._reflected(texels.planes),
+        )
 
     def behind_m(self, points_m: Floats) -> Floats:
         """The images of points (P, 3) behind the mirror."""
@@ -99,47 +118,24 @@ def mirror_images(
     if isinstance(light, Sky):
         return []
     light_emitters = emitters(light, visibility, t_ns=t_ns)
-    images = []
+    images = list[Emitter]()
     for mirror, tint, caster in visibility.mirrors:
         for emitter in light_emitters:
-            image = _MirrorImage(emitter, mirror, tint, caster)
-            centre_m = image.behind_m(emitter.ball.centre_m[None])[0]
-            around = BoundingSphere(centre_m, emitter.ball.radius_m)
-            images.append(
-                Emitter(
-                    around,
-                    image.towards,
-                    image.width_rad,
-                    image.passing,
-                    may_light=partial(_sees_image, image, around),
-                    evenly=image.evenly,
-                    side_samples=emitter.side_samples,
-                )
-            )
+            centre_m = emitter.ball.centre_m
+            image_m = centre_m - 2 * mirror.height_m(centre_m) * mirror.normal
+            around = BoundingSphere(image_m, emitter.ball.radius_m)
+            images.append(MirrorImage(emitter, mirror, tint, caster, around))
     return images
-
-
-def _sees_image(image: _MirrorImage, around: BoundingSphere, points_m: Floats) -> Mask:
-    """Points (P, 3) before the mirror from which a sphere behind it lies within the mirror's outline, about."""
-    outline = bounding_sphere(image.mirror.corners_m)
-    vectors_m = around.centre_m - points_m.astype(float)
-    height_m = image.mirror.height_m(points_m)
-    depth_m = -(vectors_m @ image.mirror.normal)
-    share = np.clip(height_m / np.maximum(depth_m, 1e-9), 0, 1)
-    crossing_m = points_m + share[:, None] * vectors_m
-    aside_m = np.linalg.norm(crossing_m - outline.centre_m, axis=1)
-    reach_m = outline.radius_m + share * around.radius_m
-    return np.asarray((height_m > 0) & (aside_m <= reach_m))
 
 
 # Steps of additive recurrences that fill the unit interval evenly: Roberts (2018), R2 and the golden ratio.
 JITTER = np.array([0.7548776662, 0.5698402910], np.float32)
 FOOTPRINT = np.array([0.6180339887, 0.3247179572], np.float32)
-# emitters that are seen narrower or wider need fewer or more rays
-NARROW_RAD = 0.15
-WIDE_RAD = 0.6
+WIDE_RAD = 0.6  # emitters that are seen wider need more rays
 MOST = 0.7  # share of rays from which on all are cast at once
 RIM = 2  # texels around a place of half shadow
+PARTIAL = 0.2  # share of the points around that see an emitter in part, from which a shadow takes more rays
+LEAST_LX = 1e-30  # by which nothing is divided that is darker
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,41 +159,175 @@ def direct_light(
     """Illuminance (P,) in lux that one emitter gives at level 1 to those among the points; of coats what enters.
 
     Few rays tell whether the emitter is seen, of soft shadows at every other point along rows and columns. Where it
-    is neither seen nor hidden all around, within RIM texels or in the same of the cells (P,), many rays follow.
-    Elsewhere the light of many places on it is added up without rays, and the sky in a pane is smoothed instead.
+    is neither seen nor hidden all around, within RIM texels or in the same of the cells (P,), rays from all over each
+    texel follow. Elsewhere its light needs no rays, and the sky in a pane is smoothed instead.
     """
-    light = np.zeros(len(points), np.float32)
-    share = np.zeros(len(points), np.float32)
-    clear = np.full(len(points), np.nan, np.float32)
     lit = reached(emitter, points, np.flatnonzero(among))
+    if not len(lit):
+        return np.zeros(len(points), np.float32)
+    receivers = Receivers(points, layout, cells, visibility, lit)
     sides = first_rays(emitter, points.points_m[lit], side)
-    is_soft = bool((sides > 1).any())
-    for first_side in np.unique(sides):
-        is_asked = sides == first_side
-        if is_soft:
-            is_asked = is_asked & layout.is_sparse[lit]
-        asked = lit[is_asked]
-        light[asked], clear[asked], unshaded = arriving(emitter, points, asked, visibility, Rays(int(first_side)))
-        share[asked] = light[asked] / np.maximum(unshaded, 1e-30)
     if emitter.sky == "pane":
-        return layout.blurred(layout.interpolated(light))
+        return receivers.pane_light(emitter, side)
+    if not (sides > 1).any():
+        return receivers.hard_light(emitter, side)
+    return receivers.soft_light(emitter, sides, side)
 
-    half = _half_shadow(clear, layout, cells, lit)
-    if not is_soft:
+
+@dataclass(frozen=True, slots=True)
+class Receivers:
+    """Points that an emitter may light, at rows `lit` (N,) among all (P,), and what may hide it from them."""
+
+    points: Texels
+    layout: TexelLayout
+    cells: Indices
+    visibility: Visibility
+    lit: Rows
+
+    def pane_light(self, emitter: Emitter, side: int) -> Floats:
+        """The sky's light (P,) in a pane, by rays from every other point along rows and columns.
+
+        Between them what would arrive with nothing in the way is interpolated, and the share that rays find smoothed.
+        """
+        points = self.points
+        layout = self.layout
+        share = np.zeros(len(points), np.float32)
+        shone = np.zeros(len(points), np.float32)
+        asked = self.lit[layout.is_sparse[self.lit]]
+        few = Rays(max(side // 2, 1))
+        pattern = self._pattern(stride=2)
+        total, _, unshaded = arriving(emitter, points, asked, self.visibility, few, pattern)
+        share[asked] = total / np.maximum(unshaded, LEAST_LX)
+        shone[asked] = unshaded > 0
+
+        shares = layout.blurred(layout.blurred(layout.interpolated(share * shone)))
+        counts = layout.blurred(layout.blurred(layout.interpolated(shone)))
+        lit = asked[shares[asked] > 0]
+        light = np.zeros(len(points), np.float32)
+        light[lit], _ = open_light(emitter, points, lit, few.side)
+        return layout.interpolated(light) * shares / np.maximum(counts, np.float32(1e-3))
+
+    def hard_light(self, emitter: Emitter, side: int) -> Floats:
+        """Light (P,) of an emitter that is so narrow that one ray tells, but for the edges of shadows."""
+        points = self.points
+        light = np.zeros(len(points), np.float32)
+        clear = np.full(len(points), np.nan, np.float32)
+        light[self.lit], clear[self.lit], _ = arriving(emitter, points, self.lit, self.visibility, Rays(1))
+        near_edge = self._half_shadow(clear, self.cells, self.lit, rim=RIM)
+
+        pattern = self._pattern(stride=1)
+        few = Rays(max(side // 2, 1), spread=True)
+        arrived = arriving(emitter, points, near_edge, self.visibility, few, pattern)
+        light[near_edge], clear[near_edge], _ = arrived
+        each_alone = np.arange(len(points), dtype=np.int32)
+        at_edge = self._half_shadow(clear, each_alone, near_edge, rim=1)
         many = Rays(3 * side // 2, spread=True)
-        light[half] = arriving(emitter, points, half, visibility, many)[0]
+        light[at_edge] = arriving(emitter, points, at_edge, self.visibility, many, pattern)[0]
         return light
-    share = layout.interpolated(share)
-    is_half = np.zeros(len(points), bool)
-    is_half[half] = True
-    for first_side in np.unique(sides):
-        open_points = lit[(sides == first_side) & ~is_half[lit] & (share[lit] > 0)]
-        open_side = max(2 * int(first_side) - 1, emitter.side_samples)
-        light[open_points] = share[open_points] * open_light(emitter, points, open_points, open_side)
-    light[half], clear[half], _ = arriving(emitter, points, half, visibility, Rays(side, spread=True))
-    is_half[half] = (clear[half] > 0) & (clear[half] < 1)
-    is_grainy = bool(emitter.sky or emitter.side_samples)
-    return np.where(is_half | is_grainy, layout.blurred(light), light)
+
+    def soft_light(self, emitter: Emitter, sides: NDArray[np.int64], side: int) -> Floats:
+        """Light (P,) of a wide emitter: what would arrive with nothing in the way, times the share that rays find."""
+        points = self.points
+        layout = self.layout
+        share = np.zeros(len(points), np.float32)
+        clear = np.full(len(points), np.nan, np.float32)
+        coarse = self._pattern(stride=2)
+        for first_side in np.unique(sides):
+            asked = self.lit[(sides == first_side) & layout.is_sparse[self.lit]]
+            rays = Rays(int(first_side))
+            total, clear[asked], unshaded = arriving(emitter, points, asked, self.visibility, rays, coarse)
+            share[asked] = total / np.maximum(unshaded, LEAST_LX)
+        share = layout.interpolated(share)
+
+        half = self._half_shadow(clear, self.cells, self.lit, rim=RIM)
+        rays = Rays(max(side // 2, 1), spread=True)
+        total, clear[half], unshaded = arriving(emitter, points, half, self.visibility, rays, self._pattern(stride=1))
+        share[half] = total / np.maximum(unshaded, LEAST_LX)
+
+        # More rays where shadows are wide.
+        is_partial = (clear > 0) & (clear < 1)
+        density = layout.blurred_among(is_partial, half, unshaded > 0)
+        wide = half[density > PARTIAL]
+        more = Rays(max(3 * side // 4, 1), spread=True)
+        halfway = self._pattern(stride=1, turn=0.5)
+        total, more_clear, more_unshaded = arriving(emitter, points, wide, self.visibility, more, halfway)
+        weight = np.float32(more.side**2 / (rays.side**2 + more.side**2))
+        share[wide] += weight * (total / np.maximum(more_unshaded, LEAST_LX) - share[wide])
+        clear[wide] += weight * (more_clear - clear[wide])
+
+        is_partial = (clear[half] > 0) & (clear[half] < 1)
+        smooth = layout.blurred_among(share, half, unshaded > 0)
+        share[half[is_partial]] = smooth[is_partial]
+
+        light = np.zeros(len(points), np.float32)
+        shone = self.lit[share[self.lit] > 0]
+        open_lx, is_grainy = open_light(emitter, points, shone, side)
+        light[shone] = share[shone] * open_lx
+        grainy = shone[is_grainy]
+        if emitter.open_side > 1 and len(grainy):
+            light[grainy] = layout.blurred(light)[grainy]
+        return light
+
+    def _pattern(self, *, stride: int, turn: float = 0) -> "EvenPattern":
+        return EvenPattern(self.layout.width, stride, self.points.dither[:1] + np.float32(turn))
+
+    def _half_shadow(self, clear: Floats, cells: Indices, among: Rows, *, rim: int) -> Rows:
+        """Those among the points (N,) beside which an emitter is both seen and hidden, or in their cell (P,).
+
+        clear (P,): the share of rays that met nothing, NaN where none was sent.
+        """
+        is_seen = clear > 0
+        is_hidden = clear < 1
+        seen_in_cell = np.zeros(int(cells.max(initial=0)) + 1, bool)
+        hidden_in_cell = np.zeros_like(seen_in_cell)
+        seen_in_cell[cells[is_seen]] = True
+        hidden_in_cell[cells[is_hidden]] = True
+        is_mixed = seen_in_cell & hidden_in_cell
+        is_near = self.layout.dilated(is_seen, steps=rim) & self.layout.dilated(is_hidden, steps=rim)
+        return among[(is_near | is_mixed[cells])[among]]
+
+
+@dataclass(frozen=True, slots=True)
+class EvenPattern:
+    """Numbers by which the rays of texels beside one another fit together, as if they were those of one larger texel.
+
+    The texels of each square of 2^n x 2^n are a (0, 2n, 2)-net of Sobol's sequence, along a Z-shaped curve. Every
+    stride-th texel along rows and columns counts; the shift (1, 2) is added to all.
+    Source: Ahmed and Wonka, Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error, 2020.
+    """
+
+    width: int
+    stride: int
+    shift: Floats
+
+    def dither(self, index: Rows) -> Floats:
+        """Two numbers in [0, 1) for each texel at a flat index (P, 2)."""
+        row, column = np.divmod(index, self.width)
+        along_curve = _spread_bits(column // self.stride) | _spread_bits(row // self.stride) << np.uint32(1)
+        first = np.zeros(len(index), np.uint32)
+        second = np.zeros(len(index), np.uint32)
+        first_direction = 1 << PATTERN_BITS - 1
+        second_direction = 1 << PATTERN_BITS - 1
+        for bit in range(PATTERN_BITS):
+            is_set = (along_curve >> np.uint32(bit)) & np.uint32(1)
+            first ^= is_set * np.uint32(first_direction)
+            second ^= is_set * np.uint32(second_direction)
+            first_direction >>= 1
+            second_direction ^= second_direction >> 1
+        numbers = np.stack([first, second], -1).astype(np.float32)
+        shifted = numbers / np.float32(1 << PATTERN_BITS) + self.shift
+        return np.asarray(shifted - np.floor(shifted))
+
+
+PATTERN_BITS = 12  # of a place along the curve: texels 64 apart have the same numbers
+
+
+def _spread_bits(numbers: Rows) -> NDArray[np.uint32]:
+    """Numbers (N,) whose bits are the lowest six of each, with a zero between."""
+    bits = (numbers & 0x3F).astype(np.uint32)
+    bits = (bits | bits << np.uint32(4)) & np.uint32(0x30F)
+    bits = (bits | bits << np.uint32(2)) & np.uint32(0x333)
+    return (bits | bits << np.uint32(1)) & np.uint32(0x555)
 
 
 def reached(emitter: Emitter, points: Texels, rows: Rows) -> Rows:
@@ -220,10 +350,8 @@ def first_rays(
 ) -> NDArray[np.int64]:
     """How many rays along a side points (P, 3) need to tell whether they see an emitter: one where shadows are hard."""
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
-    narrow = max(side // 2, 1)
-    middle = max(3 * side // 4 if emitter.sky == "pane" else side // 2, 1)
-    conditions = [width_rad == 0, width_rad < NARROW_RAD, width_rad < WIDE_RAD]
-    return np.select(conditions, [1, narrow, middle], side)
+    conditions = [width_rad == 0, width_rad < WIDE_RAD]
+    return np.select(conditions, [1, max(side // 2, 1)], max(3 * side // 4, 1))
 
 
 def arriving(
@@ -232,11 +360,18 @@ def arriving(
     rows: Rows,
     occluder: Occluder,
     rays: Rays,
+    pattern: EvenPattern | None = None,
 ) -> Floats:
-    """(3, N) of points at rows: illuminance, share of rays that met nothing opaque (NaN: none sent), light unshaded."""
+    """(3, N) of points at rows: illuminance, share of rays that met nothing opaque (NaN: none sent), light unshaded.
+
+    With a pattern the rays of points beside one another fit together.
+    """
 
     def arriving_part(part: slice) -> Floats:
-        return _arriving(emitter, points.take(rows[part]), occluder, rays)
+        texels = points.take(rows[part])
+        if pattern:
+            texels = replace(texels, dither=pattern.dither(texels.index))
+        return _arriving(emitter, texels, occluder, rays)
 
     return chunked(arriving_part, len(rows)).T
 
@@ -279,17 +414,25 @@ def open_light(
     points: Texels,
     rows: Rows,
     side: int,
-) -> Floats:
-    """Illuminance (N,) of the points at rows if nothing hid the emitter."""
+) -> tuple[Floats, Mask]:
+    """Illuminance (N,) of the points at rows if nothing hid the emitter; and where it is sampled, hence grainy (N,)."""
+    light = chunked(lambda part: emitter.open_light(points.take(rows[part])), len(rows))
+    is_sampled = np.isnan(light)
+    unknown = rows[is_sampled]
+    places_side = max(side, emitter.open_side)
+    light[is_sampled] = chunked(
+        lambda part: _sampled_light(emitter, points.take(unknown[part]), places_side), len(unknown)
+    )
+    return light, is_sampled
 
-    def open_part(part: slice) -> Floats:
-        texels = points.take(rows[part])
-        towards = (emitter.evenly or emitter.towards)(texels)
-        cell_light = [_sent(towards, texels, cell, side)[1] for cell in range(side**2)]
-        light = np.sum(cell_light, axis=0)
-        return np.asarray(light / np.float32(side**2), np.float32)
 
-    return chunked(open_part, len(rows))
+def _sampled_light(emitter: Emitter, texels: Texels, side: int) -> Floats:
+    """The mean illuminance (P,) of side x side places on an emitter."""
+    towards = emitter.towards(texels)
+    total = np.zeros(len(texels), np.float32)
+    for cell in range(side**2):
+        total += _sent(towards, texels, cell, side)[1]
+    return total / np.float32(side**2)
 
 
 def _sent(
@@ -330,20 +473,3 @@ def footprint_m(
     along_u_m = place[:, 1:] * texels.step_u_m[rows]
     along_v_m = place[:, :1] * texels.step_v_m[rows]
     return np.asarray(along_u_m + along_v_m)
-
-
-def _half_shadow(
-    clear: Floats,
-    layout: TexelLayout,
-    cells: Indices,
-    lit: Rows,
-) -> Rows:
-    """Those of the points (N,) beside which an emitter is both seen and hidden."""
-    is_seen = clear > 0
-    is_hidden = clear < 1
-    seen_in_cell = np.bincount(cells, is_seen, minlength=1) > 0
-    hidden_in_cell = np.bincount(cells, is_hidden, minlength=1) > 0
-    is_mixed = np.logical_and(seen_in_cell, hidden_in_cell)
-    is_near_seen = layout.dilated(is_seen, steps=RIM)
-    is_near = is_near_seen & layout.dilated(is_hidden, steps=RIM)
-    return lit[(is_near | is_mixed[cells])[lit]]

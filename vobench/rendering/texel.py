@@ -116,12 +116,15 @@ def _placed(
     steps_u_m = np.empty_like(points_m)
     steps_v_m = np.empty_like(points_m)
 
+    step_of_face_u_m, step_of_face_v_m = _steps_m(faces.corners_m, atlas.light_px.astype(float))
+
     def place(part: slice) -> None:
         part_face = face[part]
         uv = owner.uv[index[part]]
         corner_weights = np.column_stack([1 - uv.sum(1), uv])
         plane = faces.plane[part_face]
-        step_u_m, step_v_m = _steps_m(faces.corners_m[part_face], atlas.light_px[part_face].astype(float))
+        step_u_m = step_of_face_u_m[part_face]
+        step_v_m = step_of_face_v_m[part_face]
         is_missing = beside[:, part] == np.arange(len(index))[part]
         on_face_m = np.einsum("ni,nij->nj", corner_weights, faces.corners_m[part_face])
         inwards_m = _inwards_m(step_u_m, step_v_m, is_missing)
@@ -159,7 +162,7 @@ def _inwards_m(step_u_m: Array, step_v_m: Array, is_missing: Mask) -> Array:
 
 
 def _steps_m(corners_m: Array, places: Array) -> tuple[Array, Array]:
-    """What one texel along u and v is (P, 3) on faces with corners (P, 3, 3) and places (P, 3, 2)."""
+    """What one texel along u and v is (F, 3) on faces with corners (F, 3, 3) and places (F, 3, 2)."""
     first_u, first_v = places[:, 1].T - places[:, 0].T
     second_u, second_v = places[:, 2].T - places[:, 0].T
     area = doubled_areas_px2(places)
@@ -176,10 +179,11 @@ def _sees_only_backs(points: Texels, visibility: Visibility) -> Mask:
     is_inside = np.ones(len(points), bool)
     for tilt_u, tilt_v in TILTS:
         rows = np.flatnonzero(is_inside)
-        undecided = points.take(rows)
-        u_axis, v_axis = tangents(undecided.planes)
-        direction = tilt_u * u_axis + tilt_v * v_axis + undecided.planes
-        face = visibility.opaque.nearest(undecided.points_m, direction)
+        direction = points.planes[rows]
+        if tilt_u or tilt_v:
+            u_axis, v_axis = tangents(direction)
+            direction = tilt_u * u_axis + tilt_v * v_axis + direction
+        face = visibility.opaque.nearest(points.points_m[rows], direction)
         is_back = np.einsum("ij,ij->i", direction, visibility.normals[face]) > 0
         is_inside[rows] = (face >= 0) & is_back & (visibility.faces.lamp[face] < 0)
     return is_inside

@@ -63,6 +63,21 @@ class TexelLayout:
             values = (2 * values + values[above] + values[below]) / 4
         return values
 
+    def blurred_among(self, values: Floats, rows: Rows, counts: Mask) -> Floats:
+        """Values (N,) of the points at rows smoothed as by `blurred`, of those of them alone that count (N,)."""
+        place = np.full(len(values), -1, np.int32)
+        place[rows] = np.arange(len(rows))
+        beside = place[self.neighbours[:, rows]]
+        left, right, above, below = np.where(beside < 0, np.arange(len(rows)), beside)
+        weight = counts.astype(np.float32)
+        weighted = values[rows] * weight
+        for _ in range(BLURS):
+            weight = (2 * weight + weight[left] + weight[right]) / 4
+            weight = (2 * weight + weight[above] + weight[below]) / 4
+            weighted = (2 * weighted + weighted[left] + weighted[right]) / 4
+            weighted = (2 * weighted + weighted[above] + weighted[below]) / 4
+        return weighted / np.maximum(weight, np.float32(1e-6))
+
 
 def neighbours(index: Rows, atlas: Atlas, owner: Owners) -> Indices:
     """The points (4, P) left, right, above and below of those at flat indices (P,) in the same chart, else itself."""
@@ -193,15 +208,16 @@ def _is_sparse(index: Rows, beside: Indices, width: int) -> Mask:
 def _nearest_valid(beside: Indices, is_valid: Mask) -> Rows:
     """For each point (P,) itself if valid, else the nearest valid one by steps within its chart, or itself."""
     nearest = np.arange(len(is_valid))
+    candidate = np.full(len(is_valid), -1)
     is_known = is_valid.copy()
-    unknown = np.flatnonzero(~is_valid)
-    while len(unknown):
-        candidates = [np.where(is_known[other], nearest[other], -1) for other in beside[:, unknown]]
-        best = np.max(candidates, axis=0)
-        is_found = best >= 0
-        if not is_found.any():
-            break
-        nearest[unknown[is_found]] = best[is_found]
-        is_known[unknown[is_found]] = True
-        unknown = unknown[~is_found]
+    frontier = np.flatnonzero(is_valid)
+    while len(frontier):
+        around = beside[:, frontier]
+        is_new = ~is_known[around]
+        reached = around[is_new]
+        sources = np.broadcast_to(nearest[frontier], around.shape)[is_new]
+        np.maximum.at(candidate, reached, sources)
+        frontier = np.unique(reached)
+        nearest[frontier] = candidate[frontier]
+        is_known[frontier] = True
     return nearest
