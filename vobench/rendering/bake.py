@@ -4,6 +4,7 @@ import json
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -19,15 +20,17 @@ from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.direct_light import direct_light, mirror_images
 from vobench.rendering.emitter import emitters
+from vobench.rendering.gathering import Rounds, Smoothing
 from vobench.rendering.geometry import FAR_M, RayCaster, are_panes, face_materials, offset_from_surface
-from vobench.rendering.indirect_light import FinalGather, Gatherer, albedo, blend, bounced, response, surfels
-from vobench.rendering.texel import Texels, texels
+from vobench.rendering.indirect_light import MOST_RAYS, Gatherer, albedo, blend, bounced, response, surfels
+from vobench.rendering.photons import Reflectors
+from vobench.rendering.texel import Texels, texel_areas_m2, texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Light, Sky, Sun
-from vobench.scene.material import Material, Picture, Texture
+from vobench.scene.material import LUMINANCE, Material, Picture, Texture
 from vobench.scene.mesh import Triangles, areas_m2, distinct
 from vobench.scene.panorama import PanoramaMap
 from vobench.scene.scene import Scene, triangles
@@ -51,6 +54,7 @@ BLIND = 0.02  # of a surfel's rays: one that sees less is inside something
 TEXTURE_FIELDS = ("texture", "emission_texture")
 SAMPLES = 4_000_000  # of light, by default: what a bake of minutes takes
 UNSEEN = 1e-3  # hits, of a texel that no ray has found
+INDIRECT_RAYS = 72  # from a surfel at first, by default
 SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 
 
@@ -58,15 +62,17 @@ SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 class BakeSettings:
     """How finely light is sampled; rays per sample are squares so that they can be stratified.
 
-    bounces: at most; they end where they add no more.
+    bounces: at most; they end where they add no more. indirect_rays: from each surfel at first; more follow from those
+    whose light has a relative standard error above light_noise, up to 8 times as many.
     """
 
     spacing_m: Positive = 0.025
     light_rays: Annotated[int, Ge(1)] = 16
     indirect_spacing_m: Positive = 0.1
-    indirect_rays: Annotated[int, Ge(0)] = 100
+    indirect_rays: Annotated[int, Ge(0)] = INDIRECT_RAYS
     bounces: Annotated[int, Ge(0)] = 64
     seed: Annotated[int, Ge(0)] = 0
+    light_noise: Positive = 0.02
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +104,7 @@ class BakedScene:
     direct (L, H, W): what each light alone gives straight at level 1 if it is white: illuminance in lux, under a coat
     the share that enters it; on a lamp pi times its luminance. bounced (L, S, 3): what it gives surfels by bounces;
     spread (H·W, S) lays that on the map. A moving sun's layers are those of its first instant; see `tracks` for more.
+    light_noise: the relative standard error of the light that its rays leave, root mean square over surfaces.
     """
 
     scene: Scene
@@ -109,6 +116,7 @@ class BakedScene:
     patches: Patches
     settings: BakeSettings = field(default_factory=BakeSettings)
     tracks: tuple[SunTrack, ...] = ()
+    light_noise: float = 0.0
 
     @property
     def light_uv(self) -> Floats:
@@ -198,19 +206,18 @@ def static_points(
     faces: Triangles,
     atlas: Atlas,
     seed: int,
-) -> tuple[Visibility, Texels, TexelLayout]:
-    """A scene without its movers, as rays and as points, and these on the map."""
+) -> tuple[Visibility, Texels, TexelLayout, Floats]:
+    """A scene without its movers, as rays and as points, these on the map, and the area (P,) of each."""
     is_static = faces.mover < 0
     visibility = Visibility(faces, scene.materials, np.flatnonzero(is_static))
-    points, layout = texels(
-        faces, scene.materials, atlas, owners(atlas), among=is_static, seed=seed, visibility=visibility
-    )
-    return visibility, points, layout
+    owner = owners(atlas)
+    points, layout = texels(faces, scene.materials, atlas, owner, among=is_static, seed=seed, visibility=visibility)
+    return visibility, points, layout, texel_areas_m2(faces, atlas, owner, is_static)[points.index]
 
 
 def static_scene(baked: BakedScene) -> StaticScene:
     """The stationary part of a baked scene, computed once more."""
-    visibility, points, layout = static_points(baked.scene, baked.faces, baked.atlas, baked.settings.seed)
+    visibility, points, layout, _ = static_points(baked.scene, baked.faces, baked.atlas, baked.settings.seed)
     cells = baked.patches.surfel_of[points.index]
     open_sky = np.ones(len(points), bool)
     return StaticScene(baked.faces, visibility, baked.atlas, points, layout, cells, open_sky)
@@ -228,12 +235,13 @@ def bake(
     faces = triangles(scene)
     spacing_m = spacings_m(scene, faces, settings)
     atlas = unwrap(faces, spacing_m, bodies(scene, faces))
-    visibility, points, layout = static_points(scene, faces, atlas, settings.seed)
+    visibility, points, layout, point_areas_m2 = static_points(scene, faces, atlas, settings.seed)
     thing = faces.thing[points.face]
     cell_m = CELL_TEXELS * spacing_m[points.face]
     step_m = np.maximum(settings.indirect_spacing_m, cell_m).astype(np.float32)
     groups = surfels(points, thing, step_m, visibility)
     surfel_of = np.append(groups.of, np.int32(-1))[layout.source]
+    area_m2 = np.bincount(groups.of, point_areas_m2, len(groups))
     report(PLACED_DONE)
 
     skies = [light for light in scene.lights if isinstance(light, Sky)]
@@ -246,72 +254,100 @@ def bake(
         len(groups),
         len(scene.lights),
     )
-    gathered = gatherer.gather(
+    rays = max(settings.indirect_rays, SKY_RAYS if skies else 0)
+    rounds = Rounds(
+        gatherer,
         points.take(groups.middle),
-        rays=max(settings.indirect_rays, SKY_RAYS if skies else 0),
+        side=int(np.sqrt(min(rays, MOST_RAYS / max(len(groups), 1)) / 2)),
         done=lambda share: report(PLACED_DONE + (GATHER_DONE - PLACED_DONE) * share),
     )
-    met_share = np.asarray(gathered.table.sum(1)).ravel()
-    is_usable = met_share + gathered.escaped > BLIND
+    is_usable = rounds.met() + rounds.escaped > BLIND
     spread = blend(points, groups, layout, visibility, is_usable)
-    open_sky = (spread @ gathered.escaped)[points.index] > 0
+    smoothing = Smoothing(spread[points.index[groups.middle]])
+    open_sky = (spread @ rounds.escaped)[points.index] > 0
     static = StaticScene(faces, visibility, atlas, points, layout, groups.of, open_sky)
 
     # A surfel is represented by its points that rays have found, not by those that lie hidden under a rug.
-    point_hits = np.bincount(layout.source, gathered.hits, len(points) + 1)
+    point_hits = np.bincount(layout.source, rounds.hits, len(points) + 1)
     weights = point_hits[: len(points)] + UNSEEN
     scatters = albedo(faces, scene.materials, points)
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
+    of_lights = [emitters(scene.lights[index], visibility, t_ns=t_ns) for index, t_ns in instants]
+    reflectors = Reflectors(gatherer, points, point_areas_m2, settings.seed)
+    lamp_count = sum(not isinstance(scene.lights[index], Sky) for index, _ in instants)
+    effort = settings.indirect_rays / INDIRECT_RAYS / max(lamp_count, 1)
     direct = np.zeros((len(scene.lights), atlas.height, atlas.width), np.float32)
     received = np.zeros((len(instants), len(groups), 3), np.float32)
+    direct_lx = np.zeros((len(instants), len(groups)), np.float32)
+    by_mirrors = np.zeros((2, len(instants), len(groups)), np.float32)  # by each half of the photons
     # Backwards, so that a moving sun's layer ends as that of its first instant.
     for row in reversed(range(len(instants))):
         index, t_ns = instants[row]
         light = direct_points(scene, index, static, settings, t_ns=t_ns)
         received[row] = groups.mean(scatters * light[:, None], weights)
+        direct_lx[row] = groups.mean(light[:, None], weights)[:, 0]
         direct[index] = direct_layer(scene, index, static, light)
+        if settings.bounces and not isinstance(scene.lights[index], Sky):
+            halves_lm = reflectors.flux_lm(of_lights[row], light, effort=effort, seed=[settings.seed, row])
+            by_mirrors[:, row] = smoothing.density(halves_lm.T, area_m2).T
         report(1 - (1 - GATHER_DONE) * row / len(instants))
     reflectance = groups.mean(scatters, weights)
 
     del static, points, layout  # bounces take memory of their own
-    by_mirrors = _by_mirrors(scene, [index for index, _ in instants], gathered, len(groups))
-    indirect = bounced(received, reflectance, gathered, by_mirrors, bounces=settings.bounces)
+    lights = _Lights(scene, instants)
+    bounce = partial(bounced, received, reflectance, bounces=settings.bounces)
+    mean_by_mirrors = by_mirrors.mean(0)
+    pilot = bounce(rounds.table(), mean_by_mirrors + lights.of_skies(rounds.sky_lx()))
+    gathered = rounds.refined(
+        smoothing,
+        radiosity=lights.luminance(received + reflectance * pilot),
+        sky_weights=lights.sky_weights,
+        direct=lights.luminance(direct_lx[..., None]),
+        by_mirrors=np.stack([lights.luminance(half[..., None]) for half in by_mirrors]),
+        noise=settings.light_noise if settings.bounces else np.inf,
+    )
+    indirect = bounce(gathered.near + gathered.far, mean_by_mirrors + lights.of_skies(gathered.sky_lx))
+    if settings.bounces:
+        for row, sent in enumerate(received + reflectance * indirect):
+            far_lx = gathered.far @ sent
+            indirect[row] += smoothing.averaged(far_lx) - far_lx
     first = [instants.index((index, key_times_ns(light)[0])) for index, light in enumerate(scene.lights)]
-    point_areas_m2 = _point_areas_m2(faces, thing)
     patches = Patches(
         surfel_of=surfel_of,
         reflectance=reflectance,
-        area_m2=np.bincount(groups.of, point_areas_m2, len(groups)),
+        area_m2=area_m2,
         radiosity=received[first] + reflectance * indirect[first],
     )
     tracks = _tracks(instants, indirect, scene)
-    return BakedScene(scene, faces, atlas, direct, indirect[first], spread, patches, settings, tracks)
+    noise = float(np.sqrt(np.average(gathered.noise**2, weights=area_m2 + 1e-12))) if len(groups) else 0.0
+    return BakedScene(scene, faces, atlas, direct, indirect[first], spread, patches, settings, tracks, noise)
 
 
-def _point_areas_m2(faces: Triangles, thing: Indices) -> Array:
-    """The area (P,) that each point stands for among all of its thing's, whose index (P,) is given."""
-    thing_areas_m2 = np.bincount(faces.thing, areas_m2(faces.corners_m))
-    point_counts = np.bincount(thing, minlength=len(thing_areas_m2))
-    return np.asarray(thing_areas_m2[thing] / point_counts[thing])
+class _Lights:
+    """The lights of a scene at the instants (K,) that they are baked for."""
 
+    def __init__(self, scene: Scene, instants: list[tuple[int, float]]) -> None:
+        lights = [scene.lights[index] for index, _ in instants]
+        index = np.array([index for index, _ in instants], np.int64)
+        # A light that is baked for several instants counts with their mean.
+        share = 1 / np.bincount(index, minlength=1)[index] if len(index) else np.zeros(0)
+        colours = np.array([light.colour for light in lights]).reshape(-1, 3)
+        self._weights = (share[:, None] * colours * LUMINANCE).astype(np.float32)
+        self._sky_rows = [row for row, light in enumerate(lights) if isinstance(light, Sky)]
+        self.sky_weights = self._weights[self._sky_rows].sum(1)
 
-def _by_mirrors(
-    scene: Scene,
-    rows: list[int],
-    gathered: FinalGather,
-    surfel_count: int,
-) -> Floats:
-    """Illuminance (K, S) of surfels by lamps and the sky that rays found by way of mirrors, of lights `rows` (K,)."""
-    result = np.zeros((len(rows), surfel_count), np.float32)
-    skies = [index for index, light in enumerate(scene.lights) if isinstance(light, Sky)]
-    for row, index in enumerate(rows):
-        light = scene.lights[index]
-        if isinstance(light, AreaLight):
-            seen = gathered.table[:, surfel_count + index].toarray().ravel()
-            result[row] = np.pi * light.luminance_cd_m2 * seen
-        elif isinstance(light, Sky):
-            result[row] = gathered.sky[skies.index(index)]
-    return result
+    def luminance(self, values: Floats) -> Floats:
+        """The sum (S,) over all lights of what they give (K, S, C), by its luminance."""
+        total = np.zeros(values.shape[1], np.float32)
+        for weight, of_light in zip(self._weights, values, strict=True):
+            total += (of_light * weight).sum(-1) if of_light.shape[-1] > 1 else of_light[:, 0] * weight.sum()
+        return total
+
+    def of_skies(self, sky_lx: Floats) -> Floats:
+        """What each sky gives (N, S) as what each light does (K, S)."""
+        result = np.zeros((len(self._weights), sky_lx.shape[1]), np.float32)
+        result[self._sky_rows] = sky_lx
+        return result
 
 
 def _tracks(
@@ -406,12 +442,14 @@ LIGHT = "light.npy"
 PLACES = "surfels.npz"
 TEXTURES = "textures.npz"
 SETTINGS_FILE = "settings.json"
+NOISE_FILE = "noise.json"
 SPREAD_ARRAYS = ("data", "indices", "indptr")
 
 
 def save_baked(folder: Path, baked: BakedScene) -> None:
     """Write the light of a baked scene into a folder, and its textures as they were painted for it."""
     (folder / SETTINGS_FILE).write_text(json.dumps(asdict(baked.settings)))
+    (folder / NOISE_FILE).write_text(json.dumps({"light_noise": baked.light_noise}))
     np.save(folder / LIGHT, baked.direct)
     spread = {f"spread_{name}": getattr(baked.spread, name) for name in SPREAD_ARRAYS}
     patches = {field.name: getattr(baked.patches, field.name) for field in fields(Patches)}
@@ -484,6 +522,7 @@ def load_baked(folder: Path, scene: Scene) -> BakedScene:
     """The light that `save_baked` wrote, for the same scene. Raises RenderError where it is damaged."""
     try:
         settings = BakeSettings(**json.loads((folder / SETTINGS_FILE).read_text()))
+        light_noise = float(json.loads((folder / NOISE_FILE).read_text())["light_noise"])
         pictured = _with_panoramas(_with_pictures(scene, _load(folder / TEXTURES)), folder)
         light = np.load(folder / LIGHT)
         arrays = _load(folder / PLACES)
@@ -499,7 +538,16 @@ def load_baked(folder: Path, scene: Scene) -> BakedScene:
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, SettingError) as error:
         raise RenderError(f"the scene's light cannot be read ({error}); delete this folder: {folder}") from error
     return BakedScene(
-        pictured, triangles(scene), atlas, light, arrays["bounced"], spread, patches, settings, tuple(tracks)
+        pictured,
+        triangles(scene),
+        atlas,
+        light,
+        arrays["bounced"],
+        spread,
+        patches,
+        settings,
+        tuple(tracks),
+        light_noise,
     )
 
 

@@ -1,7 +1,7 @@
 """Indirect light: surfels, which of them see each other by rays that follow mirrors and pass panes, and bounces."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import cv2
@@ -213,10 +213,13 @@ def _tile(material: Material) -> Floats:
     return np.asarray(small.reshape(height, width, -1), np.float32)
 
 
+TURN = np.array([0.4142135624, 0.7320508076], np.float32)  # by which further rays of a point differ
 MIRRORS = 4  # followed by one ray
 FAINT = 1e-3  # what a mirror returns of a ray is dropped below this
 ROWS = 1 << 10  # points at once: times their rays
 MOST_RAYS = 25_000_000  # in one table
+PHOTON_ROWS = 1 << 16  # photons at once
+NEAR_M = 1.0  # light from nearer changes between a surfel and its neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -309,7 +312,7 @@ class FinalGather:
 
 @dataclass(slots=True)
 class _RayBatch:
-    """Rays on their journey: the point they belong to, from where, whereto, and what they weigh.
+    """Rays on their journey: the row of the result they belong to, from where, whereto, and what they weigh.
 
     is_direct: whether a lamp that they meet next is direct light, and counted as such.
     """
@@ -328,13 +331,47 @@ class _RayBatch:
 
 
 @dataclass(frozen=True, slots=True)
-class _Gathered:
-    """What the rays of a part of the points found: as in FinalGather, but the texels (R,) where they ended."""
+class _Step:
+    """Rays at the faces that they have met: with what cosine, on which texel, and the light (R,) scattered there.
 
-    table: "csr_matrix"
+    gone: the rays that met nothing; from_panes: those that panes on the way reflected.
+    """
+
+    batch: _RayBatch
+    hits: Hits
+    cosine: Floats
+    texel: Indices
+    scattered: Floats
+    gone: _RayBatch
+    from_panes: _RayBatch
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """What rays of some points found: near and far (P, S + L) are tables by how far the last segment of a ray led.
+
+    sky (K, P) by mirrors and escaped (P,) as in FinalGather; texels (R,): where rays ended.
+    """
+
+    near: "csr_matrix"
+    far: "csr_matrix"
     sky: Floats
     escaped: Floats
     texels: Indices
+
+
+@dataclass(frozen=True, slots=True)
+class Photons:
+    """Rays of light that set out from mirroring faces: from where and whereto (R, 3), and their flux (R,) in lumens.
+
+    is_shown: whether the face that they meet first has that light already, as an image in a smooth mirror.
+    """
+
+    origins_m: Floats
+    directions: Floats
+    flux_lm: Floats
+    is_shown: Mask
+    dither: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -358,71 +395,124 @@ class Gatherer:
     ) -> FinalGather:
         """Send about `rays` rays from every point; `done` is called with shares."""
         rays_each = min(rays, MOST_RAYS / max(len(points), 1))
-        side = int(np.sqrt(rays_each))
-        parts = list[_Gathered]()
+        found = self.sample(points, side=int(np.sqrt(rays_each)), done=done)
+        return FinalGather(found.near + found.far, found.sky, self.hits(found), found.escaped)
+
+    def hits(self, sample: Sample) -> Rows:
+        """How many rays ended on each texel of the map (H·W,)."""
+        return np.bincount(sample.texels, minlength=self.atlas.height * self.atlas.width)
+
+    def sample(
+        self,
+        points: Texels,
+        *,
+        side: int,
+        turn: int = 0,
+        done: Callable[[float], object] | None = None,
+    ) -> Sample:
+        """Send side x side rays from every point, in each turn others; `done` is called with shares."""
+        parts = list[Sample]()
         if side and len(points):
-            parts = in_chunks(lambda part: self._gather(points.take(part), side), len(points), chunk=ROWS, done=done)
+            turned = points.dither + np.float32(turn) * TURN
+            turned -= np.floor(turned)
+            points = replace(points, dither=turned)
+            parts = in_chunks(lambda part: self._sample(points.take(part), side), len(points), chunk=ROWS, done=done)
         unasked = 0 if parts else len(points)
         no_entries = scipy.sparse.csr_matrix((unasked, self.surfels + self.lamps), dtype=np.float32)
         no_sky = np.zeros((len(self.skies), unasked), np.float32)
         all_escaped = np.ones(unasked, np.float32)
-        texels = np.concatenate([np.zeros(0, np.int32), *(part.texels for part in parts)])
-        return FinalGather(
-            table=scipy.sparse.vstack([no_entries, *(part.table for part in parts)], "csr"),
+        return Sample(
+            near=scipy.sparse.vstack([no_entries, *(part.near for part in parts)], "csr"),
+            far=scipy.sparse.vstack([no_entries, *(part.far for part in parts)], "csr"),
             sky=np.concatenate([no_sky, *(part.sky for part in parts)], 1),
-            hits=np.bincount(texels, minlength=self.atlas.height * self.atlas.width),
             escaped=np.concatenate([all_escaped, *(part.escaped for part in parts)]),
+            texels=np.concatenate([np.zeros(0, np.int32), *(part.texels for part in parts)]),
         )
 
-    def _gather(self, points: Texels, side: int) -> _Gathered:
+    def _sample(self, points: Texels, side: int) -> Sample:
         batch = _start(points, side)
-        factors = []
-        rows = []
-        columns = []
+        parts = []
         texels = []
         ray_count = np.float32(side * side)
         sky = np.zeros((len(self.skies), len(points)), np.float32)
         escaped = np.zeros(len(points), np.float32)
         for depth in range(MIRRORS + 1):
-            hits = self.visibility.opaque.hits(batch.origins_m, batch.directions)
-            lengths_m = np.where(hits.face < 0, FAR_M, hits.distance)
-            segments_m = batch.directions * lengths_m[:, None]
-            from_panes = self._reflected_by_panes(batch, segments_m)
-            batch.weight *= self.visibility.through_panes(batch.origins_m, segments_m)
-            gone = batch.take(hits.face < 0)
+            step = self._step(batch)
             if depth == 0:
-                escaped += self._escaped(gone, len(points)) / ray_count
+                escaped += self._escaped(step.gone, len(points)) / ray_count
             else:
-                self._add_sky(sky, gone)
-
-            along_normal = np.einsum("ij,ij->i", batch.directions, self.visibility.normals[hits.face])
-            met = np.flatnonzero((hits.face >= 0) & (along_normal < 0))
-            batch = batch.take(met)
-            hits = hits.take(met)
-            cosine = -along_normal[met]
-
-            lamp = self.response.lamp[hits.face]
+                self._add_sky(sky, step.gone)
+            lamp = self.response.lamp[step.hits.face]
             is_lamp = lamp >= 0
-            texel = self.atlas.index(hits.at(self.atlas.light_px))
-            scattered = self.response.scattered(hits.face, cosine)
-            factor = batch.weight * np.where(is_lamp, ~batch.is_direct, scattered)
-            column = np.where(is_lamp, self.surfels + lamp, self.surfel_of[texel])
+            factor = np.where(is_lamp, step.batch.weight * ~step.batch.is_direct, step.scattered)
+            column = np.where(is_lamp, self.surfels + lamp, self.surfel_of[step.texel])
             counts = (column >= 0) & (factor > 0)
-            factors.append(factor[counts])
-            rows.append(batch.point[counts])
-            columns.append(column[counts])
-            texels.append(texel[counts])
-
-            batch = self._mirrored(batch, hits, cosine, points.dither)
-            batch.is_direct &= depth == 0
-            batch = batch.joined(from_panes)
+            parts.append(
+                (
+                    factor[counts] / ray_count,
+                    step.batch.point[counts],
+                    column[counts],
+                    step.hits.distance[counts] < NEAR_M,
+                )
+            )
+            texels.append(step.texel[counts])
+            batch = self._onwards(step, points.dither, is_first=depth == 0)
             if not len(batch.point):
                 break
-        places = (np.concatenate(rows), np.concatenate(columns))
-        entries = (np.concatenate(factors) / ray_count, places)
-        shape = (len(points), self.surfels + self.lamps)
-        table = scipy.sparse.csr_matrix(entries, shape, dtype=np.float32)
-        return _Gathered(table, sky / ray_count, escaped, np.concatenate(texels).astype(np.int32))
+        factor, row, column, is_near = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+
+        def table(chosen: Mask) -> "csr_matrix":
+            entries = (factor[chosen], (row[chosen], column[chosen]))
+            return scipy.sparse.csr_matrix(entries, (len(points), self.surfels + self.lamps), dtype=np.float32)
+
+        found = np.concatenate(texels).astype(np.int32)
+        return Sample(table(is_near), table(~is_near), sky / ray_count, escaped, found)
+
+    def deposited(self, photons: Photons) -> Floats:
+        """The flux (S,) in lumens that photons bring to surfels, of coats what enters."""
+        flux_lm = np.zeros(self.surfels)
+
+        def trace(part: slice) -> Floats:
+            photon = np.arange(len(photons.flux_lm))[part]
+            batch = _RayBatch(
+                point=photon,
+                origins_m=photons.origins_m[part],
+                directions=photons.directions[part],
+                weight=np.ones(len(photon), np.float32),
+                is_direct=photons.is_shown[part],
+            )
+            total_lm = np.zeros(self.surfels)
+            for _ in range(MIRRORS):
+                step = self._step(batch)
+                surfel = self.surfel_of[step.texel]
+                counts = np.flatnonzero((surfel >= 0) & ~step.batch.is_direct)
+                arriving_lm = step.scattered[counts] * photons.flux_lm[step.batch.point[counts]]
+                total_lm += np.bincount(surfel[counts], arriving_lm, self.surfels)
+                batch = self._onwards(step, photons.dither, is_first=False)
+                if not len(batch.point):
+                    break
+            return total_lm
+
+        for part_lm in in_chunks(trace, len(photons.flux_lm), chunk=PHOTON_ROWS):
+            flux_lm += part_lm
+        return flux_lm
+
+    def _step(self, batch: _RayBatch) -> _Step:
+        """Follow rays to the next face that is no pane."""
+        hits = self.visibility.opaque.hits(batch.origins_m, batch.directions)
+        lengths_m = np.where(hits.face < 0, FAR_M, hits.distance)
+        segments_m = batch.directions * lengths_m[:, None]
+        from_panes = self._reflected_by_panes(batch, segments_m)
+        batch.weight *= self.visibility.through_panes(batch.origins_m, segments_m)
+        gone = batch.take(hits.face < 0)
+        along_normal = np.einsum("ij,ij->i", batch.directions, self.visibility.normals[hits.face])
+        met = np.flatnonzero((hits.face >= 0) & (along_normal < 0))
+        batch = batch.take(met)
+        hits = hits.take(met)
+        cosine = -along_normal[met]
+        texel = self.atlas.index(hits.at(self.atlas.light_px))
+        scattered = batch.weight * self.response.scattered(hits.face, cosine)
+        return _Step(batch, hits, cosine, texel, scattered, gone, from_panes)
 
     def _escaped(self, gone: _RayBatch, point_count: int) -> Floats:
         """How many (P,) of the rays of each point that met nothing crossed no pane that shows the sky."""
@@ -450,29 +540,23 @@ class Gatherer:
         reflected = _RayBatch(batch.point, ends_m, directions, weight, is_direct)
         return reflected.take(weight > FAINT)
 
-    def _mirrored(
-        self,
-        batch: _RayBatch,
-        hits: Hits,
-        cosine: Floats,
-        dither: Floats,
-    ) -> _RayBatch:
-        """The rays that go on from the faces that they have hit."""
-        weight = batch.weight * self.response.mirrored(hits.face, cosine)
+    def _onwards(self, step: _Step, dither: Floats, *, is_first: bool) -> _RayBatch:
+        """The rays that go on from the faces and panes that they have met."""
+        weight = step.batch.weight * self.response.mirrored(step.hits.face, step.cosine)
         rays = np.flatnonzero(weight > FAINT)
-        batch = batch.take(rays)
-        face = hits.face[rays]
+        batch = step.batch.take(rays)
+        face = step.hits.face[rays]
         face_normals = self.visibility.normals[face]
-        normals = _facets(face_normals, self.response.roughness[face], dither[batch.point], rays)
+        normals = facets(face_normals, self.response.roughness[face], dither[batch.point], rays)
         along_normal = np.einsum("ij,ij->i", batch.directions, normals)[:, None]
         directions = batch.directions - 2 * along_normal * normals
-        ends_m = batch.origins_m + hits.distance[rays, None] * batch.directions
+        ends_m = batch.origins_m + step.hits.distance[rays, None] * batch.directions
         # A facet may reflect a ray into its own surface.
         is_leaving = np.einsum("ij,ij->i", directions, face_normals) > 0
-        shows_lamps = self.response.shows_lamps[face]
+        is_direct = self.response.shows_lamps[face] & is_first
         origins_m = ends_m + RAY_OFFSET_M * face_normals
-        mirrored = _RayBatch(batch.point, origins_m, directions, weight[rays], shows_lamps)
-        return mirrored.take(is_leaving)
+        mirrored = _RayBatch(batch.point, origins_m, directions, weight[rays], is_direct)
+        return mirrored.take(is_leaving).joined(step.from_panes)
 
 
 def _start(points: Texels, side: int) -> _RayBatch:
@@ -486,7 +570,7 @@ def _start(points: Texels, side: int) -> _RayBatch:
     return _RayBatch(point, origins_m, directions.reshape(-1, 3), weight, np.ones(len(point), bool))
 
 
-def _facets(
+def facets(
     normals: Floats,
     roughness: Floats,
     dither: Floats,
@@ -516,20 +600,20 @@ FAINT_REST = 1e-4
 def bounced(
     straight: Floats,
     reflectance: Floats,
-    gathered: FinalGather,
+    table: "csr_matrix",
     first: Floats,
     *,
     bounces: int,
 ) -> Floats:
     """Illuminance (K, S, C) of surfels by one bounce or more, of the radiosity (K, S, C) that direct light gives them.
 
-    reflectance (S, C) of surfels; first (K, S): what comes by mirrors from lamps and the sky, grey. In the end each
-    bounce is the same share of the one before, so the last ones are the sum of a geometric series.
+    reflectance (S, C) of surfels; table (S, S) times their radiosity is their light; first (K, S): what comes by
+    mirrors from lamps and the sky, grey. In the end each bounce is the same share of the one before, so the last ones
+    are the sum of a geometric series.
     """
     light_count, surfel_count, channels = straight.shape
     if not bounces:
         return np.zeros(straight.shape, np.float32)
-    table = gathered.table[:, :surfel_count]
     columns = (surfel_count, light_count * channels)
     grey = np.repeat(first.T[..., None], channels, 2)
     by_mirrors = grey.reshape(columns).astype(np.float32)

@@ -15,7 +15,7 @@ from vobench.rendering.texel_owner import Owners, claimed
 from vobench.rendering.thread_pool import chunked, in_chunks
 from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Triangles
+from vobench.scene.mesh import Triangles, areas_m2
 
 TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of rays that search a way out
 PULLED_M = 1e-3  # points at a chart's rim lie so far inwards, where they see past the neighbour
@@ -96,6 +96,31 @@ def texels(
     outside.step_u_m[~in_plane[:2].all(0)] = 0
     outside.step_v_m[~in_plane[2:].all(0)] = 0
     return outside, layout
+
+
+def texel_areas_m2(
+    faces: Triangles,
+    atlas: Atlas,
+    owner: Owners,
+    among: Mask,
+) -> Floats:
+    """The area (H·W,) that each texel of those among the faces (F,) stands for: together that of all faces.
+
+    A texel at a rim that reaches beyond its face stands for less than it covers, by the same factor in all of a chart.
+    """
+    face_areas_m2 = areas_m2(faces.corners_m)
+    face_areas_px2 = np.abs(doubled_areas_px2(atlas.light_px.astype(float))) / 2
+    covered_m2 = face_areas_m2 / np.maximum(face_areas_px2, 1e-12)
+    index = claimed(owner, among)
+    face = owner.face[index]
+    is_charted = atlas.chart >= 0
+    charts = int(atlas.chart.max(initial=-1)) + 1
+    chart_m2 = np.bincount(atlas.chart[is_charted], face_areas_m2[is_charted], charts)
+    chart_covered_m2 = np.bincount(atlas.chart[face], covered_m2[face], charts)
+    factor = chart_m2 / np.maximum(chart_covered_m2, 1e-30)
+    result = np.zeros(atlas.height * atlas.width)
+    result[index] = covered_m2[face] * factor[atlas.chart[face]]
+    return result
 
 
 def _placed(

@@ -52,6 +52,10 @@ class Visibility:
         self.opaque = RayCaster(faces, rows[~is_pane])
         self._glass = RayCaster(faces, rows[is_pane])
         self._has_panes = bool(is_pane.any())
+        self.is_pane = np.zeros(len(faces), bool)
+        self.is_pane[rows[is_pane]] = True
+        self.is_static = np.zeros(len(faces), bool)
+        self.is_static[rows] = True
         self.mirrors = self._mirrors(rows[is_smooth_mirror])
         self.sky_panes = self._panes_before_sky(rows[is_pane])
         sky_pane_faces = [face for pane in self.sky_panes for face in pane.faces]
