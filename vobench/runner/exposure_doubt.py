@@ -2,11 +2,11 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vobench.errors import VobenchError
-from vobench.rendering.seen_light import read_seen_light
 from vobench.runner.folder import SEQUENCE, RunFolder, UnavailableCases
 from vobench.runner.key import cache_folder
 from vobench.runner.task import bake_task, is_done
@@ -17,7 +17,11 @@ from vobench.suite.scene_build import listed_lights
 from vobench.suite.scene_lighting import with_lighting
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_case import scene_lights
-from vobench.suite.white import BLACK_DN, SATURATED_DN, ExposedShares, Remedy, doubt_sentence, exposed_shares, white_of
+
+if TYPE_CHECKING:
+    from vobench.suite.white import ExposedShares, Remedy
+
+# What reads the light is imported where it is used: a check of a suite whose light is not computed needs none of it.
 
 FIRST_PICTURES = 3  # of a case, that a run looks at
 
@@ -27,6 +31,9 @@ def exposure_doubts(spec: SceneFile, light: Path) -> list[str]:
 
     `light` is the folder with the scene's light.
     """
+    from vobench.rendering.seen_light import read_seen_light
+    from vobench.suite.white import Remedy, doubt_sentence, exposed_shares, white_of
+
     seen = read_seen_light(light)
     luminance_cd_m2 = seen.luminance(listed_lights(spec))
     remedy = Remedy(white_cd_m2=white_of(spec, light))
@@ -46,14 +53,9 @@ def doubts_of_plan(plan: Plan) -> list[str]:
     sentences = dict[str, str]()
     for case in _doubtable(plan.simulated):
         light = _light(case)
-        if light is None:
-            continue
-        seen = read_seen_light(light)
-        luminance_cd_m2 = seen.luminance(_lights(case))
-        remedy = _remedy(case, light)
-        shares = exposed_shares(luminance_cd_m2, remedy.effective_white_cd_m2)
-        if shares.is_doubtful:
-            sentences[case.name] = doubt_sentence(shares, luminance_cd_m2, seen.is_source, remedy)
+        sentence = _doubt_of(case, light) if light else None
+        if sentence:
+            sentences[case.name] = sentence
     return [f"{names}: {sentence} (along the free path)" for sentence, names in _grouped(sentences).items()]
 
 
@@ -65,13 +67,26 @@ def doubts_of_run(plan: Plan, folder: RunFolder) -> list[str]:
         if shares is None or not shares.is_doubtful:
             continue
         light = _light(case)
-        if light is None:
-            sentences[case.name] = f"{shares}; change the camera's exposure_gain, or use auto_exposure"
-            continue
-        seen = read_seen_light(light)
-        luminance_cd_m2 = seen.luminance(_lights(case))
-        sentences[case.name] = doubt_sentence(shares, luminance_cd_m2, seen.is_source, _remedy(case, light))
+        sentence = _doubt_of(case, light, shares) if light else None
+        sentences[case.name] = sentence or f"{shares}; change the camera's exposure_gain, or use auto_exposure"
     return [f"{names}: {sentence} (in its first pictures)" for sentence, names in _grouped(sentences).items()]
+
+
+def _doubt_of(case: Case, light: Path, shares: "ExposedShares | None" = None) -> str | None:
+    """What to change in a case with such shares of pixels, by default those along the free path; None if they are good.
+
+    `light` is the folder with the light of its scene.
+    """
+    from vobench.rendering.seen_light import read_seen_light
+    from vobench.suite.white import doubt_sentence, exposed_shares
+
+    seen = read_seen_light(light)
+    luminance_cd_m2 = seen.luminance(_lights(case))
+    remedy = _remedy(case, light)
+    shown = shares or exposed_shares(luminance_cd_m2, remedy.effective_white_cd_m2)
+    if not shown.is_doubtful:
+        return None
+    return doubt_sentence(shown, luminance_cd_m2, seen.is_source, remedy)
 
 
 def _doubtable(cases: Iterable[Case]) -> list[Case]:
@@ -90,12 +105,14 @@ def _lights(case: Case) -> tuple[Light, ...]:
     return with_lighting(scene_lights(case.scene, case.lighting.keys()), case.lighting)
 
 
-def _remedy(case: Case, light: Path) -> Remedy:
+def _remedy(case: Case, light: Path) -> "Remedy":
     """How a case is exposed, and which key changes that.
 
     White belongs to the scene's own lighting. Under another lighting, or if white is not stated, the camera's
     exposure_gain is to be changed.
     """
+    from vobench.suite.white import Remedy, white_of
+
     amplification = 10 ** (case.camera.gain_db / 20)
     is_white_at_fault = case.scene.white_cd_m2 is not None and not case.lighting
     return Remedy(
@@ -106,9 +123,10 @@ def _remedy(case: Case, light: Path) -> Remedy:
     )
 
 
-def _shares_of_first_pictures(sequence: Path) -> ExposedShares | None:
+def _shares_of_first_pictures(sequence: Path) -> "ExposedShares | None":
     """The shares of saturated and black pixels in the first left pictures of a sequence; None if there is none."""
     from vobench.sequence import Sequence as Recorded
+    from vobench.suite.white import BLACK_DN, SATURATED_DN, ExposedShares
 
     pictures = []
     try:
