@@ -437,7 +437,7 @@ def test_a_mover_has_its_things_about_its_own_origin(read: Reader) -> None:
     assert [thing.name for thing in model.things] == ["wall"]
     (door,) = model.movers
     assert (door.name, [thing.name for thing in door.things]) == ("hinge", ["door"])
-    np.testing.assert_allclose(door.at_m, z_up([2, 1, 0]))
+    np.testing.assert_allclose(door.origin_m, z_up([2, 1, 0]))
     np.testing.assert_allclose(door.things[0].mesh.triangles[0], z_up([[0, 0, -1], [1, 0, -1], [0, 1, -1]]))
     np.testing.assert_allclose(model.everything[1].mesh.triangles[0], z_up([[2, 1, -1], [3, 1, -1], [2, 2, -1]]))
 
