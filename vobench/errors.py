@@ -138,6 +138,12 @@ def _is_safe(character: str) -> bool:
     return character.isprintable() or character == "\n"
 
 
+def error_sentence(error: Exception) -> str:
+    """An exception as one line. The name of its type comes first, unless it is a VobenchError."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, VobenchError) else f"{type(error).__name__}: {text}"
+
+
 def unknown_name_sentence(kind: str, name: str, known: list[str]) -> str:
     """The sentence about an unknown name, with the nearest known name and all known ones."""
     nearest = get_close_matches(name, known, n=1)

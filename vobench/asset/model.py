@@ -358,7 +358,7 @@ def _note_on_unit(model: Model) -> list[str]:
 
 
 def _cleaned(primitive: Primitive) -> Primitive:
-    """A primitive in the frame of the model, with separate faces that have areas, normals and, if seen, backs.
+    """A primitive in the frame of the model, without faces that have no area, and with all normals and visible backs.
 
     Raises ModelError for vertices that are not finite, or too far from the origin.
     """

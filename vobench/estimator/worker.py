@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import BinaryIO, cast
 
-from vobench.errors import VobenchError
+from vobench.errors import VobenchError, error_sentence
 from vobench.estimator.check import InvalidOutputError, checked, checked_revision, in_one_line
 from vobench.estimator.message import HEADER, answered, revision, unpickled
 from vobench.estimator.protocol import Estimator
@@ -105,7 +105,7 @@ def main(folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
         return
     except Exception as error:
         traceback.print_exc()
-        content = _in_one_line(error).encode("utf-8", "replace")
+        content = in_one_line(error_sentence(error)).encode("utf-8", "replace")
         answers.write(HEADER.pack(_tag(error), len(content)) + content)
 
 
@@ -154,11 +154,6 @@ def _tag(error: Exception) -> bytes:
     if isinstance(error, InvalidOutputError):
         return b"WRNG"
     return b"FAIL" if isinstance(error, VobenchError) else b"CRSH"
-
-
-def _in_one_line(error: Exception) -> str:
-    text = in_one_line(error)
-    return text if isinstance(error, VobenchError) else f"{type(error).__name__}: {text}"
 
 
 if __name__ == "__main__":

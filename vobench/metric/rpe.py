@@ -449,7 +449,7 @@ METRICS = (
         "1",
         "‖E − I‖_F",
         "evo's full",
-        blind=f"metres and rotations are added: it changes with the unit of length; {GLOBAL}",
+        blind=f"the difference between translation and rotation: their sum depends on the unit of length; {GLOBAL}",
         measure=lambda comparison: comparison.once(_matrices)[1],
     ),
     _motion_metric(
