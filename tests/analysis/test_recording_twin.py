@@ -52,7 +52,11 @@ def suite(recorded_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_the_suite_has_the_recording_and_its_repetition(suite: TwinSuite, recording: Recording) -> None:
     plan = read_plan(str(suite.file))
     assert [case.name for case in plan.cases] == [TWIN, REAL]
-    assert [entrant.label for entrant in plan.entrants] == ["stereo_pnp", "mono_vo", "stand_still"]
+    assert [entry.label for entry in plan.estimator_entries] == [
+        "stereo_pnp",
+        "mono_vo",
+        "stand_still",
+    ]
     (case,) = plan.simulated
     left, recorded = case.build_rig().left, recording.rig.left
     assert (left.width_px, left.height_px) == (recorded.width_px, recorded.height_px)

@@ -25,7 +25,7 @@ from vobench.runner.estimate import LOG, estimate, read_outcome
 from vobench.runner.frames import ANSWERS, TIMES, read_table
 from vobench.runner.store import SilentProgress
 from vobench.sequence import SequenceWriter
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Trial
 from vobench.suite.source import RecordedCase, Source

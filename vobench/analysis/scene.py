@@ -11,7 +11,7 @@ from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture
 from vobench.scene.mesh import Triangles, distinct, open_edges, welded
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import FreeCircle, largest_free_circle
+from vobench.suite.free_space import FreeCircle, largest_free_circle
 
 EYE_HEIGHT_M = 1.2
 DIRECTIONS = 4096  # the number of random directions in which a survey looks for the backs of faces

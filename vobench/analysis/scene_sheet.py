@@ -16,7 +16,7 @@ from vobench.rendering.renderer import Renderer, single_instant
 from vobench.scene.material import reflectance, srgb
 from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import FreeCircle, downward_directions
+from vobench.suite.free_space import FreeCircle, downward_directions
 
 Rgb8 = NDArray[np.uint8]
 CELL_WIDTH_PX = 480

@@ -98,7 +98,7 @@ def shrink_trial(
     shrunk = _search(finished, run_plan, trials)
     suite = write_case(
         shrunk.case,
-        [finished.entrant],
+        [finished.estimator_entry],
         folder or Path("shrunk") / f"{score.case}_{score.estimator}",
         name=f"{score.case}_shrunk".replace("-", "_"),
         summary=_summary(score),

@@ -96,8 +96,8 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
     (folder / LOG).touch()
     with _keeper(folder) as keeper:
         try:
-            keeper.T_frame_left = _T_frame_left(sequence.rig, trial.entrant.manifest)
-            _check_needs(trial.entrant.manifest.needs, sequence)
+            keeper.T_frame_left = _T_frame_left(sequence.rig, trial.estimator_entry.manifest)
+            _check_needs(trial.estimator_entry.manifest.needs, sequence)
             running = _running(trial, recording, folder / LOG)
             _feed(trial, sequence, keeper, progress, running)
         except EstimatorFailure as failure:
@@ -115,15 +115,15 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
 
 def _running(trial: "Trial", recording: Path, log: Path) -> Running:
     """The trial's estimator, run as its manifest states."""
-    entrant = trial.entrant
-    manifest = entrant.manifest
-    limits = entrant.limits
+    estimator_entry = trial.estimator_entry
+    manifest = estimator_entry.manifest
+    limits = estimator_entry.limits
     hidden = _hidden(trial, recording)
     if manifest.oracle:
         return NoisyTruth(read_tum(recording / GROUND_TRUTH))
     if manifest.class_path:
         return EstimatorProcess.of_class(
-            entrant.folder,
+            estimator_entry.folder,
             manifest.class_path,
             name=manifest.name,
             log=log,
@@ -134,17 +134,17 @@ def _running(trial: "Trial", recording: Path, log: Path) -> Running:
     if manifest.stream:
         return EstimatorProcess.of_stream(
             manifest.stream,
-            entrant.folder,
+            estimator_entry.folder,
             log=log,
             limits=limits,
             rate_hz=rate_hz(t_ns),
             hidden=hidden,
         )
-    if entrant.mode == "real_time":
+    if estimator_entry.mode == "real_time":
         raise EstimatorFailure("refused", "it takes the whole recording at once, so it cannot go at the camera's pace")
     return CommandProgram(
         manifest.command,
-        entrant.folder,
+        estimator_entry.folder,
         log=log,
         limits=limits,
         out=manifest.out,
@@ -221,11 +221,11 @@ def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
 
 def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", estimator: Running) -> None:
     """Start the estimator, send it frame after frame, and write its answers. Raises EstimatorFailure."""
-    entrant = trial.entrant
+    estimator_entry = trial.estimator_entry
     with estimator as running:
-        running.start(sequence.rig, entrant.params, trial.repeat)
-        pace = _Pace(keeper, is_real_time=entrant.mode == "real_time")
-        frames = frames_of(sequence, entrant.manifest.needs, pace)
+        running.start(sequence.rig, estimator_entry.params, trial.repeat)
+        pace = _Pace(keeper, is_real_time=estimator_entry.mode == "real_time")
+        frames = frames_of(sequence, estimator_entry.manifest.needs, pace)
         for frame in progress.track(frames, trial.name, total=len(sequence)):
             answer = running.process(frame)
             keeper.keep(frame, answer)

@@ -25,7 +25,7 @@ from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.store import SILENT, Progress
 from vobench.suite import catalog
 from vobench.suite.case import Case
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Plan
 from vobench.suite.suite_spec import Suite
@@ -38,12 +38,12 @@ LEVELS_TO_RUN = 5
 
 @dataclass(frozen=True, slots=True)
 class FinishedTrial:
-    """A trial of a run with all that is needed to run it again: its case, its entrant and the suite of the run."""
+    """A trial of a run, with everything needed to repeat it: its case, its estimator and the suite of the run."""
 
     folder: RunFolder
     score: TrialScore
     case: Case
-    entrant: EstimatorEntry
+    estimator_entry: EstimatorEntry
     suite: Suite
 
     @property
@@ -65,8 +65,8 @@ def read_finished_trial(path: Path, *, estimator: Path | None = None, progress: 
     if score.status == NO_SEQUENCE:
         raise InputError(f"'{score.case}' has no sequence, as it could not be made: {score.reason}")
     case = read_simulated_case(folder, score.case)
-    entrant = _read_entrant(folder, score.estimator, estimator, progress)
-    return FinishedTrial(folder, score, case, entrant, _read_suite(folder))
+    estimator_entry = _read_estimator_entry(folder, score.estimator, estimator, progress)
+    return FinishedTrial(folder, score, case, estimator_entry, _read_suite(folder))
 
 
 def _find(path: Path) -> tuple[RunFolder, TrialScore]:
@@ -122,7 +122,7 @@ def _read_suite(folder: RunFolder) -> Suite:
         raise InputError(f"of another vobench, whose suites this one cannot read: {path}") from None
 
 
-def _read_entrant(folder: RunFolder, label: str, path: Path | None, progress: Progress) -> EstimatorEntry:
+def _read_estimator_entry(folder: RunFolder, label: str, path: Path | None, progress: Progress) -> EstimatorEntry:
     """The estimator with the parameters, limits and mode of the run. Raises UnknownNameError where it is not found."""
     listed = json.loads((folder.path / ESTIMATORS).read_bytes())
     facts = next(entry for entry in listed if entry["label"] == label)
@@ -142,7 +142,7 @@ def run_variants(trial: FinishedTrial, cases: Mapping[str, Case], *, name: str, 
     named = tuple(replace(case, name=key) for key, case in cases.items())
     suite = replace(trial.suite, name=name, repeats=1)
     source = YamlFile(trial.folder.path / SUITE, {})
-    plan = Plan(suite, named, (), (trial.entrant,), (), source)
+    plan = Plan(suite, named, (), (trial.estimator_entry,), (), source)
 
     mistakes = Mistakes(source)
     with mistakes.at():

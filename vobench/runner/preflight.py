@@ -63,12 +63,12 @@ class PlanSummary:
         """Each estimator with its version, the sensors that it needs, and its folder."""
         return [
             {
-                "estimator": entrant.label,
-                "version": entrant.manifest.version,
-                "needs": list(entrant.manifest.needs),
-                "path": str(entrant.folder),
+                "estimator": estimator_entry.label,
+                "version": estimator_entry.manifest.version,
+                "needs": list(estimator_entry.manifest.needs),
+                "path": str(estimator_entry.folder),
             }
-            for entrant in self.plan.entrants
+            for estimator_entry in self.plan.estimator_entries
         ]
 
     def found(self) -> list[dict[str, str]]:

@@ -39,7 +39,7 @@ from vobench.runner.store import Store, Tell, write_json
 from vobench.runner.task import Task, missing, plan
 from vobench.sequence import read_import_notes
 from vobench.suite.case import Case
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.plan import Plan
 from vobench.suite.source import RecordedCase
 from vobench.suite.yaml_file import plain
@@ -125,7 +125,7 @@ class _Gathering:
         self._failures = failures
         self._cases = {case.name: case for case in suite.cases}
         self._unmade = _unmade(scores, failures)
-        estimators = [_entrant_facts(entrant) for entrant in suite.entrants]
+        estimators = [_estimator_facts(entry) for entry in suite.estimator_entries]
         self.identity = {"suite": plain(suite.suite), "estimators": estimators}
 
     def require_sequences(self, *, require_all: bool) -> None:
@@ -252,14 +252,14 @@ def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> Non
     (target / SEQUENCE).symlink_to(sequence.resolve())
 
 
-def _entrant_facts(entrant: EstimatorEntry) -> dict[str, Any]:
-    manifest = entrant.manifest
+def _estimator_facts(estimator_entry: EstimatorEntry) -> dict[str, Any]:
+    manifest = estimator_entry.manifest
     return {
-        "label": entrant.label,
+        "label": estimator_entry.label,
         "name": manifest.name,
         "version": manifest.version,
-        "params": entrant.params,
-        "limits": asdict(entrant.limits),
-        "mode": entrant.mode,
-        "code": folder_digest(entrant.folder),
+        "params": estimator_entry.params,
+        "limits": asdict(estimator_entry.limits),
+        "mode": estimator_entry.mode,
+        "code": folder_digest(estimator_entry.folder),
     }

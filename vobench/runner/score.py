@@ -40,7 +40,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
     exact = (sequence / GROUND_TRUTH).read_text(encoding="utf-8")
     # The truth is read from the text that the run holds, so that anybody gets the same score from it.
     gt = parse_tum(scored_truth(exact, trial.case), name=GROUND_TRUTH)
-    claims = trial.entrant.claims
+    claims = trial.estimator_entry.claims
     est = read_tum(estimate / ESTIMATE)
     scored = score_estimate(est, gt, claims)
     stamps = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
@@ -52,7 +52,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
     score = TrialScore(
         case=trial.case.name,
         variant=trial.case.variant,
-        estimator=trial.entrant.label,
+        estimator=trial.estimator_entry.label,
         repeat=trial.repeat,
         status=status,
         reason=reason,

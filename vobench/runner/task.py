@@ -15,7 +15,7 @@ from vobench.runner.key import code_digest, digest, folder_digest, imported_by, 
 from vobench.runner.simulate import content, libraries
 from vobench.runner.store import Progress, SilentProgress, Store, write_json
 from vobench.suite.case import Case
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.plan import Plan, Trial
 from vobench.suite.scene_file import scene_content
 from vobench.suite.scene_spec import SceneFile
@@ -92,11 +92,11 @@ def plan(suite: Plan, recordings: "Mapping[str, Recording]") -> list[Task]:
             tasks.setdefault(key, task)
         return keys[-1]
 
-    code = {entrant.label: estimator_code(entrant) for entrant in suite.entrants}
+    code = {estimator_entry.label: estimator_code(estimator_entry) for estimator_entry in suite.estimator_entries}
     for case in suite.cases:
         sequence = add(*sequence_tasks(case, recordings))
         for trial in suite.trials(case):
-            add(score_task(trial, sequence, add(estimate_task(trial, sequence, code[trial.entrant.label]))))
+            add(score_task(trial, sequence, add(estimate_task(trial, sequence, code[trial.estimator_entry.label]))))
     return list(tasks.values())
 
 
@@ -127,21 +127,21 @@ def _import_task(case: RecordedCase, recording: "Recording") -> Task:
     return Task("import", case, inputs, ())
 
 
-def estimator_code(entrant: EstimatorEntry) -> dict[str, str]:
+def estimator_code(estimator_entry: EstimatorEntry) -> dict[str, str]:
     """Hashes of an estimator's folder, and of all code of vobench that runs it or that it imports."""
-    code = code_digest(*ENTRIES["estimate"], *imported_by(entrant.folder))
-    return {"estimator": folder_digest(entrant.folder), "code": code}
+    code = code_digest(*ENTRIES["estimate"], *imported_by(estimator_entry.folder))
+    return {"estimator": folder_digest(estimator_entry.folder), "code": code}
 
 
 def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
     """What lets an estimator run on the sequence of that key; `code` is its `estimator_code`."""
-    entrant = trial.entrant
+    estimator_entry = trial.estimator_entry
     needs = (sequence,)
     inputs = {
-        "params": entrant.params,
+        "params": estimator_entry.params,
         "repeat": trial.repeat,
-        "limits": asdict(entrant.limits),
-        "mode": entrant.mode,
+        "limits": asdict(estimator_entry.limits),
+        "mode": estimator_entry.mode,
         "needs": needs,
         **code,
         **_portable(),
@@ -155,8 +155,8 @@ def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
     inputs = {
         "case": trial.case.name,
         "variant": trial.case.variant,
-        "estimator": trial.entrant.label,
-        "claims": trial.entrant.claims,
+        "estimator": trial.estimator_entry.label,
+        "claims": trial.estimator_entry.claims,
         **_noise(trial.case),
         "repeat": trial.repeat,
         **_made_by("score", (sequence, estimate)),

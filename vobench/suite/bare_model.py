@@ -1,4 +1,4 @@
-"""A model file as a scene: with the model's own lights or suitable ones, and an exposure for their light."""
+"""Creates a scene from a model file: with the model's lights or default ones, and a suitable exposure."""
 
 import re
 from collections.abc import Sequence
@@ -13,26 +13,26 @@ from vobench.scene.mesh import areas_m2, corners
 from vobench.scene.scene import Scene
 from vobench.suite.scene_spec import ModelSpec, PointLamp, SceneFile, SkySpec, SunSpec
 
-# A larger model is taken to be in centimetres.
+# A larger model is probably in centimetres.
 LARGEST_M = 300.0
 CENTIMETRE = 0.01
 
-# The light of models that have none.
+# The lights of a scene whose model has none.
 DAYLIGHT_SUN = SunSpec(illuminance_lx=30_000, azimuth_deg=30, elevation_deg=50)
 DAYLIGHT_SKY = SkySpec(illuminance_lx=8_000, kind="clear")
-LEAST_OPEN = 0.1  # share of the sky that is visible from the floor of an outdoor scene
+LEAST_OPEN = 0.1  # the smallest share of the sky that is visible from the floor of an outdoor scene
 ROOM_LX = 400.0
 
-WHITEST = 0.9  # largest mean reflectance: at 1, light would be reflected for ever
-OTHER_REFLECTANCE = 0.5  # of mirrors and panes
+WHITEST = 0.9  # the largest mean reflectance; at 1, light would never be absorbed
+OTHER_REFLECTANCE = 0.5  # the reflectance of mirrors and panes
 LEAST_WHITE_CD_M2 = 1.0
 
 
 def bare_model_scene(path: Path) -> SceneFile:
-    """A model as a scene, exposed for a white wall in the mean light of the model.
+    """The scene of a model. Cameras are exposed for a white wall in the mean light of the model.
 
-    In a closed room of area A and mean reflectance r, lamps of total power P give an illuminance of P / (A (1 - r)),
-    bounces included.
+    In a closed room of area A and mean reflectance r, lamps of total power P give a mean illuminance of
+    P / (A (1 - r)), including interreflections.
     """
     from vobench.asset.model import read_model
 
@@ -79,8 +79,8 @@ def _daylight_lx(lights: Sequence[Light]) -> float:
 
 
 def _with_default_light(spec: SceneFile, shape: Scene, absorption_m2: float) -> SceneFile:
-    """The scene in daylight if its floor sees the sky, else with lamps below its ceiling."""
-    from vobench.suite.free_way import ceiling_above
+    """The scene with daylight if the sky is visible from its floor, and otherwise with lamps below its ceiling."""
+    from vobench.suite.free_space import ceiling_above
 
     sky_share, lamp_positions_m = ceiling_above(shape)
     if sky_share >= LEAST_OPEN:

@@ -9,7 +9,7 @@ from typing import Any
 from vobench.errors import SuiteError
 from vobench.setting import hints
 from vobench.suite import catalog, yaml_file
-from vobench.suite.entrant import EntrantReader
+from vobench.suite.estimator_entry import EstimatorEntryReader
 from vobench.suite.lookup import Lookup
 from vobench.suite.plan import Plan
 from vobench.suite.scenario_case import ScenarioCases
@@ -50,8 +50,8 @@ def _require_axes(content: Mapping[str, Any], mistakes: Mistakes) -> None:
 def _plan(suite: Suite, mistakes: Mistakes, only_estimators: tuple[str, ...]) -> Plan:
     """The plan of a suite of which entries or sections may be missing. Raises SuiteError with all mistakes."""
     lookup = Lookup(mistakes.source.path.resolve())
-    entrant_reader = EntrantReader(suite, mistakes, lookup)
-    entrants = entrant_reader.only(only_estimators) if only_estimators else entrant_reader.all()
+    estimator_reader = EstimatorEntryReader(suite, mistakes, lookup)
+    estimator_entries = estimator_reader.only(only_estimators) if only_estimators else estimator_reader.all()
 
     axis_reader = AxisReader(suite, mistakes, lookup)
     scenes = axis_reader.scenes()
@@ -68,7 +68,7 @@ def _plan(suite: Suite, mistakes: Mistakes, only_estimators: tuple[str, ...]) ->
     mistakes.require_none()
     axis_cases = [axis_reader.case(variant, axes, replayed) for variant in variants]
     simulated = (*axis_cases, *scenario_cases)
-    return Plan(suite, simulated, recorded, entrants, tuple(lookup.entries), mistakes.source)
+    return Plan(suite, simulated, recorded, estimator_entries, tuple(lookup.entries), mistakes.source)
 
 
 def _require_distinct(names: list[str]) -> None:

@@ -115,7 +115,7 @@ class AxisReader:
 
     def _default_trajectories(self, scenes: dict[str, SceneFile]) -> dict[str, Any]:
         """A circle in the free space of each scene."""
-        from vobench.suite.free_way import circular_path
+        from vobench.suite.free_space import circular_path
         from vobench.suite.scene_build import build
 
         trajectories = dict[str, Any]()
