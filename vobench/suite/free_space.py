@@ -1,4 +1,4 @@
-"""The free space on the floor of a scene, found by ray casting: its largest free circle, and a path in it."""
+"""Finds the free space on the floor of a scene by ray casting: the largest free circle, and a path in it."""
 
 from dataclasses import dataclass
 
@@ -15,22 +15,22 @@ from vobench.scene.scene import Scene, triangles
 
 Mask = NDArray[np.bool_]
 
-# The floor: nearly level faces at one height, to within a step.
+# The floor consists of nearly level faces at the same height, up to FLOOR_STEP_M.
 LEVEL = 0.99  # cosine of the steepest level face
 FLOOR_STEP_M = 0.02
-FLOOR_SHARE = 0.4  # of the largest level area at one height, which the floor has at least
+FLOOR_SHARE = 0.4  # the smallest area of the floor, relative to the largest level area at any height
 
 # The map of the floor, and the height of a body.
 CELL_M = 0.1
-MOST_CELLS = 600  # along one side
+MOST_CELLS = 600  # the largest number of cells along one side
 BODY_M = 0.6
 WALL_HEIGHTS_M = (0.1, 0.35, 0.6)  # where horizontal rays look for walls
 SIDES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # (4, 3) unit directions
 
 # The circular path of a body.
-LEAST_RADIUS_M = 0.2  # of the free circle
-MOST_RADIUS_M = 4.0  # of the path
-SHARE_OF_CIRCLE = 0.6  # radius of the path relative to the free circle's
+LEAST_RADIUS_M = 0.2  # the smallest radius of the free circle
+MOST_RADIUS_M = 4.0  # the largest radius of the path
+SHARE_OF_CIRCLE = 0.6  # the radius of the path relative to that of the free circle
 MOST_LENGTH_M = 10.0
 CORNERS = 16
 SPEED_MPS = 0.5
@@ -39,9 +39,9 @@ EASE_S = 1.0
 
 # Lamps below a ceiling.
 SKY_RAYS = 512
-LAMP_BELOW = 0.35  # of the ceiling's height; a lamp near the ceiling overexposes the ceiling
-LAMP_SPACING = 2.5  # in heights of the ceiling
-MOST_LAMPS = 4  # along one side
+LAMP_BELOW = 0.35  # the distance of a lamp from the ceiling, which it would overexpose, relative to the height
+LAMP_SPACING = 2.5  # the distance between lamps, relative to the height of the ceiling
+MOST_LAMPS = 4  # the largest number of lamps along one side
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,16 +79,16 @@ class _FloorMap:
 
 
 def largest_free_circle(faces: Triangles, caster: RayCaster) -> FreeCircle | None:
-    """The largest circle on the floor with nothing above it that is lower than a body's height; None if there is none.
+    """The largest circle on the floor with nothing above it up to the height of a body; None if there is none.
 
-    The floor is the lowest height with much level area, because roofs and upper storeys may have more of it.
+    The floor is at the lowest height with a large level area, because roofs and upper storeys may be larger.
     """
     floor = _floor_map(faces, caster)
     return floor.largest_circle() if floor else None
 
 
 def _floor_map(faces: Triangles, caster: RayCaster) -> _FloorMap | None:
-    """The map of the floor; None if the scene has no level face."""
+    """The map of the floor; None if the scene has no level faces."""
     is_level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
     if not is_level.any():
         return None
@@ -107,7 +107,7 @@ def _floor_map(faces: Triangles, caster: RayCaster) -> _FloorMap | None:
     if not x_m.size or not y_m.size:
         return None
 
-    # A cell is free if a ray from a body's height meets the floor first, and no wall is near.
+    # A cell is free if a ray down from the height of a body hits the floor first, and if no wall is near.
     centres_m = np.stack(np.meshgrid(x_m, y_m), -1).reshape(-1, 2)  # (H * W, 2)
     starts_m = _at_height(centres_m, floor_m + BODY_M)
     hits = caster.hits(starts_m, downward_directions(len(starts_m)))
@@ -118,7 +118,10 @@ def _floor_map(faces: Triangles, caster: RayCaster) -> _FloorMap | None:
 
 
 def _floor_height_m(level_corners_m: Array, height_steps: NDArray[np.int_]) -> float:
-    """The lowest height of level faces (F, 3, 3) with a large enough area; `height_steps` (F,) are their heights."""
+    """The lowest height at which level faces (F, 3, 3) have a large enough area.
+
+    `height_steps` (F,) are the heights of the faces in units of FLOOR_STEP_M.
+    """
     lowest_step = height_steps.min()
     area_by_step_m2 = np.bincount(height_steps - lowest_step, areas_m2(level_corners_m))
     large_steps = np.flatnonzero(area_by_step_m2 > FLOOR_SHARE * area_by_step_m2.max())
@@ -126,14 +129,14 @@ def _floor_height_m(level_corners_m: Array, height_steps: NDArray[np.int_]) -> f
 
 
 def _at_height(places_m: Array, z_m: float) -> Array:
-    """Points (N, 3) at one height above places (N, 2)."""
+    """The points (N, 3) at one height above places (N, 2)."""
     return np.column_stack([places_m, np.full(len(places_m), z_m)])
 
 
 def _away_from_walls(centres_m: Array, floor_m: float, cell_m: float, faces: Triangles, caster: RayCaster) -> Mask:
-    """Which cells (N, 2) have no wall within a cell's width, and are not inside a thing.
+    """Whether each cell (N, 2) has no wall within the width of a cell, and is not inside of a thing.
 
-    A point is inside a thing if rays to all sides hit faces from behind.
+    A point is inside of a thing if rays to all four sides hit the backs of faces.
     """
     is_clear = np.ones(len(centres_m), bool)
     for height_m in WALL_HEIGHTS_M:
@@ -154,9 +157,9 @@ def downward_directions(count: int) -> Array:
 
 
 def circular_path(scene: Scene) -> PoseSpline:
-    """A path around the centre of the scene's largest free circle, of a body that looks ahead.
+    """A circular path around the centre of the largest free circle of a scene. The body looks ahead.
 
-    Raises SuiteError if the free circle is too small, or there is no floor.
+    Raises SuiteError if the free circle is too small, or if there is no floor.
     """
     faces = triangles(scene, t_ns=0)
     free = largest_free_circle(faces, RayCaster(faces))
@@ -177,7 +180,7 @@ def _no_path(scene: Scene, reason: str) -> SuiteError:
 
 
 def _pose_on_circle(free: FreeCircle, radius_m: float, angle_rad: float) -> Pose:
-    """The pose on a circle around the centre of the free circle, along its tangent."""
+    """The pose at an angle of a circle around the centre of the free circle, along the tangent."""
     x_m = free.x_m + radius_m * float(np.cos(angle_rad))
     y_m = free.y_m + radius_m * float(np.sin(angle_rad))
     return Pose(
@@ -188,10 +191,10 @@ def _pose_on_circle(free: FreeCircle, radius_m: float, angle_rad: float) -> Pose
 
 
 def ceiling_above(scene: Scene) -> tuple[float, list[tuple[float, float, float]]]:
-    """The share of the sky that a body on the floor sees, and the positions of lamps below the ceiling.
+    """The share of the sky that is visible from the floor, and the positions of lamps below the ceiling.
 
-    There is one lamp above the free circle, or in a hall that is much wider than high a grid of them. In a scene
-    without a floor, all of the sky is visible.
+    There is one lamp above the free circle, or a grid of lamps in a hall that is much wider than high. In a scene
+    without a floor, the whole sky is visible.
     """
     faces = triangles(scene, t_ns=0)
     caster = RayCaster(faces)
@@ -209,7 +212,7 @@ def ceiling_above(scene: Scene) -> tuple[float, list[tuple[float, float, float]]
     places_m = _grid_places(floor, LAMP_SPACING * (BODY_M + height_m))
     starts_m = _at_height(places_m, eye_m[2]) if len(places_m) > 1 else eye_m[None]
 
-    # Where no ceiling is above a place, the one above the circle counts.
+    # A place without a ceiling gets the height of the ceiling above the circle.
     ceiling = caster.hits(starts_m, -downward_directions(len(starts_m)))
     clearance_m = np.where(ceiling.face < 0, height_m, ceiling.distance)
     lamps_m = starts_m - (1 - LAMP_BELOW) * clearance_m[:, None] * downward_directions(1)
@@ -217,7 +220,7 @@ def ceiling_above(scene: Scene) -> tuple[float, list[tuple[float, float, float]]
 
 
 def _upward_directions() -> Array:
-    """Random directions (SKY_RAYS, 3) of the upper hemisphere, the same in every run."""
+    """Random directions (SKY_RAYS, 3) in the upper hemisphere, which are the same in every run."""
     directions = np.abs(np.random.default_rng(0).standard_normal((SKY_RAYS, 3)))
     signs = np.sign(np.random.default_rng(1).standard_normal((SKY_RAYS, 2)))
     directions[:, :2] *= signs
@@ -225,7 +228,7 @@ def _upward_directions() -> Array:
 
 
 def _grid_places(floor: _FloorMap, spacing_m: float) -> Array:
-    """Free places (N, 2) on a regular grid of about some spacing: in each part of the floor, the most central cell."""
+    """Free places (N, 2) on an approximately regular grid: the most central free cell of each part of the floor."""
     cells = np.argwhere(floor.free)[:, ::-1]  # (N, 2) column and row
     size_cells = np.array(floor.free.shape[::-1])
     part_count = np.clip(np.rint(size_cells * floor.cell_m / spacing_m), 1, MOST_LAMPS)  # along x and y
