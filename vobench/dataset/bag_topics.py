@@ -1,4 +1,4 @@
-"""Which topics of a bag hold the left and right pictures, the IMU's readings and the ground truth."""
+"""Selects the topics of a bag with the left and right pictures, the IMU readings and the ground truth."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ INFO = "sensor_msgs/msg/CameraInfo"
 IMU = "sensor_msgs/msg/Imu"
 COUNTED_FROM_0 = ("cam", "camera", "image", "cam_", "camera_", "image_", "video", "fisheye")
 COUNTED_FROM_1 = ("cam", "camera", "image", "cam_", "camera_", "infra", "fisheye")
-# The parts of topics' names that tell left from right.
+# The parts of topic names that distinguish left from right.
 SIDES = (
     ("left", "right"),
     *((f"{name}0", f"{name}1") for name in COUNTED_FROM_0),
@@ -27,7 +27,7 @@ Types = Mapping[str, str]  # message type by topic
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The topics to read; None for those that a bag does not have."""
+    """The topics to read; None for what a bag does not contain."""
 
     left: str
     right: str | None
@@ -39,25 +39,25 @@ class Chosen:
 
     @property
     def sensors(self) -> list[str]:
-        """The topics of cameras, their calibration and the IMU."""
+        """The topics of the cameras, of their calibration, and of the IMU."""
         topics = (self.left, self.right, self.left_info, self.right_info, self.imu)
         return [topic for topic in topics if topic]
 
     @property
     def truth_topic(self) -> str:
-        """The topic of the truth, without the frames of a transform; empty where there is none."""
+        """The topic of the truth, without the frames of a transform; empty if there is none."""
         return (self.truth or "").partition(":")[0]
 
     @property
     def truth_frames(self) -> str:
-        """The frames `parent.child` of a truth among transforms; empty where they are not named."""
+        """The frames `parent.child` of a truth that is a transform; empty if they are not given."""
         return (self.truth or "").partition(":")[2]
 
 
 def choose(types: Types, topics: Topics, path: str) -> Chosen:
-    """The topics that are named; each other one is chosen if the bag has exactly one that fits.
+    """The topics that are given, and for the others, the only topic of the bag that fits.
 
-    Raises InputError for a topic that the bag lacks, and where no or several topics of pictures fit.
+    Raises InputError for a given topic that the bag does not contain, and if no or several topics of pictures fit.
     """
     left, right = _picture_topics(types, topics, path)
     for topic, message_type in ((topics.left_info, INFO), (topics.right_info, INFO), (topics.imu, IMU)):
@@ -106,13 +106,13 @@ def _undecided(types: Types, with_pictures: list[str], path: str) -> InputError:
 
 
 def _only_partner(left_topic: str, with_pictures: list[str]) -> str | None:
-    """The right topic of a left one; None where none or several fit."""
+    """The right topic for a left topic; None unless exactly one fits."""
     partners = [right for left, right in _pairs(with_pictures) if left == left_topic]
     return partners[0] if len(partners) == 1 else None
 
 
 def _pairs(with_pictures: list[str]) -> list[tuple[str, str]]:
-    """Topics of pictures whose names differ as left from right, each pair once."""
+    """The pairs of topics of pictures whose names differ only in left and right, without duplicates."""
     pairs = []
     for topic in with_pictures:
         if _contains(topic, NO_PICTURES):
@@ -129,7 +129,7 @@ def _contains(topic: str, words: tuple[str, ...]) -> bool:
 
 
 def _info_of(types: Types, picture_topic: str) -> str | None:
-    """The camera_info nearest to a topic of pictures, going up by its slashes."""
+    """The camera_info topic of a topic of pictures: the first one found in its namespace, or a parent of that."""
     parts = picture_topic.split("/")
     for end in range(len(parts), 0, -1):
         name = "/".join([*parts[:end], "camera_info"])
@@ -167,7 +167,7 @@ def _require(
     allowed: tuple[str, ...],
     path: str,
 ) -> None:
-    """Raise InputError unless a topic is there and has one of the allowed message types."""
+    """Raise InputError unless a topic exists and has one of the allowed message types."""
     if topic not in types:
         raise InputError(f"no topic {topic!r} in {path}; its topics: {_listed(types)}")
     if types[topic] not in allowed:

@@ -85,11 +85,11 @@ def convert(
             write()
 
 
-Writes = Iterator[tuple[int, Callable[[], None]]]  # a stamp in ns, and the call that writes what has it
+Writes = Iterator[tuple[int, Callable[[], None]]]  # stamps in ns, and calls that write the data of the stamp
 
 
 def _reading_writes(writer: SequenceWriter, recording: Recording) -> Iterator[Writes]:
-    """The readings of the IMU and of the encoders."""
+    """The writes of the readings of the IMU and of the encoders."""
     if imu := recording.imu:
         yield ((int(t), partial(_write_imu, writer, imu, index)) for index, t in enumerate(imu.t_ns))
     if encoders := recording.encoders:
@@ -103,7 +103,7 @@ def _write_imu(writer: SequenceWriter, imu: ImuReadings, index: int) -> None:
 
 
 def _picture_writes(writer: SequenceWriter, recording: Recording) -> Writes:
-    """The pictures, each with its exposure. Raises InputError where their number differs from the recording's."""
+    """The writes of the pictures, each with its exposure. Raises InputError for a wrong number of pictures."""
     exposed_ns, settings = recording.exposures or ((), ())
     exposure_of = dict(zip(map(int, exposed_ns), settings, strict=True))
     count = 0

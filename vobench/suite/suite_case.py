@@ -19,9 +19,9 @@ from vobench.suite.suite_spec import Suite
 from vobench.suite.trajectory import read_replayed, read_times
 from vobench.suite.yaml_source import Mistakes
 
-USUAL_RIG = "ahead"  # name of the rig of suites that have none
+USUAL_RIG = "ahead"  # the name of the default rig
 USUAL_PITCH_DEG = 10
-SHARED_SETTINGS = ("rendering", "truth", "truth_noise", "frames", "seed")  # of all cases of a suite
+SHARED_SETTINGS = ("rendering", "truth", "truth_noise", "frames", "seed")  # the same for all cases of a suite
 
 Axes = dict[str, Mapping[str, Any]]  # the variants of each axis by name, in the order of AXES
 
