@@ -1,7 +1,7 @@
-"""What scenes are made of: textures, shapes, furniture, rooms, and models from files."""
+"""The parts of scenes: textures, shapes, furniture, rooms, and models from files."""
 
-# Names that a scene's YAML may say, for those who need no more than the names: kinds of furniture, finishes of rooms
-# (both of `asset.room`), roles of a model's nodes, endings of models' files.
+# The names that a scene's YAML file can use, for code that must not import the modules that define them: kinds of
+# furniture and finishes (`asset.room`), roles of a model's nodes, and suffixes of model files (`asset.model`).
 # fmt: off
 FURNITURE = (
     "bench", "blind", "bollard", "book_stack", "bush", "cabinet", "cables", "car", "carton", "chair", "crate",

@@ -1,4 +1,4 @@
-"""OBJ, STL and PLY files, converted to .glb by trimesh."""
+"""Converts OBJ, STL and PLY files to .glb with trimesh."""
 
 import re
 from collections.abc import Iterator
@@ -22,12 +22,12 @@ def read_as_glb(path: Path) -> bytes:
             if mesh.visual.kind == "texture":
                 _without_metal(mesh.visual)
         return bytes(trimesh.exchange.gltf.export_glb(scene))  # type: ignore[no-untyped-call]
-    except Exception as error:  # trimesh raises all kinds
+    except Exception as error:  # trimesh raises errors of many types
         raise ModelError(f"trimesh cannot read it ({error or type(error).__name__}); export it as .glb") from error
 
 
 def _without_metal(visual: object) -> None:
-    """Replace the material of a visual by a physically based one that is not a metal; a texture is not tinted."""
+    """Replace the material of a visual by a physically based one that is not a metal and does not tint its texture."""
     material = visual.material  # type: ignore[attr-defined]
     physical = material.to_pbr()
     physical.name = getattr(material, "name", None)
@@ -38,7 +38,7 @@ def _without_metal(visual: object) -> None:
 
 
 def _require_readable(path: Path) -> None:
-    """Raise ModelError for too many faces, before trimesh reads any, and for an OBJ with missing files."""
+    """Raise ModelError for a file with too many faces, before trimesh reads it, and for an OBJ with missing files."""
     data = path.read_bytes()
     kind = path.suffix.lower()
     if kind == ".obj":
@@ -65,7 +65,7 @@ def _require_beside(folder: Path, obj: bytes) -> None:
 
 
 def _files_needed(folder: Path, obj: bytes) -> Iterator[str]:
-    """The names of the material files of an OBJ, then of the pictures that each of them uses."""
+    """The names of the material files of an OBJ, and of the pictures that they use."""
     libraries = [_text(name) for name in re.findall(rb"^mtllib\s+(.+?)\s*$", obj, re.M)]
     yield from libraries
     for library in libraries:

@@ -1,4 +1,4 @@
-"""Sequences of vobench: read as a recording, and any recording written as one, a pair of pictures at a time."""
+"""Reads sequences of vobench as recordings, and writes recordings as sequences."""
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -18,7 +18,7 @@ LEFT_OUT = "The sequence's case, true rig, true velocities and per-pixel ground 
 
 
 def is_sequence(path: Path) -> bool:
-    """Whether a path is a sensors.mcap or a folder with one, which may be unfinished or damaged."""
+    """Whether a path is a sensors.mcap or a folder that contains one. The file may be incomplete or damaged."""
     sensors = path / SENSORS_FILE if path.is_dir() else path
     if sensors.name != SENSORS_FILE:
         return False
@@ -26,7 +26,7 @@ def is_sequence(path: Path) -> bool:
 
 
 def read_own(path: Path, _options: ReadOptions) -> Recording:
-    """The sensors' messages of a sequence, and its true path. Raises SequenceError."""
+    """The sensor readings and the true trajectory of a sequence. Raises SequenceError."""
     folder = path.parent if path.is_file() else path
     sequence = Sequence.open(folder)
     frames_ns = sequence.frame_stamps()
@@ -63,7 +63,7 @@ def convert(
     *,
     provenance: Mapping[str, str] | None = None,
 ) -> None:
-    """Write a recording as a sequence: stamps exactly, 8-bit grey pictures bit for bit. Raises VobenchError."""
+    """Write a recording as a sequence. Stamps and 8-bit grey pictures are not changed. Raises VobenchError."""
     notes = {"form": recording.form}
     for index, note in enumerate(recording.notes, 1):
         notes[f"note_{index:02d}"] = note
@@ -76,10 +76,10 @@ def convert(
         notes=notes,
         provenance=provenance,
     ) as writer:
-        if truth := recording.truth:  # without a twist, which is not known
+        if truth := recording.truth:  # the twist is unknown
             for t_ns, T_world_body in zip(truth.t_ns.tolist(), truth.T_world_frame, strict=True):
                 writer.write_truth(t_ns, T_world_body, None)
-        # Readings come before the picture of their stamp: `merge` keeps the order of streams at equal stamps.
+        # `merge` keeps the order of streams at equal stamps, so a reading comes before the picture with its stamp.
         streams = [*_reading_writes(writer, recording), _picture_writes(writer, recording)]
         for _, write in merge(*streams, key=itemgetter(0)):
             write()
