@@ -1,9 +1,9 @@
 """Ranks of estimators and their significance: paired tests over cases and repeats, rank intervals, required repeats.
 
-A trial counts by its loss, 1 minus the lost-aware score, which is about the error as a share of the path. Estimators
+The loss of a trial is 1 minus the lost-aware score, which is approximately the error as a share of the path. Estimators
 are ordered by the share of failed trials, then by the geometric mean of the loss, which no single case dominates.
 
-Symbols: E estimators, C cases, R repeats. A unit is one case and one repeat; estimators are compared in pairs on units.
+Symbols: E estimators, C cases, R repeats. A unit is one repeat of one case. Pairs of estimators are compared on units.
 """
 
 from collections.abc import Sequence
@@ -21,27 +21,27 @@ from vobench.geometry.se3 import Array
 
 Mask = NDArray[np.bool_]
 
-ALPHA = 0.05  # significance level of intervals, and of tests within a case
+ALPHA = 0.05  # the significance level of intervals, and of tests within a case
 INTERVAL = (ALPHA / 2, 1 - ALPHA / 2)
-DECIDED = 0.02  # of tests of neighbours: stricter, so that at most 5 in 100 boards decide between two equal estimators
-RESAMPLES = 1000  # of the bootstrap
-FLIPS = 4095  # random sign patterns of a permutation test with too many units to try all
-EXACT_UNITS = 12  # up to here all sign patterns are tried
-MANY_UNITS = 200  # above it the sum is taken as normal
-MIN_UNITS = 7  # with fewer no permutation of signs has a p-value below 2 %
-MIN_TRIALS = 4  # of each of two on one case, for the same reason
+DECIDED = 0.02  # that of tests of neighbours: at most 5 in 100 boards then decide between two equal estimators
+RESAMPLES = 1000  # the number of resamples of the bootstrap
+FLIPS = 4095  # the number of random sign patterns of a permutation test, if there are too many to try all
+EXACT_UNITS = 12  # the largest number of units for which all sign patterns are tried
+MANY_UNITS = 200  # the sum over more units is assumed to be normal
+MIN_UNITS = 7  # with fewer units, no permutation of signs has a p-value below 2 %
+MIN_TRIALS = 4  # the smallest number of trials of each of two estimators on one case, for the same reason
 MIN_LOSS = 1e-9
 MIN_LOSS_RATIO_RANGE = 1e-9  # an interval narrower than this is a single value
 EFFECT = 1.1  # the ratio of losses that the required repeats would detect
 POWER = 0.95
 MAX_REPEATS = 10_000
-DIGITS = 12  # decimals at which means count as equal
-ROUNDING = 1e-15  # spread of equal differences
+DIGITS = 12  # the number of decimals to which means are compared
+ROUNDING = 1e-15  # the largest spread of differences that count as equal
 
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """The rank of one estimator and its uncertainty; what too few units cannot show is None.
+    """The rank of one estimator and its uncertainty. Values that require more units are None.
 
     `place` counts from 1, and `places` is its 95 % interval. `loss_ratio` is the mean loss relative to the first's,
     with its 95 % interval `ratio_interval`. `p_above` is the p-value of the difference to the estimator ranked above,
@@ -65,18 +65,18 @@ def trial_loss(lost_aware: float | None, *, survived: bool) -> float:
     """A trial's loss in (0, 1], 1 minus its lost-aware score; at least 1/2 for a failed trial, whatever its score."""
     score = lost_aware if lost_aware is not None else 0.5 * survived
     if not survived and score >= 0.5:
-        score -= 0.5  # it was scored as a survivor, by its poses alone
+        score -= 0.5  # the score of its poses counted it as survived
     return max(1.0 - score, MIN_LOSS)
 
 
 class _Criterion(NamedTuple):
-    """Values of trials and their weights, both (E, C, R), in the means that order estimators."""
+    """A criterion that orders estimators: the values of trials and their weights in the mean, both (E, C, R)."""
 
     values: Array
     weights: Array
 
     def means(self) -> Array:
-        """The weighted mean (E,) of each estimator, rounded so that equal ones are equal."""
+        """The weighted mean (E,) of each estimator, rounded so that rounding errors do not order estimators."""
         means = np.einsum("ecr,ecr->e", self.values, self.weights)
         return np.asarray(np.round(means, DIGITS))
 
@@ -87,7 +87,7 @@ class _Trials:
     def __init__(self, loss: Array, failed: Array) -> None:
         has_loss = ~np.isnan(loss)
         log_loss = np.log(np.where(has_loss, np.maximum(loss, MIN_LOSS), 1.0))
-        # One more failed trial outweighs any difference of losses.
+        # One additional failed trial outweighs any difference of losses.
         failure_cost = 100.0 * max(loss[0].size, 1)
 
         self.exists = ~np.isnan(failed)
@@ -96,7 +96,7 @@ class _Trials:
         self.criteria = (self.failures, self.losses)
 
     def has_enough(self, *estimators: int) -> bool:
-        """Whether all of these estimators share enough units to decide anything."""
+        """Whether the estimators have enough units in common for a decision."""
         is_shared = self.exists[list(estimators)].all(axis=0)
         return int(is_shared.sum()) >= MIN_UNITS
 
@@ -156,10 +156,10 @@ class _Trials:
 
 
 def rank(loss: Array, failed: Array, *, seed: int = 1) -> list[Standing]:
-    """Standings of estimators, best first, by the `loss` and `failed` (E, C, R) of their trials.
+    """The standings of estimators, best first, from the `loss` and `failed` (E, C, R) of their trials.
 
-    `failed` is 1 or 0, NaN if there is no such trial; `loss` is also NaN for a trial without one, as in a case whose
-    ground truth is stationary. Means are over cases, within a case over repeats: pass cases that all estimators have.
+    `failed` is 1 or 0, or NaN for a missing trial. `loss` is also NaN for a trial without a loss, for example if the
+    ground truth is stationary. Means are taken over repeats, and then over cases. All estimators must have the cases.
     """
     trials = _Trials(loss, failed)
     failures = trials.failures.means()
@@ -220,7 +220,7 @@ def _interval(draws: Array) -> Array:
 
 
 def _shared_places(failures: Array, losses: Array) -> list[int]:
-    """Places from 1 of estimators in order, with means (E,); equal ones share the first of their places."""
+    """The places, from 1, of ordered estimators with means (E,). Equal estimators share the first of their places."""
     places = list[int]()
     means = list(zip(failures.tolist(), losses.tolist(), strict=True))
     for position, mean in enumerate(means):
@@ -232,7 +232,8 @@ def _shared_places(failures: Array, losses: Array) -> list[int]:
 def permutation_p(differences: Array, rng: np.random.Generator) -> float:
     """Two-sided p-value of the sum of paired differences (N,), whose signs are random under the null hypothesis.
 
-    All signs are tried up to 12 differences, otherwise 4,095 random patterns; above 200 the sum is taken as normal.
+    All signs are tried for up to 12 differences, and 4,095 random patterns for more. Above 200, the sum is assumed to
+    be normal.
     scipy.stats.permutation_test draws other patterns, which would change the printed p-values.
     Source: Fisher (1935), section 21.
     """
@@ -252,7 +253,7 @@ def permutation_p(differences: Array, rng: np.random.Generator) -> float:
         observed_signs = np.ones((1, n))
         signs = np.concatenate([observed_signs, 1.0 - 2.0 * is_flipped])
     sums = np.abs(signs @ differences)
-    observed = sums[0] * (1 - 1e-12) - 1e-300  # equal sums must count as such in spite of rounding
+    observed = sums[0] * (1 - 1e-12) - 1e-300  # the margin makes sums equal that differ by rounding errors
     return float(np.mean(sums >= observed))
 
 
@@ -271,7 +272,7 @@ def holm(p_values: list[float]) -> list[float]:
 
 
 def _place_intervals(ranked_means: Array, decided: list[bool], *, is_enough: bool) -> list[tuple[int, int]]:
-    """First and last place of each ranked estimator, over 95 % of draws (B, E) and including undecided neighbours."""
+    """The first and last place of each ranked estimator in 95 % of draws (B, E), including undecided neighbours."""
     n = ranked_means.shape[1]
     if not is_enough:
         return [(1, n)] * n
@@ -292,10 +293,11 @@ def _place_intervals(ranked_means: Array, decided: list[bool], *, is_enough: boo
 
 
 def repeats_to_decide(differences: Array, *, tests: int = 1) -> int | None:
-    """Repeats that detect a ratio of 1.1 with a power of 95 %, from differences (C, R) of log losses of a pair.
+    """The number of repeats that detect a ratio of losses of 1.1 with a power of 95 %.
 
-    Repeats average the variance within a case, not that between cases: if an F test shows the latter and it hides
-    the ratio, more cases are needed and the result is None. NaN marks a missing trial.
+    `differences` (C, R) are the differences between the log losses of two estimators; NaN marks a missing trial.
+    Repeats reduce the variance within cases, but not that between cases. The result is None if an F test shows a
+    variance between cases that hides the ratio, because more cases are needed then.
     """
     n_cases = len(differences)
     trials_per_case = np.sum(~np.isnan(differences), axis=1)
@@ -317,7 +319,7 @@ def repeats_to_decide(differences: Array, *, tests: int = 1) -> int | None:
 
     n_tests = max(tests, 1)
     z = special.ndtri(POWER) - special.ndtri(DECIDED / 2 / n_tests)
-    allowed = (np.log(EFFECT) / z) ** 2  # variance of the mean difference
+    allowed = (np.log(EFFECT) / z) ** 2  # the largest variance of the mean difference
     left = allowed - between / n_cases
     if left <= 0:
         return None
@@ -335,7 +337,7 @@ def _variance_between_cases(
     degrees_of_freedom: int,
     trials: float,
 ) -> float:
-    """The variance of case means beyond that which repeats explain; 0 if an F test does not show any."""
+    """The variance of case means that repeats do not explain; 0 if an F test does not detect it."""
     if not degrees_of_freedom:
         return 0.0
     if within == 0:
@@ -348,25 +350,26 @@ def _variance_between_cases(
 
 
 def mean_places(loss: Array, failed: Array) -> Array:
-    """Each estimator's place (E,) in a case, by failed trials and then the median loss, averaged over cases.
+    """The place (E,) of each estimator, by failed trials and then by median loss, averaged over cases.
 
     Equal estimators share the mean of their places. `loss` and `failed` (E, C, R) are those of `rank`.
     """
     has_no_loss = np.isnan(loss).all(axis=2, keepdims=True)
     median_loss = np.nanmedian(np.where(has_no_loss, 0.0, loss), axis=2)
     failed_share = np.nanmean(failed, axis=2)
-    key = np.round(10.0 * failed_share + median_loss, DIGITS)  # no loss is more than 1
+    key = np.round(10.0 * failed_share + median_loss, DIGITS)  # a loss is at most 1
     better = (key < key[:, None]).sum(axis=1)
-    equal = (key == key[:, None]).sum(axis=1)  # itself included
+    equal = (key == key[:, None]).sum(axis=1)  # including the estimator itself
     case_places = better + (equal + 1) / 2
     places: Array = case_places.mean(axis=1)
     return places
 
 
 def difference_p(a: Array, b: Array) -> float:
-    """Two-sided p-value of values (N,) and (M,) of two estimators on one case; 1 with fewer than four of either.
+    """The two-sided p-value of the difference between values (N,) and (M,) of two estimators on one case.
 
-    Only their order counts, so infinity may stand for a failure. Unlike scipy.stats.mannwhitneyu it is exact with ties.
+    It is 1 if either estimator has fewer than four values. Only the order of values matters, so infinity can represent
+    a failure. Unlike scipy.stats.mannwhitneyu, the test is exact with ties.
     Source: Mann and Whitney (1947).
     """
     if min(len(a), len(b)) < MIN_TRIALS:
