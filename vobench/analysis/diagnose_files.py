@@ -1,4 +1,4 @@
-"""What is wrong between two trajectory files, and the command that scores them without it."""
+"""Finds faults between two trajectory files, and the command that scores them with the faults corrected."""
 
 import shlex
 from collections.abc import Sequence
@@ -35,7 +35,7 @@ class FileDiagnosis:
 
     @property
     def command(self) -> str | None:
-        """The `vobench score` command that corrects all findings; None without any, or for unrelated files."""
+        """The `vobench score` command that corrects all findings; None without findings or for unrelated files."""
         return self._command_for(self.findings)
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""A recording repeated in simulation: the suite that repeats it, and how far estimators agree on both."""
+"""Repeats a recording in simulation, and measures how far estimators agree on both."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -76,7 +76,7 @@ QUANTILES = (0.1, 0.5, 0.9)
 class TwinSuite:
     """The suite of a recording and its twin, written to a folder.
 
-    `file` is the suite, `placement` where the recorded path is in the scene, and `realism` that of the recording.
+    `file` is the suite, `placement` the pose of the recorded path in the scene, and `realism` that of the recording.
     """
 
     file: Path
@@ -86,7 +86,7 @@ class TwinSuite:
 
 @dataclass(frozen=True, slots=True)
 class TwinReport:
-    """How far a recording and its twin agree: on the order of estimators, on their errors, and on the images.
+    """The agreement of a recording and its twin: the order of estimators, their errors, and the images.
 
     `errors` are those of segments (8, N) by estimator, then by case ("real" or "twin"), in percent of their length;
     NaN where there is no segment.
@@ -148,8 +148,8 @@ def write_twin_suite(
 ) -> TwinSuite:
     """Write the suite of a recording and of its repetition in a simulated place.
 
-    The recorded path is placed where disparities agree best and nothing is in its way. The rig gets the calibration
-    errors that are found in the recording, and the camera its exposure, contrast, blur and noise.
+    The recorded path is placed where disparities agree best and the path is free. The rig gets the calibration errors
+    of the recording, and the camera gets its exposure, contrast, blur and noise.
 
     Args:
         recording: a recording with ground truth, or the folder of a run's case.
@@ -198,7 +198,7 @@ def write_twin_suite(
 def compare_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> TwinReport:
     """Run the estimators of a twin's suite on both cases, compare them, and write twin.json beside the suite.
 
-    Raises InputError where fewer than three estimators ran on both.
+    Raises InputError if fewer than three estimators ran on both.
     """
     folder = run_plan(read_plan(str(suite.file)))
     twin = realism_of(read_recording(folder.case(TWIN)))

@@ -1,4 +1,4 @@
-"""What a scene or a model contains, as lines of text, as a table, and as a picture with a plan and four views."""
+"""Reports the contents of a scene or model as lines of text, as a table, and as a picture with a plan and views."""
 
 from collections.abc import Sequence
 from contextlib import closing
@@ -24,7 +24,7 @@ from vobench.suite.suite_spec import Rendering
 
 @dataclass(frozen=True, slots=True)
 class SceneReport:
-    """A survey of a scene: its file, the scene built from it, what was found, and notes about its models."""
+    """A survey of a scene: its file, the scene that was built from it, the findings, and notes about its models."""
 
     spec: SceneFile
     scene: Scene
@@ -58,7 +58,7 @@ class SceneReport:
         return {**asdict(self.found), "notes": list(self.notes), "white_cd_m2": self.spec.white_cd_m2}
 
     def save_picture(self, path: Path, *, progress: Progress = SILENT) -> None:
-        """Draw a plan, these lines and four views to a PNG; the light is computed unless it is in the cache."""
+        """Draw a plan, the lines of text and four views to a PNG. The light is computed unless it is cached."""
         light = perform(bake_task(self.spec), cache_folder(), progress=progress)
         with closing(open_renderer(self.scene, Rendering(), light)) as renderer:
             picture = sheet(self.scene, self.found, renderer, self.spec.white_cd_m2, self.lines())
@@ -66,7 +66,7 @@ class SceneReport:
 
 
 def survey_scene(scene: str) -> SceneReport:
-    """Survey a scene, given its name or the path of its file or model; no light is computed.
+    """Survey a scene, given its name or the path of its file or model. Its light is not computed.
 
     Raises UnknownNameError if there is no such scene, and SuiteError or ModelError if its files are invalid.
     """
@@ -76,7 +76,7 @@ def survey_scene(scene: str) -> SceneReport:
 
 
 def _notes(models: Sequence[ModelSpec]) -> list[str]:
-    """What was changed or doubtful when the models were read."""
+    """Notes on what was changed or doubtful when the models were read."""
     from vobench.asset.model import read_model
 
     notes = []
