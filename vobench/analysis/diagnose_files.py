@@ -20,7 +20,7 @@ OFFSET_OPTION = "--t-offset="
 
 @dataclass(frozen=True, slots=True)
 class FileDiagnosis:
-    """The faults found between two files; none if they only differ by errors of the estimate.
+    """The faults that were found between two files. There are none if the files differ only by errors of the estimate.
 
     `times` are the files of time stamps that the two were read with. `by_frame` describes how poses were paired if
     neither file has stamps. `notes` describe what was done to read the files.

@@ -1,4 +1,4 @@
-"""Where figures come from: processor, driver, versions and commit, of what made a result and of a whole run."""
+"""The environment in which results are computed: processor, driver, versions and commit."""
 
 import os
 import platform
@@ -20,17 +20,17 @@ from vobench.portable import is_portable
 from vobench.runner.folder import ENVIRONMENT, RunFolder, run_date
 from vobench.runner.key import PACKAGE, library_versions
 
-MADE_ON = "made_on.json"  # beside each result in the store, in a file of its own: no recording holds it
+MADE_ON = "made_on.json"  # a separate file beside each result in the store
 UNKNOWN = "unknown"
-# Libraries whose release can change a score; others only draw or write reports.
+# The libraries whose version can change a score. Other libraries only draw or write reports.
 SCORING = ("numpy", "scipy", "opencv-python-headless", "PyOpenGL", "embreex")
 LIBRARIES = (*SCORING, "pyrender2", "mcap", "rosbags", "pandas", "rerun-sdk")
-# What of vobench's clone a result depends on.
+# The parts of vobench's repository on which a result depends.
 SOURCES = ("vobench", "scenes", "estimators", "suites")
 GIT_S = 10.0
 
 
-# The levels of the x86-64 psABI, by flags as Linux names them, the highest first.
+# The levels of the x86-64 psABI, by the names of their flags in Linux, the highest first.
 V2 = {"cx16", "lahf_lm", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"}
 V3 = V2 | {"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe", "xsave"}
 V4 = V3 | {"avx512bw", "avx512cd", "avx512dq", "avx512f", "avx512vl"}
@@ -40,7 +40,7 @@ ARM_LEVELS = (("SVE2", "sve2"), ("SVE", "sve"), ("NEON", "asimd"))
 
 @dataclass(frozen=True, slots=True, order=True)
 class Processor:
-    """A processor's model as the system names it, and the instruction set that libraries choose their code by."""
+    """The model of a processor, and its instruction set, by which libraries select their code."""
 
     model: str = UNKNOWN
     simd: str = UNKNOWN
@@ -51,7 +51,7 @@ class Processor:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What made a result, and everything that it was made from; usually one processor and one driver."""
+    """The processors and drivers that computed a result and its inputs; usually one of each."""
 
     processors: tuple[Processor, ...] = ()
     drawn_by: tuple[str, ...] = ()
@@ -59,11 +59,12 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """Where the figures of a run come from; the fields of `environment.json`, empty where a run does not state them.
+    """The environment of a run. The fields are those of `environment.json`, and are empty if they are unknown.
 
-    `processors` and `drawn_by` are of all results of the run, also those that the cache held. `cores` are those that
-    the run may use, of `cores_total`. `commit` is of vobench's clone, with `+changes` where files differ from it.
-    `date` stands in no file: it is read off the name of the run's folder.
+    `processors` and `drawn_by` are those of all results of the run, including cached ones.
+    `cores` is the number of cores that the run may use, of `cores_total`.
+    `commit` is that of vobench's repository, followed by `+changes` if files differ from it.
+    `date` is not in the file, but is taken from the name of the run's folder.
     """
 
     vobench: str = ""
@@ -92,16 +93,16 @@ class Environment:
 
     @property
     def driver(self) -> str:
-        """All drivers that drew."""
+        """All graphics drivers that rendered pictures."""
         return " and ".join(self.drawn_by)
 
     @property
     def release(self) -> str:
-        """The version of vobench, and the commit where it runs from a clone."""
+        """The version of vobench, and the commit if it runs from a repository."""
         return f"vobench {self.vobench}{f' ({self.commit})' if self.commit else ''}"
 
     def line(self) -> str:
-        """All of it in one line, without the libraries that do not change scores."""
+        """The environment in one line, without libraries that do not change scores."""
         parts = list[str]()
         if self.processors:
             parts.append(" and ".join(map(str, self.processors)))
@@ -124,7 +125,7 @@ class Environment:
         return [f"{name} {self.libraries[name]}" for name in SCORING if name in self.libraries]
 
     def facts(self) -> dict[str, str]:
-        """The same as columns of a table."""
+        """The environment as columns of a table."""
         return {
             "processor": self.processor,
             "simd": self.simd,
@@ -144,7 +145,7 @@ ORIGINS = TypeAdapter(Origin)
 
 
 def differences(old: Environment, new: Environment) -> list[str]:
-    """The differences of two environments that can change scores, as `name old value → new value`."""
+    """The differences between two environments that can change scores, as `name old value → new value`."""
     old_facts = _comparable_facts(old)
     new_facts = _comparable_facts(new)
     changes = []
@@ -156,7 +157,7 @@ def differences(old: Environment, new: Environment) -> list[str]:
 
 
 def _comparable_facts(environment: Environment) -> dict[str, str]:
-    """The facts that can change scores, by name; empty if the run does not state them."""
+    """The facts that can change scores, by name; empty if they are unknown."""
     libraries = {name: environment.libraries.get(name, "") for name in SCORING}
     return {
         "processor": " and ".join(map(str, environment.processors)),
@@ -169,7 +170,7 @@ def _comparable_facts(environment: Environment) -> dict[str, str]:
 
 @cache
 def processor() -> Processor:
-    """This machine's processor, read off /proc/cpuinfo where there is one."""
+    """The processor of this machine, from /proc/cpuinfo if that exists."""
     text = ""
     with suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
@@ -177,7 +178,7 @@ def processor() -> Processor:
 
 
 def parse_cpuinfo(text: str, machine: str, *, fallback: str = "") -> Processor:
-    """The processor that a text of Linux's /proc/cpuinfo describes; `fallback` is its model if the text names none."""
+    """The processor that the text of /proc/cpuinfo describes. `fallback` is its model if the text has none."""
     stated = dict[str, str]()
     for line in text.splitlines():
         name, colon, value = line.partition(":")
