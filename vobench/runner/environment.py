@@ -189,7 +189,7 @@ def parse_cpuinfo(text: str, machine: str, *, fallback: str = "") -> Processor:
 
 
 def _model(stated: Mapping[str, str]) -> str:
-    """The model's name; numbers tell apart the models that clouds give one name, and those of Arm, which have none."""
+    """The name of the model, with numbers that distinguish models of the same name, and Arm models without a name."""
     numbers = [f"{name} {stated[key]}" for name, key in (("family", "cpu family"), ("model", "model")) if key in stated]
     if "model name" in stated:
         return ", ".join([stated["model name"], *numbers])
@@ -199,7 +199,7 @@ def _model(stated: Mapping[str, str]) -> str:
 
 
 def _simd(flags: set[str], machine: str) -> str:
-    """The highest level of instructions that these flags name."""
+    """The highest instruction set level that the flags contain."""
     if not flags:
         return UNKNOWN
     if machine in ("aarch64", "arm64"):
@@ -211,7 +211,7 @@ def _simd(flags: set[str], machine: str) -> str:
 
 @cache
 def commit() -> str:
-    """The commit of the clone that vobench runs from, with `+changes` where its files differ; empty elsewhere."""
+    """The commit of the repository from which vobench runs, with `+changes` if files differ; empty if there is none."""
     clone = PACKAGE.parent
     if not (clone / ".git").exists():
         return ""
@@ -221,7 +221,7 @@ def commit() -> str:
 
 
 def _git(clone: Path, *words: str) -> str:
-    """What git says of a clone; empty where there is no git, or it refuses."""
+    """The output of git in a repository; empty if git is missing or fails."""
     with suppress(OSError, subprocess.SubprocessError):
         done = subprocess.run(
             ["git", "-C", str(clone), *words], capture_output=True, text=True, timeout=GIT_S, check=True
@@ -231,7 +231,7 @@ def _git(clone: Path, *words: str) -> str:
 
 
 def drawn_by(engine: str) -> str:
-    """What draws the pictures of an engine here: the OpenGL driver, or Mitsuba."""
+    """The software that renders the pictures of an engine on this machine: the OpenGL driver, or Mitsuba."""
     if engine == "path":
         return f"Mitsuba {library_versions('mitsuba')['mitsuba']}"
     from vobench.rendering.raster import driver_facts
@@ -243,14 +243,17 @@ def drawn_by(engine: str) -> str:
 
 
 def origin_here(needs: Iterable[Path], *, engine: str = "") -> Origin:
-    """The origin of a result that is made here of other results; `engine` is named if it draws pictures."""
+    """The origin of a result that this machine computes from other results.
+
+    `engine` is given if it renders pictures.
+    """
     before = [read_origin(folder) for folder in needs]
     own = Origin((processor(),), (drawn_by(engine),) if engine else ())
     return joined([*before, own])
 
 
 def joined(origins: Iterable[Origin]) -> Origin:
-    """The origin of what several results are part of, each processor and driver once, in order of their names."""
+    """The joint origin of several results: all processors and drivers without duplicates, sorted by name."""
     processors = set[Processor]()
     drivers = set[str]()
     for origin in origins:
@@ -260,14 +263,14 @@ def joined(origins: Iterable[Origin]) -> Origin:
 
 
 def read_origin(folder: Path) -> Origin:
-    """The origin of a result in the store; empty where an older vobench made it."""
+    """The origin of a result in the store; empty if an older version of vobench computed it."""
     with suppress(OSError, ValidationError):
         return ORIGINS.validate_json((folder / MADE_ON).read_bytes())
     return Origin()
 
 
 def environment(origin: Origin, *, timed: str, sandboxed: bool) -> dict[str, Any]:
-    """The content of a run's `environment.json`: equal on one machine for equal inputs, so without date and times."""
+    """The content of a run's `environment.json`, without date and times, so that equal runs have equal files."""
     stated = asdict(
         Environment(
             vobench=__version__,
@@ -289,7 +292,7 @@ def environment(origin: Origin, *, timed: str, sandboxed: bool) -> dict[str, Any
 
 
 def read_environment(folder: RunFolder) -> Environment | None:
-    """The environment that a run states, with its date; None where it states none."""
+    """The environment of a run, with its date; None if the run does not contain it."""
     try:
         stated = ENVIRONMENTS.validate_json((folder.path / ENVIRONMENT).read_bytes())
     except (OSError, ValidationError):
@@ -299,7 +302,7 @@ def read_environment(folder: RunFolder) -> Environment | None:
 
 
 def merged_environment(environments: Sequence[Environment]) -> dict[str, Any]:
-    """The environment of several runs together: all processors and drivers, and versions, joined if they differ."""
+    """The joint environment of several runs: all processors, drivers and versions."""
     origin = joined(Origin(each.processors, each.drawn_by) for each in environments)
     are_portable = bool(environments) and all(each.portable for each in environments)
 
@@ -330,5 +333,5 @@ def _merged_libraries(environments: Sequence[Environment]) -> dict[str, str]:
 
 
 def _joined(texts: Iterable[str]) -> str:
-    """The texts that are not empty, each once."""
+    """The texts that are not empty, without duplicates, joined."""
     return " and ".join(dict.fromkeys(filter(None, texts)))

@@ -1,4 +1,4 @@
-"""A trial of a finished run, read back so that variants of its case can be run with the same estimator."""
+"""Reads a trial of a finished run, and runs the same estimator on variants of its case."""
 
 import json
 from collections.abc import Mapping
@@ -32,7 +32,7 @@ from vobench.suite.suite_spec import Suite
 from vobench.suite.yaml_file import checked
 from vobench.suite.yaml_source import Mistakes, YamlFile
 
-# RUN/cases/CASE/estimates/ESTIMATOR/REPEAT: how far above the folder of a trial its run is.
+# The number of levels from the folder of a trial, RUN/cases/CASE/estimates/ESTIMATOR/REPEAT, to that of its run.
 LEVELS_TO_RUN = 5
 
 
@@ -53,13 +53,13 @@ class FinishedTrial:
 
 
 def read_finished_trial(path: Path, *, estimator: Path | None = None, progress: Progress = SILENT) -> FinishedTrial:
-    """Read the trial at RUN/CASE/ESTIMATOR, at RUN/CASE/ESTIMATOR/REPEAT, or at its own folder in the run.
+    """Read the trial RUN/CASE/ESTIMATOR or RUN/CASE/ESTIMATOR/REPEAT, or the trial in a folder of the run.
 
-    `estimator` is the folder of the estimator, for one that is not found by its name. `progress` is told when the
+    `estimator` is the folder of the estimator, if it cannot be found by its name. `progress` gets a note if the
     estimator has changed since the run.
 
-    Raises InputError and UnknownNameError where there is no such trial, where the case is a recording, which cannot be
-    simulated in variants, and where another version of vobench wrote the run.
+    Raises InputError and UnknownNameError if there is no such trial, if the case is a recording, which cannot be
+    changed, or if another version of vobench wrote the run.
     """
     folder, score = _find(path)
     if score.status == NO_SEQUENCE:
@@ -70,7 +70,7 @@ def read_finished_trial(path: Path, *, estimator: Path | None = None, progress: 
 
 
 def _find(path: Path) -> tuple[RunFolder, TrialScore]:
-    """The run and the score of the trial that a path names."""
+    """The run and the score of the trial at a path."""
     if (path / SCORE).is_file() and len(path.parts) > LEVELS_TO_RUN:
         return RunFolder(path.parents[LEVELS_TO_RUN - 1]), read_score(path / SCORE)
 
@@ -94,7 +94,7 @@ def _find(path: Path) -> tuple[RunFolder, TrialScore]:
 
 
 def _require_in_run(kind: str, name: str, known: set[str], folder: RunFolder) -> None:
-    """Raise UnknownNameError, which names the run, unless it has a case or an estimator of this name."""
+    """Raise UnknownNameError with the run unless the name of a case or an estimator is known in it."""
     try:
         require_known(kind, name, sorted(known))
     except UnknownNameError as error:
@@ -102,7 +102,7 @@ def _require_in_run(kind: str, name: str, known: set[str], folder: RunFolder) ->
 
 
 def read_simulated_case(folder: RunFolder, name: str) -> Case:
-    """Read a simulated case of a run. Raises InputError for a recording, or where another version wrote the file."""
+    """Read a simulated case of a run. Raises InputError for a recording, or if another version wrote the file."""
     path = folder.case(name) / CASE
     content = json.loads(path.read_bytes())
     if "source" in content:
@@ -123,7 +123,7 @@ def _read_suite(folder: RunFolder) -> Suite:
 
 
 def _read_estimator_entry(folder: RunFolder, label: str, path: Path | None, progress: Progress) -> EstimatorEntry:
-    """The estimator with the parameters, limits and mode of the run. Raises UnknownNameError where it is not found."""
+    """The estimator with the parameters, limits and mode of the run. Raises UnknownNameError if it is not found."""
     listed = json.loads((folder.path / ESTIMATORS).read_bytes())
     facts = next(entry for entry in listed if entry["label"] == label)
     place = path or catalog.find("estimator", facts["name"]).path
@@ -135,9 +135,9 @@ def _read_estimator_entry(folder: RunFolder, label: str, path: Path | None, prog
 
 
 def run_variants(trial: FinishedTrial, cases: Mapping[str, Case], *, name: str, run_plan: PlanRunner) -> RunFolder:
-    """Run the estimator of a trial once on each of these cases, which get the names that they are mapped from.
+    """Run the estimator of a trial once on each of the given cases, which are renamed to their keys.
 
-    `name` is the name of the suite of this run. Raises SuiteError where one of the cases cannot be simulated.
+    `name` is the name of the suite of the new run. Raises SuiteError if one of the cases cannot be simulated.
     """
     named = tuple(replace(case, name=key) for key, case in cases.items())
     suite = replace(trial.suite, name=name, repeats=1)

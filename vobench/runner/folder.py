@@ -1,4 +1,4 @@
-"""The folder of a run, which people read, and the hashes of its files."""
+"""Reads and writes the folder of a run and the hashes of its files."""
 
 import json
 import os
@@ -24,15 +24,15 @@ from vobench.trajectory.trajectory import Trajectory
 CASE = "case.json"
 SCORE = "score.json"
 SEQUENCE = "sequence"
-STAMP = "%Y%m%dT%H%M%S"  # of the name of a run's folder
+STAMP = "%Y%m%dT%H%M%S"  # the date in the name of a run's folder
 ESTIMATES = "estimates"
 PAGE = "leaderboard.html"
 ENVIRONMENT = "environment.json"
 SUITE = "suite.json"
 ESTIMATORS = "estimators.json"
 
-# Best first. Those from `lost` to `not_applicable` are failures, and no failure ranks before a survivor. The last one
-# is not a failure of an estimator: its case is excluded for all of them.
+# The best status comes first. Those from `lost` to `not_applicable` are failures, which rank after all others. The last
+# one is not a failure of an estimator, because its case is excluded for all estimators.
 TrialStatus = Literal[
     "ok",
     "partial",
@@ -51,11 +51,11 @@ SURVIVED = ("ok", "partial")
 FINISHED_TRIAL = (*SURVIVED, "lost", "diverged")  # the estimator answered to the end, well or not
 NOT_APPLICABLE = "not_applicable"  # the recording lacks a sensor that the estimator needs
 NO_SEQUENCE: Final = "no_sequence"  # the case could not be simulated or imported
-MOST_NAMED = 3  # cases that a sentence names; the others are counted
+MOST_NAMED = 3  # the largest number of cases that a sentence names; the others are counted
 
 
 class _Metric(BaseModel):
-    """One metric of a score, as far as everybody reads it."""
+    """The fields of a metric in JSON that are always read."""
 
     model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
 
@@ -63,7 +63,7 @@ class _Metric(BaseModel):
 
 
 class _ScoreShape(BaseModel):
-    """What every score in JSON has."""
+    """The fields that every score in JSON has."""
 
     model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
 
@@ -73,12 +73,12 @@ class _ScoreShape(BaseModel):
 
 
 class TrialScore(BaseModel):
-    """One estimator on one case: its status and, where there is any estimate, its score.
+    """The status of an estimator on a case and, if there is an estimate, its score.
 
-    `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
-    `claims` are the manifest's, such as Sim(3); `consistency` is of the covariances that were stated, and `revised`
-    the score of the poses that came after the last frame, where there were some. `sandbox` is what the estimator could
-    see; None where none was started, and in runs of an older vobench.
+    `drift_m` is the largest distance of the estimate from its start if the body is stationary, and None otherwise.
+    `claims` are those of the manifest, such as Sim(3).
+    `consistency` is that of the reported covariances, and `revised` the score of the revised poses, if there are any.
+    `sandbox` says what the estimator could see. It is None if it was not started, and in runs of older versions.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -108,29 +108,29 @@ class TrialScore(BaseModel):
         return score
 
     def value(self, metric: str, statistic: str) -> float | None:
-        """One statistic of one metric, None where the trial has no such score."""
+        """A statistic of a metric; None if the trial does not have it."""
         return value_of(self.score, metric, statistic)
 
 
 @dataclass(frozen=True, slots=True)
 class UnavailableCases:
-    """Cases that could not be simulated or imported for one cause, which names the remedy where there is one."""
+    """Cases that could not be simulated or imported for the same cause. The cause may include a remedy."""
 
     cause: str
     cases: tuple[str, ...]
 
     @property
     def names(self) -> str:
-        """The first of the cases, and how many others there are."""
+        """The names of the first cases, and the number of the others."""
         named = ", ".join(self.cases[:MOST_NAMED])
         others = len(self.cases) - MOST_NAMED
         return f"{named} and {others} more" if others > 0 else named
 
 
 def unavailable_cases(scores: Iterable[TrialScore]) -> tuple[UnavailableCases, ...]:
-    """The cases without a sequence, grouped by cause, in order of their first case.
+    """The cases without a sequence, grouped by cause, in the order of their first case.
 
-    A case that another of several merged runs has made is none of them.
+    If several runs are merged, a case that one of them has simulated is not included.
     """
     causes = dict[str, str]()
     made = set[str]()
@@ -146,12 +146,12 @@ def unavailable_cases(scores: Iterable[TrialScore]) -> tuple[UnavailableCases, .
 
 
 def with_sequence(scores: Iterable[TrialScore]) -> list[TrialScore]:
-    """The trials whose case could be simulated or imported: those that say something about an estimator."""
+    """The trials whose case could be simulated or imported. Other trials say nothing about an estimator."""
     return [score for score in scores if score.status != NO_SEQUENCE]
 
 
 def total_failure(scores: Iterable[TrialScore]) -> str:
-    """One sentence if no estimator finished any trial: how many trials failed how, and the first; else empty."""
+    """A sentence about the numbers of failures and the first one if no trial finished; empty otherwise."""
     trials = with_sequence(scores)
     if not trials or any(trial.status in FINISHED_TRIAL for trial in trials):
         return ""
@@ -162,7 +162,7 @@ def total_failure(scores: Iterable[TrialScore]) -> str:
 
 
 def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> float | None:
-    """One statistic of one metric of a score as JSON has it; None without such a metric."""
+    """A statistic of a metric of a score in JSON; None if there is no such metric."""
     metrics = score["metrics"] if score else []
     for entry in metrics:
         if entry["name"] == metric:
@@ -171,13 +171,13 @@ def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> fl
 
 
 ONLY_THEIR_OWN = "Estimators saw only their own files."
-ORACLE = "oracle"  # the claim of the harness's own estimators, which are no programs
+ORACLE = "oracle"  # the claim of estimators that are part of vobench and use the ground truth
 
 
 def visible_to(trials: Iterable[TrialScore]) -> str:
-    """What the estimators of trials could see, in sentences for every form of a board.
+    """Sentences about what the estimators of trials could see, for every form of the leaderboard.
 
-    Estimators that saw more than their own files are named, and those of older runs, of which nothing is recorded.
+    They name estimators that saw more than their own files, and those of older runs, for which nothing is recorded.
     """
     estimators = dict[str, set[str]]()
     for trial in trials:
@@ -189,7 +189,7 @@ def visible_to(trials: Iterable[TrialScore]) -> str:
 
 
 def seen_by(trial: TrialScore) -> str:
-    """What a trial's estimator saw beyond its own files; empty if nothing."""
+    """What the estimator of a trial saw besides its own files; empty if nothing."""
     sandbox = trial.sandbox
     if sandbox is not None:
         is_strict = sandbox.level == "full" and not sandbox.read

@@ -128,7 +128,7 @@ class ForkServer:
         self._process: subprocess.Popen[bytes] | None = None
 
     def start_worker(self) -> WorkerProcess:
-        """Ask for a new worker; it starts once the server has imported everything."""
+        """Request a new worker. It starts when the server has imported all modules."""
         ours, theirs = Pipe()
         reads_fd, writes_fd = os.pipe()
         try:
@@ -148,7 +148,7 @@ class ForkServer:
         if self._control is not None:
             try:
                 socket.send_fds(self._control, [request], fds)
-            except OSError:  # the server was killed
+            except OSError:  # the server has been killed
                 self._close()
             else:
                 return
@@ -168,7 +168,7 @@ class ForkServer:
                 [sys.executable, "-c", code],
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
-                start_new_session=True,  # the terminal's Ctrl-C is vobench's
+                start_new_session=True,  # Ctrl-C in the terminal is handled by vobench
             )
         return ours
 
@@ -189,7 +189,7 @@ _shared: dict[tuple[str, ...], ForkServer] = {}
 
 
 def shared_server(entry: str, preloaded: Sequence[str]) -> ForkServer:
-    """The server of this process for these workers; it ends with the process."""
+    """The server of this process for workers with an entry function. It ends with the process."""
     key = (entry, *preloaded)
     if key not in _shared:
         _shared[key] = ForkServer(entry, preloaded)
@@ -200,13 +200,13 @@ def shared_server(entry: str, preloaded: Sequence[str]) -> ForkServer:
 def watch(
     connection: Connection, vobench_fd: int, signals_fd: int, *, grace_s: float, leave: Callable[[], None]
 ) -> None:
-    """Call `leave` in a worker once nobody needs it: vobench is gone, or has closed the connection to it.
+    """Call `leave` in a worker when vobench ends or closes the connection to it.
 
-    A byte from `signals_fd` is a request to stop that reached the worker; `leave` is called if the worker still runs
-    after `grace_s` seconds.
+    A byte from `signals_fd` means that the worker received a request to stop. `leave` is called if the worker still
+    runs after `grace_s` seconds.
     """
     poll = select.poll()
-    poll.register(connection.fileno(), 0)  # events that are always reported: the other end is closed
+    poll.register(connection.fileno(), 0)  # 0 selects only the events that are always reported, such as a hang-up
     poll.register(signals_fd, select.POLLIN)
     if vobench_fd >= 0:
         poll.register(vobench_fd, select.POLLIN)
@@ -218,21 +218,21 @@ def watch(
 
 
 def serve(control_fd: int, *, vobench_pid: int, entry: str, preloaded: list[str]) -> NoReturn:
-    """Be the server: import, then fork workers as they are asked for, until vobench ends or closes the socket."""
-    # Nobody looks at the control socket during imports, so the kernel watches vobench.
+    """Run the server: import the modules, then fork workers on request until vobench ends or closes the socket."""
+    # The control socket is not read during imports, so the kernel ends the server if vobench ends.
     _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     _require_parent(vobench_pid)
     for name in preloaded:
-        with suppress(Exception):  # the worker that needs it reports why
+        with suppress(Exception):  # the worker that needs the module reports the error
             import_module(name)
     module, _, function = entry.partition(":")
     work = getattr(import_module(module), function)
-    # From here on the server watches by itself: the kernel would leave workers no time to tidy up, and would end the
-    # server with the thread of vobench that started it.
+    # From here on, the server itself detects the end of vobench. The kernel would leave workers no time to clean up,
+    # and would end the server with the thread of vobench that started it.
     vobench_fd = _pidfd(vobench_pid)
     _prctl(PR_SET_PDEATHSIG, 0)
     _require_parent(vobench_pid)
-    _prctl(PR_SET_CHILD_SUBREAPER, 1)  # orphans of workers become children of the server
+    _prctl(PR_SET_CHILD_SUBREAPER, 1)  # orphaned processes of workers become children of the server
     with socket.socket(fileno=control_fd) as control:
         control.set_inheritable(False)
         server = _Server(control, vobench_fd, work)
@@ -242,14 +242,14 @@ def serve(control_fd: int, *, vobench_pid: int, entry: str, preloaded: list[str]
 
 
 class _Server:
-    """The state of the server: its workers, by id, with the descriptor on which the end of each is reported."""
+    """The server: its workers by id, with the descriptors on which their ends are reported."""
 
     def __init__(self, control: socket.socket, vobench_fd: int, work: Callable[[Connection, int], None]) -> None:
         self._control = control
         self._vobench_fd = vobench_fd
         self._work = work
         self._workers: dict[int, int] = {}
-        self._orphans_end_s: float | None = None  # when orphans are killed
+        self._orphans_end_s: float | None = None  # the time at which orphans are killed
         self._woken_fd, self._wakes_fd = os.pipe()
         os.set_blocking(self._woken_fd, False)
         os.set_blocking(self._wakes_fd, False)
@@ -257,7 +257,7 @@ class _Server:
         signal.set_wakeup_fd(self._wakes_fd)
 
     def run(self) -> None:
-        """Fork and bury workers until vobench is gone."""
+        """Fork workers and reap ended ones until vobench ends."""
         poll = select.poll()
         for fd in (self._control.fileno(), self._woken_fd, self._vobench_fd):
             if fd >= 0:
@@ -274,7 +274,7 @@ class _Server:
                 return
 
     def end(self) -> None:
-        """Wait for the workers to leave, then kill whoever is left."""
+        """Wait for the workers to end, then kill the remaining ones."""
         ends_s = time.monotonic() + FAREWELL_S
         while self._workers and time.monotonic() < ends_s:
             time.sleep(LOOK_S)
@@ -289,7 +289,7 @@ class _Server:
             children = _children(os.getpid())
 
     def _answer(self) -> bool:
-        """Answer one request; False once nobody is there to ask."""
+        """Answer one request. Returns False if vobench has closed the socket."""
         try:
             request, fds, _, _ = socket.recv_fds(self._control, 1, 2)
         except OSError:
@@ -299,7 +299,7 @@ class _Server:
         connection_fd, status_fd = fds
         try:
             pid = os.fork()
-        except OSError:  # no memory, or too many processes: the closed descriptors report it
+        except OSError:  # there is too little memory or too many processes, which the closed descriptors report
             pid = -1
         if pid == 0:
             self._become_worker(connection_fd, status_fd)
@@ -333,7 +333,7 @@ class _Server:
             os._exit(exit_code)
 
     def _bury(self) -> None:
-        """Report the workers that have ended."""
+        """Reap and report the workers that have ended."""
         with suppress(ChildProcessError):
             while True:
                 pid, status = os.waitpid(-1, os.WNOHANG)
@@ -346,18 +346,18 @@ class _Server:
                     self._orphans_end_s = time.monotonic() + ORPHAN_S
 
     def _end_orphans(self) -> None:
-        """Kill what dead workers have started and left behind, a while after the death of a worker."""
+        """Kill the orphaned processes of dead workers, some time after the death of a worker."""
         if self._orphans_end_s is None or time.monotonic() < self._orphans_end_s:
             return
         orphans = [pid for pid in _children(os.getpid()) if pid not in self._workers]
         for pid in orphans:
             _kill(pid)
-        if not orphans:  # else their own children are now ours
+        if not orphans:  # otherwise their children have become children of the server
             self._orphans_end_s = None
 
 
 def _report(fd: int, number: int) -> None:
-    with suppress(OSError):  # vobench is gone
+    with suppress(OSError):  # vobench has ended
         os.write(fd, NUMBER.pack(number))
 
 
@@ -367,13 +367,13 @@ def _kill(pid: int) -> None:
 
 
 def _require_parent(pid: int) -> None:
-    """End this process if it has another parent: its own is gone."""
+    """End this process if it has another parent, because its original parent has ended."""
     if os.getppid() != pid:
         os._exit(1)
 
 
 def _pidfd(pid: int) -> int:
-    """A descriptor that becomes readable when a process ends; -1 on systems without."""
+    """A descriptor that becomes readable when a process ends; -1 on systems without such descriptors."""
     try:
         return os.pidfd_open(pid)
     except (AttributeError, OSError):
@@ -381,12 +381,12 @@ def _pidfd(pid: int) -> int:
 
 
 def _prctl(option: int, value: int) -> None:
-    with suppress(OSError, AttributeError):  # on Linux only
+    with suppress(OSError, AttributeError):  # prctl exists only on Linux
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 def _children(parent: int) -> list[int]:
-    """The ids of the children of a process; none on systems without /proc."""
+    """The ids of the children of a process; empty on systems without /proc."""
     children = []
     for name in os.listdir("/proc") if sys.platform == "linux" else []:
         if not name.isdigit():

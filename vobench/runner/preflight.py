@@ -1,4 +1,4 @@
-"""What is known of a plan before anything is made: what is wrong with it, its cases, and the work that is left."""
+"""Checks a plan before it is run: its mistakes, its cases, and the remaining work."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -30,7 +30,7 @@ class Preflight:
 
 @dataclass(frozen=True, slots=True)
 class CaseSummary:
-    """A case before it is made. `notes` is None for a simulated case, and lists the assumptions of an import."""
+    """A case before it is created. `notes` are the assumptions of an import, and None for a simulated case."""
 
     case: str
     frames: int
@@ -40,7 +40,7 @@ class CaseSummary:
     notes: tuple[str, ...] | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The fields that apply, as JSON has them."""
+        """The fields that apply, as plain JSON values."""
         content = asdict(self)
         notes = content.pop("notes")
         return content if notes is None else {**content, "notes": list(notes)}
@@ -48,7 +48,7 @@ class CaseSummary:
 
 @dataclass(frozen=True, slots=True)
 class PlanSummary:
-    """A valid plan: its cases, and stage by stage the work that is left where that was asked for."""
+    """A valid plan: its cases and, if requested, the remaining work by stage."""
 
     plan: Plan
     cases: tuple[CaseSummary, ...]
@@ -72,20 +72,20 @@ class PlanSummary:
         ]
 
     def found(self) -> list[dict[str, str]]:
-        """The scenes and estimators that the suite's names stand for."""
+        """The scenes and estimators to which the names in the suite refer."""
         return [
             {"kind": entry.kind, "name": entry.name, "origin": entry.origin, "path": str(entry.path)}
             for entry in self.plan.found
         ]
 
     def tasks(self) -> list[dict[str, Any]]:
-        """Stage by stage: how many tasks there are, how many are to do and why, and an estimate of the seconds."""
+        """For each stage: the number of tasks, how many must be performed and why, and the estimated seconds."""
         return [
             {**asdict(stage), IN_CACHE: stage.tasks - stage.to_do, "to do": stage.to_do} for stage in self.stages or ()
         ]
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it, as JSON has it."""
+        """The summary as plain JSON values."""
         content = {
             "suite": self.plan.suite.name,
             "cases": [case.as_dict() for case in self.cases],
@@ -99,10 +99,9 @@ class PlanSummary:
 
 
 def preflight(planned: Plan, *, only_missing: bool = False) -> Preflight:
-    """Compute the motion of every simulated case, and read what every recorded case needs.
+    """Compute the motion of all simulated cases, and read the recordings of all recorded cases.
 
-    With `only_missing`, cases whose sequence is in the cache are taken to be valid. Raises SuiteError, which lists
-    all that is wrong.
+    With `only_missing`, cases whose sequence is cached are not checked. Raises SuiteError with all mistakes.
     """
     wrong = planned.mistakes()
     motions: dict[str, BodyMotion] = {}
@@ -122,9 +121,9 @@ def preflight(planned: Plan, *, only_missing: bool = False) -> Preflight:
 
 
 def summarize(planned: Plan, *, with_stages: bool = False) -> PlanSummary:
-    """Validate a plan and say what it comes to; with_stages also counts the work that is left.
+    """Validate a plan, and summarise it. With `with_stages`, the remaining work is counted, too.
 
-    Raises SuiteError, which lists all that is wrong.
+    Raises SuiteError with all mistakes.
     """
     checked = preflight(planned)
     cases = tuple(_case_summary(case, checked) for case in planned.cases)
@@ -138,7 +137,7 @@ def summarize(planned: Plan, *, with_stages: bool = False) -> PlanSummary:
 
 
 def is_in_cache(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> bool:
-    """Whether the sequence of a case has been made."""
+    """Whether the sequence of a case is cached."""
     return is_done(sequence_tasks(case, recordings)[-1], cache_folder())
 
 
