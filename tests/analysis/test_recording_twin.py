@@ -80,8 +80,8 @@ def test_the_path_of_the_twin_is_that_of_the_recording_moved_as_a_whole(suite: T
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"truth": None}, "repeats a path, and this recording has none"),
-        ({"still": True}, "this recording stands still"),
+        ({"truth": None}, "needs a path, and this recording has none"),
+        ({"still": True}, "this recording is stationary"),
         ({"short": True}, "takes 12 pictures or more with a truth, and this recording has 5"),
     ],
 )

@@ -827,7 +827,7 @@ def test_a_ply_has_the_colours_of_its_vertices(read: Reader) -> None:
 
 
 def test_a_file_of_another_kind_and_none_at_all_are_refused(read: Reader, tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match=r"is of no format that is read: .glb, .gltf, .obj, .stl, .ply"):
+    with pytest.raises(ModelError, match=r"is of an unknown format; known formats are .glb, .gltf, .obj, .stl, .ply"):
         read(b"x", "thing.fbx")
     with pytest.raises(ModelError, match=r"nothing.glb: there is no such file"):
         read_model(tmp_path / "nothing.glb")

@@ -267,10 +267,12 @@ class _RecordedPath:
 def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
     """The path of a recording's images that have a true pose. Raises InputError if it cannot be repeated."""
     if realism.pair is None:
-        raise InputError("a twin repeats a pair of eyes, and this recording has none that can be rectified and matched")
+        raise InputError("a twin needs a stereo pair that can be rectified and matched, and this recording has none")
     truth = recording.truth
     if truth is None:
-        raise InputError("a twin repeats a path, and this recording has none; give one with --truth, say an estimate")
+        raise InputError(
+            "a twin needs a path, and this recording has none; give one, such as an estimate, with --truth"
+        )
 
     has_pose = (recording.t_ns >= truth.t_ns[0]) & (recording.t_ns <= truth.t_ns[-1])
     t_ns = recording.t_ns[has_pose]
@@ -283,7 +285,7 @@ def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
     extent_m = np.linalg.norm(np.ptp(T_world_left[:, :3, 3], axis=0))
     if extent_m < LEAST_EXTENT_M:
         raise InputError(
-            "a twin ranks estimators by errors per length of path, and this recording stands still; take one that moves"
+            "a twin ranks estimators by errors per length of path, and this recording is stationary; use one that moves"
         )
     if recording.form == "kitti":  # its world is the first camera, which need not be level
         T_world_left = levelled(T_world_left)

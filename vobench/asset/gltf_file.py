@@ -107,7 +107,7 @@ class GltfFile:
         if count > 3 * MOST_FACES or rows not in (None, count):
             raise ModelError(f"accessor {index} has {count:,} rows, and should have {rows or 3 * MOST_FACES:,}")
         if "bufferView" not in accessor and "sparse" not in accessor:
-            raise ModelError(f"accessor {index} has no data; where it is compressed, {DECOMPRESS}")
+            raise ModelError(f"accessor {index} has no data; if it is compressed, {DECOMPRESS}")
 
         dtype = np.dtype(COMPONENTS[accessor["componentType"]])
         width = WIDTHS[accessor["type"]]

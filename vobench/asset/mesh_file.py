@@ -51,7 +51,7 @@ def _require_readable(path: Path) -> None:
         counts = re.findall(rb"element (?:face|vertex) (\d+)", header)
         faces = max(map(int, counts), default=0) // 2
     else:
-        raise ModelError("is of no format that is read: .glb, .gltf, .obj, .stl, .ply")
+        raise ModelError("is of an unknown format; known formats are .glb, .gltf, .obj, .stl, .ply")
     if faces > MOST_FACES:
         advice = "make them fewer, as by Blender's Decimate"
         raise ModelError(f"has {faces:,} faces, more than {MOST_FACES:,}; {advice}")

@@ -190,7 +190,7 @@ class EstimatorProcess:
                 revised.update(read_revision(payload))
             except InvalidOutputError as error:
                 raise EstimatorFailure("invalid_output", str(error)) from None
-        raise EstimatorFailure("invalid_output", f"the end: more poses revised than the {self._frames} frames it had")
+        raise EstimatorFailure("invalid_output", f"the end: more revised poses than the {self._frames} frames it had")
 
     def _refuse_early_answer(self, what: str) -> None:
         """Raise EstimatorFailure if the estimator has sent an answer before the request."""

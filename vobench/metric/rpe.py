@@ -468,7 +468,7 @@ METRICS = (
         "%",
         "100 | ‖q_j − q_i‖ − ‖p_j − p_i‖ | / ‖q_j − q_i‖, pairs where the truth stood still left out",
         "evo's point_distance_error_ratio",
-        blind="every direction, and drift while the truth stands still",
+        blind="every direction, and drift while the truth is stationary",
         measure=lambda comparison: comparison.once(_distances)[1],
     ),
     _part_metric(

@@ -381,7 +381,7 @@ def _missing_warnings(comparison: Comparison, metrics: tuple[MetricResult, ...])
             f"path apart; the whole path is {path_m:.3g} m"
         )
     if not path_m:
-        yield "no lost-aware score: the truth stands still, so no error can be measured against its path"
+        yield "no lost-aware score: the truth is stationary, so its path has no length to compare errors with"
 
 
 def _count(number: int, noun: str) -> str:

@@ -146,7 +146,7 @@ def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
                 folder = RunFolder(temporary / _suite(file) / (_plain_name(path.stem) or "bundle"))
                 names = _unpack(file, folder.path, path)
         except (BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
-            raise InputError(f"neither a run's folder nor a bundle of one ({error}): {path}") from None
+            raise InputError(f"neither the folder of a run nor a bundle ({error}): {path}") from None
         hashes = read_hashes(folder)
         for name, held in hashes.items():
             there = folder.path / name
@@ -154,7 +154,7 @@ def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
                 raise InputError(f"{name} is not the file that was bundled: {path}")
         unnamed = sorted(set(names) - hashes.keys() - {HASHES, TIMES_HASHES, SEQUENCES})
         if unnamed:
-            raise InputError(f"holds a file that its hashes do not name ({printable(unnamed[0])}): {path}")
+            raise InputError(f"contains a file that its hashes do not name ({printable(unnamed[0])}): {path}")
         _require_names(folder)
         for name in hashes:
             if _clean(folder.path / name):
@@ -242,7 +242,7 @@ def _unpack(file: ZipFile, to: Path, path: Path) -> list[str]:
     seen = set[str]()
     for entry in entries:
         if _is_outside(entry):
-            raise InputError(f"holds a file that would lie outside of it ({entry.filename!r}): {path}")
+            raise InputError(f"contains a file whose path is outside of it ({entry.filename!r}): {path}")
         name = str(PurePosixPath(entry.filename))
         if name in seen:
             raise InputError(f"holds a file twice ({entry.filename!r}): {path}")
@@ -332,7 +332,7 @@ def _link_case(folder: RunFolder, made: RunFolder, case: str, name: str) -> None
     target = made.case(case)
     truths = [place / GROUND_TRUTH for place in (source, target)]
     if all(truth.is_file() for truth in truths) and not _is_same_path(*truths):
-        raise InputError(f"case {case!r} is another one in {name}: its true path differs, so nothing compares")
+        raise InputError(f"case {case!r} is another one in {name}: its true path differs, so runs cannot be compared")
     target.mkdir(parents=True, exist_ok=True)
     # A run that could not create the case has no true path of it. The path of another run is linked then.
     for path in (source / each for each in (*OF_CASE, SEQUENCE)):

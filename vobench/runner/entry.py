@@ -153,4 +153,4 @@ def copy_files(folder: Path, names: Iterable[str], target: Path) -> None:
         if name in files:
             copyfile(folder / name, target / name)
         if name not in files or file_hash(target / name) != files[name].sha256:
-            raise InputError(f"not what was written; run the suite again to make it anew: {folder / name}")
+            raise InputError(f"differs from what was written; run the suite again to recreate it: {folder / name}")

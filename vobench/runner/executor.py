@@ -190,7 +190,7 @@ class LocalProcesses:
             worker = first
             done = worker.ask(task, store, limit, tell)
             if worker.had_fault and task.stage in REPEATABLE:
-                tell(f"{task.key}: {done.reason}, by a fault in a library; it is made once more")
+                tell(f"{task.key}: {done.reason}, because of a fault in a library; it is repeated once")
                 self._running.discard(worker.process)
                 worker.leave()
                 worker = self._worker(slot, task, cores)

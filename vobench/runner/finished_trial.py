@@ -106,7 +106,7 @@ def read_simulated_case(folder: RunFolder, name: str) -> Case:
     path = folder.case(name) / CASE
     content = json.loads(path.read_bytes())
     if "source" in content:
-        raise InputError(f"'{name}' is a recording: nothing in it can be changed and made again: {path}")
+        raise InputError(f"'{name}' is a recording, so it cannot be simulated with changes: {path}")
     try:
         return checked(Case, content)
     except ValidationError as error:

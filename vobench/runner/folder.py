@@ -230,7 +230,7 @@ class RunFolder:
             raise InputError(f"no such folder: {self.path}")
         if any(cases.glob(f"*/*/*/{SCORE}")):
             raise InputError(
-                f"a run of an older vobench, whose estimates do not lie in cases/*/{ESTIMATES}; "
+                f"a run of an older vobench, whose estimates are not in cases/*/{ESTIMATES}; "
                 f"run the suite again: {self.path}"
             )
         raise InputError(f"not the folder of a run (no cases/*/{ESTIMATES}/*/*/{SCORE} in it): {self.path}")
@@ -243,7 +243,7 @@ class RunFolder:
             folder = self.estimate(score.case, score.estimator, score.repeat)
             if folder / SCORE != file:
                 trial = f"{score.estimator!r} on {score.case!r}, {score.repeat}"
-                raise InputError(f"should be the score of the folder it lies in, but is of {trial}: {file}")
+                raise InputError(f"should be the score of its folder, but is that of {trial}: {file}")
             scores.append(score)
         return scores
 

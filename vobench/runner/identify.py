@@ -153,7 +153,7 @@ def _require_same_drive(drive: Drive, folder: Path) -> None:
     T_world_body = drive.motion.at(truth.t_ns).T_world_body
     has_same_stamps = bool(np.isin(truth.t_ns, drive.t_ns).all())
     if not has_same_stamps or not np.allclose(T_world_body, truth.T_world_frame, atol=SAME_POSE):
-        raise InputError(f"this version of vobench drives the case otherwise than it was recorded: {folder}")
+        raise InputError(f"this version of vobench drives the case differently from the recording: {folder}")
 
 
 def read_csv_log(path: Path, wheels: WheelGeometry) -> WheelLog:
@@ -176,7 +176,7 @@ def read_csv_log(path: Path, wheels: WheelGeometry) -> WheelLog:
         raise InputError(f"the columns {listed} should hold a number in each row: {path}") from None
     is_rising = bool((np.diff(values[:, 0]) > 0).all())
     if not np.isfinite(values).all() or not is_rising:
-        raise InputError(f"numbers should be finite and t_ns should rise: {path}")
+        raise InputError(f"numbers should be finite and t_ns should increase: {path}")
 
     t_ns = values[:, 0].astype(np.int64)
     rim_rad = values[:, 1:3]

@@ -32,7 +32,7 @@ def default_jobs() -> int:
     stated = os.environ.get("VOBENCH_JOBS", "")
     if stated:
         if not stated.isdecimal() or int(stated) < 1:
-            raise InputError(f"VOBENCH_JOBS should be a number of tasks from 1 on, got {stated!r}")
+            raise InputError(f"VOBENCH_JOBS should be a number of tasks, 1 or more, got {stated!r}")
         return int(stated)
     return min(len(os.sched_getaffinity(0)), MOST_JOBS)
 

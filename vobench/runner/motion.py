@@ -145,7 +145,7 @@ def stamps(motion: Motion, rate_hz: float, *, per_frame: int = 1) -> Stamps:
     lasts_s = (motion.end_ns - motion.start_ns) / NS_PER_S
     frames = int(lasts_s * rate_hz + 1e-6)
     if frames > MOST_FRAMES:
-        raise MotionError(f"{lasts_s:.4g} s at {rate_hz:g} Hz are {frames} frames, and {MOST_FRAMES} are the most")
+        raise MotionError(f"{lasts_s:.4g} s at {rate_hz:g} Hz are {frames} frames; at most {MOST_FRAMES} are possible")
     index = np.arange(frames * per_frame + 1)
     since_start_ns = np.rint(index * NS_PER_S / per_frame / rate_hz)
     return since_start_ns.astype(np.int64) + motion.start_ns
@@ -237,8 +237,8 @@ def check_cases(cases: Sequence[Case], motion: BodyMotion, mistakes: Mistakes) -
     with mistakes.at(*_place_in_suite(cases[0], "trajectory")):
         if len(motion.t_ns) < 2:
             raise MotionError(
-                f"the way ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows no "
-                "motion; go further, more slowly or with a higher rate_hz"
+                f"the trajectory ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows "
+                "no motion; go further, more slowly or with a higher rate_hz"
             )
     for case, *_ in _by(cases, "scene", "rig").values():
         with mistakes.at(*_place_in_suite(case, "trajectory")):

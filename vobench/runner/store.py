@@ -214,7 +214,9 @@ class Store:
             return self.root / key
         is_there = (self.root / key).is_dir()
         wrong = f"is damaged ({self.fault(key)})" if is_there else "is gone"
-        raise InputError(f"a result {wrong} that this is made of; the same command makes it anew: {self.root / key}")
+        raise InputError(
+            f"a result that this depends on {wrong}; run the same command again to recreate it: {self.root / key}"
+        )
 
     def get(
         self,
@@ -295,7 +297,7 @@ class Store:
             aside = folder.with_name(f"{BAD}{folder.name}")
             shutil.rmtree(aside, ignore_errors=True)
             folder.rename(aside)
-            tell(f"a damaged result is made anew, for {wrong}: {folder}")
+            tell(f"a damaged result is computed again, because {wrong}: {folder}")
 
     def require_writable(self) -> None:
         """Raise InputError if the store cannot be written."""

@@ -539,7 +539,7 @@ def _frame_numbers(table: TrajectoryTable) -> Stamps:
     if wrong_rows.size:
         row = wrong_rows[0]
         raise TrajectoryError(
-            f"{table.place(row)}: the first of 13 columns should be the number of a frame, whole and from 0 on, "
+            f"{table.place(row)}: the first of 13 columns should be the number of a frame, an integer from 0, "
             f"but is {table.first[row]}"
         )
     return numbers.astype(np.int64)

@@ -122,7 +122,7 @@ class TimeLaw:
 
     def __post_init__(self) -> None:
         if not self.end_s - self.start_s <= LONGEST_S:
-            raise MotionError(f"the motion would last {self.end_s - self.start_s:.3g} s; a day is the longest")
+            raise MotionError(f"the motion would last {self.end_s - self.start_s:.3g} s; it should last at most a day")
 
     @property
     def start_s(self) -> float:
