@@ -198,34 +198,36 @@ def _require_matched(roles: Roles, nodes: Sequence[Node]) -> None:
 
 
 def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles: Roles) -> Model:
-    """The model that consists of primitives and lights.
-
-    Names are made unique, roles are applied, and movers are separated from stationary things.
-    """
+    """The model that consists of primitives and lights, with unique names. Raises ModelError if it has no faces."""
     visible = [primitive for primitive in primitives if len(primitive.mesh.faces)]
     if not visible:
         raise ModelError("has no faces to see: are its nodes empty, of points or lines, without area, or ignored?")
-    node_names = _unique_names({primitive.node: primitive.node.names[-1] for primitive in visible})
-    role_by_node = {node: _role(node, roles) for node in node_names}
-    named_materials = [_in_role(primitive.look, role_by_node[primitive.node].name) for primitive in visible]
-    material_names = _unique_names({named: named[0] for named in named_materials})
-
-    parts = []
-    for primitive, named_material in zip(visible, named_materials, strict=True):
-        node = primitive.node
-        _, material = named_material
-        thing = Thing(node_names[node], primitive.mesh.mesh(), material_names[named_material])
-        emits_light = max(material.emission_cd_m2) > 0
-        parts.append(_Part(node, role_by_node[node], thing, emits_light))
-
+    parts, materials = _parts(visible, roles)
     return Model(
         things=tuple(part.thing for part in parts if part.role.mover is None),
-        materials={name: material for (_, material), name in material_names.items()},
+        materials=materials,
         lights=_renamed(lights),
         movers=_movers(parts),
         lamps=_lamps(parts),
         dropped=sum(primitive.dropped for primitive in primitives),
     )
+
+
+def _parts(primitives: Sequence[Primitive], roles: Roles) -> tuple[list[_Part], dict[str, Material]]:
+    """The parts of a model, one for each primitive, and their materials by unique names."""
+    node_names = _unique_names({primitive.node: primitive.node.names[-1] for primitive in primitives})
+    role_by_node = {node: _role(node, roles) for node in node_names}
+    named_materials = [_in_role(primitive.look, role_by_node[primitive.node].name) for primitive in primitives]
+    material_names = _unique_names({named: named[0] for named in named_materials})
+
+    parts = []
+    for primitive, named_material in zip(primitives, named_materials, strict=True):
+        node = primitive.node
+        _, material = named_material
+        thing = Thing(node_names[node], primitive.mesh.mesh(), material_names[named_material])
+        emits_light = max(material.emission_cd_m2) > 0
+        parts.append(_Part(node, role_by_node[node], thing, emits_light))
+    return parts, {name: material for (_, material), name in material_names.items()}
 
 
 def _renamed(lights: Sequence[ModelLight]) -> tuple[ModelLight, ...]:

@@ -24,7 +24,8 @@ from vobench.suite.suite import read_plan
 
 if TYPE_CHECKING:
     from vobench.report.leaderboard import Board
-    from vobench.runner.folder import RunFolder
+    from vobench.report.threshold import Threshold
+    from vobench.runner.folder import RunFolder, TrialScore
 
 INCOMPLETE_RUN = 1  # exit codes
 BROKEN_LIMIT = 3
@@ -168,7 +169,11 @@ def run_command(
     _print_board(board, as_json=json)
     if not json:
         _print_remarks(folder, shares_time=execution.share_time or plan.suite.share_time)
+    _exit_if_failed(scores, thresholds, is_incomplete=bool(board.unmade))
 
+
+def _exit_if_failed(scores: "Sequence[TrialScore]", thresholds: "Sequence[Threshold]", *, is_incomplete: bool) -> None:
+    """Warn about broken thresholds, and exit with an error code if there are any or if the run is incomplete."""
     broken_limits = list[str]()
     for threshold in thresholds:
         broken_limits += threshold.broken_by(scores)
@@ -177,7 +182,7 @@ def run_command(
     failure = total_failure(scores)
     if failure:
         terminal.warn(failure)
-    if board.unmade or failure:  # an incomplete run fails, whatever the thresholds are
+    if is_incomplete or failure:  # an incomplete run fails, whatever the thresholds are
         raise typer.Exit(INCOMPLETE_RUN)
     if broken_limits:
         raise typer.Exit(BROKEN_LIMIT)

@@ -126,36 +126,51 @@ def _require_ros2(path: Path) -> None:
 
 def _contents(reader: Any, chosen: Chosen, path: Path) -> BagContents:
     """Read the chosen topics once, without decoding or keeping pictures. Raises InputError."""
-    wanted = {*chosen.sensors, ros.TF_STATIC.name, chosen.truth_topic}
-    first_only = (chosen.truth_topic, chosen.left_info, chosen.right_info)
-    stamps_lists: dict[str, list[int]] = {}
-    first: dict[str, Any] = {}
-    readings: list[tuple[float, ...]] = []
-    static = []
-    connections = [connection for connection in reader.connections if connection.topic in wanted]
-    for connection, _, raw in reader.messages(connections):
-        topic = connection.topic
-        if topic in first and topic in first_only:
-            continue
-        message = reader.deserialize(raw, connection.msgtype)
-        if topic == ros.TF_STATIC.name:
-            static.append(message)
-            continue
-        if topic not in first:
-            first[topic] = _without_pixels(message)
-        if hasattr(message, "header"):
-            stamps_lists.setdefault(topic, []).append(ros.stamp_ns(message))
-        if topic == chosen.imu:
-            readings.append(_imu_fields(message))
-
-    _require_pictures(chosen, first, path)
+    messages = _read_once(reader, chosen)
+    _require_pictures(chosen, messages.first, path)
     stamps = {}
-    for topic, topic_ns in stamps_lists.items():
+    for topic, topic_ns in messages.stamps_ns.items():
         stamps[topic] = _increasing(np.array(topic_ns, np.int64), topic, path)
     imu = None
     if chosen.imu in stamps:
-        imu = _readings(chosen.imu, stamps[chosen.imu], readings, path)
-    return BagContents(stamps, first, imu, tree_of(static, str(path)))
+        imu = _readings(chosen.imu, stamps[chosen.imu], messages.readings, path)
+    return BagContents(stamps, messages.first, imu, tree_of(messages.static, str(path)))
+
+
+class _Messages(NamedTuple):
+    """The unchecked result of reading a bag once.
+
+    `stamps_ns` and `first` are the stamps and the first message of each topic, `readings` those of the IMU, and
+    `static` the messages on /tf_static.
+    """
+
+    stamps_ns: dict[str, list[int]]
+    first: dict[str, Any]
+    readings: list[tuple[float, ...]]
+    static: list[Any]
+
+
+def _read_once(reader: Any, chosen: Chosen) -> _Messages:
+    """Read the messages of the chosen topics in order. Of the truth and the calibrations, only the first is read."""
+    wanted = {*chosen.sensors, ros.TF_STATIC.name, chosen.truth_topic}
+    first_only = (chosen.truth_topic, chosen.left_info, chosen.right_info)
+    messages = _Messages({}, {}, [], [])
+    connections = [connection for connection in reader.connections if connection.topic in wanted]
+    for connection, _, raw in reader.messages(connections):
+        topic = connection.topic
+        if topic in messages.first and topic in first_only:
+            continue
+        message = reader.deserialize(raw, connection.msgtype)
+        if topic == ros.TF_STATIC.name:
+            messages.static.append(message)
+            continue
+        if topic not in messages.first:
+            messages.first[topic] = _without_pixels(message)
+        if hasattr(message, "header"):
+            messages.stamps_ns.setdefault(topic, []).append(ros.stamp_ns(message))
+        if topic == chosen.imu:
+            messages.readings.append(_imu_fields(message))
+    return messages
 
 
 def _require_pictures(

@@ -80,26 +80,33 @@ def _picture_topics(
     topics: Topics,
     path: str,
 ) -> tuple[str, str | None]:
+    """The topics of the left and the right pictures. The right one is None for a single camera."""
     for topic in (topics.left, topics.right):
         if topic is not None:
             _require(types, topic, (RAW, COMPRESSED), path)
     with_pictures = [topic for topic, message_type in types.items() if message_type in (RAW, COMPRESSED)]
     if topics.left is not None:
         return topics.left, topics.right or _only_partner(topics.left, with_pictures)
+    chosen = _only_pair(with_pictures, topics.right)
+    if chosen is None:
+        raise _undecided(types, with_pictures, path)
+    return chosen
 
+
+def _only_pair(with_pictures: list[str], right_topic: str | None) -> tuple[str, str | None] | None:
+    """The only pair of topics, with the given right topic if any, or the only camera; None if several fit."""
     pairs = _pairs(with_pictures)
-    if topics.right is not None:
-        pairs = [pair for pair in pairs if pair[1] == topics.right]
+    if right_topic is not None:
+        pairs = [pair for pair in pairs if pair[1] == right_topic]
     if len(pairs) == 1:
         return pairs[0]
     cameras = [topic for topic in with_pictures if not _contains(topic, NO_PICTURES)]
-    is_single_camera = not pairs and len(cameras) == 1 and topics.right is None
-    if is_single_camera:
-        return cameras[0], None
-    raise _undecided(types, with_pictures, path)
+    is_single_camera = not pairs and len(cameras) == 1 and right_topic is None
+    return (cameras[0], None) if is_single_camera else None
 
 
 def _undecided(types: Types, with_pictures: list[str], path: str) -> InputError:
+    """The error about topics that must be named."""
     if not with_pictures:
         return InputError(f"no pictures (Image or CompressedImage) in {path}; its topics: {_listed(types)}")
     return InputError(f"name the left and the right topic of {path}; with pictures: {', '.join(with_pictures)}")
