@@ -288,7 +288,7 @@ def _track(shots: Sequence[MatchedShot], pair: StereoPair) -> TrackedPoints | No
 
 
 def _true_motion(first: PairShot, last: PairShot, pair: StereoPair) -> Array | None:
-    """The true motion (4, 4) in the axes of the view, None where it is not known."""
+    """The true motion (4, 4) in the frame of the view, None if it is unknown."""
     if first.T_world_left is None or last.T_world_left is None:
         return None
     T_view_left = pair.T_view_left

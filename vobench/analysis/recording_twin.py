@@ -226,7 +226,7 @@ def make_twin(
 ) -> TwinReport:
     """Repeat a recording in simulation, run the same estimators on both, and compare.
 
-    `write_twin_suite` and `compare_twin` in one; their arguments and errors are these two functions'.
+    It calls `write_twin_suite` and `compare_twin`. See them for the arguments and errors.
     """
     suite = write_twin_suite(
         recording, out=out, place=place, estimators=estimators, form=form, options=options, progress=progress
@@ -234,12 +234,12 @@ def make_twin(
     return compare_twin(suite, run_plan=run_plan)
 
 
-# --- The path, and where it lies ---
+# --- The path and its placement ---
 
 
 @dataclass(frozen=True, slots=True)
 class _RecordedPath:
-    """What a twin repeats: poses T_world_left (N, 4, 4) of the left camera at times t_ns (N,), the rig and its fit."""
+    """The data that a twin repeats: poses T_world_left (N, 4, 4) at t_ns (N,), the rig, and the fit of the rig."""
 
     t_ns: Stamps
     T_world_left: Array
@@ -355,7 +355,7 @@ def _look(recording: Recording) -> CameraLook:
 
 
 def _evenly(items: list[Any]) -> list[Any]:
-    """FITTED_PICTURES items, evenly spread over all."""
+    """FITTED_PICTURES evenly spaced items."""
     indices = np.linspace(0, len(items) - 1, FITTED_PICTURES).astype(int)
     return [items[index] for index in indices]
 
@@ -405,7 +405,7 @@ def _spread(errors: Array) -> dict[str, float]:
 
 
 def _compared(real: Realism, twin: Realism) -> dict[str, tuple[float, float]]:
-    """Figures without a range, of the recording and of its twin, by a title with the unit."""
+    """The statistics without a range, of the recording and its twin, by title with unit."""
     compared = {}
     for key, title in (
         ("noise_dn", "noise where flat, DN"),
@@ -420,7 +420,7 @@ def _compared(real: Realism, twin: Realism) -> dict[str, tuple[float, float]]:
 
 
 def _compared_pairs(real: StereoFit, twin: StereoFit) -> dict[str, tuple[float, float]]:
-    """The right camera's rotation where both are known, and the quantiles of disparity."""
+    """The rotations of the right camera if both are known, and the quantiles of disparity."""
     compared = {}
     for name, unit in (("yaw_deg", "°"), ("roll_deg", "°"), ("pitch_deg", "°"), ("offset_px", " px")):
         of_real = getattr(real, name)

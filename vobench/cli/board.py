@@ -26,8 +26,8 @@ from vobench.report.leaderboard import Board
 LEAST_FIRST = ("MiB", "mean place", "CPU ms/frame", "ATE %", "failed", "decided", "× first")
 
 UNLIMITED_WIDTH = 10_000  # columns
-HEADING_WIDTH = 12  # of an estimator's name above a column
-MOST_CASES = 60  # rows on a terminal
+HEADING_WIDTH = 12  # the width of an estimator's name above a column
+MOST_CASES = 60  # the largest number of rows on a terminal
 ADVICE = "use a wider terminal, or --format csv"
 
 
@@ -69,7 +69,7 @@ def _cell_text(cell: ShownCell) -> str:
 
 
 def _fit_matrix(title: str, names: Sequence[str], rows: Sequence[Sequence[str]], console: Console) -> _FittedTable:
-    """The matrix without the last estimators, if not all fit; at least one remains."""
+    """The matrix without the last estimators, if not all of them fit. At least one remains."""
     shown_count = len(names)
     while True:
         headings = ["case", *(_folded(name) for name in names[:shown_count])]

@@ -33,7 +33,7 @@ BROKEN_LIMIT = 3
 
 @option_group
 class Selection:
-    """Which trials of the suite are run."""
+    """The selection of trials that are run."""
 
     estimator: Annotated[
         list[str] | None,
@@ -55,7 +55,7 @@ class Selection:
 
 @option_group
 class Changes:
-    """What is changed in the suite."""
+    """The changes to the suite."""
 
     repeats: Annotated[int | None, typer.Option("--repeats", "-n", help="Run each trial this many times.")] = None
     changes: Annotated[
@@ -93,7 +93,7 @@ class TrialLimits:
 
 @option_group
 class Execution:
-    """Where and how tasks are performed."""
+    """The options for performing tasks."""
 
     jobs: Annotated[
         int | None,
@@ -122,7 +122,7 @@ class Execution:
 
 @option_group
 class ProgressOptions:
-    """What is shown and logged while the suite runs."""
+    """The options for showing and logging progress."""
 
     events: Annotated[
         Path | None, typer.Option(help="Log the events of all tasks to this file, one JSON object a line.")

@@ -212,7 +212,7 @@ class RunFolder:
     def unmade(self) -> tuple[UnavailableCases, ...]:
         """The cases that could not be simulated or imported, by cause; empty if the run is complete.
 
-        Raises InputError where the folder or a score is none of ours.
+        Raises InputError for an invalid folder or score.
         """
         return unavailable_cases(self.scores())
 
@@ -221,7 +221,7 @@ class RunFolder:
         return self.case(case) / ESTIMATES / estimator / str(repeat)
 
     def score_files(self) -> list[Path]:
-        """Where every trial's score lies, in order of folders. Raises InputError where the folder is none of ours."""
+        """The paths of the scores of all trials, in the order of folders. Raises InputError if it is not a run."""
         cases = self.path / "cases"
         files = sorted(cases.glob(f"*/{ESTIMATES}/*/*/{SCORE}"))
         if files:
@@ -236,7 +236,7 @@ class RunFolder:
         raise InputError(f"not the folder of a run (no cases/*/{ESTIMATES}/*/*/{SCORE} in it): {self.path}")
 
     def scores(self) -> list[TrialScore]:
-        """Every trial's score, in order of folders. Raises InputError where the folder or a score is none of ours."""
+        """The scores of all trials, in the order of folders. Raises InputError for an invalid folder or score."""
         scores = []
         for file in self.score_files():
             score = read_score(file)
@@ -249,7 +249,7 @@ class RunFolder:
 
 
 def read_score(path: Path) -> TrialScore:
-    """One trial's score. Raises InputError where the file is none."""
+    """The score of a trial. Raises InputError if the file is not a score."""
     try:
         return TrialScore.model_validate_json(path.read_bytes())
     except ValidationError as error:
@@ -261,12 +261,12 @@ def read_score(path: Path) -> TrialScore:
 
 
 def open_run(path: Path) -> RunFolder:
-    """The run at a path; a suite's folder stands for its latest run."""
+    """The run at a path. The folder of a suite stands for its latest run."""
     return RunFolder((path / "latest") if (path / "latest").exists() else path)
 
 
 def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]) -> RunFolder:
-    """A new run's folder, which gets its name when `fill` is through with it without an error."""
+    """Create the folder of a run. It gets its final name when `fill` has returned without an error."""
     parent = root / suite
     sweep(parent)
     with unfinished(parent) as folder:
@@ -274,12 +274,12 @@ def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]
         final = _published(folder, parent / f"{datetime.now(UTC):{STAMP}}_{key[:8]}")
         fresh = parent / f".latest-{os.getpid()}"
         fresh.symlink_to(final.name)
-        fresh.replace(parent / "latest")  # in one step
+        fresh.replace(parent / "latest")  # atomic
     return RunFolder(final)
 
 
 def _published(folder: Path, name: Path) -> Path:
-    """The folder under its final name, with a number behind it where two runs ended in one second."""
+    """The folder with its final name, followed by a number if two runs ended in the same second."""
     for number in count(1):
         final = name if number == 1 else name.with_name(f"{name.name}.{number}")
         try:
@@ -291,7 +291,7 @@ def _published(folder: Path, name: Path) -> Path:
 
 
 def run_date(folder: RunFolder) -> str:
-    """The day a run ended in UTC, as in 2026-11-24, read off its folder's name; empty for a folder of another name."""
+    """The date in UTC on which a run ended, as in 2026-11-24, from the name of its folder; empty for another name."""
     stamp = folder.path.resolve().name.partition("_")[0]
     try:
         ended = datetime.strptime(stamp, STAMP).replace(tzinfo=UTC)
@@ -301,9 +301,9 @@ def run_date(folder: RunFolder) -> str:
 
 
 def read_tum(path: Path) -> Trajectory:
-    """The trajectory in a TUM file of a run; empty where an estimator gave no pose at all.
+    """The trajectory in a TUM file of a run; empty if an estimator gave no pose.
 
-    Raises TrajectoryError where the file is none.
+    Raises TrajectoryError if the file is not a trajectory.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -312,13 +312,13 @@ def read_tum(path: Path) -> Trajectory:
     return parse_tum(text, name=str(path))
 
 
-# Of runs of equal inputs the first are equal; the second are of the files of times, and of the page that shows them.
+# The first file is equal for runs with equal inputs. The second has the hashes of durations and of the page with them.
 HASHES = "hashes.json"
 TIMES_HASHES = "times_hashes.json"
 
 
 def write_hashes(folder: RunFolder) -> None:
-    """Hash all files in a run's folder, and the sequences that it links to; files of times apart."""
+    """Hash all files in the folder of a run and the sequences to which it links, and files of durations separately."""
     hashes: dict[str, str] = {}
     times_hashes: dict[str, str] = {}
     for name in _names(folder.path):
@@ -330,7 +330,7 @@ def write_hashes(folder: RunFolder) -> None:
 
 
 def read_hashes(folder: RunFolder) -> dict[str, str]:
-    """The hash of each file by its path in the folder. Raises InputError where none were kept."""
+    """The hash of each file by its path in the folder. Raises InputError if the run has no hashes."""
     return {**_hashes_in(folder.path / HASHES), **_hashes_in(folder.path / TIMES_HASHES)}
 
 
@@ -352,7 +352,7 @@ def _hashes_in(path: Path) -> dict[str, str]:
 
 
 def _names(root: Path) -> Iterator[str]:
-    """Paths of all files below a run's folder; a sequence is a link to a folder in the cache."""
+    """The paths of all files below the folder of a run. A sequence is a link to a folder in the cache."""
     files = {path for path in root.rglob("*") if path.is_file()}
     for link in root.glob(f"cases/*/{SEQUENCE}"):
         files.update(link.glob("*.mcap"))

@@ -1,13 +1,13 @@
-"""A process that has imported what workers need and forks them; neither it nor any worker outlives vobench.
+"""A server process that imports the modules of workers once and forks workers. None of them outlives vobench.
 
-Three things end a worker, each where the others cannot:
+There are three ways in which a worker ends, so that at least one always works:
 
-- a thread of the worker sees that vobench is gone, tidies up and leaves;
-- the server kills workers that have not left after a grace period, and what they have left behind;
-- the kernel kills every worker when the server dies.
+- A thread of the worker notices that vobench has ended, cleans up and ends the worker.
+- The server kills workers that still run after a grace period, and the processes that they have started.
+- The kernel kills all workers when the server dies.
 
-multiprocessing's own fork server is not used: each of its children holds open the pipe whose end should end the
-server, so killing vobench ends neither, and its socket stays in the temporary folder.
+The fork server of multiprocessing is not used. Each of its children holds open the pipe whose closing should end the
+server, so the server and its workers survive if vobench is killed, and its socket stays in the temporary folder.
 """
 
 import atexit
@@ -31,16 +31,16 @@ from typing import NoReturn
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 PR_SET_CHILD_SUBREAPER = 36
-FAREWELL_S = 0.8  # for workers to leave by themselves once vobench is gone
-ORPHAN_S = 0.3  # for what a dead worker has left behind to end by itself
-LOOK_S = 0.02  # how often the server looks while it waits for ends
-END_S = 2.0  # for the server to end when it is asked to
+FAREWELL_S = 0.8  # the time for workers to end by themselves after vobench has ended
+ORPHAN_S = 0.3  # the time for the orphans of a dead worker to end by themselves
+LOOK_S = 0.02  # the period at which the server checks whether processes have ended
+END_S = 2.0  # the time for the server to end on request
 NUMBER = struct.Struct("q")  # a process id or an exit code on a pipe
 START = b"w"  # on the control socket: fork a worker
 
 
 class WorkerProcess:
-    """A forked worker as vobench sees it: the connection to it, and how it ended."""
+    """A forked worker: the connection to it, and its exit code."""
 
     def __init__(self, connection: Connection, status_fd: int) -> None:
         self.connection = connection
@@ -51,26 +51,26 @@ class WorkerProcess:
 
     @property
     def exit_code(self) -> int | None:
-        """The exit code, or minus the signal's number; None while the worker runs or has yet to start."""
+        """The exit code, or minus the number of a signal; None while the worker runs or has not started."""
         return self.join(timeout_s=0)
 
     @property
     def is_alive(self) -> bool:
-        """Whether the worker runs or has yet to start."""
+        """Whether the worker runs or has not started yet."""
         return self.exit_code is None
 
     def pid(self, timeout_s: float | None = None) -> int | None:
-        """The process id, waited for if need be; None if the worker did not start in time, or at all."""
+        """The process id, for which the call waits if necessary; None if the worker does not start in time."""
         self._read(until=lambda: self._pid is not None, timeout_s=timeout_s)
         return self._pid
 
     def join(self, timeout_s: float | None = None) -> int | None:
-        """Wait for the end of the worker; its exit code, None if it has not ended in time."""
+        """Wait for the end of the worker, and return its exit code; None if it has not ended in time."""
         self._read(until=lambda: self._exit_code is not None, timeout_s=timeout_s)
         return self._exit_code
 
     def abandon(self) -> bool:
-        """Whether the worker has yet to start; if so it will end as soon as it does."""
+        """Return whether the worker has not started yet. In this case, it will end as soon as it starts."""
         if self.pid(timeout_s=0) is not None or not self.is_alive:
             return False
         with suppress(OSError), socket.socket(fileno=os.dup(self.connection.fileno())) as line:
@@ -78,7 +78,7 @@ class WorkerProcess:
         return True
 
     def kill(self, number: int) -> None:
-        """Send a signal to the worker, unless it has ended or has yet to start."""
+        """Send a signal to the worker if it runs."""
         pid = self.pid(timeout_s=0)
         if pid is not None and self.is_alive:
             with suppress(ProcessLookupError):
@@ -94,7 +94,7 @@ class WorkerProcess:
             self._status_fd = -1
 
     def _read(self, *, until: Callable[[], bool], timeout_s: float | None) -> None:
-        """Read what the server reports of the worker: its id, then its exit code."""
+        """Read the reports of the server on the worker: its id, then its exit code."""
         ends_s = None if timeout_s is None else time.monotonic() + timeout_s
         while not until() and self._exit_code is None:
             left_s = None if ends_s is None else max(ends_s - time.monotonic(), 0)
@@ -105,7 +105,7 @@ class WorkerProcess:
                     return
                 report = os.read(self._status_fd, NUMBER.size)
                 if len(report) < NUMBER.size:
-                    self._exit_code = -signal.SIGKILL  # the server died, and the worker with it
+                    self._exit_code = -signal.SIGKILL  # the server died, which killed the worker
                 elif self._pid is None:
                     (self._pid,) = NUMBER.unpack(report)
                 else:

@@ -48,7 +48,7 @@ def content(case: "Case") -> dict[str, Any]:
     return {**settings, "scene": scene}
 
 
-# What draws and writes is imported where it is used: whoever asks whether a sequence is there needs none of it.
+# The modules that render and write are imported when they are used, because looking up a sequence needs none of them.
 
 
 def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
