@@ -120,7 +120,7 @@ class StereoPair:
         return float(self.K[0, 0] * self.baseline_m)
 
     def seen(self, points: Points) -> Mask:
-        """Whether each point (N, 2) of the left picture is inside of the left view."""
+        """Whether the left view can show each point (N, 2) of the left picture."""
         in_view = self.left.in_view(points)
         return np.asarray(np.isfinite(in_view).all(1))
 
