@@ -90,7 +90,7 @@ FORGERIES = {
     "shape": (lambda files: with_score(files, metrics="x"), "not a score as vobench writes it"),
     "not a number": (not_a_number, "not a score as vobench writes it"),
     "other truth": (lambda files: files | {TRUTH: files[f"{TRIAL}/estimate.tum"]}, "not the path that its case.json"),
-    "other case": (lambda files: edited(files, f"{TRIAL}/score.json", case="dim"), "should be the score of the folder"),
+    "other case": (lambda files: edited(files, f"{TRIAL}/score.json", case="dim"), "should be the score of its folder"),
     "edited estimate": (
         lambda files: files | {f"{TRIAL}/estimate.tum": files[TRUTH]}, "another score than its run states"
     ),
