@@ -34,7 +34,8 @@ class FilePlace:
     value: Any = None
 
     def __str__(self) -> str:
-        position = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        parts = (self.file, self.line, self.column)
+        position = ":".join(str(part) for part in parts if part is not None)
         return f"{position}: {self.key}" if self.key else position
 
 

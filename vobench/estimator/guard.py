@@ -178,7 +178,8 @@ def _prctl(option: int, value: int) -> None:
 
 def descendants(ancestor: int) -> list[int]:
     """The ids of all descendants of a process; empty on a system without /proc."""
-    pids = [int(pid) for pid in os.listdir("/proc") if pid.isdigit()] if sys.platform == "linux" else []
+    names = os.listdir("/proc") if sys.platform == "linux" else []
+    pids = [int(name) for name in names if name.isdigit()]
     children = dict[int, list[int]]()
     for pid in pids:
         if fields := stat(pid):

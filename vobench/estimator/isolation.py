@@ -345,8 +345,12 @@ class _Tree:
 
 def _unescaped(text: str) -> str:
     """A path of mountinfo without escapes. A blank, for example, is escaped as a backslash and 040."""
-    parts = text.split("\\")
-    return parts[0] + "".join(chr(int(part[:3], 8)) + part[3:] for part in parts[1:])
+    first, *escaped = text.split("\\")
+    plain = first
+    for part in escaped:
+        octal_code = part[:3]
+        plain += chr(int(octal_code, 8)) + part[3:]
+    return plain
 
 
 def _mount(source: str | None, target: str, kind: str | None, flags: int, data: str | None = None) -> None:

@@ -68,7 +68,8 @@ def _changes(inputs: dict[str, str], kind: Path) -> str:
     fewest: set[str] | None = None
     nearest: dict[str, str] = {}
     for other in _stored(kind):
-        names = {name for name in inputs.keys() | other.keys() if inputs.get(name) != other.get(name)}
+        all_names = inputs.keys() | other.keys()
+        names = {name for name in all_names if inputs.get(name) != other.get(name)}
         limit = MOST_CHANGES + 1 if fewest is None else len(fewest)
         if len(names) < limit:
             fewest = names

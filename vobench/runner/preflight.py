@@ -80,9 +80,11 @@ class PlanSummary:
 
     def tasks(self) -> list[dict[str, Any]]:
         """For each stage: the number of tasks, how many must be performed and why, and the estimated seconds."""
-        return [
-            {**asdict(stage), IN_CACHE: stage.tasks - stage.to_do, "to do": stage.to_do} for stage in self.stages or ()
-        ]
+        rows = []
+        for stage in self.stages or ():
+            in_cache = stage.tasks - stage.to_do
+            rows.append({**asdict(stage), IN_CACHE: in_cache, "to do": stage.to_do})
+        return rows
 
     def as_dict(self) -> dict[str, Any]:
         """The summary as plain JSON values."""

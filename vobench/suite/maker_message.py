@@ -117,7 +117,11 @@ def _require_sound(mesh: MeshArrays) -> None:
             raise SuiteError(f"{name} have shape {array.shape}, where {shape} is right")
         if not np.isfinite(array).all():
             raise SuiteError(f"{name} have a number that is not finite")
-    if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < vertices:
+    if not len(mesh.faces):
+        return
+    first_vertex = mesh.faces.min()
+    last_vertex = mesh.faces.max()
+    if first_vertex < 0 or last_vertex >= vertices:
         raise SuiteError("faces name a vertex that is not there")
 
 
@@ -274,9 +278,11 @@ def _reader(name: str) -> type[BaseModel]:
     """The pydantic model that checks the fields of a class of `CLASSES`. Of arrays, only the class is checked."""
     known = CLASSES[name]
     hints = get_type_hints(known, localns={"Trimesh": _Mesh}, include_extras=True)
-    types = {field.name: _OF_FIELDS.get(hints[field.name], hints[field.name]) for field in fields(known)}
+    required: dict[str, Any] = {}
+    for field in fields(known):
+        hint = hints[field.name]
+        required[field.name] = (_OF_FIELDS.get(hint, hint), ...)
     config = ConfigDict(arbitrary_types_allowed=True, extra="forbid")
-    required: dict[str, Any] = {key: (kind, ...) for key, kind in types.items()}
     return create_model(name, __config__=config, **required)
 
 
@@ -301,9 +307,11 @@ def _array(entry: Any, arrays: memoryview) -> Any:
 
 
 def _require_picture(texture: Picture) -> None:
+    """Raise SuiteError unless a picture is grey, or has three or four channels of 8 bits."""
     shape = texture.values.shape
+    has_bytes = texture.values.dtype == np.uint8
     is_grey = len(shape) == 2
-    is_colour = len(shape) == 3 and shape[2] in (3, 4) and texture.values.dtype == np.uint8
+    is_colour = has_bytes and len(shape) == 3 and shape[2] in (3, 4)
     if not (is_grey or is_colour) or 0 in shape:
         kind = texture.values.dtype.name
         raise SuiteError(

@@ -447,5 +447,6 @@ class SceneFile:
     movers: tuple[MoverSpec, ...] = ()
 
     def __post_init__(self) -> None:
-        if not (self.room or self.maker or any((self.boxes, self.boards, self.furniture, self.meshes))):
+        has_objects = any((self.boxes, self.boards, self.furniture, self.meshes))
+        if not (self.room or self.maker or has_objects):
             raise SettingError("a scene needs something visible: room, boxes, boards, furniture, meshes or a maker")

@@ -31,7 +31,8 @@ class Trajectory:
     T_world_frame: Array
 
     def __post_init__(self) -> None:
-        if self.T_world_frame.shape != (len(self.t_ns), 4, 4) or self.t_ns.dtype != np.int64:
+        has_one_pose_per_stamp = self.T_world_frame.shape == (len(self.t_ns), 4, 4)
+        if not has_one_pose_per_stamp or self.t_ns.dtype != np.int64:
             raise TrajectoryError(
                 f"a trajectory needs (N,) int64 stamps and (N, 4, 4) poses, "
                 f"got {self.t_ns.shape} {self.t_ns.dtype} and {self.T_world_frame.shape}"
