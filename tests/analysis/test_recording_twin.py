@@ -98,7 +98,7 @@ def test_a_recording_that_cannot_be_repeated_is_a_sentence(recording, realism, c
 
 
 def test_a_recording_without_a_pair_is_a_sentence(recording: Recording, realism: Realism) -> None:
-    with pytest.raises(InputError, match="none that can be rectified and matched"):
+    with pytest.raises(InputError, match="needs a stereo pair that can be rectified and matched"):
         recording_twin._recorded_path(recording, replace(realism, pair=None))
 
 

@@ -633,7 +633,7 @@ FAULTS: dict[str, tuple[Callable[[], Glb | bytes], str]] = {
     "the unknown": (lambda: changed("extensionsRequired", ["X_y"]), "needs the extension X_y, which is unknown here"),
     "no data": (
         lambda: changed("bufferView", None, of="accessors") and no_data(),
-        "accessor 0 has no data; where it is",
+        "accessor 0 has no data; if it is",
     ),
     "no faces": (lambda: changed("nodes", []), "has no faces to see"),
     "NaN": (with_nan, "node 'tile': has vertices at NaN or infinity; repair it where it was made"),
