@@ -25,7 +25,7 @@ from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.scene import Scene, triangles
 from vobench.suite import catalog
-from vobench.suite.free_way import largest_free_circle
+from vobench.suite.free_space import largest_free_circle
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 

@@ -34,7 +34,8 @@ class FilePlace:
     value: Any = None
 
     def __str__(self) -> str:
-        position = ":".join(str(part) for part in (self.file, self.line, self.column) if part is not None)
+        parts = (self.file, self.line, self.column)
+        position = ":".join(str(part) for part in parts if part is not None)
         return f"{position}: {self.key}" if self.key else position
 
 
@@ -136,6 +137,12 @@ def printable(text: str) -> str:
 
 def _is_safe(character: str) -> bool:
     return character.isprintable() or character == "\n"
+
+
+def error_sentence(error: Exception) -> str:
+    """An exception as one line. The name of its type comes first, unless it is a VobenchError."""
+    text = " ".join(str(error).split())
+    return text if isinstance(error, VobenchError) else f"{type(error).__name__}: {text}"
 
 
 def unknown_name_sentence(kind: str, name: str, known: list[str]) -> str:

@@ -6,7 +6,7 @@ Estimators   Estimator Frame Result Status Tracks Image EncoderReadings ImuReadi
              Points Mask: corners and tracks
              StereoPair Eye stereo_pair coarse_disparity DisparityOffset: a stereo pair of any two lenses
              PoseFit pose_from_points carried_on: motion
-             StereoTracker TrackerSettings Followed: a view whose points are tracked in both cameras
+             StereoTracker TrackerSettings Followed: a keyframe whose points are tracked in both cameras
              parameters assert_contract: the manifest's parameters, and the contract in a plugin's own test
 Makers       Thing make_mesh joined moved copies flipped two_sided textured: meshes, as trimesh.Trimesh
              quad at block card cards cushion extrusion lathe pierced reveal sheet spline tube: shapes

@@ -80,7 +80,9 @@ def _base() -> Path:
         facts = base.lstat()
     except FileNotFoundError:
         return _base()
-    is_private = stat.S_ISDIR(facts.st_mode) and facts.st_uid == os.getuid() and not facts.st_mode & 0o077
+    is_own_folder = stat.S_ISDIR(facts.st_mode) and facts.st_uid == os.getuid()
+    is_open_to_others = facts.st_mode & 0o077
+    is_private = is_own_folder and not is_open_to_others
     return base if is_private else Path(tempfile.mkdtemp(prefix=f"{BASE}-", dir=temporary))
 
 

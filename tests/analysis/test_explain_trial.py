@@ -39,7 +39,7 @@ def test_every_variant_is_run_by_the_plan_runner_with_the_estimator_of_the_trial
 
     explain_trial(noisy_run.trial("blind"), run_plan=run_plan, repeats=1, estimator=noisy_run.estimator)
     assert {plan.suite.name for plan in plans} == {"explain_short_blind"}
-    assert {entrant.label for plan in plans for entrant in plan.entrants} == {"blind"}
+    assert {estimator_entry.label for plan in plans for estimator_entry in plan.estimator_entries} == {"blind"}
 
 
 def never(plan, /):

@@ -52,7 +52,11 @@ def suite(recorded_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 def test_the_suite_has_the_recording_and_its_repetition(suite: TwinSuite, recording: Recording) -> None:
     plan = read_plan(str(suite.file))
     assert [case.name for case in plan.cases] == [TWIN, REAL]
-    assert [entrant.label for entrant in plan.entrants] == ["stereo_pnp", "mono_vo", "stand_still"]
+    assert [entry.label for entry in plan.estimator_entries] == [
+        "stereo_pnp",
+        "mono_vo",
+        "stand_still",
+    ]
     (case,) = plan.simulated
     left, recorded = case.build_rig().left, recording.rig.left
     assert (left.width_px, left.height_px) == (recorded.width_px, recorded.height_px)
@@ -76,8 +80,8 @@ def test_the_path_of_the_twin_is_that_of_the_recording_moved_as_a_whole(suite: T
 @pytest.mark.parametrize(
     ("change", "sentence"),
     [
-        ({"truth": None}, "repeats a path, and this recording has none"),
-        ({"still": True}, "this recording stands still"),
+        ({"truth": None}, "needs a path, and this recording has none"),
+        ({"still": True}, "this recording is stationary"),
         ({"short": True}, "takes 12 pictures or more with a truth, and this recording has 5"),
     ],
 )
@@ -94,7 +98,7 @@ def test_a_recording_that_cannot_be_repeated_is_a_sentence(recording, realism, c
 
 
 def test_a_recording_without_a_pair_is_a_sentence(recording: Recording, realism: Realism) -> None:
-    with pytest.raises(InputError, match="none that can be rectified and matched"):
+    with pytest.raises(InputError, match="needs a stereo pair that can be rectified and matched"):
         recording_twin._recorded_path(recording, replace(realism, pair=None))
 
 

@@ -437,7 +437,7 @@ def test_a_mover_has_its_things_about_its_own_origin(read: Reader) -> None:
     assert [thing.name for thing in model.things] == ["wall"]
     (door,) = model.movers
     assert (door.name, [thing.name for thing in door.things]) == ("hinge", ["door"])
-    np.testing.assert_allclose(door.at_m, z_up([2, 1, 0]))
+    np.testing.assert_allclose(door.origin_m, z_up([2, 1, 0]))
     np.testing.assert_allclose(door.things[0].mesh.triangles[0], z_up([[0, 0, -1], [1, 0, -1], [0, 1, -1]]))
     np.testing.assert_allclose(model.everything[1].mesh.triangles[0], z_up([[2, 1, -1], [3, 1, -1], [2, 2, -1]]))
 
@@ -633,7 +633,7 @@ FAULTS: dict[str, tuple[Callable[[], Glb | bytes], str]] = {
     "the unknown": (lambda: changed("extensionsRequired", ["X_y"]), "needs the extension X_y, which is unknown here"),
     "no data": (
         lambda: changed("bufferView", None, of="accessors") and no_data(),
-        "accessor 0 has no data; where it is",
+        "accessor 0 has no data; if it is",
     ),
     "no faces": (lambda: changed("nodes", []), "has no faces to see"),
     "NaN": (with_nan, "node 'tile': has vertices at NaN or infinity; repair it where it was made"),
@@ -833,7 +833,7 @@ def test_a_ply_has_the_colours_of_its_vertices(read: Reader) -> None:
 
 
 def test_a_file_of_another_kind_and_none_at_all_are_refused(read: Reader, tmp_path: Path) -> None:
-    with pytest.raises(ModelError, match=r"is of no format that is read: .glb, .gltf, .obj, .stl, .ply"):
+    with pytest.raises(ModelError, match=r"is of an unknown format; known formats are .glb, .gltf, .obj, .stl, .ply"):
         read(b"x", "thing.fbx")
     with pytest.raises(ModelError, match=r"nothing.glb: there is no such file"):
         read_model(tmp_path / "nothing.glb")

@@ -45,7 +45,7 @@ def test_verify_names_what_is_damaged_and_the_next_run_mends_it_with_a_sentence(
     said = vobench("run", "tiny")
     assert said.code == 0
     (sentence,) = [line for line in said.err.splitlines() if "damaged" in line]
-    assert sentence.startswith("vobench: a damaged result is made anew, for estimate.tum has ")
+    assert sentence.startswith("vobench: a damaged result is computed again, because estimate.tum has ")
     assert estimate.read_bytes() == right
     assert vobench("cache", "verify").code == 0
 

@@ -77,7 +77,7 @@ def test_a_drive_that_cannot_tell_is_one_line(vobench, here):
         ("t_ns,left_rim_rad\n0,0\n", "no right_rim_rad, u_ref_mps, omega_ref_radps in it.csv"),
         ("", "no t_ns, left_rim_rad"),
         ("t_ns,left_rim_rad,right_rim_rad,u_ref_mps,omega_ref_radps\n0,0,0,x,0\n", "should hold a number in each row"),
-        ("t_ns,left_rim_rad,right_rim_rad,u_ref_mps,omega_ref_radps\n0,0,0,0,0\n0,0,0,0,0\n", "t_ns should rise"),
+        ("t_ns,left_rim_rad,right_rim_rad,u_ref_mps,omega_ref_radps\n0,0,0,0,0\n0,0,0,0,0\n", "t_ns should increase"),
         ("t_ns,left_rim_rad,right_rim_rad,u_ref_mps,omega_ref_radps\n0,0,0,0,0\n", "lasts 1 s and three periods"),
     ],
 )

@@ -556,7 +556,7 @@ BROKEN = [
     ("stamps going back", "1 0 0 0 0 0 0 1\n0 0 0 0 0 0 0 1\n", "bad:2: stamps must increase, but 0 follows 1"),
     ("cut off", "0 0 0 0 0 0 0 1\n1 0 0 0 0", "bad:2: a pose has 8 columns (t x y z qx qy qz qw), this line has 5 (the last row: was the file cut off?)"),
     ("mirrored", "1 0 0 0 0 1 0 0 0 0 -1 0\n", "bad:1: the rotation is mirrored (its determinant is -1): these axes are left-handed, a pose's are right-handed"),
-    ("empty", "", "no pose, for the file is empty: bad"),
+    ("empty", "", "no pose, because the file is empty: bad"),
     ("pointer", "version https://git-lfs.github.com/spec/v1\noid sha256:1\nsize 2\n", "a Git-LFS pointer, not the file itself; fetch it with git lfs pull: bad"),
     ("garbage", b"\x00\x01\xfe garbage", "neither text, nor an MCAP file or ROS bag: bad"),
     ("utf-16", "0 0 0 0 0 0 0 1\n".encode("utf-16"), "neither text, nor an MCAP file or ROS bag: bad"),

@@ -24,4 +24,4 @@ def test_a_pair_in_which_nothing_matches_is_a_sentence(vobench, ran):
     case = next((ran / "latest" / "cases").iterdir())
     said = vobench("twin", case, "--out", "new")
     assert said.code == 1
-    assert "a twin repeats a pair of eyes" in said.err
+    assert "a twin needs a stereo pair" in said.err

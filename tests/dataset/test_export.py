@@ -186,7 +186,7 @@ def test_kitti_leaves_out_frames_without_truth_and_says_so(make_sequence: Make, 
     exported = export(made.folder, tmp_path / "out", "kitti")
     assert sum(name.startswith("image_0") for name in exported.files) == 3
     assert any(note.startswith("2 of 5 frames lie before or after") for note in exported.notes)
-    assert any("2 poses were interpolated between true ones" in note for note in exported.notes)
+    assert any("2 poses were interpolated between true poses" in note for note in exported.notes)
 
 
 @pytest.mark.parametrize("form", FORMS)

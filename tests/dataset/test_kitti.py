@@ -104,8 +104,8 @@ def test_poses_behind_their_picture_s_number_may_be_fewer(scene, tmp_path):
     [
         ((0, 1, 5), r"a picture's number, from 0 to 4, but there is 5: .*00\.txt"),
         ((0, 2, 1), r"00\.txt:3: frame numbers must increase, but 1 follows 2"),
-        ((0, 1, -2), r"00\.txt:3: .* whole and from 0 on, but is -2"),
-        ((0, 1, 2.5), r"00\.txt:3: .* whole and from 0 on, but is 2\.5"),
+        ((0, 1, -2), r"00\.txt:3: .* an integer from 0, but is -2"),
+        ((0, 1, 2.5), r"00\.txt:3: .* an integer from 0, but is 2\.5"),
     ],
 )
 def test_a_number_that_no_picture_has_or_that_does_not_rise_is_refused(scene, tmp_path, numbers, said):

@@ -83,6 +83,16 @@ def test_a_breach_of_the_contract_is_named_with_its_frame(answer, sentence):
         checked(answer, 9)
 
 
+def test_the_rounding_of_a_covariance_is_relative_to_its_size():
+    large = 1e12 * SQUARES
+    large[0, 1] = 10.0
+    assert checked(Result(I, covariance=large), 0).covariance[0, 1] == 10.0
+    small = 1e-12 * SQUARES
+    small[0, 1] = 1e-13
+    with pytest.raises(InvalidOutputError, match="not symmetric"):
+        checked(Result(I, covariance=small), 0)
+
+
 def test_rounding_in_a_covariance_is_no_breach():
     P = with_entry(SQUARES, 0, 1, 1e-10)
     assert checked(Result(I, covariance=P), 0).covariance[0, 1] == 1e-10

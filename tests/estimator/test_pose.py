@@ -44,6 +44,14 @@ def test_an_exact_motion_is_found_again_with_one_eye_and_with_two():
         assert fit.inlier.all()
 
 
+def test_six_points_are_enough_for_a_motion_and_five_are_not():
+    *_, points = cloud(np.random.default_rng(3), n=6)
+    uv, _ = pixels(se3.apply(STEP, points))
+    fit = pose_from_points(points, uv, PAIR.K)
+    np.testing.assert_allclose(fit.T_now_last, STEP, atol=1e-6)
+    assert pose_from_points(points[:5], uv[:5], PAIR.K) is None
+
+
 def test_forty_percent_of_wrong_points_do_not_move_it():
     rng = np.random.default_rng(1)
     *_, points = cloud(rng)

@@ -691,9 +691,9 @@ def test_a_program_is_the_first_on_path_that_an_estimator_may_read(tmp_path, mon
     shim.write_text("#!/bin/sh\n")
     shim.chmod(0o755)
     monkeypatch.setenv("PATH", f"{shim.parent}:/usr/bin:/bin")
-    assert sandbox.found("sh", None) in ("/usr/bin/sh", "/bin/sh")
-    assert sandbox.found("sh", shim.parent) == str(shim)  # its own folder
-    assert sandbox.found(str(shim), None) == str(shim)
+    assert sandbox.program_path("sh", None) in ("/usr/bin/sh", "/bin/sh")
+    assert sandbox.program_path("sh", shim.parent) == str(shim)  # its own folder
+    assert sandbox.program_path(str(shim), None) == str(shim)
     monkeypatch.setenv("PATH", str(shim.parent))
-    assert sandbox.found("sh", None) == str(shim)
+    assert sandbox.program_path("sh", None) == str(shim)
     assert sandbox.is_out_of_reach("sh", None)

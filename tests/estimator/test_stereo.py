@@ -50,6 +50,14 @@ def test_a_prediction_with_the_true_motion_and_depth_is_where_the_point_is(rig):
     np.testing.assert_allclose(predicted(pair.left, uv, np.full(50, np.nan), np.eye(4)), uv, atol=1e-3)
 
 
+def test_a_view_shows_only_pixels_whose_ray_is_at_most_sixty_degrees_from_its_axis():
+    pair = stereo_pair(bulging(), "test")
+    angles = np.deg2rad([0.0, 30.0, 55.0, 65.0, 85.0])
+    rays = np.stack([np.sin(angles), 0 * angles, np.cos(angles)], -1)
+    pixels = pair.left.camera.project(rays)
+    assert pair.seen(pixels).tolist() == [True, True, True, False, False]
+
+
 def test_a_motion_of_the_view_is_the_same_motion_of_the_left_camera():
     pair = stereo_pair(wild("euroc"), "test")
     T_left = se3.transform(se3.rotation_z(0.3), [0.1, 0.2, 0.3])

@@ -6,7 +6,7 @@ import pytest
 
 from vobench.errors import VobenchError
 from vobench.estimator.check import InvalidOutputError
-from vobench.estimator.worker import NAMESPACE, _in_one_line, _tag, load
+from vobench.estimator.worker import NAMESPACE, _tag, load
 
 CLASS = "class Mine:\n    number = {}\n    def start(self, rig, params, seed): ...\n    def process(self, frame): ...\n"
 
@@ -87,8 +87,3 @@ def test_what_is_wrong_with_a_plugin_is_one_sentence_with_its_place(tmp_path, so
 )
 def test_a_failure_has_the_tag_of_its_kind(error, tag):
     assert _tag(error) == tag
-
-
-def test_a_crash_is_named_by_its_exception_and_a_refusal_by_its_sentence():
-    assert _in_one_line(ValueError("a\nb")) == "ValueError: a b"
-    assert _in_one_line(VobenchError("needs\nwheels")) == "needs wheels"

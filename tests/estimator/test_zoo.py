@@ -25,7 +25,7 @@ from vobench.runner.estimate import LOG, estimate, read_outcome
 from vobench.runner.frames import ANSWERS, TIMES, read_table
 from vobench.runner.store import SilentProgress
 from vobench.sequence import SequenceWriter
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Trial
 from vobench.suite.source import RecordedCase, Source
@@ -161,7 +161,7 @@ ZOO = {
     "an infinite covariance": Animal(INVALID, "return Result(I, covariance=np.eye(6) * np.inf)", "frame 0: the covariance should be a finite"),
     "revises what is none": Animal(INVALID, OK, "finish() must return poses", finish="return [np.eye(4)]"),
     "revises with NaN": Animal(INVALID, OK, "finish(): the pose should be a finite", finish="return {0: np.eye(4) * np.nan}"),
-    "revises for ever": Animal(INVALID, OK, "the end: more poses revised than the 3 frames it had", finish="while True: send(b'REVI', struct.pack('<q', 0) + np.eye(4)[:3].tobytes())"),
+    "revises for ever": Animal(INVALID, OK, "the end: more revised poses than the 3 frames it had", finish="while True: send(b'REVI', struct.pack('<q', 0) + np.eye(4)[:3].tobytes())"),
     # It speaks past our worker.
     "half a header": writes("os.write(OUT, b'POS')", "no answer within 0.4 s", LATE, frame_s=0.4),
     "half a message": writes("send(b'POSE', b'1234', 112)", "no answer within 0.4 s", LATE, frame_s=0.4),

@@ -59,7 +59,7 @@ def test_cells_trials_and_frames_have_a_row_each(ran):
 
 def test_only_chooses_cases_scenes_or_estimators(here):
     assert [case.name for case in plan("tiny", only="sh*").cases] == ["short"]
-    assert [entrant.label for entrant in plan("tiny", only=["stand*", "closet"]).entrants] == ["stand_still"]
+    assert [entry.label for entry in plan("tiny", only=["stand*", "closet"]).estimator_entries] == ["stand_still"]
     with pytest.raises(UnknownNameError, match=r"no case, scene or estimator named 'shirt'. Did you mean 'short'"):
         plan("tiny", only="shirt")
 

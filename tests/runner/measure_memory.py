@@ -50,5 +50,5 @@ for suite in sys.argv[2:]:
     simulating = peak_mb()
     forget_peak()
     for trial in plan.trials(case):
-        perform(estimate_task(trial, task.key, estimator_code(trial.entrant)), store)
+        perform(estimate_task(trial, task.key, estimator_code(trial.estimator_entry)), store)
     print(len(Sequence.open(sequence)), simulating, peak_mb())

@@ -90,8 +90,8 @@ def test_a_score_that_is_not_its_estimates_is_found_and_scored_anew(make, tmp_pa
     ("name", "text", "sentence"),
     [
         ("cases/down/ground_truth.tum", "0 0 0 0 0 0 0 1\n", "holds a file twice"),
-        ("../outside.txt", "x", "would lie outside"),
-        ("/etc/outside.txt", "x", "would lie outside"),
+        ("../outside.txt", "x", "whose path is outside"),
+        ("/etc/outside.txt", "x", "whose path is outside"),
     ],
 )
 @pytest.mark.filterwarnings("ignore:Duplicate name")
@@ -105,7 +105,7 @@ def test_a_bundle_that_was_meddled_with_is_a_sentence(make, tmp_path, name, text
 
 def test_what_is_no_bundle_is_a_sentence(tmp_path):
     (tmp_path / "a.zip").write_bytes(b"PK, but not for long")
-    with pytest.raises(InputError, match="neither a run's folder nor a bundle"), opened(tmp_path / "a.zip"):
+    with pytest.raises(InputError, match="neither the folder of a run nor a bundle"), opened(tmp_path / "a.zip"):
         pass
 
 

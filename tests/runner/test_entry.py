@@ -109,7 +109,7 @@ def test_a_file_is_copied_if_it_is_what_was_written(made, tmp_path):
     copy_files(made[0], ["a.npy"], tmp_path)
     assert (tmp_path / "a.npy").read_bytes() == FILES["a.npy"]
     change(made[0] / "a.npy", bytes(90))
-    with pytest.raises(InputError, match=r"not what was written; run the suite again to make it anew: .*a\.npy"):
+    with pytest.raises(InputError, match=r"differs from what was written; run the suite again to recreate it: .*a.npy"):
         copy_files(made[0], ["a.npy"], tmp_path)
 
 

@@ -20,7 +20,7 @@ from vobench.runner.frames import ANSWERS, read_table
 from vobench.runner.store import SilentProgress
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import SequenceWriter
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Trial
 
@@ -71,9 +71,9 @@ def recorded(folder: Path, rig: Rig, *, frames: int = 3) -> Path:
 
 
 def estimated(tmp_path: Path, sequence: Path, plugin: Path) -> Path:
-    entrant, folder = EstimatorEntry("mine", plugin, read_manifest(plugin), {}), tmp_path / "estimate"
+    estimator_entry, folder = EstimatorEntry("mine", plugin, read_manifest(plugin), {}), tmp_path / "estimate"
     folder.mkdir()
-    estimate(Trial(Named(), entrant, 0), sequence, folder, SilentProgress())
+    estimate(Trial(Named(), estimator_entry, 0), sequence, folder, SilentProgress())
     return folder
 
 

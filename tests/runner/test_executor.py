@@ -241,7 +241,7 @@ def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monk
     assert hit
     for key in hit:
         assert told[key].startswith(f"{key}: its process ended with signal SIGABRT")
-        assert told[key].endswith(", by a fault in a library; it is made once more")
+        assert told[key].endswith(", because of a fault in a library; it is repeated once")
 
 
 @pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGABRT])

@@ -20,7 +20,7 @@ from vobench.runner.frames import read_frames
 from vobench.runner.store import SilentProgress
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import SequenceWriter
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Trial
 from vobench.suite.source import RecordedCase, Source
@@ -161,8 +161,8 @@ def test_a_perfect_program_is_perfect_whatever_frame_it_gives_the_poses_of(tmp_p
     (folder / "poses.tum").write_text(format_tum(Trajectory(t_ns, T_world_body @ T_body_frame)))
     case = RecordedCase(name="case", variant={}, source=Source(path="."))
     (tmp_path / "estimate").mkdir()
-    entrant = EstimatorEntry("perfect", folder, read_manifest(folder), {})
-    estimate(Trial(case, entrant, 0), tmp_path / "sequence", tmp_path / "estimate", SilentProgress())
+    estimator_entry = EstimatorEntry("perfect", folder, read_manifest(folder), {})
+    estimate(Trial(case, estimator_entry, 0), tmp_path / "sequence", tmp_path / "estimate", SilentProgress())
     assert read_outcome(tmp_path / "estimate").reason == ""
     est, gt = read_tum(tmp_path / "estimate" / ESTIMATE), T_world_body @ rig.T_body_left
     T_first = gt[0] @ se3.inverse(est.T_world_frame[0])

@@ -23,11 +23,11 @@ def test_a_trial_is_found_by_its_name_by_its_repeat_and_by_its_folder(first):
     assert by_name.path == first.estimate("dim", "wheel_odometry", 0)
 
 
-def test_case_entrant_and_suite_are_those_of_the_plan(bench, first):
+def test_case_estimator_and_suite_are_those_of_the_plan(bench, first):
     plan = bench.plan()
     trial = read_finished_trial(first.path / "dim" / "wheel_odometry")
     assert trial.case == next(case for case in plan.simulated if case.name == "dim")
-    assert trial.entrant == plan.entrants[0]
+    assert trial.estimator_entry == plan.estimator_entries[0]
     assert trial.suite == plan.suite
 
 
@@ -55,7 +55,7 @@ def test_a_word_is_no_trial(tmp_path, monkeypatch):
 def test_an_estimator_that_has_changed_since_the_run_is_told_of(first, tmp_path):
     trial = read_finished_trial(first.path / "dim" / "wheel_odometry")
     changed = tmp_path / "wheel_odometry"
-    shutil.copytree(trial.entrant.folder, changed)
+    shutil.copytree(trial.estimator_entry.folder, changed)
     (changed / "notes.txt").write_text("changed")
     heard = []
 
@@ -64,7 +64,7 @@ def test_an_estimator_that_has_changed_since_the_run_is_told_of(first, tmp_path)
             heard.append(sentence)
 
     again = read_finished_trial(first.path / "dim" / "wheel_odometry", estimator=changed, progress=Listening())
-    assert again.entrant.folder == changed
+    assert again.estimator_entry.folder == changed
     (sentence,) = heard
     assert sentence == f"{changed} has changed since the run, whose wheel_odometry this is"
 

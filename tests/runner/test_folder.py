@@ -157,7 +157,7 @@ def test_a_score_that_names_another_place_than_its_own_is_refused(tmp_path):
     made = make_run(tmp_path, "suite", "key", fill_with(score()))
     file = made.estimate("c", "e", 0) / SCORE
     write_json(file, score(estimator="../../..").model_dump(mode="json"))
-    with pytest.raises(InputError, match=r"^should be the score of the folder it lies in, but is of '\.\./"):
+    with pytest.raises(InputError, match=r"^should be the score of its folder, but is that of '\.\./"):
         made.scores()
 
 

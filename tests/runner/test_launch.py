@@ -70,7 +70,7 @@ def test_the_environment_says_how_many_jobs_there_are(monkeypatch):
     monkeypatch.setenv("VOBENCH_JOBS", "3")
     assert default_jobs() == 3
     monkeypatch.setenv("VOBENCH_JOBS", "0")
-    with pytest.raises(InputError, match="VOBENCH_JOBS should be a number of tasks from 1 on, got '0'"):
+    with pytest.raises(InputError, match="VOBENCH_JOBS should be a number of tasks, 1 or more, got '0'"):
         default_jobs()
 
 

@@ -19,7 +19,7 @@ def test_a_summary_counts_frames_and_trials_and_makes_nothing(bench, empty_cache
     assert [case.case for case in summary.cases] == [case.name for case in planned.cases]
     assert all(case.frames > 1 and case.duration_s > 0 for case in summary.cases)
     assert {case.sequence for case in summary.cases} == {TO_SIMULATE}
-    assert summary.trials == len(planned.cases) * len(planned.entrants) * planned.suite.repeats
+    assert summary.trials == len(planned.cases) * len(planned.estimator_entries) * planned.suite.repeats
     assert not (empty_cache / "sequences").exists()
 
 

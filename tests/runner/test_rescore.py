@@ -90,7 +90,7 @@ FORGERIES = {
     "shape": (lambda files: with_score(files, metrics="x"), "not a score as vobench writes it"),
     "not a number": (not_a_number, "not a score as vobench writes it"),
     "other truth": (lambda files: files | {TRUTH: files[f"{TRIAL}/estimate.tum"]}, "not the path that its case.json"),
-    "other case": (lambda files: edited(files, f"{TRIAL}/score.json", case="dim"), "should be the score of the folder"),
+    "other case": (lambda files: edited(files, f"{TRIAL}/score.json", case="dim"), "should be the score of its folder"),
     "edited estimate": (
         lambda files: files | {f"{TRIAL}/estimate.tum": files[TRUTH]}, "another score than its run states"
     ),
@@ -135,14 +135,14 @@ def test_links_and_files_that_are_there_twice_are_reported(honest, tmp_path):
     link.external_attr = (stat.S_IFLNK | 0o777) << 16
     with ZipFile(path, "a") as file:
         file.writestr(link, "/etc/shadow")
-    assert "would lie outside" in reported(path)[0]
+    assert "whose path is outside" in reported(path)[0]
 
 
 def test_a_trial_that_the_hashes_do_not_name_is_reported(honest, tmp_path):
     path = packed(honest, tmp_path / "a.zip")
     with ZipFile(path, "a") as file:
         file.writestr(TRIAL.replace("/0", "/1") + "/score.json", honest[f"{TRIAL}/score.json"])
-    assert "holds a file that its hashes do not name" in reported(path)[0]
+    assert "contains a file that its hashes do not name" in reported(path)[0]
 
 
 def test_a_forged_rank_is_not_the_rank_of_the_board(honest, tmp_path):

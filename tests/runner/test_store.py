@@ -284,7 +284,7 @@ def test_a_damaged_result_is_made_anew_with_a_sentence_and_set_aside(store):
     (made / "result").write_text("wrong size")
     store.get("kind", {}, write("right"), tell=said.append)
     assert (made / "result").read_text() == "right"
-    assert said == [f"a damaged result is made anew, for result has 10 bytes, should have 5: {made}"]
+    assert said == [f"a damaged result is computed again, because result has 10 bytes, should have 5: {made}"]
     assert (made.with_name(f"{BAD}{made.name}") / "result").read_text() == "wrong size"
 
 
@@ -293,9 +293,13 @@ def test_what_a_result_is_made_of_must_be_there_and_sound(store):
     assert store.need(f"kind/{made.name}") == made
     (made / "result").write_text("wrong")
     os.utime(made / "result", ns=(0, 0))
-    with pytest.raises(InputError, match=r"a result is damaged \(result holds other bytes than were written\)"):
+    with pytest.raises(
+        InputError, match=r"a result that this depends on is damaged \(result holds other bytes than were written\)"
+    ):
         store.need(f"kind/{made.name}")
-    with pytest.raises(InputError, match="a result is gone that this is made of; the same command makes it anew: "):
+    with pytest.raises(
+        InputError, match="a result that this depends on is gone; run the same command again to recreate it"
+    ):
         store.need("kind/other")
 
 

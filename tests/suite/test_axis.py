@@ -56,8 +56,12 @@ CALIB, CAMCHAIN = "{pitch_deg: 0, calib: it}", "{pitch_deg: 0, camchain: it}"
     ("text", "rig", "wrong"),
     [
         (None, CALIB, "it"),
-        (GREY.split("P1", maxsplit=1)[0], CALIB, "a pair needs P0 and P1, or P2 and P3; the matrices there are P0"),
-        (GREY.replace("600", "300"), CALIB, "it: P0 has its centre at [300.0, 180.0], so pictures are not 1241 x 376"),
+        (GREY.split("P1", maxsplit=1)[0], CALIB, "a pair needs P0 and P1, or P2 and P3; the file has P0"),
+        (
+            GREY.replace("600", "300"),
+            CALIB,
+            "it: P0 has its principal point at [300.0, 180.0], so pictures are not 1241",
+        ),
         (CHAIN.split("cam1", maxsplit=1)[0], CAMCHAIN, "a pair of cameras needs cam1, which is missing in"),
         (CHAIN.replace("  resolution: [640, 400]\n", "", 1), CAMCHAIN, "it: the key cam0.resolution is missing"),
         (CHAIN, "{pitch_deg: 0, camchain: it, calib: it}", "camchain: gives the lenses, which calib gives"),

@@ -47,17 +47,17 @@ def test_what_is_written_reads_as_the_same_case_wherever_it_lies(tmp_path: Path,
     (tmp_path / "suite.yaml").write_text(SUITE.replace("WAY", way))
     plan = read_plan(str(tmp_path / "suite.yaml"))
     (case,) = plan.simulated
-    written = write_case(case, plan.entrants, tmp_path / "away", name="again")
+    written = write_case(case, plan.estimator_entries, tmp_path / "away", name="again")
     (tmp_path / "away").rename(tmp_path / "moved")
     again = read_plan(str(tmp_path / "moved" / written.name))
     assert content(again.simulated[0]) == content(case)
     assert again.simulated[0].truth_noise == case.truth_noise
-    assert again.entrants == plan.entrants
+    assert again.estimator_entries == plan.estimator_entries
 
 
 def test_an_estimator_is_written_with_those_limits_alone_that_are_not_its_manifests(bent, tmp_path):
     plan = bent(("stand_still,", "{name: stand_still, label: slow, limits: {frame_s: 1.5}},"))
-    path = write_case(plan.simulated[0], plan.entrants, tmp_path / "case", name="copy")
+    path = write_case(plan.simulated[0], plan.estimator_entries, tmp_path / "case", name="copy")
     estimators = YAML(typ="safe").load(path)["estimators"]
     assert estimators == [
         {"name": "stand_still", "label": "slow", "params": {}, "limits": {"frame_s": 1.5}},

@@ -8,7 +8,7 @@ from vobench.errors import UnknownNameError
 def test_every_estimator_runs_repeats_times_on_every_case(bent):
     planned = bent(("seed: 1", "seed: 1\nrepeats: 3"))
     runs = [run for case in planned.cases for run in planned.trials(case)]
-    assert len(runs) == len({(run.case.name, run.entrant.label, run.repeat) for run in runs}) == 2 * 2 * 3
+    assert len(runs) == len({(run.case.name, run.estimator_entry.label, run.repeat) for run in runs}) == 2 * 2 * 3
 
 
 MORE = ("{clean: {sensor: clean}}", "{clean: {sensor: clean}, noisy: {sensor: mt9v034}}")
@@ -73,10 +73,10 @@ def test_a_pattern_without_a_match_is_refused_with_the_known_names(bent, cases, 
     assert str(refused.value) == sentence
 
 
-def test_limits_replace_those_of_every_entrant_and_no_others(bent):
+def test_limits_replace_those_of_every_estimator_and_no_others(bent):
     plan = bent(("stand_still,", "{name: stand_still, limits: {frame_s: 1}},"))
     limited = plan.limited(memory_mib=99)
-    for before, after in zip(plan.entrants, limited.entrants, strict=True):
+    for before, after in zip(plan.estimator_entries, limited.estimator_entries, strict=True):
         assert after.limits.memory_mib == 99
         assert after.limits.frame_s == before.limits.frame_s
         assert after.params == before.params

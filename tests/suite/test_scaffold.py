@@ -33,7 +33,7 @@ def test_a_new_suite_is_valid_and_found_by_its_name() -> None:
     assert plan.source.path == path.resolve()
     assert plan.suite.name == "mine"
     assert len(plan.cases) == 4
-    assert len(plan.entrants) == 3
+    assert len(plan.estimator_entries) == 3
 
 
 def test_a_new_scene_is_valid_and_found_by_its_name() -> None:

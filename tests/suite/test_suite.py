@@ -6,7 +6,7 @@ import pytest
 
 from vobench.errors import MOST_SAID, FilePlace, SuiteError, VobenchError
 from vobench.runner.motion import body_motions
-from vobench.suite import catalog, entrant, scene_build, scene_file
+from vobench.suite import catalog, estimator_entry, scene_build, scene_file
 from vobench.suite.case import AXES
 from vobench.suite.catalog import builtin_root
 from vobench.suite.suite import read_plan
@@ -69,7 +69,7 @@ def test_a_suite_goes_over_what_it_includes_key_by_key(building):
     down, ahead = planned.simulated
     assert (down.rig.pitch_deg, down.rig.height_m, down.seed, down.trajectory.rate_hz) == (90, 0.3, 2, 5)
     assert ahead.lighting["lamp"].power_lm == 99
-    assert [entrant.label for entrant in planned.entrants] == ["stand_still"]
+    assert [entry.label for entry in planned.estimator_entries] == ["stand_still"]
 
 
 def test_a_mistake_is_said_with_the_file_that_it_is_in(building):
@@ -94,7 +94,7 @@ def test_scenes_and_estimators_are_found_beside_their_suite_from_anywhere(bent, 
     monkeypatch.chdir(tmp_path / "elsewhere")
     for only in ((), ("stand_still",)):
         planned = read_plan("../tiny.yaml", only_estimators=only)
-        assert planned.entrants[0].manifest.version == "mine"
+        assert planned.estimator_entries[0].manifest.version == "mine"
     assert [(e.kind, e.name, e.origin) for e in read_plan("../tiny.yaml").found] == [
         ("estimator", "stand_still", "beside the suite"),
         ("estimator", "constant_velocity", "built in"),
@@ -107,7 +107,7 @@ def test_what_cases_share_is_made_once_however_many_there_are(bent, monkeypatch)
     for module, name in (
         (scene_file, "read_scene_with_mistakes"),
         (scene_build, "build"),
-        (entrant, "read_manifest"),
+        (estimator_entry, "read_manifest"),
     ):
         made = getattr(module, name)
         monkeypatch.setattr(module, name, lambda *args, made=made, name=name: (calls.append(name), made(*args))[1])

@@ -193,7 +193,7 @@ class TestReplay:
         ("files", "more", "sentence"),
         [
             ({}, {"file": "no.tum"}, "cannot read {0}/no.tum: No such file or directory"),
-            ({"a.tum": ""}, {"file": "a.tum"}, "no pose, for the file is empty: {0}/a.tum"),
+            ({"a.tum": ""}, {"file": "a.tum"}, "no pose, because the file is empty: {0}/a.tum"),
             ({"a.tum": format_tum(way())}, {"file": "a.tum", "recorded_hz": 10}, "times and recorded_hz are for files without stamps, but this file has stamps: {0}/a.tum"),
             ({"k.txt": format_kitti(np.tile(np.eye(4), (3, 1, 1)))}, {"file": "k.txt"}, "no stamps in k.txt; set times, to a file with stamps, or recorded_hz"),
             ({"k.txt": format_kitti(np.tile(np.eye(4), (3, 1, 1))), "t.txt": "1\n2\n"}, {"file": "k.txt", "times": "t.txt"}, "2 stamps in t.txt for 3 poses in k.txt"),

@@ -7,7 +7,7 @@ from vobench.asset.shape import at, block
 from vobench.geometry.camera import Pinhole
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import Thing, Triangles, flipped, moved, quad, table
-from vobench.suite.free_way import largest_free_circle
+from vobench.suite.free_space import largest_free_circle
 from vobench.suite.viewpoint import EYE_SHARE, Viewpoint, around, is_place, viewpoints
 
 LENS = Pinhole(8, 6, 4.0, 4.0, 3.5, 2.5)

@@ -83,9 +83,9 @@ def test_crlf_blank_lines_tabs_and_comments_change_nothing(text):
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("", "no pose, for the file is empty: run.txt"),
-        ("\n \r\n", "no pose, for the file is empty: run.txt"),
-        ("# only\n# comments\n", "no pose, for all lines are comments: run.txt"),
+        ("", "no pose, because the file is empty: run.txt"),
+        ("\n \r\n", "no pose, because the file is empty: run.txt"),
+        ("# only\n# comments\n", "no pose, because all lines are comments: run.txt"),
         ("version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "a Git-LFS pointer, not the file itself; fetch it with git lfs pull: run.txt"),
         ("a b c\n", "run.txt:1: no form of trajectory has 3 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, or 13 with a frame number first, TartanAir 7, EuRoC 8 and commas"),
         (TUM + "3.5 1 2 3 0", "run.txt:3: a pose has 8 columns (t x y z qx qy qz qw), this line has 5 (the last row: was the file cut off?)"),
@@ -99,8 +99,8 @@ def test_crlf_blank_lines_tabs_and_comments_change_nothing(text):
         (TARTANAIR + "1 2 3 0 0 0 2", "(0, 0, 0, 2) has 2"),
         (EUROC + "1499999999,1,2,3,1,0,0,0", "run.txt:3: stamps must increase, but 1499999999 follows 1500000000"),
         (TUM + "2.4 0 0 0 0 0 0 1", "run.txt:3: stamps must increase, but 2.4 follows 2.5"),
-        ("0 " + KITTI + "0.5 " + KITTI, "run.txt:2: the first of 13 columns should be the number of a frame, whole and from 0 on, but is 0.5"),
-        ("-1 " + KITTI, "run.txt:1: the first of 13 columns should be the number of a frame, whole and from 0 on, but is -1"),
+        ("0 " + KITTI + "0.5 " + KITTI, "run.txt:2: the first of 13 columns should be the number of a frame, an integer from 0, but is 0.5"),
+        ("-1 " + KITTI, "run.txt:1: the first of 13 columns should be the number of a frame, an integer from 0, but is -1"),
         ("7 " + KITTI + "6 " + KITTI, "run.txt:2: frame numbers must increase, but 6 follows 7"),
         ("1305031102160407000 0 0 0 0 0 0 1", "run.txt:1: t should be seconds below 9223372036.854775807, but is 1305031102160407000 (is it in another unit?)"),
     ],

@@ -1,4 +1,4 @@
-"""A simulated camera fitted to the look of images: exposure, contrast, blur and noise."""
+"""Fits a simulated camera to the appearance of images: exposure, contrast, blur and noise."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -16,9 +16,9 @@ from vobench.sequence.picture import Image
 
 @dataclass(frozen=True, slots=True)
 class CameraLook:
-    """What a camera is fitted to: mean and standard deviation of grey values, noise of flat parts, width of edges.
+    """The properties of images that a camera is fitted to: mean and standard deviation of grey values, noise, edges.
 
-    `flat_dn` (N,) are grey values of flat parts.
+    Noise is measured in flat parts, whose grey values are `flat_dn` (N,). Edges are measured by their width.
     """
 
     mean_dn: float
@@ -46,7 +46,7 @@ Develop = Callable[[CameraSettings], list[Image]]  # the images that a camera ta
 WELL_E = 20_000.0
 READ_NOISE_E = 25.0
 ADC_BITS: Literal[10] = 10
-ROUNDING_VARIANCE = 1 / 12  # of grey values that are rounded
+ROUNDING_VARIANCE = 1 / 12  # the variance of the rounding errors of grey values
 
 # Bounds of the search.
 GAIN_BOUNDS = (0.02, 60.0)
@@ -74,7 +74,7 @@ class _Parameters:
 
 
 def camera_of(gain: float, gamma: float, blur_px: float, noise: float) -> CameraSettings:
-    """A camera with an exposure, grey values that are light ** gamma, a blur, and a noisy chip.
+    """A camera with an exposure, a blur, a noisy chip, and grey values that are light ** gamma.
 
     The chip is `noise` times as noisy as one of 20,000 electrons.
     """
@@ -89,7 +89,7 @@ def camera_of(gain: float, gamma: float, blur_px: float, noise: float) -> Camera
 
 
 def fit_camera(wanted: CameraLook, develop: Develop) -> tuple[CameraSettings, CameraLook]:
-    """Fit the camera whose images look most as wanted; return it and the look of its images."""
+    """The camera whose images are most similar to the wanted look, and the look of its images."""
     parameters = _Parameters(gain=1.0, gamma=0.45, blur_px=0.0, noise=0.05)
     for _ in range(ROUNDS):
         parameters = replace(parameters, gamma=_fit_gamma(parameters, wanted, develop))
@@ -101,7 +101,7 @@ def fit_camera(wanted: CameraLook, develop: Develop) -> tuple[CameraSettings, Ca
 
 
 def _fit_gamma(parameters: _Parameters, wanted: CameraLook, develop: Develop) -> float:
-    """The exponent that gives the standard deviation of grey values, each with the gain that gives their mean."""
+    """The exponent that gives the wanted standard deviation of grey values, with the gain that gives their mean."""
 
     def sd_dn(gamma: float) -> float:
         of_gamma = replace(parameters, gamma=gamma)
@@ -113,7 +113,7 @@ def _fit_gamma(parameters: _Parameters, wanted: CameraLook, develop: Develop) ->
 
 
 def _fit_gain(parameters: _Parameters, wanted: CameraLook, develop: Develop) -> float:
-    """The exposure that gives the mean of grey values."""
+    """The gain that gives the wanted mean of grey values."""
 
     def mean_dn(log_gain: float) -> float:
         exposed = replace(parameters, gain=float(np.exp(log_gain)))
@@ -124,7 +124,7 @@ def _fit_gain(parameters: _Parameters, wanted: CameraLook, develop: Develop) -> 
 
 
 def _fit_blur_px(parameters: _Parameters, wanted: CameraLook, develop: Develop) -> float:
-    """The blur that gives the width of edges."""
+    """The blur that gives the wanted width of edges."""
 
     def width_px(blur_px: float) -> float:
         return look_of(develop(replace(parameters, blur_px=blur_px).settings())).edge_px

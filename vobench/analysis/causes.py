@@ -1,4 +1,4 @@
-"""Regression of an estimator's error on the conditions of its frames, and where each trial diverged."""
+"""Attributes the error of an estimator to the conditions of its frames by regression, and finds divergences."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,9 +25,9 @@ MAX_DIVERGENCE_LOSS = 0.5
 
 @dataclass(frozen=True, slots=True)
 class ErrorSeries:
-    """One trial: the conditions (N,) of its frames by name, and the error (N,) since the frame before.
+    """The errors of a trial: the error (N,) since the previous frame, and the conditions (N,) of frames by name.
 
-    The first frame has error 0.
+    The error of the first frame is 0.
     """
 
     case: str
@@ -46,7 +46,7 @@ class ErrorSeries:
 
 @dataclass(frozen=True, slots=True)
 class Cause:
-    """Conditions that no segment tells apart (one or several), and the factor by which they multiply the error.
+    """One or several collinear conditions, and the factor by which they multiply the error.
 
     The factor compares the 95th with the 5th percentile of the condition over all segments. `low` and `high` are its
     95 % confidence interval.
@@ -65,7 +65,7 @@ class Cause:
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """A few successive frames of a trial, their mean error, and the factors of its causes, the largest first."""
+    """Several successive frames of a trial, their mean error, and the factors of its causes, the largest first."""
 
     case: str
     repeat: int
@@ -92,7 +92,7 @@ class Attribution:
 
 @dataclass(frozen=True, slots=True)
 class _Window:
-    """The frames of one segment: the trial, its number among all trials, and the first frame."""
+    """The frames of one segment: the trial, its index among all trials, and the first frame."""
 
     trial: ErrorSeries
     trial_number: int
@@ -159,7 +159,7 @@ def attribute(courses: Sequence[ErrorSeries]) -> Attribution | None:
 
 
 def _windows(courses: Sequence[ErrorSeries]) -> Iterator[_Window]:
-    """Yield all segments of all trials; the first frame has no error and belongs to none."""
+    """Yield all segments of all trials. The first frame is in no segment, because it has no error."""
     for number, course in enumerate(courses):
         for first in range(1, len(course.loss), SEGMENT_FRAMES):
             yield _Window(course, number, first)
@@ -171,7 +171,7 @@ def _mean_conditions(windows: Sequence[_Window], names: Sequence[str]) -> Array:
 
 
 def _usual_ranges(predictors: Array) -> Array:
-    """The range (K,) of each predictor (M, K) between its percentiles, or all of it where these coincide."""
+    """The range (K,) of each predictor (M, K) between two percentiles, or its whole range if these are equal."""
     low, high = np.percentile(predictors, USUAL_RANGE_PERCENT, axis=0)
     full_range = np.ptp(predictors, axis=0)
     return np.asarray(np.where(high > low, high - low, full_range))

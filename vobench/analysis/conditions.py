@@ -1,4 +1,4 @@
-"""Conditions that make each frame of a simulated case hard, computed by rays, from the images and from settings."""
+"""Computes the conditions that make frames of a simulated case difficult, from rays, images and settings."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -59,7 +59,7 @@ def conditions(
     frames: Iterable[StereoFrame],
     exposures: Exposures,
 ) -> dict[str, Array]:
-    """Compute all CONDITIONS (N,) of the N frames of a simulated case; shares are from 0 to 1.
+    """Compute all CONDITIONS (N,) of the N frames of a simulated case. Shares are from 0 to 1.
 
     `gt` is the trajectory of the left camera with a pose for each frame.
     """
@@ -103,19 +103,19 @@ def _column(rows: list[dict[str, float]], name: str) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class SubsampledCamera:
-    """A camera with every `step`-th pixel of the rows and columns of another one."""
+    """A camera with every `step`-th pixel of the rows and columns of another camera."""
 
     full: Camera
     step: int
 
     @property
     def width_px(self) -> int:
-        """Number of columns."""
+        """The number of columns."""
         return self.full.width_px // self.step
 
     @property
     def height_px(self) -> int:
-        """Number of rows."""
+        """The number of rows."""
         return self.full.height_px // self.step
 
     @property
@@ -128,7 +128,7 @@ class SubsampledCamera:
         return self.full.rays(uv_px * self.step + self._first_px)
 
     def project(self, points_camera: Array) -> Array:
-        """Pixels (..., 2) of this camera in which points (..., 3) are seen."""
+        """The pixels (..., 2) of this camera that show points (..., 3)."""
         return (self.full.project(points_camera) - self._first_px) / self.step
 
     @property
@@ -138,7 +138,7 @@ class SubsampledCamera:
 
 
 class _SceneObserver:
-    """The scene of a case, seen by rays through a subset of the left camera's pixels."""
+    """Observes the scene of a case by rays through a subset of the left camera's pixels."""
 
     def __init__(self, case: Case) -> None:
         scene = case.build_scene()
@@ -176,7 +176,7 @@ class _SceneObserver:
         return points_m
 
     def _pixel_shares(self, truth: TruthFrame) -> dict[str, float]:
-        """Shares of pixels with a property, and the faintness of what they show."""
+        """The shares of pixels with certain properties, and the faintness of the texture in the image."""
         material = cast("Any", truth.material)
         mirror = cast("Any", truth.mirror)
         shadow = cast("Any", truth.shadow)
@@ -201,7 +201,7 @@ class _SceneObserver:
         return 0.0
 
     def _disparity_px(self, points_m: Array) -> Array:
-        """How far apart (N,) the right camera sees points (N, 3) from where it would see them without a baseline."""
+        """The distances (N,) in px between the right camera's pixels of points (N, 3) with and without the baseline."""
         right = self._true_rig.camera("right")
         T_right_left = se3.inverse(self._true_rig.T_left_right)
         at_infinity_px = right.project(points_m @ T_right_left[:3, :3].T)
@@ -209,7 +209,7 @@ class _SceneObserver:
         return np.asarray(np.linalg.norm(shift_px, axis=-1))
 
     def _reprojection_error_px(self, points_m: Array) -> Array:
-        """How far (N,) the nominal calibration projects points (N, 3) from where they are, as mean of both cameras."""
+        """The projection errors (N,) of points (N, 3) with the nominal calibration, averaged over both cameras."""
         nominal = self._nominal_rig
         true = self._true_rig
         left_error_px = nominal.left.project(points_m) - true.left.project(points_m)
@@ -224,9 +224,9 @@ class _SceneObserver:
 
 
 def _contrast(material: Material | None) -> float:
-    """Standard deviation of a material's texture over its mean.
+    """The standard deviation of a material's texture divided by its mean.
 
-    NaN where there is no material, and for mirrors and panes, which show other surfaces.
+    NaN without a material, and for mirrors and panes, which show other surfaces.
     """
     if material is None or material.kind != "body":
         return float("nan")
@@ -314,7 +314,7 @@ def chip_noise_dn(chip: CameraSensor, grey_dn: float, *, gain_db: float = 0.0) -
 
 @dataclass(frozen=True, slots=True)
 class _FrameState:
-    """What a frame is compared by with the next one."""
+    """The properties of a frame that are compared with those of the next frame."""
 
     exposure_stops: float
     brightness_stops: float

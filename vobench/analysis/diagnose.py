@@ -1,4 +1,4 @@
-"""Faults between an estimate and its ground truth (units, clocks, frames, scale), with evidence and the correction."""
+"""Finds faults between an estimate and its ground truth (units, clocks, frames, scale), and their corrections."""
 
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, replace
@@ -48,7 +48,7 @@ LONGEST_REPR = 100  # characters
 
 @dataclass(frozen=True, slots=True)
 class Evidence:
-    """One figure before and after the correction of a fault; `before` is None where it could not be computed."""
+    """A number before and after the correction of a fault. `before` is None if it could not be computed."""
 
     name: str
     unit: str
@@ -82,10 +82,10 @@ class Finding:
 
 
 def diagnose(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Finding, ...]:
-    """Find the faults between two trajectories of one motion; none if they only differ by errors of the estimate.
+    """Find the faults between two trajectories of the same motion. Errors of the estimate are not faults.
 
-    Each fault is looked for after the previous ones are corrected. Raises AlignmentError where fewer than MIN_POSES
-    poses match and no fault of the clocks explains it.
+    Each fault is searched after the previous ones are corrected. Raises AlignmentError if fewer than MIN_POSES poses
+    match, and no fault of the clocks explains that.
     """
     findings: list[Finding] = []
     if gt.unit and est.unit:
@@ -152,9 +152,9 @@ def _in_right_units(
 
 
 def _in_right_unit(reading: TrajectoryReading, other: TrajectoryReading) -> TrajectoryReading:
-    """The trajectory in the finer unit that makes durations similar, if both its steps and duration are far too long.
+    """The trajectory in the finer unit that makes the durations similar, if its steps and duration are far too long.
 
-    A lost track shortens the duration and keyframes lengthen the steps, but neither does both.
+    Lost tracking shortens the duration, and keyframes lengthen the steps, but neither of them does both.
     """
     if reading.unit is None or reading.is_unit_told:
         return reading
@@ -183,7 +183,7 @@ def _in_right_unit(reading: TrajectoryReading, other: TrajectoryReading) -> Traj
 def _unit_finding(
     side: Side, as_read: TrajectoryReading, corrected: TrajectoryReading, other: TrajectoryReading
 ) -> Finding:
-    """The finding that time stamps are not in the unit that files of their form have."""
+    """The finding that time stamps are not in the default unit of their format."""
     assert as_read.form_unit is not None
     assert as_read.unit is not None
     assert corrected.unit is not None
@@ -208,7 +208,7 @@ MIN_CORRELATION = 0.5  # of the speeds on one clock
 # An offset counts where it leaves at most this share of the missing correlation, and adds this much to it.
 MAX_CORRELATION_LEFT = 0.75
 MIN_CORRELATION_GAIN = 5e-4
-# A smaller gain counts too where most stretches of the recording show the same offset.
+# A smaller gain also counts if most parts of the recording show the same offset.
 MIN_STEADY_OFFSET_NS = 25_000_000  # fr1/xyz of TUM has 10 ms, the same in all of its stretches
 MIN_STEADY_SHARE = 0.875
 STEADY_TOLERANCE = 0.5  # of the offset
@@ -238,7 +238,7 @@ def _on_one_clock(gt: TrajectoryReading, est: TrajectoryReading, findings: list[
 
 
 def _is_clear_gain(before: float | None, after: float) -> bool:
-    """Whether an offset raises the correlation of the speeds clearly; before is None without an overlap."""
+    """Whether an offset clearly increases the correlation of the speeds. `before` is None without an overlap."""
     if before is None:
         return True
     gain = after - before
@@ -247,7 +247,7 @@ def _is_clear_gain(before: float | None, after: float) -> bool:
 
 
 def _is_steady(gt: Trajectory, est: Trajectory, offset_ns: int) -> bool:
-    """Whether nearly every stretch of the recording shows the offset by itself."""
+    """Whether nearly all parts of the recording show the same offset."""
     if abs(offset_ns) <= MIN_STEADY_OFFSET_NS:
         return False
     of_stretches_ns = offsets_in_stretches(gt, est, within_ns=round(STRETCH_SEARCH * abs(offset_ns)))
@@ -259,7 +259,7 @@ def _is_steady(gt: Trajectory, est: Trajectory, offset_ns: int) -> bool:
 
 
 def _matched_poses(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Array, Array]:
-    """At most MAX_POSES matched poses (K, 4, 4), evenly chosen, at most half a step of the ground truth apart."""
+    """At most MAX_POSES evenly spaced matched poses (K, 4, 4), which differ by at most half a step of the truth."""
     steps_ns = np.diff(gt.trajectory.t_ns)
     half_step_ns = int(np.median(steps_ns)) // 2 if len(steps_ns) else 0
     pairs = associate(gt.trajectory.t_ns, est.trajectory.t_ns, max_diff_ns=max(MAX_DIFF_NS, half_step_ns))

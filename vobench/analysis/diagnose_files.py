@@ -1,4 +1,4 @@
-"""What is wrong between two trajectory files, and the command that scores them without it."""
+"""Finds faults between two trajectory files, and the command that scores them with the faults corrected."""
 
 import shlex
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ OFFSET_OPTION = "--t-offset="
 
 @dataclass(frozen=True, slots=True)
 class FileDiagnosis:
-    """The faults found between two files; none if they only differ by errors of the estimate.
+    """The faults that were found between two files. There are none if the files differ only by errors of the estimate.
 
     `times` are the files of time stamps that the two were read with. `by_frame` describes how poses were paired if
     neither file has stamps. `notes` describe what was done to read the files.
@@ -35,7 +35,7 @@ class FileDiagnosis:
 
     @property
     def command(self) -> str | None:
-        """The `vobench score` command that corrects all findings; None without any, or for unrelated files."""
+        """The `vobench score` command that corrects all findings; None without findings or for unrelated files."""
         return self._command_for(self.findings)
 
     def as_dict(self) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The offset of a stereo pair's disparities, from points that are tracked through the motion of the camera."""
+"""Fits the offset of a stereo pair's disparities to points that are tracked through the motion of the camera."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ SHARED = slice(6, None)
 
 @dataclass(frozen=True, slots=True)
 class FittedOffset:
-    """How much too large disparities at the centre of the image are, and the standard deviation of that, in px."""
+    """The offset of disparities at the centre of the image, and its standard deviation, in px."""
 
     value_px: float
     sigma_px: float
@@ -134,7 +134,7 @@ class _Model:
     roll_pitch_rad: Array
 
     def measurements(self, T_after_before: Array, shared: Array, inverse_depth: Array) -> Array:
-        """Disparities before and pixels of the view after (N, 3), for inverse depths (N,) in 1/m."""
+        """The disparities in the first frame and pixels in the second (N, 3), for inverse depths (N,) in 1/m."""
         offset_px = shared[0]
         disparity_scale = 1 + shared[1]
         K = self.pair.K.copy()
@@ -288,7 +288,7 @@ def _track(shots: Sequence[MatchedShot], pair: StereoPair) -> TrackedPoints | No
 
 
 def _true_motion(first: PairShot, last: PairShot, pair: StereoPair) -> Array | None:
-    """The true motion (4, 4) in the axes of the view, None where it is not known."""
+    """The true motion (4, 4) in the frame of the view, None if it is unknown."""
     if first.T_world_left is None or last.T_world_left is None:
         return None
     T_view_left = pair.T_view_left

@@ -1,4 +1,4 @@
-"""Which nuisance makes an estimator fail: the case is run again without each, and the error is compared."""
+"""Finds the nuisance that makes an estimator fail, by running the case again without each of them."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,12 +17,12 @@ from vobench.trajectory.trajectory import Trajectory
 
 SEGMENTS = 24
 MIN_STEPS = 2  # frames per segment
-MIN_LENGTH_M = 1e-3  # length of a segment on which the body stands still
+MIN_LENGTH_M = 1e-3  # the smallest length of a segment; the body is stationary on a shorter one
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """How a trial ended, and its error (S,) in each of its segments."""
+    """The status of a trial, and its error (S,) in each of its segments."""
 
     status: str
     survived: bool
@@ -92,9 +92,9 @@ MORE_REPEATS = 3
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """The error that is left without some nuisances, and the share of it that went, with a 95 % interval.
+    """The remaining error without some nuisances, and the share by which it decreased, with a 95 % interval.
 
-    `survived` of `repeats` trials ended well.
+    `survived` is the number of successful trials out of `repeats`.
     """
 
     removed: tuple[str, ...]
@@ -115,7 +115,7 @@ class Change:
 class Explanation:
     """Why a case is hard: what removing single nuisances, pairs and all of them changes.
 
-    `singles` and `pairs` have the largest improvement first. `alone` is the error where only that nuisance is left; it
+    `singles` and `pairs` have the largest improvement first. `alone` is the error with only that nuisance left; it
     is measured if no single nuisance explains the failure.
     """
 
@@ -219,7 +219,7 @@ class _Variants:
         return outcomes
 
     def loss_with_only_one_left(self, repeats: int) -> dict[str, float]:
-        """The mean error of each nuisance where all others are removed."""
+        """The mean error with only one nuisance left, for each of them."""
         others = {}
         for name in self.names:
             others[name] = tuple(other for other in self.names if other != name)
@@ -231,7 +231,7 @@ class _Variants:
 
 
 def folder_name(removed: Sequence[str], names: Sequence[str]) -> str:
-    """The case name of a variant: the removed nuisances or, where only one is left, that one."""
+    """The case name of a variant: the removed nuisances or, if only one is left, the name of that one."""
     if not removed:
         return "as_it_is"
     left = [name for name in names if name not in removed]
@@ -286,7 +286,7 @@ def _improvement(change: Change) -> float:
 
 
 def _differ(outcomes: Sequence[Outcome]) -> bool:
-    """Whether some repeats have other errors than the first."""
+    """Whether the errors of some repeats differ from those of the first one."""
     first, *others = outcomes
     return any(not np.array_equal(first.loss, other.loss) for other in others)
 
@@ -317,8 +317,8 @@ def _change(
     baseline: Sequence[Outcome],
     changed: Sequence[Outcome],
 ) -> Change:
-    """How much of the error went, with a bootstrap interval over repeats and blocks of segments, before and after."""
-    # Equal generators draw the same repeats and blocks on both sides.
+    """The decrease of the error, with a bootstrap interval over repeats and blocks of segments of both variants."""
+    # Equal generators draw the same repeats and blocks for both variants.
     loss_before = _resampled_means(baseline, np.random.default_rng(0))
     loss_after = _resampled_means(changed, np.random.default_rng(0))
     low, high = np.percentile(1 - loss_after / loss_before, INTERVAL_PERCENT).tolist()

@@ -1,4 +1,4 @@
-"""Why a trial of a run fails: its case is run again without each of its nuisances."""
+"""Explains why a trial fails by running its case again without each of its nuisances."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass

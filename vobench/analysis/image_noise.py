@@ -1,4 +1,4 @@
-"""The noise of an image, estimated from its flat patches."""
+"""Estimates the noise of an image from its flat patches."""
 
 from functools import cache
 from typing import Any
@@ -66,7 +66,7 @@ def _smallest_variance(patches: Patches) -> float:
 
 @cache
 def _smallest_variance_of_noise(magnitude: int) -> float:
-    """The smallest variance of 2 ** magnitude patches of noise of variance 1: fewer patches have a smaller one."""
+    """The smallest principal variance of 2 ** magnitude patches of noise with variance 1."""
     side = round(PATCH_STEP_PX * 2 ** (magnitude / 2 + 0.25)) + PATCH_PX
     noise = np.random.default_rng(0).standard_normal((side, side))
     return _smallest_variance(_patches(noise))
@@ -84,7 +84,7 @@ def _patch_differences() -> NDArray[np.float32]:
 
 @cache
 def _max_energy_of_noise() -> float:
-    """The gradient energy that TEXTURE_QUANTILE of the patches of noise of variance 1 stay below.
+    """The TEXTURE_QUANTILE of the gradient energy of patches of noise with variance 1.
 
     The energy is approximated by a gamma distribution with the same mean and variance.
     """

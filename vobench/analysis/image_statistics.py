@@ -1,4 +1,4 @@
-"""Statistics of single images and of their sequence: gradients, edges, corners, spectrum, tracks."""
+"""Computes statistics of single images and of their sequence: gradients, edges, corners, spectrum and tracks."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from vobench.sequence.picture import Image
 MAX_CORNERS = 2000
 CORNER_QUALITY = 0.01
 CORNER_DISTANCE_PX = 8
-CELLS = (8, 6)  # columns and rows in which corners are counted
+CELLS = (8, 6)  # the columns and rows of cells in which corners are counted
 
 
 def picture_statistics(picture: Image) -> dict[str, float]:
@@ -37,17 +37,17 @@ def picture_statistics(picture: Image) -> dict[str, float]:
 
 # --- Gradients and edges ---
 
-SOBEL_GAIN = 8  # of the 3 x 3 kernel on a ramp of 1 per pixel
-EDGE_SHARE = 0.01  # of the pixels: the strongest gradients
-EDGE_WINDOW_PX = 9  # contains the whole of an edge
+SOBEL_GAIN = 8  # the response of the 3 x 3 kernel to a ramp of 1 per pixel
+EDGE_SHARE = 0.01  # the share of pixels, with the strongest gradients, that are edges
+EDGE_WINDOW_PX = 9  # large enough to contain an edge
 MIN_EDGE_GRADIENT = 1.0
 EDGE_QUANTILE = 0.25
 
 
 def gradients(picture: Image) -> Array:
-    """Magnitudes (H, W) of the gradient in grey values per pixel, by Sobel's 3 x 3 kernel.
+    """The magnitudes (H, W) of the gradient in grey values per pixel, by the Sobel kernel of size 3 x 3.
 
-    NumPy takes the root: the last bits of `cv2.magnitude` depend on where in memory an image lies.
+    NumPy computes the square root, because the last bits of `cv2.magnitude` depend on the memory address of an image.
     """
     along_x = cv2.Sobel(picture, cv2.CV_64F, 1, 0, ksize=3) / SOBEL_GAIN
     along_y = cv2.Sobel(picture, cv2.CV_64F, 0, 1, ksize=3) / SOBEL_GAIN
@@ -56,14 +56,14 @@ def gradients(picture: Image) -> Array:
 
 
 def _kurtosis(values: Array) -> float:
-    """The fourth central moment over the square of the second: 3 for a normal distribution."""
+    """The fourth central moment divided by the square of the second one, which is 3 for a normal distribution."""
     deviation = values - values.mean()
     variance = float(np.mean(deviation**2))
     return float(np.mean(deviation**4) / max(variance**2, 1e-12))
 
 
 def edge_px(picture: Image, gradient: Array) -> float:
-    """The width of the sharpest edges: their height over their gradient, lower quartile; 0 if there are none."""
+    """The width of the sharpest edges: the lower quartile of height / gradient; 0 if there are no edges."""
     kernel = np.ones((EDGE_WINDOW_PX, EDGE_WINDOW_PX), np.uint8)
     brightest = cv2.dilate(picture, kernel)
     darkest = cv2.erode(picture, kernel)
@@ -91,7 +91,7 @@ def corners(picture: Image) -> Points:
 
 
 def _unevenness(points: Points, picture: Image) -> float:
-    """Standard deviation over mean of the number of points (N, 2) in the cells of an image."""
+    """The standard deviation divided by the mean of the numbers of points (N, 2) in the cells of an image."""
     height_px, width_px = picture.shape
     columns, rows = CELLS
     borders_x = np.linspace(0, width_px, columns + 1)
@@ -103,12 +103,12 @@ def _unevenness(points: Points, picture: Image) -> float:
 # --- Power spectrum ---
 
 TILE_PX = 256
-CYCLES = (4, 100)  # per tile, between which the slope is fitted
+CYCLES = (4, 100)  # the range of frequencies, in cycles per tile, in which the slope is fitted
 MIN_POWER = 1e-12
 
 
 def spectrum(pictures: Sequence[Image]) -> tuple[float, Array]:
-    """The slope of log power over log frequency, and log10 of the power by cycles per tile, of Hann-windowed tiles."""
+    """The slope of log power over log frequency, and log10 of the power by cycles per tile, of windowed tiles."""
     window = np.hanning(TILE_PX)
     window_2d = np.outer(window, window)
     total = np.zeros(TILE_PX * TILE_PX)
@@ -133,7 +133,7 @@ def spectrum(pictures: Sequence[Image]) -> tuple[float, Array]:
 
 
 def _tiles(picture: Image) -> Iterator[Array]:
-    """Tiles that cover an image, the outer ones at its borders; a smaller image is continued by reflection."""
+    """Tiles that cover an image. The outer tiles are at its borders. A smaller image is padded by reflection."""
     padding_px = [(0, max(0, TILE_PX - size)) for size in picture.shape]
     padded = np.pad(picture, padding_px, mode="symmetric").astype(float)
     height_px, width_px = padded.shape
@@ -143,7 +143,7 @@ def _tiles(picture: Image) -> Iterator[Array]:
 
 
 def _tile_starts(size_px: int) -> list[int]:
-    """Where tiles begin along a side, as few as cover it."""
+    """The positions of the smallest number of tiles that cover a side."""
     count = -(-size_px // TILE_PX)
     starts = np.linspace(0, size_px - TILE_PX, count).astype(int)
     return [int(start) for start in np.unique(starts)]
@@ -154,7 +154,7 @@ def _tile_starts(size_px: int) -> list[int]:
 
 @dataclass(frozen=True, slots=True)
 class TrackStatistics:
-    """How corners are tracked through a run of images.
+    """Statistics of corners that are tracked through a run of images.
 
     `consistent_share` is the share of forward–backward consistent tracks from one image to the next, and `flow_px` the
     median length of these, both as means over the run. `alive_share` (P,) is the share of the first image's corners

@@ -1,4 +1,4 @@
-"""The fault of frames between matched poses: wrong axes, quaternions, inverses, or another frame of the body."""
+"""Finds faults of frames between matched poses: wrong axes, quaternions, inverses, or another frame of the body."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -41,9 +41,9 @@ TINY = 1e-300  # prevents 0/0
 
 @dataclass(frozen=True, slots=True)
 class Misfit:
-    """What is left after the best similarity: positions as share of the truth's extent, rotations in rad (rms).
+    """The misfit after the best similarity transform: of positions relative to the extent, of rotations in rad (rms).
 
-    `turned_rad` is the rotation angle of that similarity.
+    `turned_rad` is the rotation angle of the similarity transform.
     """
 
     trans: float
@@ -57,7 +57,7 @@ class Misfit:
 
 
 def misfit(T_gt: Array, T_est: Array) -> Misfit:
-    """Measure how far matched poses (K, 4, 4) disagree, independent of their world frames and scales."""
+    """The misfit of matched poses (K, 4, 4), which does not depend on their world frames and scales."""
     alignment = align(T_est, T_gt, kind="sim3")
     aligned = _aligned(T_est, T_gt)
     position_errors_m = (aligned - T_gt)[:, :3, 3]
@@ -105,7 +105,7 @@ def _rotations_between(T_est: Array, T_gt: Array) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Correction:
-    """A correction of one side, the corrected poses (K, 4, 4), and the misfit that is left.
+    """A correction of one side, the corrected poses (K, 4, 4), and the remaining misfit.
 
     `move` is None for the other order of the quaternions.
     """
@@ -118,24 +118,24 @@ class Correction:
 
     @property
     def is_inverse(self) -> bool:
-        """Whether it inverts poses or rotations."""
+        """Whether the correction inverts poses or rotations."""
         return self.move is not None and self.move.kind in INVERSE
 
     @property
     def is_axis_rotation(self) -> bool:
-        """Whether it changes axes, of positions and rotations, without mirroring."""
+        """Whether the correction changes the axes of positions and rotations without mirroring."""
         if self.move is None or self.move.kind != "axes":
             return False
         return float(np.linalg.det(self.move.matrix)) > 0
 
     def reduces(self, before: Misfit) -> bool:
-        """Whether it reduces the misfit so much that no real pair without a fault does."""
+        """Whether the correction reduces the misfit by more than it does for any real pair without a fault."""
         after = self.misfit.total
         limit = min(MAX_SHARE_LEFT * before.total, MAX_MISFIT)
         return after <= limit and before.total - after >= MIN_REDUCTION
 
     def reduces_by_lever(self, before: Misfit) -> bool:
-        """Whether it reduces the misfit enough for a lever that the motions show; they show millimetres."""
+        """Whether the correction reduces the misfit enough for a lever that was found from the motions."""
         after = self.misfit.total
         return after <= MAX_MISFIT and before.total - after >= MIN_LEVER_REDUCTION
 
@@ -144,7 +144,7 @@ class Correction:
 class Lever:
     """A lever (3,) in m, and the misfit (rms, m) of motions without and with it.
 
-    Its component along an axis that the path hardly rotates about cannot be observed and is 0.
+    Its component along an axis about which the path hardly rotates is not observable, and is 0.
     """
 
     m: Array
@@ -153,12 +153,12 @@ class Lever:
 
     @property
     def ratio(self) -> float:
-        """The share of the misfit that is left with the lever, 0 to 1."""
+        """The share of the misfit that remains with the lever, 0 to 1."""
         return self.after_m / (self.before_m + TINY)
 
     @property
     def is_plain(self) -> bool:
-        """Whether the lever is more than noise would give."""
+        """Whether the lever is larger than noise could explain."""
         return self.ratio <= MAX_LEVER_RATIO and bool(np.any(self.m))
 
 
@@ -179,7 +179,7 @@ def find_mismatch(
     gt_order: QuaternionOrder | None,
     est_order: QuaternionOrder | None,
 ) -> Mismatch | None:
-    """Find the fault of frames that explains most between matched poses (K, 4, 4); None if there is none.
+    """Find the fault of frames that explains the misfit of matched poses (K, 4, 4) best; None if there is none.
 
     A discrete correction (axes, inverse, order) is preferred to a fitted one unless that is clearly better.
     """
@@ -208,7 +208,7 @@ def _best_discrete(
 ) -> Correction:
     """The discrete correction with the smallest misfit."""
     candidates = list(discrete_corrections(T_gt, T_est, gt_order=gt_order, est_order=est_order))
-    # In one world frame, inverting either side has the same effect; ground truth is seldom given inverted.
+    # In the same world frame, inverting either side has the same effect. Ground truth is rarely inverted.
     est_inverses = [each for each in candidates if each.side == "est" and each.is_inverse]
     if any(inverse.reduces(before) for inverse in est_inverses):
         candidates = [each for each in candidates if each.side == "est" or each.move is None]
@@ -216,9 +216,9 @@ def _best_discrete(
 
 
 def _is_fitted_preferred(discrete: Correction, fitted: Correction) -> bool:
-    """Whether the estimate is of another frame of the body rather than in other axes.
+    """Whether the estimate is that of another frame of the body instead of being in other axes.
 
-    Motions do not distinguish rotated axes from a rotated body; the correction that leaves the world in place counts.
+    Motions do not distinguish rotated axes from a rotated body. The correction that does not rotate the world is used.
     """
     if fitted.misfit.total * AS_GOOD < discrete.misfit.total:
         return True
@@ -228,7 +228,7 @@ def _is_fitted_preferred(discrete: Correction, fitted: Correction) -> bool:
 
 
 def _kind(correction: Correction) -> Kind:
-    """The fault that a discrete correction undoes."""
+    """The fault that a discrete correction corrects."""
     move = correction.move
     if move is None:
         return "quaternion_order"
@@ -247,7 +247,7 @@ def discrete_corrections(
 ) -> Iterator[Correction]:
     """Yield the other quaternion order and the inverses of either side, and all 47 other signed axes of the estimate.
 
-    The orders are those that the files were read in, None where they hold matrices.
+    The orders are those in which the files were read, None for files that contain matrices.
     """
     if est_order:
         yield _correction("est", None, T_gt, _reordered(T_est, est_order))
@@ -272,9 +272,9 @@ def _correction(
 
 
 def _reordered(T: Array, read_as: QuaternionOrder) -> Array:
-    """Poses (K, 4, 4) as they read if the quaternions have the other order than `read_as`."""
+    """The poses (K, 4, 4) that result if the quaternions are read in the order other than `read_as`."""
     as_read = se3.to_quaternion(T[:, :3, :3])  # (K, 4), scalar last
-    # The numbers in the file were taken as x, y, z, w or as w, x, y, z; exchange the two readings.
+    # The numbers in the file were read as x, y, z, w or as w, x, y, z, and are now read in the other order.
     columns = [1, 2, 3, 0] if read_as == "xyzw" else [3, 0, 1, 2]
     return se3.transform(se3.from_quaternion(as_read[:, columns]), T[:, :3, 3])
 
@@ -292,9 +292,9 @@ MIN_RELATIVE_STRENGTH = 1e-6  # of how well the rotations determine a lever; bel
 
 
 def mounted(T_gt: Array, T_est: Array) -> Correction:
-    """Fit the constant T_est_gt that moves the estimate onto the truth: rotation by the mean, lever by the motions.
+    """Fit the constant T_est_gt between estimate and truth: its rotation by the mean, and its lever by the motions.
 
-    A lever that is no more than noise is left out.
+    A lever that noise can explain is omitted.
     """
     lever_m = np.zeros(3)
     iterates_m: list[Array] = []

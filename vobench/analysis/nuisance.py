@@ -1,4 +1,4 @@
-"""Nuisances: what makes a case hard, each with the change of its settings that removes it."""
+"""The nuisances that make a case difficult, and for each of them, the change of settings that removes it."""
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -26,17 +26,17 @@ from vobench.suite.scene_spec import (
     SkySpec,
 )
 
-MIN_SHOWN_SHARE = 2e-3  # of the pixels of a frame
+MIN_SHOWN_SHARE = 2e-3  # the smallest share of the pixels of a frame that must show a nuisance
 
 Change = Callable[[Case], Case]
 
 
 @dataclass(frozen=True, slots=True)
 class Nuisance:
-    """One of NUISANCES: its name, what the case has instead once it is removed, and the change that removes it.
+    """One of NUISANCES: its name, the change that removes it, and a description of what replaces it.
 
-    A case lacks it if the change leaves the case as it is, or if `shown_by`, a condition of its frames, is 0 in all
-    of them.
+    A case does not have the nuisance if the change has no effect on the case, or if the condition `shown_by` is 0 in
+    all of its frames.
     """
 
     name: str
@@ -46,7 +46,7 @@ class Nuisance:
 
 
 def nuisances_of(case: Case, largest: Mapping[str, float] = MappingProxyType({})) -> tuple[Nuisance, ...]:
-    """Return the NUISANCES that a case has; `largest` are the largest values of conditions that are known."""
+    """The NUISANCES that a case has. `largest` are the largest values of the known conditions."""
     present = []
     for nuisance in NUISANCES:
         largest_share = largest.get(nuisance.shown_by or "", 1.0)
@@ -56,7 +56,7 @@ def nuisances_of(case: Case, largest: Mapping[str, float] = MappingProxyType({})
 
 
 def without(case: Case, removed: Iterable[str]) -> Case:
-    """Return the case with these nuisances removed, in the order of NUISANCES."""
+    """The case without these nuisances, which are removed in the order of NUISANCES."""
     names = set(removed)
     for nuisance in NUISANCES:
         if nuisance.name in names:
@@ -92,19 +92,20 @@ def _without_noise(case: Case) -> Case:
     return replace(case, camera=replace(case.camera, chip=noiseless))
 
 
-HEADROOM = 8.0  # full wells of the wider chip in one of the original
-KNEE = 0.9  # share of the grey values for signals that were in range before
+HEADROOM = 8.0  # the full well of the new chip, relative to that of the original
+KNEE = 0.9  # the share of the grey values for signals that were in range before
 
 
 def _without_saturation(case: Case) -> Case:
-    """Give the chip eight times the full well: signals that were in range look nearly as before, brighter ones fit.
+    """Give the chip eight times the full well.
 
-    A fixed exposure that saturates white is lowered first, so that white just fits.
+    Signals that were in range look nearly as before, and brighter signals are not saturated. A fixed exposure that
+    saturates white is reduced first, so that white is just not saturated.
     """
     camera = case.camera
     chip = camera.chip
     grey = np.linspace(0, 1, FULL_SCALE_DN + 1)
-    signal = np.interp(grey / KNEE, grey, linear_of_grey(chip.curve))  # in full wells of the original chip
+    signal = np.interp(grey / KNEE, grey, linear_of_grey(chip.curve))  # relative to the full well of the original chip
     is_above = grey > KNEE
     signal[is_above] = np.linspace(1, HEADROOM, 1 + int(is_above.sum()))[1:]
     wide_chip = replace(
@@ -144,7 +145,7 @@ def _without_movers(case: Case) -> Case:
 def _with_materials(change: MaterialChange) -> Change:
     """A change of every material that a scene uses.
 
-    `change` gets its name and its definition in the scene, which is None for a built-in finish.
+    `change` is called with the name and the definition in the scene, which is None for a built-in finish.
     """
 
     def changed(case: Case) -> Case:
@@ -161,7 +162,7 @@ def _with_materials(change: MaterialChange) -> Change:
     return changed
 
 
-# Mirrors become textured stone: a plain surface would add the nuisance of low texture.
+# Mirrors are replaced by textured stone, because a plain surface would add the nuisance of low texture.
 STONE = DiffuseSpec("terrazzo", 0.45, contrast=0.5)
 # Built-in finishes with a glossy coat, and those with little texture; the others are textured by a picture.
 COATED_FINISHES = {"terrazzo": DiffuseSpec("terrazzo", 0.45, contrast=0.4)}
@@ -173,7 +174,7 @@ STRONG_ALBEDO = 0.55  # at most: a brighter pattern of this contrast would be cl
 
 
 def _diffuse_mirror(name: str, defined: MaterialSpec | None) -> MaterialSpec | None:
-    """Stone in place of a mirror, and a pane without reflections."""
+    """Stone instead of a mirror, and a pane without reflections."""
     if isinstance(defined, MirrorSpec):
         return STONE
     if isinstance(defined, GlassSpec):
@@ -196,7 +197,7 @@ def _without_coat(name: str, defined: MaterialSpec | None) -> MaterialSpec | Non
 
 
 def _with_strong_texture(name: str, defined: MaterialSpec | None) -> MaterialSpec | None:
-    """A pattern of strong contrast in place of a plain or faint one."""
+    """A pattern with strong contrast instead of a plain or faint one."""
     if defined is None and name in FAINT_FINISHES:
         return DiffuseSpec("poster", STRONG_ALBEDO, contrast=STRONG_CONTRAST, tile_m=STRONG_TILE_M)
     if not isinstance(defined, DiffuseSpec | PolishedSpec):
@@ -238,12 +239,12 @@ def _first_level(level: LevelSpec) -> LevelSpec:
     return LevelSpec(steady=at_start or 1.0)
 
 
-CEILING_SHARE = 0.96  # of the sides of a room: the shadows of so large a panel are negligible
+CEILING_SHARE = 0.96  # the size of the panel relative to the room; the shadows of such a large panel are negligible
 PANEL_BELOW_CEILING_M = 0.02
 
 
 def _without_shadows(case: Case) -> Case:
-    """Replace lamps by one panel under the whole ceiling, and the sun by a uniformly bright sky of equal illuminance.
+    """Replace lamps by one panel below the whole ceiling, and the sun by a uniform sky of the same illuminance.
 
     The level of the panel over time is that of the strongest lamp.
     """

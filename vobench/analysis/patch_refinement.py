@@ -1,4 +1,4 @@
-"""Matches of image points refined by patches that shift, stretch and shear."""
+"""Refines matches of image points by patches that shift, stretch and shear."""
 
 from typing import Any
 
@@ -28,10 +28,10 @@ def refined(
     *,
     shape: int,
 ) -> tuple[Points, Mask]:
-    """Where points (N, 2) are in a later image, and whether that converged near the guess (N, 2).
+    """The pixels (N, 2) of points in a later image, and whether the search converged near the guess (N, 2).
 
-    `shape` is SLANT or AFFINE: a patch that only shifts is biased on slanted surfaces. Points on whole pixels are
-    sharper than their matches, which biases shifts by a few percent: dither them.
+    `shape` is SLANT or AFFINE, because a patch that only shifts is biased on slanted surfaces. Points should not be at
+    integer pixels. There, they are sharper than their matches, which biases shifts by a few percent.
     Source: Shi and Tomasi (1994); Baker and Matthews (2004), inverse compositional.
     """
     if not len(points):

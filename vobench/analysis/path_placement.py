@@ -1,4 +1,4 @@
-"""The path of a recording placed into a scene so that the distances of what the camera sees agree."""
+"""Places the path of a recording into a scene so that the distances of the visible surfaces agree."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -24,7 +24,7 @@ MIN_DISPARITY_PX = 0.3  # points that are further away count as infinitely far
 def cell_disparities(fit: StereoFit, pair: StereoPair) -> Array:
     """The median disparity (V, 3, 3) in px of a recording's matches, by rows and columns of the left view.
 
-    V are the stretches of the path that were matched. NaN where a cell has too few matches.
+    V are the parts of the path that were matched. NaN for a cell with too few matches.
     """
     matches = fit.matches
     offset_px = 0.0
@@ -46,7 +46,7 @@ def cell_disparities(fit: StereoFit, pair: StereoPair) -> Array:
 
 
 def _cell(pixel: Array, size_px: int) -> Array:
-    """The number of the cell (N,) along one axis of pixels (N,)."""
+    """The index of the cell (N,) of pixels (N,) along one axis."""
     number = (pixel * CELLS / size_px).astype(int)
     return np.asarray(np.clip(number, 0, CELLS - 1))
 
@@ -55,11 +55,11 @@ def _cell(pixel: Array, size_px: int) -> Array:
 
 
 def levelled(T_world_left: Array) -> Array:
-    """Rotate a path (N, 4, 4) so that it is as level as it can be; its world frame was that of the first camera."""
+    """The path (N, 4, 4), whose world is the frame of the first camera, rotated to be as level as possible."""
     positions_m = T_world_left[:, :3, 3] - T_world_left[:, :3, 3].mean(0)
     horizontal_m = positions_m[:, :2]
     covariance = horizontal_m.T @ horizontal_m
-    # A straight path does not determine the slope across it, which the damping keeps at 0.
+    # A straight path does not determine the slope across it. The damping keeps that slope at 0.
     damping = 1e-3 * np.trace(covariance) * np.eye(2)
     damped = covariance + damping + 1e-9 * np.eye(2)
     slope = np.linalg.solve(damped, horizontal_m.T @ positions_m[:, 2])
@@ -75,7 +75,7 @@ def levelled(T_world_left: Array) -> Array:
 
 
 def _thinned(T: Array, count: int) -> Array:
-    """At most `count` poses of a path (N, 4, 4), evenly chosen."""
+    """At most `count` evenly spaced poses of a path (N, 4, 4)."""
     rows = np.unique(np.linspace(0, len(T) - 1, count).astype(int))
     return np.asarray(T[rows], float)
 
@@ -90,9 +90,9 @@ def _scaled_down(T: Array, scale: float) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """Where a path is in a place, the scale of the place, and the mean error of log disparities.
+    """The pose of a path in a place, the scale of the place, and the mean error of log disparities.
 
-    `scale` is how many times as large the place is made. `tried` is the number of free paths that were compared.
+    `scale` is the factor by which the place is enlarged. `tried` is the number of free paths that were compared.
     """
 
     T_place_world: Array
@@ -101,7 +101,7 @@ class Placement:
     tried: int
 
 
-# The more unusual a scale, the later it stands: later ones are drawn less often.
+# More unusual scales come later, and are drawn less often.
 SCALES = (1.0, 0.7, 1.4, 0.5, 2.0, 0.35, 2.8, 4.0, 5.6)
 MEAN_SCALE_INDEX = 2.5
 HEIGHTS_M = (0.3, 0.5, 0.8, 1.2, 1.65, 2.2)
@@ -109,7 +109,7 @@ CLEARANCE_M = 0.3
 WAYPOINTS = 40
 EXTENT_QUANTILE = 0.01  # of the corners of faces: a few far ones do not extend the place
 
-# Draws anywhere in the place, and then ever closer to the best one.
+# The numbers of draws anywhere in the place, and then closer and closer to the best one.
 DRAWS = 6000
 NEAR_DRAWS = 1500
 NEAR_M = 1.0
@@ -120,7 +120,7 @@ SCALE_COST = 0.05  # misfit that is worth a factor e of the scale
 
 @dataclass(frozen=True, slots=True)
 class _Start:
-    """A candidate for the start of a path: height above the ground, heading, and position (2,)."""
+    """A candidate for the start of a path: its height above the ground, heading, and position (2,)."""
 
     scale: float
     height_m: float
@@ -128,7 +128,7 @@ class _Start:
     xy_m: Array
 
     def near(self, share: float, rng: np.random.Generator) -> "_Start":
-        """Draw a start near this one, at a share of the usual distance."""
+        """Draw a start near this one. `share` scales the usual distance."""
         height, heading, x, y = (share * rng.standard_normal(4)).tolist()
         return _Start(
             scale=self.scale,
@@ -155,9 +155,9 @@ def place_path(
     *,
     seed: int = 0,
 ) -> Placement:
-    """Place a path (N, 4, 4) of the left camera into a scene so that disparities agree and nothing is in its way.
+    """Place a path (N, 4, 4) of the left camera into a scene so that disparities agree and the path is free.
 
-    `wanted_px` (V, 3, 3) are the disparities of V stretches of the path. Raises InputError if no free path is found.
+    `wanted_px` (V, 3, 3) are the disparities of V parts of the path. Raises InputError if no free path is found.
     """
     place = _Place.of(scene)
     path = _thinned(T_world_left, WAYPOINTS)
@@ -291,7 +291,7 @@ class _Place:
         if np.any(is_hit & (hits.distance < clearance_m)):
             return False
 
-        # Inside of an object, the face above is seen from behind.
+        # Inside of an object, the back of the face above is visible.
         is_behind = np.einsum("ij,ij->i", self.normals[hits.face], directions) > 0
         is_upward = directions[:, 2] > LEVEL_COSINE
         return not np.any(is_hit & is_behind & is_upward)

@@ -1,4 +1,4 @@
-"""How far two recordings agree on the order of estimators."""
+"""Measures the agreement of two recordings on the order of estimators."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,10 +21,10 @@ MIN_POSES_FOR_SCALE = 3
 
 
 def segment_errors(gt: Trajectory, est: Trajectory, *, scaled: bool = False) -> Array:
-    """Errors (8, N) in percent of segments of 1/12 to 8/12 of the path, by the pose at which they start.
+    """The errors (8, N) in percent of segments with 1/12 to 8/12 of the path, by the pose at which they start.
 
-    NaN stands for no segment, LOST_PERCENT for a segment without an estimated pose at both ends. `scaled` gives an
-    estimate without a unit of length the scale of the ground truth.
+    NaN means that there is no segment, and LOST_PERCENT that the estimate has no pose at both ends. With `scaled`, an
+    estimate without a unit of length gets the scale of the ground truth.
     """
     has_pose = np.isin(gt.t_ns, est.t_ns)
     T_est = np.full((len(gt), 4, 4), np.nan)
@@ -55,7 +55,7 @@ def segment_errors(gt: Trajectory, est: Trajectory, *, scaled: bool = False) -> 
 # --- Agreement of orders ---
 
 MIN_ESTIMATORS = 3
-BLOCKS = 10  # stretches of a recording that are resampled
+BLOCKS = 10  # the number of parts of a recording that are resampled
 RESAMPLES = 1000
 INTERVAL = (0.025, 0.975)
 
@@ -76,9 +76,9 @@ def agreement(
     *,
     seed: int = 0,
 ) -> Agreement:
-    """Compare how two recordings order estimators by their segments' errors (8, N) each.
+    """The agreement of two recordings on the order of estimators by the errors (8, N) of segments.
 
-    The interval covers the orders that other stretches of the recordings would have given, by a bootstrap.
+    The bootstrap interval accounts for the choice of parts of the recordings.
     """
     names = [name for name in first if name in second]
     if len(names) < MIN_ESTIMATORS:
@@ -118,6 +118,6 @@ def _means(block_sums: Array, blocks: NDArray[np.int64]) -> Array:
 
 
 def _tau(first: Array, second: Array) -> float:
-    """Kendall's tau; 0 where it is undefined because all values of one side are equal."""
+    """Kendall's tau; 0 if it is undefined because all values of one side are equal."""
     tau = float(scipy.stats.kendalltau(first, second).statistic)
     return tau if np.isfinite(tau) else 0.0

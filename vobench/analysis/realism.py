@@ -1,6 +1,6 @@
-"""How realistic images are: nine statistics with the ranges that real images have, and what moves each of them.
+"""Measures how realistic images are by nine statistics, the ranges of real images, and settings that change them.
 
-The ranges are of 14 images each of KITTI 00, 01, 06 and EuRoC V1_01: a first guess, to be widened with others.
+The ranges are those of 14 images each of KITTI 00, 01, 06 and EuRoC V1_01. More recordings would widen them.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -49,7 +49,7 @@ class Statistic:
         return "high" if value > self.high else "in"
 
     def knob(self, value: float) -> str:
-        """What would bring a value into the range; empty if it is there."""
+        """The settings that would bring a value into the range; empty if it is in the range."""
         settings = {"in": "", "low": self.raised_by, "high": self.lowered_by}
         return settings[self.verdict(value)]
 
@@ -93,7 +93,7 @@ class Realism:
 
     @property
     def inside(self) -> int:
-        """How many of the nine are in their ranges."""
+        """The number of the nine statistics that are in their ranges."""
         measured = [statistic for statistic in STATISTICS if statistic.name in self.values]
         verdicts = [statistic.verdict(self.values[statistic.name]) for statistic in measured]
         return verdicts.count("in")
@@ -101,7 +101,7 @@ class Realism:
 
 @dataclass(frozen=True, slots=True)
 class FrameSample:
-    """The grey images of one instant, and the true pose of the left camera in the world where it is known."""
+    """The grey images of one frame, and the true pose of the left camera in the world, None if it is unknown."""
 
     left: Image
     right: Image | None
@@ -117,7 +117,7 @@ GRADIENT_BINS = 128  # of 1 DN
 
 
 def window_starts(count: int, *, windows: int = WINDOWS) -> list[int]:
-    """Return where runs of WINDOW images begin, spread over a recording of `count`; one run for a short recording."""
+    """The first frames of runs of WINDOW images that are spread over `count` images; one run for a short recording."""
     if count < 2:
         raise InputError(f"statistics need 2 successive pictures or more, and this recording has {count}")
     fitting = max(1, min(windows, count // WINDOW))
@@ -172,14 +172,14 @@ def _means(of_images: Sequence[Mapping[str, float]]) -> dict[str, float]:
 
 
 def _track_means(tracks_of_runs: Sequence[TrackStatistics]) -> dict[str, float]:
-    """The means of what is measured of tracks from one image to the next."""
+    """The mean of each statistic of tracks from one image to the next."""
     consistent_shares = [tracks.consistent_share for tracks in tracks_of_runs]
     flows_px = [tracks.flow_px for tracks in tracks_of_runs]
     return {"tracks_home": 100 * float(np.mean(consistent_shares)), "flow_px": float(np.mean(flows_px))}
 
 
 def _fit_stereo(runs: Sequence[Sequence[FrameSample]], rig: Rig) -> StereoFit | None:
-    """The fit of the stereo pair; None where the rig or the first run has none."""
+    """The fit of the stereo pair; None if the rig or the first run has only one camera."""
     pairs_of_runs = [_pairs(run) for run in runs]
     if not rectification(rig) or not pairs_of_runs[0]:
         return None
@@ -208,7 +208,7 @@ def _gradient_counts(images: Iterable[Image]) -> Array:
 
 
 def shots_of(recording: Recording) -> list[list[FrameSample]]:
-    """Return the runs of images that a recording is measured by."""
+    """The runs of images by which a recording is measured."""
     starts = window_starts(recording.frame_count)
     frames_end = starts[-1] + WINDOW
     runs: list[list[FrameSample]] = [[] for _ in starts]
@@ -252,7 +252,7 @@ MIN_OFFSET_PX = 0.05
 
 
 def pair_sentences(found: Realism) -> list[str]:
-    """Return sentences about the errors of the stereo pair and their most likely causes."""
+    """Sentences about the errors of the stereo pair and their most likely causes."""
     pair = found.pair
     if pair is None:
         return ["There is no stereo pair to judge: one camera, cameras with different directions, or too few matches."]
@@ -300,7 +300,7 @@ def _degrees_text(angle_deg: Uncertain) -> str:
 
 
 def residual(pair: StereoFit) -> dict[str, float]:
-    """Return the significant errors of a stereo pair as `calibration_error` of a suite's rig."""
+    """The significant errors of a stereo pair, as the `calibration_error` of a suite's rig."""
     angles = {"right_yaw_deg": pair.yaw_deg, "right_roll_deg": pair.roll_deg, "right_pitch_deg": pair.pitch_deg}
     error = {}
     for name, angle_deg in angles.items():

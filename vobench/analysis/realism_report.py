@@ -1,4 +1,4 @@
-"""How realistic the images of a recording are, compared with real ones or with another recording."""
+"""Reports how realistic the images of a recording are, compared with real images or another recording."""
 
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -18,9 +18,9 @@ SIMILAR_SHARE = 0.25  # relative difference below which values of two recordings
 
 @dataclass(frozen=True, slots=True)
 class RealismReport:
-    """The realism of one recording and, where it is compared with another recording, that of the other.
+    """The realism of a recording, and that of another recording if they are compared.
 
-    `path` and `against_path` are where the recordings are.
+    `path` and `against_path` are the paths of the recordings.
     """
 
     path: Path

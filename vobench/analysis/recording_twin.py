@@ -1,4 +1,4 @@
-"""A recording repeated in simulation: the suite that repeats it, and how far estimators agree on both."""
+"""Repeats a recording in simulation, and measures how far estimators agree on both."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -76,7 +76,7 @@ QUANTILES = (0.1, 0.5, 0.9)
 class TwinSuite:
     """The suite of a recording and its twin, written to a folder.
 
-    `file` is the suite, `placement` where the recorded path is in the scene, and `realism` that of the recording.
+    `file` is the suite, `placement` the pose of the recorded path in the scene, and `realism` that of the recording.
     """
 
     file: Path
@@ -86,7 +86,7 @@ class TwinSuite:
 
 @dataclass(frozen=True, slots=True)
 class TwinReport:
-    """How far a recording and its twin agree: on the order of estimators, on their errors, and on the images.
+    """The agreement of a recording and its twin: the order of estimators, their errors, and the images.
 
     `errors` are those of segments (8, N) by estimator, then by case ("real" or "twin"), in percent of their length;
     NaN where there is no segment.
@@ -148,8 +148,8 @@ def write_twin_suite(
 ) -> TwinSuite:
     """Write the suite of a recording and of its repetition in a simulated place.
 
-    The recorded path is placed where disparities agree best and nothing is in its way. The rig gets the calibration
-    errors that are found in the recording, and the camera its exposure, contrast, blur and noise.
+    The recorded path is placed where disparities agree best and the path is free. The rig gets the calibration errors
+    of the recording, and the camera gets its exposure, contrast, blur and noise.
 
     Args:
         recording: a recording with ground truth, or the folder of a run's case.
@@ -198,7 +198,7 @@ def write_twin_suite(
 def compare_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> TwinReport:
     """Run the estimators of a twin's suite on both cases, compare them, and write twin.json beside the suite.
 
-    Raises InputError where fewer than three estimators ran on both.
+    Raises InputError if fewer than three estimators ran on both.
     """
     folder = run_plan(read_plan(str(suite.file)))
     twin = realism_of(read_recording(folder.case(TWIN)))
@@ -226,7 +226,7 @@ def make_twin(
 ) -> TwinReport:
     """Repeat a recording in simulation, run the same estimators on both, and compare.
 
-    `write_twin_suite` and `compare_twin` in one; their arguments and errors are these two functions'.
+    It calls `write_twin_suite` and `compare_twin`. See them for the arguments and errors.
     """
     suite = write_twin_suite(
         recording, out=out, place=place, estimators=estimators, form=form, options=options, progress=progress
@@ -234,12 +234,12 @@ def make_twin(
     return compare_twin(suite, run_plan=run_plan)
 
 
-# --- The path, and where it lies ---
+# --- The path and its placement ---
 
 
 @dataclass(frozen=True, slots=True)
 class _RecordedPath:
-    """What a twin repeats: poses T_world_left (N, 4, 4) of the left camera at times t_ns (N,), the rig and its fit."""
+    """The data that a twin repeats: poses T_world_left (N, 4, 4) at t_ns (N,), the rig, and the fit of the rig."""
 
     t_ns: Stamps
     T_world_left: Array
@@ -267,10 +267,12 @@ class _RecordedPath:
 def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
     """The path of a recording's images that have a true pose. Raises InputError if it cannot be repeated."""
     if realism.pair is None:
-        raise InputError("a twin repeats a pair of eyes, and this recording has none that can be rectified and matched")
+        raise InputError("a twin needs a stereo pair that can be rectified and matched, and this recording has none")
     truth = recording.truth
     if truth is None:
-        raise InputError("a twin repeats a path, and this recording has none; give one with --truth, say an estimate")
+        raise InputError(
+            "a twin needs a path, and this recording has none; give one, such as an estimate, with --truth"
+        )
 
     has_pose = (recording.t_ns >= truth.t_ns[0]) & (recording.t_ns <= truth.t_ns[-1])
     t_ns = recording.t_ns[has_pose]
@@ -283,7 +285,7 @@ def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
     extent_m = np.linalg.norm(np.ptp(T_world_left[:, :3, 3], axis=0))
     if extent_m < LEAST_EXTENT_M:
         raise InputError(
-            "a twin ranks estimators by errors per length of path, and this recording stands still; take one that moves"
+            "a twin ranks estimators by errors per length of path, and this recording is stationary; use one that moves"
         )
     if recording.form == "kitti":  # its world is the first camera, which need not be level
         T_world_left = levelled(T_world_left)
@@ -355,7 +357,7 @@ def _look(recording: Recording) -> CameraLook:
 
 
 def _evenly(items: list[Any]) -> list[Any]:
-    """FITTED_PICTURES items, evenly spread over all."""
+    """FITTED_PICTURES evenly spaced items."""
     indices = np.linspace(0, len(items) - 1, FITTED_PICTURES).astype(int)
     return [items[index] for index in indices]
 
@@ -405,7 +407,7 @@ def _spread(errors: Array) -> dict[str, float]:
 
 
 def _compared(real: Realism, twin: Realism) -> dict[str, tuple[float, float]]:
-    """Figures without a range, of the recording and of its twin, by a title with the unit."""
+    """The statistics without a range, of the recording and its twin, by title with unit."""
     compared = {}
     for key, title in (
         ("noise_dn", "noise where flat, DN"),
@@ -420,7 +422,7 @@ def _compared(real: Realism, twin: Realism) -> dict[str, tuple[float, float]]:
 
 
 def _compared_pairs(real: StereoFit, twin: StereoFit) -> dict[str, tuple[float, float]]:
-    """The right camera's rotation where both are known, and the quantiles of disparity."""
+    """The rotations of the right camera if both are known, and the quantiles of disparity."""
     compared = {}
     for name, unit in (("yaw_deg", "°"), ("roll_deg", "°"), ("pitch_deg", "°"), ("offset_px", " px")):
         of_real = getattr(real, name)

@@ -1,4 +1,4 @@
-"""What the errors of a run depend on: for each estimator, a regression on the conditions of all its frames."""
+"""Finds the conditions on which the errors of a run depend, by a regression for each estimator."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -18,12 +18,12 @@ from vobench.runner.store import SILENT, Progress
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
-WORST_SEGMENTS = 8  # how many segments are listed unless more are asked for
+WORST_SEGMENTS = 8  # the default number of segments that are listed
 
 
 @dataclass(frozen=True, slots=True)
 class EstimatorCauses:
-    """One estimator of a run: its trials frame by frame, and what its errors depend on.
+    """One estimator of a run: the errors of its trials, and the conditions on which they depend.
 
     `statuses` are those of the trials in `courses`. `attribution` is None if there are too few frames for a
     regression, or if no condition varies.
@@ -64,7 +64,7 @@ class EstimatorCauses:
 
 @dataclass(frozen=True, slots=True)
 class RunCauses:
-    """What the errors of a run depend on, by estimator."""
+    """The conditions on which the errors of a run depend, by estimator."""
 
     run: Path
     estimators: tuple[EstimatorCauses, ...]
@@ -93,7 +93,7 @@ def find_causes(
     estimator: str | None = None,
     progress: Progress = SILENT,
 ) -> RunCauses:
-    """Find what the errors of each estimator of a run depend on, or those of one estimator.
+    """Find the conditions on which the errors of each estimator of a run depend, or those of one estimator.
 
     Raises:
         InputError: the folder is not of a run, a case is a recording, or its sequence is no longer in the cache.

@@ -1,4 +1,4 @@
-"""What a scene contains, and where a body can drive in it."""
+"""Surveys a scene: its contents, the defects of its meshes, and the free area for a robot."""
 
 from dataclasses import dataclass
 
@@ -11,17 +11,17 @@ from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture
 from vobench.scene.mesh import Triangles, distinct, open_edges, welded
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import FreeCircle, largest_free_circle
+from vobench.suite.free_space import FreeCircle, largest_free_circle
 from vobench.suite.viewpoint import is_place
 
 EYE_HEIGHT_M = 1.2
-DIRECTIONS = 4096  # in which a survey looks for the backs of faces
-MAX_FACES_OF_RECTANGLE = 2  # objects with more faces are expected to be closed
+DIRECTIONS = 4096  # the number of random directions in which a survey looks for the backs of faces
+MAX_FACES_OF_RECTANGLE = 2  # an object with more faces is expected to be closed
 
 
 @dataclass(frozen=True, slots=True)
 class SceneSurvey:
-    """The contents of a scene at its start.
+    """The contents of a scene at its start, and the defects of its meshes.
 
     `open_edges` are edges of a single face, of all objects but rectangles. `twins` are faces with the corners of
     another face. `backs` is the share of directions in which a viewer sees the back of a face first; backs are not
@@ -44,7 +44,7 @@ class SceneSurvey:
 
 
 def survey(scene: Scene) -> SceneSurvey:
-    """Survey a scene; no light is computed."""
+    """Survey a scene. Its light is not computed."""
     faces = triangles(scene, t_ns=0)
     caster = RayCaster(faces)
     point_ids = _point_ids(faces)
@@ -72,6 +72,7 @@ def survey(scene: Scene) -> SceneSurvey:
 
 
 def _textures(scene: Scene) -> set[Texture]:
+    """The distinct textures of all materials."""
     textures: set[Texture | None] = set()
     for material in scene.materials.values():
         textures |= {material.texture, material.emission_texture}
@@ -84,31 +85,31 @@ def _rounded(point_m: ArrayLike) -> tuple[float, float, float]:
 
 
 def _point_ids(faces: Triangles) -> NDArray[np.intp]:
-    """The number (F, 3) of the point at each corner."""
+    """The index (F, 3) of the point at each corner; corners in the same place share a point."""
     _, point_ids = welded(faces.corners_m.reshape(-1, 3))
     return point_ids.reshape(-1, 3)
 
 
 def _open_edges(faces: Triangles, point_ids: NDArray[np.intp]) -> int:
-    """The number of edges of objects that belong to a single face; those of rectangles do not count."""
-    faces_of_thing = np.bincount(faces.thing, minlength=len(faces.things))
-    solid_things = np.flatnonzero(faces_of_thing > MAX_FACES_OF_RECTANGLE)
+    """The number of edges that belong to a single face, without those of rectangles."""
+    face_counts = np.bincount(faces.thing, minlength=len(faces.things))
+    solid_things = np.flatnonzero(face_counts > MAX_FACES_OF_RECTANGLE)
     is_solid = np.isin(faces.thing, solid_things)
-    # Every object has point numbers of its own, so that edges of two objects are never the same.
+    # Each object has a separate range of point ids, so that two objects never share an edge.
     point_count = point_ids.max(initial=0) + 1
-    first_point = faces.thing[is_solid, None] * point_count
-    return len(open_edges(point_ids[is_solid] + first_point))
+    first_id = faces.thing[is_solid, None] * point_count
+    return len(open_edges(point_ids[is_solid] + first_id))
 
 
 def _twins(point_ids: NDArray[np.intp]) -> int:
-    """The number of faces with the same three points as an earlier face."""
+    """The number of faces that have the same three points as an earlier face."""
     sorted_corners = np.sort(point_ids, axis=1)
     first_faces, _ = distinct(sorted_corners)
     return len(point_ids) - len(first_faces)
 
 
 def _share_of_backs(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:
-    """The share of directions from a point in which the back of a face is seen."""
+    """The share of directions from a viewpoint (3,) in which the nearest face shows its back."""
     directions = unit(np.random.default_rng(0).standard_normal((DIRECTIONS, 3)))
     hits = caster.hits(np.tile(eye_m, (DIRECTIONS, 1)), directions)
     is_back = np.einsum("ij,ij->i", faces.plane[hits.face], directions) > 0
@@ -116,7 +117,7 @@ def _share_of_backs(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> fl
 
 
 def strength(scene: Scene, name: str) -> str:
-    """The strength of a light, with its unit."""
+    """The illuminance or power of a light, as text with its unit."""
     light = next(light for light in scene.lights if light.name == name)
     if isinstance(light, Sky | Sun):
         return f"{light.illuminance_lx:.0f} lx"

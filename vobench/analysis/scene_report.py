@@ -1,4 +1,4 @@
-"""What a scene or a model contains, as lines of text, as a table, and as a picture with a plan and four views."""
+"""Reports the contents of a scene or model as lines of text, as a table, and as a picture with a plan and views."""
 
 from collections.abc import Sequence
 from contextlib import closing
@@ -26,7 +26,7 @@ from vobench.suite.white import white_of
 
 @dataclass(frozen=True, slots=True)
 class SceneReport:
-    """A survey of a scene: its file, the scene built from it, what was found, and notes about its models."""
+    """A survey of a scene: its file, the scene that was built from it, the findings, and notes about its models."""
 
     spec: SceneFile
     scene: Scene
@@ -79,7 +79,7 @@ class SceneReport:
         return root / task.key if is_done(task, root) else None
 
     def save_picture(self, path: Path, *, progress: Progress = SILENT) -> None:
-        """Draw a plan, these lines and four views to a PNG; the light is computed unless it is in the cache."""
+        """Draw a plan, the lines of text and four views to a PNG. The light is computed unless it is cached."""
         light = perform(bake_task(self.spec), cache_folder(), progress=progress)
         with closing(open_renderer(self.scene, Rendering(), light)) as renderer:
             picture = sheet(self.scene, self.found, renderer, white_of(self.spec, light), self.lines())
@@ -87,7 +87,7 @@ class SceneReport:
 
 
 def survey_scene(scene: str) -> SceneReport:
-    """Survey a scene, given its name or the path of its file or model; no light is computed.
+    """Survey a scene, given its name or the path of its file or model. Its light is not computed.
 
     Raises UnknownNameError if there is no such scene, and SuiteError or ModelError if its files are invalid.
     """
@@ -97,7 +97,7 @@ def survey_scene(scene: str) -> SceneReport:
 
 
 def _notes(models: Sequence[ModelSpec]) -> list[str]:
-    """What was changed or doubtful when the models were read."""
+    """Notes on what was changed or doubtful when the models were read."""
     from vobench.asset.model import read_model
 
     notes = []

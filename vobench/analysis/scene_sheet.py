@@ -1,4 +1,4 @@
-"""A picture of a scene: its plan, lines of text, and views from the free circle."""
+"""Draws a picture of a scene: its plan, lines of text, and views from the free circle."""
 
 from collections.abc import Sequence
 
@@ -14,15 +14,15 @@ from vobench.rendering.renderer import Renderer, single_instant
 from vobench.scene.material import reflectance, srgb
 from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import downward_directions
+from vobench.suite.free_space import downward_directions
 from vobench.suite.viewpoint import Viewpoint, around
 
 Rgb8 = NDArray[np.uint8]
 CELL_WIDTH_PX = 480
 CELL_HEIGHT_PX = 320
-VIEWS_DEG = (45, 135, 225, 315)  # yaw
+VIEWS_DEG = (45, 135, 225, 315)  # the yaw of each view
 VIEW_PITCH_DEG = 8
-VIEW_WHITE = 1.5  # times the scene's white: views are a little darker than its images
+VIEW_WHITE = 1.5  # the white of views relative to that of the scene, so views are slightly darker than its images
 LENS = Pinhole(CELL_WIDTH_PX, CELL_HEIGHT_PX, 240.0, 240.0, 239.5, 159.5)
 
 
@@ -95,7 +95,7 @@ class _PlanScale:
 
 
 def plan(scene: Scene, found: SceneSurvey) -> Rgb8:
-    """Draw a scene from above (H, W, 3), cut where rooms are open, with the free circle."""
+    """Draw a scene from above (H, W, 3), cut below lamps and ceilings, with the free circle."""
     faces = triangles(scene, t_ns=0)
     scale = _PlanScale(found)
     column, row = np.meshgrid(np.arange(CELL_WIDTH_PX), np.arange(CELL_HEIGHT_PX))
@@ -115,7 +115,7 @@ def plan(scene: Scene, found: SceneSurvey) -> Rgb8:
 
 
 def _shaded(scene: Scene, faces: Triangles, origins_m: Array) -> Array:
-    """The shade (N,) of what is below points (N, 3), white where there is nothing."""
+    """The brightness (N,) of the surfaces below points (N, 3); white if there is none."""
     hits = RayCaster(faces).hits(origins_m, downward_directions(len(origins_m)))
     is_hit = hits.face >= 0
     tone_of_material = {name: reflectance(material).mean() for name, material in scene.materials.items()}

@@ -1,4 +1,4 @@
-"""The shortest part of a case that still fails in the same way: delta debugging over its frames and its nuisances."""
+"""Finds the shortest part of a case that still fails in the same way, by delta debugging of frames and nuisances."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -17,14 +17,14 @@ MIN_STEP_SHARE = 1 / 8  # of a window, by which it is still cut
 
 @dataclass(frozen=True, slots=True)
 class Failure:
-    """How a trial failed: its status, and its reason without the numbers."""
+    """The kind of a failure: the status of the trial, and its reason without numbers."""
 
     status: str
     reason: str
 
     @classmethod
     def of(cls, status: str, reason: str) -> "Failure":
-        """Return what two failures of one kind have in common."""
+        """The kind of the failure with a status and a reason."""
         return cls(status, re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", reason))
 
 
@@ -32,7 +32,7 @@ class Failure:
 class Shrunk:
     """The smallest case found that fails in the same way, and the candidates that were tried with their results.
 
-    `window` are its frames, `whole` those of the whole case.
+    `window` is its range of frames, and `whole` the range of the whole case.
     """
 
     case: Case
@@ -95,7 +95,7 @@ class _Search:
         return self._variant(self.window, self.removed)
 
     def find_window(self, likely: Callable[[Window], bool]) -> None:
-        """Find a window that fails, twice as long each time; the whole case if no shorter one does."""
+        """Find a window that fails, by doubling its length; the whole case if no shorter window fails."""
         first, end = self._whole
         length = max(MIN_FRAMES, round(FIRST_SHARE * (end - first)))
         while length < end - first:
@@ -108,12 +108,12 @@ class _Search:
             length *= 2
 
     def cut_window(self) -> None:
-        """Cut frames off the end, then off the start, as long as the case goes on failing."""
+        """Remove frames at the end, then at the start, as long as the case still fails."""
         self._cut(at_end=True)
         self._cut(at_end=False)
 
     def _cut(self, *, at_end: bool) -> None:
-        """Cut by half the window, and after each success again by as much; after a failure, by half of that."""
+        """Remove half of the window. After each success, remove as much again; after a failure, try half as much."""
         step = _length(self.window) // 2
         while step >= 1 and _length(self.window) - step >= MIN_FRAMES:
             first, end = self.window
@@ -125,7 +125,7 @@ class _Search:
                 return
 
     def remove(self, nuisances: Sequence[Nuisance]) -> None:
-        """Remove all nuisances at once or, if the case does not fail then, one after the other."""
+        """Remove all nuisances at once, or one after the other if the case does not fail without all of them."""
         names = [nuisance.name for nuisance in nuisances]
         if not names or self._try(self.window, names) or len(names) == 1:
             return

@@ -1,4 +1,4 @@
-"""The shortest part of a failed trial that still fails in the same way, saved as a suite of its own."""
+"""Finds the shortest part of a failed trial that still fails in the same way, and writes it as a suite."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -26,7 +26,7 @@ from vobench.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
-# Statuses in the table of frames of those without a pose.
+# The statuses, in the table of frames, of frames without a pose.
 WITHOUT_POSE = ("", "lost")
 
 
@@ -98,7 +98,7 @@ def shrink_trial(
     shrunk = _search(finished, run_plan, trials)
     suite = write_case(
         shrunk.case,
-        [finished.entrant],
+        [finished.estimator_entry],
         folder or Path("shrunk") / f"{score.case}_{score.estimator}",
         name=f"{score.case}_shrunk".replace("-", "_"),
         summary=_summary(score),
@@ -111,7 +111,7 @@ def _summary(score: TrialScore) -> str:
 
 
 def _fails(score: TrialScore) -> bool:
-    """Whether there is a failure to reproduce: a partial trial is one if it has a reason."""
+    """Whether a trial failed. A partial trial counts as failed if it has a reason."""
     if score.status == "partial":
         return bool(score.reason)
     return score.status != "ok"
@@ -172,7 +172,7 @@ def _first_without_pose_ns(trial: FinishedTrial, paths: TrialPaths) -> int:
 
 
 def _part(paths: TrialPaths, *, first_ns: int, last_ns: int) -> TrialPaths:
-    """The poses of both paths from one stamp to another, both included."""
+    """The poses of both paths from one stamp to another, including both."""
     gt = _between(paths.gt, first_ns, last_ns)
     est = _between(paths.est, first_ns, last_ns)
     return TrialPaths(gt, est, paths.scale)

@@ -1,6 +1,6 @@
-"""Errors of a stereo pair's calibration, from the rows and the disparities of matches.
+"""Estimates the errors of a stereo pair's calibration from the rows and the disparities of matches.
 
-x, y      a match's place in the right view over the focal length; fx, fy are the focal lengths of both views
+x, y      the position of a match in the right view divided by the focal length; fx, fy are that of both views
 rotated   by roll r to the right, pitch p upwards and yaw w to the right (the signs of `CalibrationError`), the right
           camera sees a point lower by fy (p (1 + y²) - r x - w x y) and further left by fx (w (1 + x²) - r y - p x y)
 """
@@ -31,7 +31,7 @@ class Uncertain:
 
     @property
     def is_plain(self) -> bool:
-        """Whether it differs from 0 by more than 3 standard deviations."""
+        """Whether the value differs from 0 by more than 3 standard deviations."""
         return abs(self.value) > PLAIN_SIGMAS * self.sigma
 
 
@@ -41,8 +41,8 @@ class StereoFit:
 
     `row_mad_px` is the spread of row errors as they are, `row_noise_px` that around the fit a + b x + c y + d xy + e y²
     with these `coefficients`. Roll follows from b, pitch from a, and `xy_px` is d. `yaw_deg` follows from rows and
-    motion where they agree, otherwise from `yaw_from` alone; it is None where neither determines it. `gain` is right
-    over left.
+    motion if they agree, and otherwise only from `yaw_from`; it is None if neither determines it. `gain` is the ratio
+    of right and left.
     """
 
     focal_px: float

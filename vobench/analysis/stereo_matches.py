@@ -1,4 +1,4 @@
-"""Matches between the left and right images of a stereo pair, refined below a pixel."""
+"""Matches the left and right images of a stereo pair with sub-pixel accuracy."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ MAX_EXPOSED_DN = 240
 
 @dataclass(frozen=True, slots=True)
 class PairShot:
-    """A left and a right image, and the true pose T_world_left of the left camera, None where it is not known."""
+    """A left and a right image, and the true pose T_world_left of the left camera, None if it is unknown."""
 
     left: Image
     right: Image
@@ -77,7 +77,7 @@ def _match_shot(shot: PairShot, pair: StereoPair) -> MatchedShot:
 
 
 def _corners(left: Image, pair: StereoPair) -> Points:
-    """Corners (N, 2) of the left image that the left view has."""
+    """The corners (N, 2) of the left image that are inside of the left view."""
     corners = corners_per_cell(left, CORNERS_PER_CELL, distance_px=CORNER_DISTANCE_PX, margin_px=MARGIN_PX)
     return corners[pair.seen(corners)]
 
@@ -108,13 +108,13 @@ def _match_count(window: Sequence[MatchedShot]) -> int:
 
 
 def _row_differences(left_px: Points, right_px: Points, pair: StereoPair) -> Array:
-    """How much lower (N,) right pixels (N, 2) are than left ones in the rectified views."""
+    """The differences (N,) between the rows of right and left pixels (N, 2) in the rectified views."""
     difference_px: Array = pair.right.in_view(right_px) - pair.left.in_view(left_px)
     return difference_px[:, 1]
 
 
 def row_errors(shot: PairShot, pair: StereoPair) -> Array:
-    """The row errors (N,) in px of matches that are not refined, as the ranges of real images were measured."""
+    """The row errors (N,) in px of unrefined matches, which are also used for the ranges of real images."""
     corners = _corners(shot.left, pair)
     matched, disparity_px = pair.match(shot.left, shot.right, corners, margin_px=MARGIN_PX, row_px=MAX_ROW_PX)
     return _row_differences(corners, matched, pair)[np.isfinite(disparity_px)]

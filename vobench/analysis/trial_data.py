@@ -54,13 +54,13 @@ def read_error_series(folder: RunFolder, score: TrialScore, frame_conditions: Ma
 def read_conditions(folder: RunFolder, case: Case) -> dict[str, Array]:
     """Compute the conditions (N,) of the N frames of a case, by their names in `CONDITIONS`.
 
-    Raises InputError where the sequence of the case is no longer in the cache.
+    Raises InputError if the sequence of the case is no longer in the cache.
     """
     link = folder.case(case.name) / SEQUENCE
     if not link.exists():
         raise InputError(f"the sequence is gone from the cache; run the suite again to recreate it: {link}")
 
-    # The exposures of frames belong to the sequence and so are the same in the table of every trial.
+    # The exposures of frames are properties of the sequence, so they are the same in the tables of all trials.
     any_trial = next(folder.case(case.name).glob(f"{ESTIMATES}/*/*"))
     exposures = {}
     for row in read_frames(any_trial):

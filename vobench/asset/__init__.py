@@ -1,4 +1,4 @@
-"""What scenes are made of: textures, shapes, furniture, rooms, and models from files."""
+"""The parts of scenes: textures, shapes, furniture, rooms, and models from files."""
 
 # Names that a scene's YAML may say, for those who need no more than the names: kinds of furniture, finishes of rooms
 # (both of `asset.room`), kinds of panoramas, roles of a model's nodes, endings of models' files.

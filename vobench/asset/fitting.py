@@ -1,4 +1,4 @@
-"""Fittings: doors, windows, pictures, pipes and lamps; on a wall at x = 0 that faces x, or below z = 0."""
+"""Fittings: doors, windows, pictures, pipes and lamps. They are on a wall at x = 0 that faces x, or below z = 0."""
 
 from typing import TYPE_CHECKING
 
@@ -102,7 +102,7 @@ def window_frame(
     height_m: float = 1.5,
     depth_m: float = 0.15,
 ) -> list[Part]:
-    """Frame, mullion, transom, handle and sill for a hole centred at the origin, with the pane depth_m behind x = 0."""
+    """The frame, mullion, transom, handle and sill of a window centred at the origin, `depth_m` behind x = 0."""
     x = 0.035 - depth_m
     w = width_m
     h = height_m

@@ -1,4 +1,4 @@
-"""Furniture and objects on it: they stand on z = 0 at the origin, face x, and their width is along y."""
+"""Furniture and objects on it. They stand on z = 0 at the origin and face x; their width is along y."""
 
 from dataclasses import dataclass, replace
 from itertools import product
@@ -45,9 +45,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Part:
-    """Faces of one material.
+    """Faces with one material.
 
-    geometry: a mesh, or the arrays of one; arrays are much faster to move.
+    `geometry` is a mesh or the arrays of a mesh. Arrays are much faster to move.
     """
 
     geometry: "Trimesh | MeshArrays"
@@ -64,12 +64,12 @@ class Part:
         return self.geometry.mesh() if isinstance(self.geometry, MeshArrays) else self.geometry
 
     def moved(self, T_a_b: Array) -> "Part":
-        """The part of a frame b in the frame a."""
+        """The part transformed from frame b to frame a by T_a_b (4, 4)."""
         return Part(self.arrays.moved(T_a_b), self.material)
 
 
 def matt(colour: str = "#ffffff", texture: Texture | None = None) -> Material:
-    """A diffuse material of colour #rrggbb; a texture is multiplied by the colour."""
+    """A diffuse material with the colour #rrggbb. A texture is multiplied by the colour."""
     srgb = np.array(picture.rgb(colour), np.uint8)
     red, green, blue = linear(srgb).tolist()
     return Material(colour=(red, green, blue), texture=texture)
@@ -91,7 +91,7 @@ PAGE = matt("#e9e4d8")
 
 
 def wood(kind: str) -> Material:
-    """Lacquered wood; kind: one of the woods in `picture.TONES`."""
+    """Lacquered wood. `kind` is one of the woods in `picture.TONES`."""
     return coated(texture=picture.boards(kind), roughness=0.28)
 
 
@@ -101,7 +101,7 @@ def cloth(colour: str) -> Material:
 
 
 def mm(places: str) -> Array:
-    """Points (N, K) in metres, from a text in millimetres such as "0 0, 34 0, 40 8"."""
+    """Points (N, K) in metres from a text in millimetres, such as "0 0, 34 0, 40 8"."""
     rows = [point.split() for point in places.split(",")]
     return np.array(rows, float) / 1000
 
@@ -114,7 +114,7 @@ def put(
     z: float = 0,
     **turn: float,
 ) -> Part:
-    """A part at a position in metres; turn: yaw, pitch and roll in degrees, as of `at`."""
+    """A part at a position in metres. `turn` are the yaw, pitch and roll in degrees, as in `at`."""
     T = at(x, y, z, **turn)
     return Part(mesh, material).moved(T)
 
@@ -129,7 +129,7 @@ def stood(
     bevel: float = 0.003,
     u: float = 0,
 ) -> Part:
-    """A block whose bottom face is at z; u shifts its texture, so that equal blocks look different."""
+    """A block whose bottom face is at z. `u` shifts its texture, so that equal blocks look different."""
     height = float(np.asarray(size_m)[2])
     mesh = block_arrays(size_m, bevel_m=bevel, uv_m=(u, 1.7 * u))
     return put(mesh, material, x, y, z + height / 2)
@@ -358,7 +358,7 @@ def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> l
 
 
 def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
-    """A display on a foot; it is switched on and slightly tilted."""
+    """A display on a foot, switched on and slightly tilted."""
     h = width_m * 0.58
     tilt = rng.uniform(-4, 0)
     glow = replace(

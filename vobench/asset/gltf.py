@@ -1,4 +1,4 @@
-"""glTF 2.0 files, .glb and .gltf: nodes, faces, materials, textures and lights. Source: Khronos, glTF 2.0.
+"""Reads the nodes, faces, materials, textures and lights in glTF 2.0 files. Source: Khronos, glTF 2.0.
 
 This reader exists because trimesh 5.2 reads sparse and compressed accessors as zeros, and ignores triangle fans,
 normalised integers, second texture coordinates, lights, emission strengths and instances.
@@ -26,7 +26,7 @@ ModelLight = PointLight | SpotLight | Sun
 MOST_INSTANCES = 100_000
 MOST_NESTED = 256
 JOINTS_PER_VERTEX = 4
-LEAST_WEIGHT = 1e-9  # of all joints of a vertex together
+LEAST_WEIGHT = 1e-9  # the smallest total weight of the joints of a vertex
 LEAST_CONE_DEG = 0.1
 # Modes of a primitive; the other modes are points and lines.
 TRIANGLES = 4
@@ -36,10 +36,11 @@ FAN = 6
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Node:
-    """A node of the scene, or one instance of it if it has EXT_mesh_gpu_instancing.
+    """A node of the scene, or one instance of a node with EXT_mesh_gpu_instancing.
 
-    names, roles, poses: those of its ancestors from the root on, and its own last. A role is the value of `vobench` in
-    a node's extras, and a pose is T_model_node (4, 4). index: its number in the file. source: its JSON.
+    `names`, `roles` and `poses` are those of its ancestors, from the root on, followed by its own. A role is the value
+    of `vobench` in the extras of a node. A pose is T_model_node (4, 4); `poses` begins with T_model_file.
+    `index` is the index of the node in the file, and `source` is its JSON.
     """
 
     names: tuple[str, ...]
@@ -54,10 +55,12 @@ class Node:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Primitive:
-    """Faces of a node that share one look.
+    """The faces of a node that have the same look.
 
-    mesh: its normals are 0 if the file has none. T_model_mesh: the pose (4, 4) of its frame. colours: linear colours
-    (V, 3) of the vertices. dropped: the number of faces without area that were removed.
+    `mesh` has normals of 0 if the file has none.
+    `T_model_mesh` (4, 4) is the pose of the mesh.
+    `colours` (V, 3) are linear colours of the vertices.
+    `dropped` is the number of faces without area that were removed.
     """
 
     node: Node
@@ -70,16 +73,19 @@ class Primitive:
 
 
 def read_gltf(data: bytes, folder: Path, *, has_srgb_vertices: bool = False) -> "Gltf":
-    """The file in a folder. Raises ModelError if it is incomplete or requires an unknown extension."""
+    """A reader of the content of a file. Raises ModelError if it is incomplete or requires an unknown extension.
+
+    `folder` is the folder that contains the file.
+    """
     file = read_gltf_file(data, folder)
     return Gltf(file, MaterialReader(file), has_srgb_vertices)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Gltf:
-    """A reader of the nodes, primitives and lights of a file.
+    """Reads the nodes, primitives and lights of a file.
 
-    has_srgb_vertices: whether vertex colours are sRGB, as in PLY files, instead of linear.
+    `has_srgb_vertices` says that vertex colours are in sRGB, as in PLY files, instead of linear.
     """
 
     file: GltfFile
@@ -87,7 +93,7 @@ class Gltf:
     has_srgb_vertices: bool = False
 
     def nodes(self, T_model_file: Array) -> Iterator[Node]:
-        """Every node of the scene, parents before children."""
+        """All nodes of the scene, parents before children."""
         root = Node((), (), (T_model_file,))
         stack = [(index, root) for index in reversed(self._roots())]
         visited: set[int] = set()
@@ -120,7 +126,7 @@ class Gltf:
         return [index for index in range(len(nodes)) if index not in children]
 
     def _instances(self, source: Json) -> Array:
-        """T_node_instance (N, 4, 4) of the instances of a node's mesh."""
+        """The poses T_node_instance (N, 4, 4) of the instances of a node's mesh."""
         extension = source.get("extensions", {}).get("EXT_mesh_gpu_instancing", {})
         attributes = extension.get("attributes")
         if not attributes:
@@ -132,7 +138,7 @@ class Gltf:
         return _transforms(parts)
 
     def require_few(self, nodes: Sequence[Node]) -> None:
-        """Raise ModelError for too many faces, or for vertices of as many, before any of them is read."""
+        """Raise ModelError if the nodes have too many faces. The faces are counted before any of them is read."""
         faces = 0
         for node in nodes:
             for source in self._primitives(node):
@@ -155,7 +161,7 @@ class Gltf:
         return list(mesh["primitives"])
 
     def primitives(self, node: Node, poses: Mapping[int, Array]) -> list[Primitive]:
-        """The primitives of a node's mesh; poses: T_model_node of every node by its index, for skins."""
+        """The primitives of a node's mesh. `poses` has T_model_node of every node by its index, for skins."""
         return [self._primitive(node, source, poses) for source in self._primitives(node)]
 
     def _primitive(
@@ -180,7 +186,7 @@ class Gltf:
         if "NORMAL" in attributes:
             normals = self.file.accessor(attributes["NORMAL"], count).astype(float)
 
-        # The vertices of a skin are moved by its joints, in the frame of the model.
+        # The joints of a skin move its vertices to the frame of the model.
         T_model_mesh = node.poses[-1]
         if "skin" in node.source and "JOINTS_0" in attributes:
             blend = self._blend(node.source["skin"], attributes, poses, count)
@@ -236,7 +242,7 @@ class Gltf:
         return np.asarray(colours)
 
     def _blend(self, index: Any, attributes: Json, poses: Mapping[int, Array], count: int) -> Array:
-        """T_model_vertex (V, 4, 4) of a skin's vertices: linear blend skinning, a weighted sum over four joints."""
+        """The transforms T_model_vertex (V, 4, 4) of a skin's vertices, by linear blend skinning with four joints."""
         skin = self.file.entry("skins", index)
         T_joints = np.stack([poses[node] for node in skin["joints"]])
         if "inverseBindMatrices" in skin:
@@ -253,7 +259,7 @@ class Gltf:
         return np.asarray(sum(weighted))
 
     def lights(self, node: Node) -> list[ModelLight]:
-        """The light of KHR_lights_punctual at a node, if any.
+        """The light of a node by KHR_lights_punctual; empty if the node has none.
 
         The intensity of a spot light decreases linearly with the angle between its inner and outer cone.
         """
@@ -266,7 +272,7 @@ class Gltf:
 
 
 def _child(parent: Node, index: int, source: Json) -> Node:
-    """A child of a node, without its poses."""
+    """A child of a node. Its own pose is not yet set."""
     extras = source.get("extras")
     role = str(extras.get("vobench", "")) if isinstance(extras, dict) else ""
     name = str(source.get("name") or f"node_{index}")
@@ -302,7 +308,7 @@ def _light(node: Node, source: Json) -> ModelLight:
 
 
 def _applied(T: Array, vectors: Array) -> Array:
-    """Vectors (N, 3), each transformed by the linear part of its own T (N, 4, 4)."""
+    """The vectors (N, 3), each transformed by the linear part of the T (N, 4, 4) with the same index."""
     columns = T[:, :3, :3] @ vectors[..., None]
     return np.asarray(columns[..., 0])
 
@@ -319,7 +325,7 @@ def _local(source: Json) -> Array:
 
 
 def _transforms(parts: Mapping[str, Array]) -> Array:
-    """Transforms (..., 4, 4) of TRANSLATION (..., 3), ROTATION (..., 4), scalar last, and SCALE (..., 3)."""
+    """The transforms (..., 4, 4) with TRANSLATION (..., 3), ROTATION (..., 4), scalar last, and SCALE (..., 3)."""
     quaternion = np.asarray(parts.get("ROTATION", (0, 0, 0, 1)), float)
     norm = np.linalg.norm(quaternion, axis=-1, keepdims=True)
     R = se3.from_quaternion(quaternion / norm)
@@ -340,7 +346,7 @@ def _triangles(vertices: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
     if mode == FAN:
         corners = np.stack([n + 1, n + 2, 0 * n], axis=1)
     else:
-        # Every other triangle of a strip runs the other way round.
+        # Every second triangle of a strip has the opposite orientation.
         is_odd = n % 2
         corners = np.stack([n, n + 1 + is_odd, n + 2 - is_odd], axis=1)
     return np.asarray(vertices[corners])

@@ -1,4 +1,4 @@
-"""The container of glTF 2.0: JSON and buffers of .glb and .gltf, and the arrays in them. Source: Khronos, glTF 2.0."""
+"""Reads the JSON, the buffers and the arrays of .glb and .gltf files. Source: Khronos, glTF 2.0."""
 
 import base64
 import json
@@ -17,16 +17,16 @@ from vobench.errors import ModelError
 from vobench.geometry.se3 import Array
 
 Json = dict[str, Any]
-# More is refused before memory is taken; two cores could not light more faces.
+# Larger files are refused before memory is allocated. Computing the light of more faces would take too long.
 MOST_FACES = 1_000_000
 MOST_BYTES = 1 << 30
-GLB_HEADER_BYTES = 20  # of the file and of its first chunk
+GLB_HEADER_BYTES = 20  # the headers of the file and of its first chunk
 CHUNK_HEADER_BYTES = 8
 
 COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 DECOMPRESS = "decompress it: gltf-transform cp in.glb out.glb"
-# What is known of extensions: empty where they are read, else why they are not.
+# The known extensions: the reason why an extension is not read; empty for one that is read.
 EXTENSIONS = {
     "KHR_draco_mesh_compression": f"is compressed by Draco; {DECOMPRESS}",
     "EXT_meshopt_compression": f"is compressed by meshopt; {DECOMPRESS}",
@@ -47,7 +47,7 @@ MALFORMED = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeE
 
 @contextmanager
 def located(where: str) -> Iterator[None]:
-    """Prefix errors with where they are, and report whatever malformed data raises as a ModelError."""
+    """Prefix errors with the place where they occurred. Other exceptions, from malformed data, become ModelErrors."""
     try:
         yield
     except ModelError as error:
@@ -62,7 +62,7 @@ def _one_line(text: str) -> str:
 
 
 def numbers(values: Any, *shape: int) -> Array:
-    """Finite numbers of a shape. Raises ModelError for anything else."""
+    """The values as an array of finite numbers with the given shape. Raises ModelError for other values."""
     array = np.asarray(values, float)
     if array.shape != shape or not np.isfinite(array).all():
         count = shape[0] if shape else 1
@@ -72,7 +72,7 @@ def numbers(values: Any, *shape: int) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GltfFile:
-    """A glTF file: its folder, JSON and buffers, and notes on what of it is not read."""
+    """A glTF file: its folder, JSON and buffers, and notes on what is not read."""
 
     folder: Path
     tree: Json
@@ -80,7 +80,7 @@ class GltfFile:
     notes: tuple[str, ...]
 
     def entry(self, kind: str, index: Any) -> Json:
-        """One of the objects of a numbered kind."""
+        """The JSON object with an index in the list of a kind, such as "nodes"."""
         entries = self.tree.get(kind, [])
         if type(index) is not int or not 0 <= index < len(entries):
             raise ModelError(f"number {index} of {len(entries)} {kind} is requested; export it again")
@@ -98,13 +98,16 @@ class GltfFile:
         index: Any,
         rows: int | None = None,
     ) -> NDArray[Any]:
-        """Numbers (rows, width) of an accessor, which has as many rows as expected; floats where normalized."""
+        """The numbers (rows, width) of an accessor; floats if it is normalized.
+
+        Raises ModelError unless it has the expected number of rows.
+        """
         count = self.rows(index)
         accessor = self.entry("accessors", index)
         if count > 3 * MOST_FACES or rows not in (None, count):
             raise ModelError(f"accessor {index} has {count:,} rows, and should have {rows or 3 * MOST_FACES:,}")
         if "bufferView" not in accessor and "sparse" not in accessor:
-            raise ModelError(f"accessor {index} has no data; where it is compressed, {DECOMPRESS}")
+            raise ModelError(f"accessor {index} has no data; if it is compressed, {DECOMPRESS}")
 
         dtype = np.dtype(COMPONENTS[accessor["componentType"]])
         width = WIDTHS[accessor["type"]]
@@ -118,7 +121,7 @@ class GltfFile:
         return values
 
     def _substituted(self, values: NDArray[Any], sparse: Json) -> NDArray[Any]:
-        """Values (N, width) with the rows of a sparse accessor replaced."""
+        """The values (N, width), in which the rows of a sparse accessor are replaced."""
         count, width = values.shape
         index_dtype = np.dtype(COMPONENTS[sparse["indices"]["componentType"]])
         indices = self._array(sparse["indices"], min(sparse["count"], count), index_dtype, 1)[:, 0]
@@ -133,7 +136,7 @@ class GltfFile:
         dtype: np.dtype[Any],
         width: int,
     ) -> NDArray[Any]:
-        """Numbers (count, width) from a buffer view and an offset."""
+        """The numbers (count, width) at an offset of a buffer view."""
         data = self.view(source["bufferView"])
         offset = source.get("byteOffset", 0)
         row_bytes = dtype.itemsize * width
@@ -165,7 +168,10 @@ def _beyond(end: int, size: int) -> str:
 
 
 def read_gltf_file(data: bytes, folder: Path) -> GltfFile:
-    """A file that is in a folder. Raises ModelError where it is incomplete or requires an unknown extension."""
+    """The glTF file with this content. Raises ModelError if it is incomplete or requires an unknown extension.
+
+    `folder` is the folder that contains the file.
+    """
     is_binary = data[:4] == b"glTF"
     text, blob = _chunks(data) if is_binary else (data, b"")
     if not text.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
@@ -181,7 +187,7 @@ def read_gltf_file(data: bytes, folder: Path) -> GltfFile:
 
 
 def _require_readable(tree: Json) -> None:
-    """Refuse other versions and required extensions that are not read."""
+    """Raise ModelError for another version of glTF, or a required extension that is not read."""
     version = tree["asset"]["version"]
     if not str(version).startswith("2."):
         raise ModelError(f"is glTF {version}, not 2; gltf-pipeline -i old.gltf -o new.glb converts it")
@@ -192,7 +198,7 @@ def _require_readable(tree: Json) -> None:
 
 
 def _unread(tree: Json) -> tuple[str, ...]:
-    """Notes on optional parts that are not read."""
+    """Notes on optional extensions that are not read."""
     used = sorted(tree.get("extensionsUsed", []))
     notes = [f"{name} is not read" for name in used if EXTENSIONS.get(name, name)]
     if tree.get("animations"):

@@ -1,4 +1,4 @@
-"""Materials and pictures of glTF 2.0. Source: Khronos, glTF 2.0, sections 3.8 and 3.9, appendix B."""
+"""Reads the materials and pictures of glTF 2.0 files. Source: Khronos, glTF 2.0, sections 3.8, 3.9, appendix B."""
 
 import warnings
 from collections.abc import Sequence
@@ -17,22 +17,22 @@ from vobench.geometry.se3 import Array
 from vobench.scene.material import LUMINANCE, Map, Material, Picture
 
 MOST_PIXELS = 1 << 26
-# Pictures are reduced to this side, and further where there are many, to so many texels in all.
+# The largest side of a picture, and the largest number of texels of all pictures. Larger pictures are reduced.
 MOST_SIDE = 4096
 MOST_TEXELS = 1 << 27
-# GGX alpha from which on nothing is seen mirrored: a coat or metal this rough is read as diffuse, in its colour.
+# A coat or metal with this GGX alpha or more shows no reflections, so it is read as diffuse with its colour.
 DIFFUSE_ALPHA = 0.4
-# Opacity below which a blended material is a pane, and below which it is not there.
+# The opacity below which a blended material is a pane, and the opacity below which it is invisible.
 PANE_OPACITY = 0.5
 ABSENT_OPACITY = 0.02
-CUTOFF = 0.5  # glTF's own for masks, and the one for blended materials that are cut out
+CUTOFF = 0.5  # the default of glTF for masks; also used for blended materials that are cut out
 GLASS_ETA = 1.5
-DIM_CD_M2 = 3.0  # the sum over the channels up to which an emission is likely without its strength
+DIM_CD_M2 = 3.0  # an emission with at most this sum over the channels probably lacks its strength
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Look:
-    """A material, the texture coordinates that its pictures use, and T_uv (2, 3) from these to uv."""
+    """A material, the set of texture coordinates that its pictures use, and their transform T_uv (2, 3) to uv."""
 
     name: str
     material: Material
@@ -42,7 +42,7 @@ class Look:
     notes: tuple[str, ...] = ()
 
 
-# glTF's default is white; in a room of nothing else light would accumulate, and every picture be saturated.
+# The default of glTF is white. In a room with only this material, light would accumulate and saturate all pictures.
 BARE = Look(
     "default",
     Material(colour=(0.5, 0.5, 0.5)),
@@ -51,9 +51,9 @@ BARE = Look(
 
 
 class MaterialReader:
-    """Reads each material and picture of a file once.
+    """Reads the materials and pictures of a file, each of them only once.
 
-    reduced: the numbers of images that were made smaller to fit into memory.
+    `reduced` has the indices of the images that were reduced to fit into memory.
     """
 
     def __init__(self, file: GltfFile) -> None:
@@ -63,7 +63,7 @@ class MaterialReader:
         self._pictures: dict[tuple[int, int], Picture] = {}
 
     def look(self, index: int | None) -> Look:
-        """A material; that of glTF's defaults for None."""
+        """The look of the material with an index; the default look of glTF for None."""
         if index not in self._looks:
             source = {} if index is None else self._file.entry("materials", index)
             name = "default" if index is None else str(source.get("name") or f"material_{index}")
@@ -88,13 +88,13 @@ class MaterialReader:
         return Look(name, material, bool(source.get("doubleSided")), uv_set, T_uv, tuple(all_notes))
 
     def _roughness_and_metalness(self, surface: Json) -> tuple[float, float, list[str]]:
-        """The factors times the means of their texture, with a note where there is one."""
+        """The roughness and metalness: their factors times the mean of their texture. A note says if there is one."""
         roughness = float(numbers(surface.get("roughnessFactor", 1.0)))
         metalness = float(numbers(surface.get("metallicFactor", 1.0)))
         picture = self._picture(surface.get("metallicRoughnessTexture"))
         if picture is None:
             return roughness, metalness, []
-        means = picture.values[..., 1:].mean((0, 1))  # of green, the roughness, and blue, the metalness
+        means = picture.values[..., 1:].mean((0, 1))  # green is the roughness, and blue the metalness
         roughness, metalness = np.array([roughness, metalness]) * means / 255
         return roughness, metalness, [f"is {metalness:.0%} metal and {roughness:.0%} rough, the means of its texture"]
 
@@ -105,7 +105,10 @@ class MaterialReader:
         metalness: float,
         emission_cd_m2: tuple[float, float, float],
     ) -> Material:
-        """The coat's reflectance follows from the index of refraction; GGX alpha is the square of the roughness."""
+        """The material of a surface.
+
+        The reflectance of its coat follows from the index of refraction. GGX alpha is the square of the roughness.
+        """
         surface = source.get("pbrMetallicRoughness", {})
         extensions = source.get("extensions", {})
         red, green, blue, _ = _base_colour(surface)
@@ -137,7 +140,7 @@ class MaterialReader:
         texture: Json | None,
         channels: int = 3,
     ) -> Picture | None:
-        """The pixels of a texture (H, W, 3), or (H, W, 4) where it has opacity and four channels are requested."""
+        """The pixels of a texture (H, W, 3), or (H, W, 4) if it has opacity and four channels are requested."""
         if not texture:
             return None
         source = self._file.entry("textures", texture["index"])
@@ -153,7 +156,7 @@ class MaterialReader:
         return self._pictures[key]
 
     def _pixels(self, index: Any) -> NDArray[np.uint8]:
-        """An image (H, W, 3), or (H, W, 4) where it is not opaque, reduced to the side that there is room for."""
+        """The image with an index (H, W, 3), or (H, W, 4) if it is not opaque, reduced to fit into memory."""
         image = self._file.entry("images", index)
         texels = MOST_TEXELS / len(self._file.tree["images"])
         side = min(MOST_SIDE, 2 ** int(np.log2(texels) / 2))
@@ -168,13 +171,13 @@ class MaterialReader:
                 if max(whole.size) > side:
                     self.reduced.add(index)
                 return np.asarray(whole.reduce(-(-max(whole.size) // side)))
-            except Exception as error:  # decoders raise all kinds
+            except Exception as error:  # decoders raise errors of many types
                 advice = f"save it as PNG of {MOST_PIXELS:,} pixels at most"
                 raise ModelError(f"cannot be read ({error}); {advice}") from None
 
 
 def _decoded(data: bytes | memoryview) -> Image.Image:
-    """A picture in RGB or, where it is not opaque, in RGBA."""
+    """The picture in RGB, or in RGBA if it is not opaque."""
     with warnings.catch_warnings(action="ignore"):
         image = Image.open(BytesIO(data), formats=("PNG", "JPEG", "WEBP"))
         if image.width * image.height > MOST_PIXELS:
@@ -185,7 +188,7 @@ def _decoded(data: bytes | memoryview) -> Image.Image:
 
 
 def _base_colour(surface: Json) -> list[float]:
-    """Red, green, blue and opacity, each in [0, 1]."""
+    """The red, green, blue and opacity of a surface, each in [0, 1]."""
     factor = numbers(surface.get("baseColorFactor", (1, 1, 1, 1)), 4)
     return np.clip(factor, 0, 1).tolist()  # type: ignore[no-any-return]
 
@@ -203,7 +206,7 @@ def _notes_on_emission(
     emission_texture: Json | None,
     emission_cd_m2: Sequence[float],
 ) -> list[str]:
-    """Notes where an emission is weak, and where it is mapped otherwise than the colour."""
+    """Notes if an emission is weak, or if its texture is mapped differently from that of the colour."""
     red, green, blue = emission_cd_m2
     notes = []
     if 0 < red + green + blue <= DIM_CD_M2:
@@ -215,12 +218,12 @@ def _notes_on_emission(
 
 
 def _is_mapped_alike(texture: Json, other: Json) -> bool:
-    """Whether two textures differ in their picture at most."""
+    """Whether two textures use the same texture coordinates and transform."""
     return {**texture, "index": 0} == {**other, "index": 0}
 
 
 def _uv_of(texture: Json) -> tuple[int, Array]:
-    """The set of coordinates that a texture uses, and T_uv (2, 3) of these by KHR_texture_transform."""
+    """The set of coordinates that a texture uses, and their transform T_uv (2, 3) by KHR_texture_transform."""
     transform = texture.get("extensions", {}).get("KHR_texture_transform", {})
     rotation = se3.rotation_z(-numbers(transform.get("rotation", 0.0)))[:2, :2]
     scale = numbers(transform.get("scale", (1, 1)), 2)
@@ -231,7 +234,7 @@ def _uv_of(texture: Json) -> tuple[int, Array]:
 
 
 def _opacity(material: Material, factor: float) -> Map | Array:
-    """Opacity (H, W) of a texture times a factor."""
+    """The opacity (H, W) of a texture times a factor."""
     if material.texture is None:
         return np.full((1, 1), factor)
     pixels = material.texture.pixels()
@@ -245,7 +248,7 @@ def _with_opacity(
     source: Json,
     factor: float,
 ) -> tuple[Material, list[str]]:
-    """A material with the holes, or as the pane, that its opacity makes of it, and notes on that."""
+    """The material with its opacity applied, which makes holes in it or turns it into a pane, and notes on that."""
     mode = source.get("alphaMode", "OPAQUE")
     if mode == "OPAQUE" or material.kind == "pane":
         return material, []
@@ -262,7 +265,7 @@ def _masked(
     cutoff: float,
     factor: float,
 ) -> tuple[Material, list[str]]:
-    """A material with holes where its opacity is below a cutoff."""
+    """The material with holes where its opacity is below a cutoff."""
     if opacity.max() < cutoff:
         return _open_pane()
     if opacity.min() < cutoff:
@@ -275,7 +278,7 @@ def _blended(
     opacity: Map | Array,
     factor: float,
 ) -> tuple[Material, list[str]]:
-    """A blended material as what it likely stands for: nothing, holes, glass or a solid."""
+    """The material that a blended material probably represents: an open pane, holes, glass, or an opaque material."""
     if opacity.max() < ABSENT_OPACITY:
         return _open_pane()
     is_clear_or_solid = (opacity < 0.1) | (opacity > 0.9)

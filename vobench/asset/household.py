@@ -1,4 +1,4 @@
-"""Furniture and lamps for homes and halls; they stand on z = 0 at the origin and face x."""
+"""Furniture and lamps for homes and halls. They stand on z = 0 at the origin and face x."""
 
 from itertools import product
 from typing import TYPE_CHECKING
@@ -197,7 +197,7 @@ def floor_lamp(
     colour: str = SAND,
     wide_m: float = 0.42,
 ) -> list[Part]:
-    """A floor lamp with a cloth shade; the place for its bulb is 0.15 m below height_m."""
+    """A floor lamp with a cloth shade. The bulb belongs 0.15 m below `height_m`."""
     foot_profile = mm("0 0, 130 0, 130 12, 40 22, 12 30, 0 30") * [1, 1]
     foot = lathe(foot_profile * (0.6 + 0.25 * height_m))
     stem = tube(np.array([[0, 0, 0.01], [0, 0, height_m - 0.2]]), 0.011)
@@ -212,7 +212,7 @@ def pendant(
     colour: str = "",
     wide_m: float = 0.4,
 ) -> list[Part]:
-    """A pendant lamp: its shade ends drop_m below z = 0, and the place for its bulb is 0.08 m higher."""
+    """A pendant lamp. Its shade ends `drop_m` below z = 0, and the bulb belongs 0.08 m above that."""
     scale = wide_m / 0.4
     profile = mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232") * [scale, scale]
     shade = lathe(profile, sections=36)

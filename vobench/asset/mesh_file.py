@@ -1,4 +1,4 @@
-"""OBJ, STL and PLY files, converted to .glb by trimesh."""
+"""Converts OBJ, STL and PLY files to .glb with trimesh."""
 
 import re
 from pathlib import Path
@@ -29,7 +29,7 @@ def read_as_glb(path: Path) -> tuple[bytes, list[str]]:
 
 
 def _without_metal(visual: object) -> None:
-    """Replace the material of a visual by a physically based one that is not a metal; a texture is not tinted."""
+    """Replace the material of a visual by a physically based one that is not a metal and does not tint its texture."""
     material = visual.material  # type: ignore[attr-defined]
     physical = material.to_pbr()
     physical.name = getattr(material, "name", None)
@@ -57,7 +57,7 @@ def _require_readable(path: Path) -> list[str]:
         counts = re.findall(rb"element (?:face|vertex) (\d+)", header)
         faces = max(map(int, counts), default=0) // 2
     else:
-        raise ModelError("is of no format that is read: .glb, .gltf, .obj, .stl, .ply")
+        raise ModelError("is of an unknown format; known formats are .glb, .gltf, .obj, .stl, .ply")
     if faces > MOST_FACES:
         advice = "make them fewer, as by Blender's Decimate"
         raise ModelError(f"has {faces:,} faces, more than {MOST_FACES:,}; {advice}")

@@ -1,4 +1,4 @@
-"""Reads glTF, OBJ, STL and PLY files as things, materials, lights and movers of a scene."""
+"""Reads the things, materials, lights and movers of a scene from glTF, OBJ, STL and PLY files."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -32,43 +32,42 @@ Roles = Mapping[str, str]
 Key = TypeVar("Key")
 ROLES = ("mirror", "pane", "lamp", "mover", "ignored")
 GLTF_SUFFIXES = (".glb", ".gltf")
-Z_UP_SUFFIXES = (".stl", ".ply")  # by custom: these formats do not define an axis
-SILVER_TINT = 0.9  # of a mirror whose material is not a metal
-LEAST_M2 = 1e-12  # smaller faces count as faces without area
-# A camera cannot enter a closed body of at most this size, so that the backs of its faces are never seen.
-CLOSED_M = 1.0
-# A model outside of these limits is probably in another unit, or damaged. Most models are about TYPICAL_M across.
-SMALLEST_M = 0.05
-PLACE_M = 3.0
-TYPICAL_M = 5.0
-LARGEST_M = 500.0
-FARTHEST_M = 1e7
-LYING = 2.0  # ratio of the areas that face along the other axis and up or down, above which a model lies
+Z_UP_SUFFIXES = (".stl", ".ply")  # by convention, because these formats do not define the up axis
+SILVER_TINT = 0.9  # the tint of a mirror whose material is not a metal
+LEAST_M2 = 1e-12  # faces with a smaller area are removed
+CLOSED_M = 1.0  # a camera cannot be inside a closed body of at most this size, so it never sees the backs of its faces
+SMALLEST_M = 0.05  # a smaller model is probably in another unit
+PLACE_M = 3.0  # a larger model may be a place, such as a room, instead of an object
+TYPICAL_M = 5.0  # the extent of most models
+LARGEST_M = 500.0  # a larger model is probably in another unit
+FARTHEST_M = 1e7  # a model with vertices farther from the origin is probably damaged
+LYING = 2.0  # a place probably lies on its side if its area along one axis exceeds that along another by this factor
 FLAT = 0.5  # the height of a place is usually less than this share of its length and of its width
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # T_model_file of a file with y up
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Moving:
-    """Things that move together. Their frame has the axes of the model and its origin at at_m (3,), their node."""
+class ModelMover:
+    """Things that move together, in a frame with the axes of the model and the origin `origin_m` (3,)."""
 
     name: str
-    at_m: Array
+    origin_m: Array
     things: tuple[Thing, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Model:
-    """The contents of a file in metres, with z up.
+    """The contents of a model file in metres, with z up.
 
-    lamps: names of the things that are lamps. notes: differences from the file, and doubts about it. dropped: the
-    number of faces without area that were removed.
+    `lamps` lists the names of the things that are lamps.
+    `notes` lists what was read differently from the file, and what is probably wrong with it.
+    `dropped` is the number of faces that were removed because they have no area.
     """
 
     things: tuple[Thing, ...]
     materials: dict[str, Material]
     lights: tuple[ModelLight, ...] = ()
-    movers: tuple[Moving, ...] = ()
+    movers: tuple[ModelMover, ...] = ()
     lamps: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     dropped: int = 0
@@ -76,8 +75,30 @@ class Model:
     @property
     def everything(self) -> list[Thing]:
         """All things at their positions in the file, including those of movers."""
-        moving = [_shifted(thing, mover.at_m) for mover in self.movers for thing in mover.things]
+        moving = [_shifted(thing, mover.origin_m) for mover in self.movers for thing in mover.things]
         return [*self.things, *moving]
+
+
+@dataclass(frozen=True, slots=True)
+class _Role:
+    """The role of a node.
+
+    `name` is "" for a node without a role.
+    `mover` is the index, in the names of the node, of the ancestor that moves the node; None if it is stationary.
+    """
+
+    name: str
+    mover: int | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """The thing that a primitive of a node becomes, and the role of the node."""
+
+    node: Node
+    role: _Role
+    thing: Thing
+    emits_light: bool
 
 
 def read_model(
@@ -89,50 +110,71 @@ def read_model(
 ) -> Model:
     """The contents of a glTF, OBJ, STL or PLY file whose unit is `scale` metres.
 
-    roles: a role for each glob of node names; it replaces the role that the file gives (extras: {"vobench": "mirror"}).
-    A node without a role has that of its nearest ancestor with one. up: "y" or "z"; by default that of the format.
-    An emission of 1 is 1 cd/m², and lights are in cd and lx, as in glTF; `scale` does not change them.
+    `roles` maps a glob of node names to a role. It overrides the role in the file (extras: {"vobench": "mirror"}).
+    A node without a role has the role of its nearest ancestor that has one.
+    `up` is the axis of the file that points up, "y" or "z". By default it is that of the format.
+    As in glTF, an emission of 1 is 1 cd/m², and the units of lights are cd and lx. `scale` does not change them.
     Raises ModelError with the file, the node and advice.
     """
     path = Path(path)
     with located(str(path)), np.errstate(all="ignore"):
         _require_file(path)
-        kind = path.suffix.lower()
-        axis = up or ("z" if kind in Z_UP_SUFFIXES else "y")
-        T_model_file = np.diag([scale, scale, scale, 1.0]) @ (Y_UP if axis == "y" else np.eye(4))
-
-        is_gltf = kind in GLTF_SUFFIXES
-        notes = [] if is_gltf else [f"{kind} has no unit and no axes: read as {scale:g} m each, {axis} up"]
-        if is_gltf:
-            data = path.read_bytes()
-        else:
-            data, missing = read_as_glb(path)
-            notes += missing
-        file = read_gltf(data, path.parent, has_srgb_vertices=not is_gltf)
-
-        nodes = sorted(file.nodes(T_model_file), key=lambda node: node.names)
-        _require_matched(roles, nodes)
-        shown = [node for node in nodes if _role(node, roles).name != "ignored"]
-        file.require_few(shown)
-
-        poses = {node.index: node.poses[-1] for node in nodes}
-        primitives: list[Primitive] = []
-        lights: list[ModelLight] = []
-        for node in shown:
-            with located(str(node)):
-                primitives += [_sound(primitive) for primitive in file.primitives(node, poses)]
-                lights += file.lights(node)
-
+        suffix = path.suffix.lower()
+        up_axis = up or _default_up_axis(suffix)
+        notes = []
+        if suffix not in GLTF_SUFFIXES:
+            notes.append(f"{suffix} has no unit and no axes: read as {scale:g} m each, {up_axis} up")
+        file, missing = _gltf(path, is_gltf=suffix in GLTF_SUFFIXES)
+        notes += missing
+        primitives, lights = _shown(file, _T_model_file(scale, up_axis), roles)
         model = _model(primitives, lights, roles)
-        notes += _notes_of_file(file, primitives)
-        if not up:  # else the user has decided
-            notes += _doubt_of_axis(model, path, axis)
-        notes += _doubt_of_unit(model)
+
+        notes += _notes_on_reading(file, primitives)
+        if not up:  # otherwise the user has chosen the axis
+            notes += _note_on_axis(model, path, up_axis)
+        notes += _note_on_unit(model)
         return replace(model, notes=tuple(dict.fromkeys(notes)))
 
 
-def _notes_of_file(file: Gltf, primitives: Sequence[Primitive]) -> list[str]:
-    """Notes on what is read differently from the file."""
+def _default_up_axis(suffix: str) -> str:
+    """The axis that points up in files of a format."""
+    return "z" if suffix in Z_UP_SUFFIXES else "y"
+
+
+def _T_model_file(scale: float, up_axis: str) -> Array:
+    """The transform (4, 4) from the coordinates of a file to metres with z up."""
+    R_model_file = Y_UP if up_axis == "y" else np.eye(4)
+    T_model_file: Array = np.diag([scale, scale, scale, 1.0]) @ R_model_file
+    return T_model_file
+
+
+def _gltf(path: Path, *, is_gltf: bool) -> tuple[Gltf, list[str]]:
+    """The reader of a file, and notes on what is missing; a file of another format is converted to glTF first."""
+    if is_gltf:
+        return read_gltf(path.read_bytes(), path.parent, has_srgb_vertices=False), []
+    data, missing = read_as_glb(path)
+    return read_gltf(data, path.parent, has_srgb_vertices=True), missing
+
+
+def _shown(file: Gltf, T_model_file: Array, roles: Roles) -> tuple[list[Primitive], list[ModelLight]]:
+    """The primitives and lights of all nodes that are not ignored."""
+    nodes = sorted(file.nodes(T_model_file), key=lambda node: node.names)
+    _require_matched(roles, nodes)
+    shown_nodes = [node for node in nodes if _role(node, roles).name != "ignored"]
+    file.require_few(shown_nodes)
+
+    poses = {node.index: node.poses[-1] for node in nodes}
+    primitives: list[Primitive] = []
+    lights: list[ModelLight] = []
+    for node in shown_nodes:
+        with located(str(node)):
+            primitives += [_cleaned(primitive) for primitive in file.primitives(node, poses)]
+            lights += file.lights(node)
+    return primitives, lights
+
+
+def _notes_on_reading(file: Gltf, primitives: Sequence[Primitive]) -> list[str]:
+    """Notes on what was read differently from the file."""
     notes = []
     reduced = len(file.materials.reduced)
     if reduced:
@@ -159,76 +201,81 @@ def _require_matched(roles: Roles, nodes: Sequence[Node]) -> None:
 
 
 def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles: Roles) -> Model:
-    """The model of a file: names are unique, roles are applied, and movers are separated from stationary things."""
-    solid = [primitive for primitive in primitives if len(primitive.mesh.faces)]
-    if not solid:
+    """The model that consists of primitives and lights, with unique names. Raises ModelError if it has no faces."""
+    visible = [primitive for primitive in primitives if len(primitive.mesh.faces)]
+    if not visible:
         raise ModelError("has no faces to see: are its nodes empty, of points or lines, without area, or ignored?")
-    names = _unique_names({primitive.node: primitive.node.names[-1] for primitive in solid})
-    role = {node: _role(node, roles) for node in names}
-
-    named_materials = [_in_role(primitive.look, role[primitive.node].name) for primitive in solid]
-    material_names = _unique_names({named: named[0] for named in named_materials})
-    stationary = []
-    moving = []
-    bright = {}
-    for primitive, named_material in zip(solid, named_materials, strict=True):
-        node = primitive.node
-        _, material = named_material
-        thing = Thing(names[node], primitive.mesh.mesh(), material_names[named_material])
-        mover = role[node].mover
-        if mover is None:
-            stationary.append(thing)
-        else:
-            moving.append((node, mover, thing))
-        if max(material.emission_cd_m2) > 0:
-            bright[node] = names[node]
-
+    parts, materials = _parts(visible, roles)
     return Model(
-        things=tuple(stationary),
-        materials={name: material for (_, material), name in material_names.items()},
+        things=tuple(part.thing for part in parts if part.role.mover is None),
+        materials=materials,
         lights=_renamed(lights),
-        movers=_movers(moving),
-        lamps=_lamps([node for node in names if role[node].name == "lamp"], bright),
+        movers=_movers(parts),
+        lamps=_lamps(parts),
         dropped=sum(primitive.dropped for primitive in primitives),
     )
 
 
+def _parts(primitives: Sequence[Primitive], roles: Roles) -> tuple[list[_Part], dict[str, Material]]:
+    """The parts of a model, one for each primitive, and their materials by unique names."""
+    node_names = _unique_names({primitive.node: primitive.node.names[-1] for primitive in primitives})
+    role_by_node = {node: _role(node, roles) for node in node_names}
+    named_materials = [_in_role(primitive.look, role_by_node[primitive.node].name) for primitive in primitives]
+    material_names = _unique_names({named: named[0] for named in named_materials})
+
+    parts = []
+    for primitive, named_material in zip(primitives, named_materials, strict=True):
+        node = primitive.node
+        _, material = named_material
+        thing = Thing(node_names[node], primitive.mesh.mesh(), material_names[named_material])
+        emits_light = max(material.emission_cd_m2) > 0
+        parts.append(_Part(node, role_by_node[node], thing, emits_light))
+    return parts, {name: material for (_, material), name in material_names.items()}
+
+
 def _renamed(lights: Sequence[ModelLight]) -> tuple[ModelLight, ...]:
     """The lights with unique names."""
-    names = _unique_names({nth: light.name for nth, light in enumerate(lights)})
-    return tuple(replace(light, name=names[nth]) for nth, light in enumerate(lights))
+    names = _unique_names({index: light.name for index, light in enumerate(lights)})
+    return tuple(replace(light, name=names[index]) for index, light in enumerate(lights))
 
 
-def _lamps(
-    lamps: Sequence[Node],
-    bright: Mapping[Node, str],
-) -> tuple[str, ...]:
-    """The names of the things of lamps that emit light. Raises ModelError if there are lamps, but none emits."""
-    shining = tuple(bright[node] for node in lamps if node in bright)
-    if lamps and not shining:
-        raise ModelError(f"{lamps[0]}: is a lamp without light; set its emissiveFactor and emissiveStrength (cd/m²)")
-    return shining
+def _lamps(parts: Sequence[_Part]) -> tuple[str, ...]:
+    """The names of the lamps that emit light. Raises ModelError if there are lamps, but none of them emits light."""
+    lamps = [part for part in parts if part.role.name == "lamp"]
+    names = dict.fromkeys(part.thing.name for part in lamps if part.emits_light)
+    if lamps and not names:
+        node = lamps[0].node
+        raise ModelError(f"{node}: is a lamp without light; set its emissiveFactor and emissiveStrength (cd/m²)")
+    return tuple(names)
 
 
-def _movers(moving: Sequence[tuple[Node, int, Thing]]) -> tuple[Moving, ...]:
-    """Things grouped by the ancestor that moves them, which is given by its place in the names of the node."""
-    gathered: dict[tuple[tuple[float, ...], tuple[str, ...]], list[Thing]] = {}
-    for node, nth, thing in moving:
-        origin_m = node.poses[nth + 1][:3, 3]
-        key = (tuple(origin_m), node.names[: nth + 1])
-        gathered.setdefault(key, []).append(_shifted(thing, -origin_m))
-    names = _unique_names({key: key[1][-1] for key in gathered})
-    return tuple(Moving(names[key], np.array(key[0]), tuple(things)) for key, things in gathered.items())
+def _movers(parts: Sequence[_Part]) -> tuple[ModelMover, ...]:
+    """The movers of a model: the moving parts, grouped by the ancestor that moves them."""
+    things_by_ancestor: dict[tuple[tuple[float, ...], tuple[str, ...]], list[Thing]] = {}
+    for part in parts:
+        mover = part.role.mover
+        if mover is None:
+            continue
+        origin_m = part.node.poses[mover + 1][:3, 3]  # poses[0] is that of the root, which has no name
+        ancestor = (tuple(origin_m), part.node.names[: mover + 1])
+        things_by_ancestor.setdefault(ancestor, []).append(_shifted(part.thing, -origin_m))
+
+    unique_names = _unique_names({ancestor: ancestor[1][-1] for ancestor in things_by_ancestor})
+    movers = []
+    for ancestor, things in things_by_ancestor.items():
+        origin, _ = ancestor
+        movers.append(ModelMover(unique_names[ancestor], np.array(origin), tuple(things)))
+    return tuple(movers)
 
 
-def _shifted(thing: Thing, by_m: Array) -> Thing:
+def _shifted(thing: Thing, offset_m: Array) -> Thing:
     original = arrays(thing.mesh)
-    shifted = replace(original, vertices_m=original.vertices_m + by_m)
+    shifted = replace(original, vertices_m=original.vertices_m + offset_m)
     return replace(thing, mesh=shifted.mesh())
 
 
 def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:
-    """A name for each key, none of them twice: a second 'chair' is 'chair_2'."""
+    """A unique name for each key: the wanted name, with a number if an earlier key has it, as in 'chair_2'."""
     reserved = set(wanted.values())
     given: set[str] = set()
     unique_names: dict[Key, str] = {}
@@ -240,22 +287,14 @@ def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:
     return unique_names
 
 
-def _free_names(name: str, taken: set[str]) -> Iterator[str]:
-    """name_2, name_3 and so on, without the taken ones."""
-    numbered = (f"{name}_{n}" for n in count(2))
-    return (candidate for candidate in numbered if candidate not in taken)
-
-
-@dataclass(frozen=True, slots=True)
-class _Role:
-    """The role of a node. mover: the place, in the names of the node, of the ancestor that moves it."""
-
-    name: str
-    mover: int | None
+def _free_names(name: str, reserved: set[str]) -> Iterator[str]:
+    """The names name_2, name_3 and so on that are not reserved."""
+    numbered = (f"{name}_{number}" for number in count(2))
+    return (candidate for candidate in numbered if candidate not in reserved)
 
 
 def _role(node: Node, roles: Roles) -> _Role:
-    """The role of a node: that of its nearest ancestor with one. `ignored` and `mover` apply to all descendants."""
+    """The role of a node, or of its nearest ancestor with a role. `ignored` and `mover` apply to all descendants."""
     names = [_own_role(name, in_file, roles) for name, in_file in zip(node.names, node.roles, strict=True)]
     for name in names:
         if name and name not in ROLES:
@@ -263,18 +302,18 @@ def _role(node: Node, roles: Roles) -> _Role:
     mover = names.index("mover") if "mover" in names else None
     if "ignored" in names:
         return _Role("ignored", mover)
-    looks = [name for name in names if name not in ("", "mover")]
-    return _Role(looks[-1] if looks else "", mover)
+    appearances = [name for name in names if name not in ("", "mover")]
+    return _Role(appearances[-1] if appearances else "", mover)
 
 
 def _own_role(node_name: str, role_in_file: str, roles: Roles) -> str:
-    """The role of the first glob that matches the name of a node; without one, the role in the file."""
-    matching = (role for glob, role in roles.items() if fnmatchcase(node_name, glob))
-    return next(matching, role_in_file)
+    """The role of the first glob that matches the name of a node; if none matches, the role in the file."""
+    matching_roles = (role for glob, role in roles.items() if fnmatchcase(node_name, glob))
+    return next(matching_roles, role_in_file)
 
 
 def _in_role(look: Look, role: str) -> tuple[str, Material]:
-    """The name and material of a look in a role; a mirror keeps the tone of a metal, or is silver."""
+    """The name and the material of a look in a role. The tint of a mirror is that of its metal, or of silver."""
     material = look.material
     if role == "mirror":
         is_metal = material.metal > 0.5
@@ -285,10 +324,11 @@ def _in_role(look: Look, role: str) -> tuple[str, Material]:
     return look.name, material
 
 
-def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
-    """A note if a model, read with `axis` up, is likely a place that lies on its side, its floor upright as a wall.
+def _note_on_axis(model: Model, path: Path, axis: str) -> list[str]:
+    """A note if a model that was read with `axis` up is probably a place that lies on its side.
 
-    Signs of it: most of its area faces along the other axis, or it is flat along that axis, as rooms are in height.
+    There are two signs. Most of its area faces sideways instead of up and down, or it is flat in a horizontal
+    direction, whereas rooms are flat in height.
     """
     corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
     width_m, depth_m, height_m = np.ptp(corners_m, axis=(0, 1))
@@ -298,7 +338,8 @@ def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
     is_place = max(width_m, depth_m, height_m) > PLACE_M
     faces_sideways = sideways_m2 > LYING * up_m2
     has_large_sides = LYING * sideways_m2 > up_m2
-    is_flat_sideways = depth_m < FLAT * min(width_m, height_m) and height_m > PLACE_M and has_large_sides
+    is_shallow = depth_m < FLAT * min(width_m, height_m)
+    is_flat_sideways = is_shallow and height_m > PLACE_M and has_large_sides
     if not (is_place and (faces_sideways or is_flat_sideways)):
         return []
     other = "z" if axis == "y" else "y"
@@ -308,19 +349,24 @@ def _doubt_of_axis(model: Model, path: Path, axis: str) -> list[str]:
     ]
 
 
-def _doubt_of_unit(model: Model) -> list[str]:
+def _note_on_unit(model: Model) -> list[str]:
     """A note if the unit of a model is probably not the metre."""
     corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
-    span = float(np.ptp(corners_m, axis=(0, 1)).max())
-    if SMALLEST_M <= span <= LARGEST_M:
+    span_m = float(np.ptp(corners_m, axis=(0, 1)).max())
+    if SMALLEST_M <= span_m <= LARGEST_M:
         return []
-    units = {0.001: "in millimetres?", 0.01: "in centimetres?", 100.0: "shrunk twice?", 1000.0: "shrunk twice?"}
-    factor = min(units, key=lambda unit: abs(np.log(max(span, 1e-9) * unit / TYPICAL_M)))
-    return [f"spans {span:,.4g} m: {units[factor]} scale: {factor:g}"]
+
+    questions = {0.001: "in millimetres?", 0.01: "in centimetres?", 100.0: "shrunk twice?", 1000.0: "shrunk twice?"}
+    positive_span_m = max(span_m, 1e-9)
+    likeliest = min(questions, key=lambda scale: abs(np.log(positive_span_m * scale / TYPICAL_M)))
+    return [f"spans {span_m:,.4g} m: {questions[likeliest]} scale: {likeliest:g}"]
 
 
-def _sound(primitive: Primitive) -> Primitive:
-    """A primitive of separate faces in the frame of the model, with area and normals, and with visible backs."""
+def _cleaned(primitive: Primitive) -> Primitive:
+    """A primitive in the frame of the model, without faces that have no area, and with all normals and visible backs.
+
+    Raises ModelError for vertices that are not finite, or too far from the origin.
+    """
     mesh = primitive.mesh
     T_model_mesh = primitive.T_model_mesh
     if not np.isfinite(mesh.vertices_m).all():
@@ -339,19 +385,23 @@ def _sound(primitive: Primitive) -> Primitive:
         raise ModelError(f"reaches {farthest_m:.3g} m; is it damaged, or of another unit?")
 
     has_area = areas_m2(mesh.corners_m) > LEAST_M2
-    solid = _separate_faces(mesh, mesh.faces[has_area])
+    faces = mesh.faces[has_area]
+    separate = _separate_faces(mesh, faces)
     look = primitive.look
     if primitive.colours is not None and has_area.any():
-        solid, look = painted(solid, primitive.colours[mesh.faces[has_area]], look)
+        separate, look = painted(separate, primitive.colours[faces], look)
     shows_backs = look.two_sided and look.material.kind == "body"
-    if shows_backs and not _is_small_and_closed(solid):
-        solid = solid.two_sided()
+    if shows_backs and not _is_small_and_closed(separate):
+        separate = separate.two_sided()
     dropped = int(np.count_nonzero(~has_area))
-    return replace(primitive, mesh=solid, look=look, colours=None, notes=notes, dropped=dropped)
+    return replace(primitive, mesh=separate, look=look, colours=None, notes=notes, dropped=dropped)
 
 
 def _separate_faces(mesh: MeshArrays, faces: Faces) -> MeshArrays:
-    """Faces (F, 3) of a mesh without shared vertices; a vertex without a normal has that of its face."""
+    """The given faces (F, 3) of a mesh, each with three vertices of its own.
+
+    A vertex without a normal gets the normal of its face.
+    """
     normals = np.nan_to_num(mesh.normals)[faces]
     flat_normals = face_normals(mesh.vertices_m[faces])[:, None]
     has_normal = np.linalg.norm(normals, axis=2, keepdims=True) > 0.5

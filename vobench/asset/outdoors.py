@@ -1,4 +1,4 @@
-"""Objects for outdoor scenes: cars, people, plants, street furniture; they stand on z = 0 and face x."""
+"""Objects for outdoor scenes: cars, people, plants and street furniture. They stand on z = 0 and face x."""
 
 from dataclasses import dataclass, replace
 from functools import cache
@@ -245,9 +245,10 @@ NOMINAL_HEIGHT_M = 1.74  # of a person with TRUNK and the joint positions below
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Limb:
-    """Parts that move together, in upright posture, and their rotation over a gait cycle.
+    """Parts of a person that move together, and their rotation over a gait cycle.
 
-    joints_m: (J, 3), from the body outwards. pitch_rad: (K, J), at each of the K steps of the cycle; see `Gait`.
+    The parts are in upright posture. `joints_m` (J, 3) are the joints, from the body outwards. `pitch_rad` (K, J) are
+    their angles at the K steps of the cycle; see `LimbMotion`.
     """
 
     parts: list[Part]
@@ -265,13 +266,13 @@ class Limb:
         return Limb([part.moved(T) for part in self.parts], factor * self.joints_m, self.pitch_rad)
 
     def lowest_m(self, step: int) -> float:
-        """The lowest z of its vertices at a step."""
+        """The lowest z of the limb at a step."""
         T_body_limb = jointed(self.joints_m, self.pitch_rad[step])
         return min(_lowest_z_m(part.arrays.vertices_m, T_body_limb) for part in self.parts)
 
 
 def _lowest_z_m(points_m: Array, T_a_b: Array) -> float:
-    """The lowest z in a frame a of points (N, 3) in a frame b."""
+    """The lowest z in frame a of points (N, 3) in frame b."""
     moved_m = points_m @ T_a_b[:3, :3].T + T_a_b[:3, 3]
     return float(moved_m[:, 2].min())
 
@@ -296,7 +297,7 @@ class _Clothes:
 
 
 def walker(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.0) -> Walker:
-    """A person who walks along x without slipping; stride_deg is the largest angle of a thigh."""
+    """A person who walks along x without slipping. `stride_deg` is the largest angle of a thigh."""
     coat = one_of(rng, *COATS)
     trousers = one_of(rng, *TROUSERS)
     skin = matt(one_of(rng, *SKINS))
@@ -307,7 +308,7 @@ def walker(rng: Rng, height_m: float = NOMINAL_HEIGHT_M, stride_deg: float = 22.
     trunk = Limb(_trunk(clothes.coat, skin, hair), np.zeros((0, 3)), np.zeros((STEPS, 0)))
     limbs = [trunk]
     for side in (-1, 1):
-        delay = 0 if side > 0 else STEPS // 2  # the right leg is half a cycle behind
+        delay = 0 if side > 0 else STEPS // 2  # the right leg follows the left one by half a cycle
         side_hip_rad = np.roll(hip_rad, delay)
         side_knee_rad = np.roll(knee_rad, delay)
         limbs += _leg(side, clothes, side_hip_rad, side_knee_rad)
@@ -527,7 +528,7 @@ def tree(
 
 
 def street_lamp(_: Rng, height_m: float = 5.0, reach_m: float = 1.2) -> list[Part]:
-    """A steel mast with an arm along x; the place for its light is (reach_m, 0, height_m)."""
+    """A steel mast with an arm along x. Its light belongs at (reach_m, 0, height_m)."""
     iron = coated("#2d3532", roughness=0.35)
     h = height_m
     top = h - 0.3
@@ -618,7 +619,7 @@ SLATS = (
 
 
 def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
-    """Wooden slats on two cast-iron feet; a person on the bench looks along x."""
+    """Wooden slats on two cast-iron feet. A person on the bench looks along x."""
     iron = coated("#23282a", roughness=0.35)
     foot_path = spline(mm("240 0 0, 200 0 250, 230 0 420, 0 0 410, -200 0 430, -280 0 860"), 24)
     leg_path = spline(mm("-200 0 430, -230 0 200, -290 0 0"), 8)
@@ -641,7 +642,7 @@ def park_bench(rng: Rng, width_m: float = 1.8) -> list[Part]:
 
 
 def park_lamp(_: Rng, height_m: float = 3.4) -> list[Part]:
-    """A post with the cage and hat of a lantern; the place for its globe, 0.3 m wide, is at height_m."""
+    """A post with the cage and hat of a lantern. Its globe, 0.3 m wide, belongs at `height_m`."""
     iron = coated("#27302d", roughness=0.35)
     h = height_m
     post = mm("0 0, 130 0, 130 50, 80 120, 70 700, 45 780, 35 1000, 100 1000, 0 1000")

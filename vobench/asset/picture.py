@@ -44,8 +44,8 @@ TONES = {
 class Octave:
     """A band of noise.
 
-    low, high: frequencies in cycles per tile. slope: of the spectrum, f^-slope. amount: standard deviation, where 1 is
-    the whole palette.
+    `low` and `high` are frequencies in cycles per tile. The spectrum is f^-slope. `amount` is the standard deviation;
+    1 is the whole palette.
     """
 
     low: float
@@ -58,7 +58,8 @@ class Octave:
 class Pits:
     """Spots where a band of noise exceeds a threshold.
 
-    low, high: frequencies in cycles per tile. depth: change of the tone in a spot; a negative one is darker.
+    `low` and `high` are frequencies in cycles per tile. `depth` is the change of the tone in a spot; it is negative
+    for a darker spot.
     """
 
     low: float
@@ -198,8 +199,8 @@ def noise(
 ) -> Map:
     """Periodic noise (px, px) of unit variance between two frequencies per tile.
 
-    stretch: the features are this many times as long along u. Above 1024 pixels the noise repeats within the tile if
-    its lowest frequency allows that.
+    The features are `stretch` times as long along u. Above 1024 pixels, the noise repeats within the tile if its
+    lowest frequency allows that.
     """
     repeats = max(1, min(px // 1024, int(low) // 16))
     n = px // repeats
@@ -227,9 +228,9 @@ def _polygons(
     *,
     is_open: bool = False,
 ) -> Map:
-    """An image as an array, after polygons (N, K, 2) in pixels are drawn on it in order.
+    """The image, on which polygons (N, K, 2) in pixels are drawn in order, as an array.
 
-    A polygon across a border continues at the opposite border. is_open: draw polylines instead.
+    A polygon across a border continues at the opposite border. With `is_open`, polylines are drawn instead.
     """
     draw = ImageDraw.Draw(image)
     draw_shape = draw.line if is_open else draw.polygon
@@ -270,7 +271,7 @@ def _scratches(rng: Rng, px: int, count: int) -> Map:
 def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
     """The index (px, px) of the cell at each pixel, and the distance in pixels to the nearest joint.
 
-    cuts: where each row is cut, as shares of its length, (rows, K).
+    `cuts` (rows, K) are the positions of the joints in each row, as shares of its length.
     """
     rows, count = cuts.shape
     x = np.arange(px)
@@ -320,7 +321,7 @@ def _boards(tones: str, seed: int, px: int, tile_m: float, *, rows: int, joint_m
     planks = cuts.size
     cell, to_joint = _cells(px, cuts)
 
-    # Each plank is cut lengthwise at some depth beside the heart of its trunk. Late wood is the dark end of a ring.
+    # Each plank is cut at a random distance from the centre of its trunk. Late wood is the dark part of a ring.
     row_share = (np.arange(px) / px * rows) % 1
     v = row_share[:, None] * tile_m / rows
     heart = rng.uniform(-0.05, 0.15, planks)
@@ -454,7 +455,7 @@ def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
     center_px = rng.uniform(0, px, (count, 1, 2))
     shapes = circle * radius_px[:, None, None] + center_px
 
-    shades = 6  # of each stone
+    shades = 6  # the number of shades of each stone
     stones = rng.integers(1, shades * len(STONES) + 1, count)
     chips = _polygons(Image.new("L", (px, px)), shapes, stones)
     tones = [rgb(stone) for stone in STONES for _ in range(shades)]
@@ -586,9 +587,9 @@ def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spines:
-    """A picture of the spines of books; its lowest row has the colour of paper.
+    """A picture of the spines of books. Its lowest row has the colour of paper.
 
-    cells: of each book in the picture. sizes_m: thickness and height of each book.
+    `cells` has the part of the picture of each book, and `sizes_m` its thickness and height.
     """
 
     picture: Picture
@@ -605,7 +606,7 @@ def spines(seed: int = 0, count: int = 52) -> Spines:
         has_binders = rng.random() < 0.14
         drawn += _binders(rng) if has_binders else _series(rng)
 
-    # Spines are drawn horizontally; in the picture they stand side by side.
+    # Spines are drawn horizontally, but are upright and side by side in the picture.
     ends = np.cumsum([0, *(spine.height for spine in drawn)])
     height = round(0.325 * SPINE_PX_PER_M)
     image = Image.new("RGB", (int(ends[-1]), height), PAPER)
@@ -861,7 +862,7 @@ def sign(text: str, colour: str = PAPER) -> Picture:
 
 
 def __getattr__(name: str) -> object:
-    """A name that this module had in the last release."""
+    """A name that this module had in the previous release."""
     from vobench import retired
 
     return retired.lookup(__name__, name)

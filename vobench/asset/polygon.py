@@ -9,7 +9,7 @@ from vobench.geometry.se3 import Array
 
 
 def oriented(ring_m: ArrayLike, *, counter_clockwise: bool) -> Array:
-    """A closed polygon (N, 2) in the given orientation; its corners are reversed if they run the other way."""
+    """A closed polygon (N, 2) with the given orientation. Its corners are reversed if necessary."""
     ring = np.asarray(ring_m, float)
     is_counter_clockwise = _signed_area(ring) > 0
     return ring if is_counter_clockwise == counter_clockwise else ring[::-1]
@@ -18,7 +18,7 @@ def oriented(ring_m: ArrayLike, *, counter_clockwise: bool) -> Array:
 def triangulated(rings: Sequence[Array]) -> Array:
     """Triangles (F, 3, 2) of a polygon with holes, by ear clipping.
 
-    rings: the counter-clockwise outline first, then the clockwise holes.
+    `rings` are the counter-clockwise outline, followed by the clockwise holes.
     """
     outline = _bridged(rings)
     remaining = list(range(len(outline)))  # corners of the outline that are not yet cut off
@@ -28,7 +28,7 @@ def triangulated(rings: Sequence[Array]) -> Array:
         ears.append(_neighbours(remaining, tip))
         del remaining[tip]
 
-    # Ears along a bridge can be flat; they are left out.
+    # Ears along a bridge can have no area, and are omitted.
     triangles = outline[np.array([*ears, remaining])]
     a = triangles[:, 0]
     b = triangles[:, 1]
@@ -38,7 +38,7 @@ def triangulated(rings: Sequence[Array]) -> Array:
 
 
 def _first_ear(outline: Array, remaining: list[int]) -> int:
-    """The place in `remaining` of the first corner that is an ear; 0 if rounding leaves none."""
+    """The index in `remaining` of the first corner that is an ear; 0 if there is none because of rounding errors."""
     for k in range(len(remaining)):
         if _is_ear(outline, remaining, k):
             return k
@@ -46,7 +46,7 @@ def _first_ear(outline: Array, remaining: list[int]) -> int:
 
 
 def _bridged(rings: Sequence[Array]) -> Array:
-    """One outline (N, 2) without holes: a bridge joins each hole to it, and is passed in both directions.
+    """An outline (N, 2) that includes the holes. A bridge, which is passed in both directions, connects each hole.
 
     The rightmost holes come first. A bridge ends at the nearest corner that is visible from its hole.
     """

@@ -1,4 +1,4 @@
-"""Interiors: walls with windows, their finishes, and pieces of furniture."""
+"""Builds interiors: walls with windows, their finishes, and pieces of furniture."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -62,7 +62,7 @@ FINISHES: dict[str, Callable[[], Material]] = {
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """One of KINDS at a position. Its random choices depend on its name and on the seed of the scene only."""
+    """A piece of furniture of one of KINDS. Its random choices depend only on its name and the seed of the scene."""
 
     kind: str
     name: str
@@ -77,7 +77,7 @@ class Piece:
         return np.random.default_rng(np.random.SeedSequence([seed, name_hash]))
 
     def build(self, seed: int = 0) -> Instance:
-        """Its name and its parts in the scene's frame."""
+        """The name of the piece, and its parts in the frame of the scene."""
         make = KINDS[self.kind]
         T_world_piece = at(*self.at_m, yaw=self.yaw_deg, pitch=self.pitch_deg)
         parts = make(self.rng(seed), **self.size)
@@ -112,7 +112,8 @@ def _by_material(parts: Sequence[Part]) -> dict[Material, list[MeshArrays]]:
 class Opening:
     """A window.
 
-    center_m: along the wall (world x or y), and above the floor. depth_m: of its pane behind the face of the wall.
+    `center_m` is its position along the wall (world x or y) and above the floor. `depth_m` is the distance of its pane
+    from the face of the wall.
     """
 
     wall: Wall
@@ -131,10 +132,10 @@ def shell(
     frame: Material = furniture.WHITE,
     pane: Material = fitting.PANE,
 ) -> Iterator[Instance]:
-    """Floor, ceiling, walls and windows of a room whose floor is centred at the origin.
+    """The floor, ceiling, walls and windows of a room whose floor is centred at the origin.
 
-    The instances are `floor`, `ceiling`, `wall_east` and so on, and `window_0` and so on; a window is its reveals and
-    its pane.
+    The instances are called `floor`, `ceiling`, `wall_east` and so on, and `window_0` and so on. A window consists of
+    its reveals and its pane.
     """
     x, y, z = size_m
     floor_mesh = _floor((-x / 2, -y / 2, 0), (x, 0, 0), (0, y, 0), floor)

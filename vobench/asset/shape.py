@@ -1,4 +1,4 @@
-"""Shapes as meshes: lengths in metres, texture coordinates in metres, normals outward."""
+"""Creates meshes of basic shapes. Lengths and texture coordinates are in metres, and normals point outwards."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -19,11 +19,11 @@ from vobench.scene.mesh import Faces, MeshArrays, face_normals, joined_arrays, q
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-SMOOTH_DEG = 40.0  # a corner of a profile that turns by less is shaded as round
-LEAST_AREA_M2 = 1e-12  # faces of a grid are left out if twice their area is smaller
+SMOOTH_DEG = 40.0  # a corner of a profile with a smaller angle is shaded as round
+LEAST_AREA_M2 = 1e-12  # faces of a grid are omitted if twice their area is smaller
 WHOLE_PICTURE: Hole = (0.0, 1.0, 0.0, 1.0)
-LARGEST_BEVEL = 0.45  # as a share of half the shortest side of a block
-BEVEL_OF_CUBE = 0.1  # of the unit bevelled cube; its normals and uv axes do not depend on it
+LARGEST_BEVEL = 0.45  # the largest bevel, relative to half the shortest side of a block
+BEVEL_OF_CUBE = 0.1  # the bevel of the bevelled unit cube, whose normals and uv axes do not depend on it
 LEVEL_COSINE = 0.9  # faces of a lathe whose normals are closer to z have the texture of a disc
 
 
@@ -54,7 +54,7 @@ def block(
     upright: bool = False,
     transform: Array | None = None,
 ) -> "Trimesh":
-    """A box around the origin with bevelled edges, shaded as round; u runs along the longer side of each face.
+    """A box around the origin with bevelled edges that are shaded as round.
 
     uv_m: the texture coordinates at its centre. upright: on the sides, u runs to the right and v down instead, as on a
     printed carton. transform: the pose (4, 4) of the box; the identity by default.
@@ -82,7 +82,7 @@ def block_arrays(
 
     corners_m = vertices_m[cube.faces]
     has_thickness = half_m.all()
-    # The rim of a plate without thickness has no area, so that its normals are 0.
+    # The rim of a plate without thickness has no area, so its normals are 0.
     normals = cube.normals if has_thickness else _flat_normals(corners_m)
 
     if upright:
@@ -136,18 +136,18 @@ def _projection_axes(corners_m: Array) -> NDArray[np.int64]:
 
 
 def _without(axes: Sequence[int], excluded: int) -> list[int]:
-    """All axes but the excluded one, in the same order."""
+    """All axes except the excluded one, in the same order."""
     return [axis for axis in axes if axis != excluded]
 
 
 class _Cube:
-    """A cube around the origin, from which the vertices, normals and texture axes of a block of any size follow."""
+    """A cube around the origin that determines the vertices, normals and texture axes of blocks of any size."""
 
     def __init__(self, signs: Array, faces: Faces, sides: Array) -> None:
-        """Make a cube, bevelled if `sides` are not 0.
+        """Create a cube, which is bevelled if `sides` are not 0.
 
-        signs: octant (V, 3) of each vertex, ±1. faces: (F, 3). sides: unit vector (V, 3) along the axis of the side
-        that the vertex lies on.
+        `signs` (V, 3) are the octants of the vertices, ±1 per axis. `faces` are (F, 3). `sides` (V, 3) are unit vectors
+        along the axis of the side that contains a vertex.
         """
         self.signs = signs
         self.faces = faces
@@ -162,7 +162,7 @@ class _Cube:
         self._uv_indices: dict[tuple[int, ...], tuple[NDArray[np.int64], ...]] = {}
 
     def uv_index(self, order: tuple[int, ...]) -> tuple[NDArray[np.int64], ...]:
-        """The index that selects u and v (F, 3, 2) from the corners (F, 3, 3) of a block, by `_uv_axes`."""
+        """The index that selects u and v (F, 3, 2) from the corners (F, 3, 3) of a block, as in `_uv_axes`."""
         if order not in self._uv_indices:
             axes = _uv_axes(self._corners, order)
             face = np.arange(len(self.faces))[:, None, None]
@@ -173,7 +173,7 @@ class _Cube:
 
 @cache
 def _bevelled_cube() -> _Cube:
-    """A cube of 24 vertices, three at each corner, and 44 faces; vertex 3 c + a is on the side of axis a."""
+    """A cube with 44 faces and 24 vertices, three at each corner. Vertex 3 c + a is on the side of axis a."""
     signs = np.repeat(_cube().signs, 3, axis=0)
     sides = np.eye(3)[np.arange(24) % 3]
     vertices = _bevelled_vertices(signs, sides)
@@ -207,7 +207,7 @@ def _cube() -> _Cube:
 
 
 def _outward(vertices: Array, faces: Faces) -> Faces:
-    """The faces of a convex body around the origin, turned so that they are counter-clockwise from outside."""
+    """The faces of a convex body around the origin, with the orientation that makes them visible from outside."""
     corners = vertices[faces]
     a = corners[:, 0]
     b = corners[:, 1]
@@ -221,7 +221,7 @@ def _outward(vertices: Array, faces: Faces) -> Faces:
 def _grids(points_m: Array, normals: Array, uv: Array) -> MeshArrays:
     """Two faces per cell of B grids of vertices (B, R, C, 3), without those that have no area.
 
-    The faces are seen from the side of the cross product of the column and the row direction.
+    The faces are visible from the side to which the cross product of the column and the row direction points.
     """
     grids, rows, columns = points_m.shape[:3]
     index = np.arange(grids * rows * columns).reshape(grids, rows, columns)
@@ -241,7 +241,10 @@ def _grids(points_m: Array, normals: Array, uv: Array) -> MeshArrays:
 
 
 def _circle(sections: int) -> tuple[Array, Array]:
-    """Angles (sections + 1,) of a full turn and points (sections + 1, 2) of the unit circle; the last is the first."""
+    """The angles (sections + 1,) of a full turn, and the points (sections + 1, 2) on the unit circle.
+
+    The last point is equal to the first one.
+    """
     angle_rad = np.linspace(0, 2 * np.pi, sections + 1)
     points = np.stack([np.cos(angle_rad), np.sin(angle_rad)], axis=-1)
     points[-1] = points[0]
@@ -249,7 +252,7 @@ def _circle(sections: int) -> tuple[Array, Array]:
 
 
 def _arc_length_m(steps_m: Array) -> Array:
-    """Distances (N + 1,) of the vertices of a polyline from its start; its segments are steps_m (N, K)."""
+    """The distances (N + 1,) along a polyline with segments `steps_m` (N, K) of its vertices from its start."""
     lengths_m = np.linalg.norm(steps_m, axis=1)
     return np.concatenate([[0.0], np.cumsum(lengths_m)])
 
@@ -257,18 +260,19 @@ def _arc_length_m(steps_m: Array) -> Array:
 def lathe(profile_m: ArrayLike, *, sections: int = 24) -> "Trimesh":
     """A solid of revolution about z.
 
-    profile_m: (K, 2) of radius and height, from the bottom on the axis, along the outside, to the top on the axis.
+    `profile_m` (K, 2) are points (radius, height), from the bottom on the axis, along the outside, to the top on the
+    axis.
     """
     profile = np.asarray(profile_m, float)
-    segments = np.stack([profile[:-1], profile[1:]], axis=1)  # (K - 1, 2, 2), both ends of each
+    segments = np.stack([profile[:-1], profile[1:]], axis=1)  # (K - 1, 2, 2), both ends of each segment
     steps = np.diff(profile, axis=0)
-    outward = unit(np.stack([steps[:, 1], -steps[:, 0]], axis=1))  # (K - 1, 2), normals of the segments
+    outward = unit(np.stack([steps[:, 1], -steps[:, 0]], axis=1))  # (K - 1, 2), the normals of the segments
 
     angle_rad, circle = _circle(sections)
     points = _revolved(segments, circle)
     normals = _revolved(_profile_normals(outward), circle)
 
-    # The texture is wrapped around the solid, except on level faces, where it is seen from above.
+    # The texture is wrapped around the solid, except on level faces, on which it is projected along z.
     distance_m = _arc_length_m(steps)
     segment_distances_m = np.stack([distance_m[:-1], distance_m[1:]], axis=1)
     along = np.broadcast_to(segment_distances_m[..., None], points.shape[:3])
@@ -281,9 +285,9 @@ def lathe(profile_m: ArrayLike, *, sections: int = 24) -> "Trimesh":
 
 
 def _profile_normals(outward: Array) -> Array:
-    """Normals (K, 2, 2) at both ends of each of the K segments of a profile, whose own normals are given (K, 2).
+    """The normals (K, 2, 2) at both ends of the K segments of a profile, from the normals of the segments (K, 2).
 
-    At a smooth corner both segments have the mean of their normals.
+    At a smooth corner, both segments have the mean of their normals.
     """
     normals = np.stack([outward, outward], axis=1)
     cosine = np.einsum("kj,kj->k", outward[:-1], outward[1:])
@@ -297,9 +301,9 @@ def _profile_normals(outward: Array) -> Array:
 
 
 def _revolved(vectors: Array, circle: Array) -> Array:
-    """Vectors (K, 2, C, 3) that result if vectors (K, 2, 2) of radius and height are turned around z.
+    """The vectors (K, 2, C, 3) from turning vectors (K, 2, 2), which are radius and height, around z.
 
-    circle: the C directions (C, 2) of the radius.
+    `circle` (C, 2) are the directions of the radius.
     """
     radius = vectors[..., None, :1]
     height = vectors[..., None, 1:]
@@ -309,11 +313,11 @@ def _revolved(vectors: Array, circle: Array) -> Array:
 
 
 def spline(points_m: ArrayLike, count: int = 16) -> Array:
-    """Points (count, 3) of a cubic spline through the given ones (N, 3), which are evenly spaced in its parameter."""
+    """Points (count, 3) on a cubic spline through the given points (N, 3), which are evenly spaced in its parameter."""
     points = np.asarray(points_m, float)
     t = np.linspace(0, 1, count)
     if len(points) == 3:
-        # The spline is a parabola. Its Lagrange form avoids the dense solver that scipy would use.
+        # The spline is a parabola. Its Lagrange form avoids the dense solver that SciPy would use.
         first = (1 - t) * (1 - 2 * t)
         middle = 4 * t * (1 - t)
         last = t * (2 * t - 1)
@@ -360,13 +364,13 @@ def tube_arrays(
 
 
 def _tangents(directions: Array) -> Array:
-    """Unit tangents (N, 3) at the vertices of a polyline; the directions (N - 1, 3) are those of its segments."""
+    """The unit tangents (N, 3) at the vertices of a polyline, from the directions (N - 1, 3) of its segments."""
     inner = directions[:-1] + directions[1:]
     return unit(np.concatenate([directions[:1], inner, directions[-1:]]))
 
 
 def _cross_section_axes(tangents: Array) -> Array:
-    """Two unit axes (N, 2, 3) perpendicular to each tangent (N, 3), with the least twist from one to the next."""
+    """Two unit axes (N, 2, 3) perpendicular to each tangent (N, 3), with minimal twist between neighbours."""
     least_aligned = np.abs(tangents[0]).argmin()
     start = unit(cross(tangents[0], np.eye(3)[least_aligned]))
     axes = [start]
@@ -380,7 +384,10 @@ def _cross_section_axes(tangents: Array) -> Array:
 
 
 def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> MeshArrays:
-    """A disc that fills a ring (C, 3) of vertices, seen from the side of the normal; uv (C, 2) are the ring's."""
+    """A disc that fills a ring (C, 3) of vertices, which have texture coordinates uv (C, 2).
+
+    It is visible from the side to which the normal points.
+    """
     rows = np.stack([np.broadcast_to(center_m, ring_m.shape), ring_m])
     rows_uv = np.stack([0 * uv, uv])
     area_vector = cross(ring_m[1] - ring_m[0], ring_m[0] - center_m)
@@ -395,8 +402,8 @@ def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> MeshArray
 def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimesh":
     """A superellipsoid around the origin: |x/a|^p + |y/b|^p + |z/c|^p = 1.
 
-    power: p; 2 gives an ellipsoid, a larger value a shape closer to a box. cells: per edge of the cube that is
-    projected onto it.
+    `power` is p: 2 gives an ellipsoid, and a larger value a shape closer to a box. `cells` is the number of cells
+    along each edge of the cube that is projected onto it.
     """
     half_m = np.asarray(size_m, float) / 2
     steps = np.linspace(-1, 1, cells + 1)
@@ -423,7 +430,7 @@ def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimes
 
 
 def sheet(points_m: ArrayLike) -> "Trimesh":
-    """A smooth surface through a grid of points (R, C, 3), seen from the side of column × row direction."""
+    """A smooth surface through a grid of points (R, C, 3). It is visible from the side of column × row direction."""
     return sheet_arrays(points_m).mesh()
 
 
@@ -438,7 +445,7 @@ def sheet_arrays(points_m: ArrayLike) -> MeshArrays:
 
 
 def _grid_length_m(points_m: Array, axis: int) -> Array:
-    """Distances (R, C) of the points of a grid (R, C, 3) from its border, along the grid lines of an axis."""
+    """The distances (R, C) of the points of a grid (R, C, 3) from its border, along the grid lines of an axis."""
     border = np.take(points_m, [0], axis)
     steps = np.diff(points_m, axis=axis, prepend=border)
     lengths_m = np.linalg.norm(steps, axis=2)
@@ -448,7 +455,7 @@ def _grid_length_m(points_m: Array, axis: int) -> Array:
 def card(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> "Trimesh":
     """An upright rectangle around the origin that faces x and shows a cell of a picture.
 
-    cell: first and last u, first and last v, as shares of the picture.
+    `cell` is the first and last u, and the first and last v, as shares of the picture.
     """
     return card_arrays(size_m, cell=cell).mesh()
 
@@ -467,7 +474,7 @@ def card_arrays(
 
 
 def cards(sizes_m: ArrayLike, poses: ArrayLike) -> "Trimesh":
-    """Rectangles like those of `card`, seen from both sides, as one mesh; sizes (N, 2), rigid poses (N, 4, 4)."""
+    """One mesh of rectangles with sizes (N, 2) at rigid poses (N, 4, 4), visible from both sides; see `card`."""
     return cards_arrays(sizes_m, poses).mesh()
 
 
@@ -502,7 +509,7 @@ def cards_arrays(sizes_m: ArrayLike, poses: ArrayLike) -> MeshArrays:
 
 
 def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayLike] = ()) -> "Trimesh":
-    """A prism from z = 0 to height_m over a polygon (N, 2) with holes, each in either orientation."""
+    """A prism from z = 0 to `height_m` over a polygon (N, 2) with holes. Polygons can have either orientation."""
     outline = oriented(polygon_m, counter_clockwise=True)
     holes = [oriented(hole, counter_clockwise=False) for hole in holes_m]
     rings = [outline, *holes]
@@ -521,7 +528,7 @@ def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayL
 
 
 def _cap(corners_m: Array) -> MeshArrays:
-    """Level faces (F, 3, 3), whose texture coordinates are x and y."""
+    """The mesh of level faces (F, 3, 3), with x and y as texture coordinates."""
     axes = _uv_axes(corners_m, range(3))
     uv = np.take_along_axis(corners_m, axes[:, None, :], axis=2)
     return MeshArrays(

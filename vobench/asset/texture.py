@@ -19,9 +19,9 @@ def _noise(
     fine_m: float,
     slope: float,
 ) -> Map:
-    """Periodic noise of unit variance with features from `fine_m` to `coarse_m` wide; 0 if no such feature fits.
+    """Periodic noise of unit variance with features that are `fine_m` to `coarse_m` wide; 0 if none fits.
 
-    White noise is multiplied by f^-slope in the frequency domain, so that it is isotropic and has no seams.
+    White noise is multiplied by f^-slope in the frequency domain, so the result is isotropic and has no seams.
     """
     n = texture.resolution_px
     px_per_m = n / texture.tile_m
@@ -119,7 +119,7 @@ Pattern = Annotated[str, OneOf("pattern", PATTERNS)]
 Albedo = Annotated[float, Gt(0), Lt(1)]
 Resolution = Annotated[int, Ge(8), Le(8192)]
 Seed = Annotated[int, Ge(0)]
-MOST_SAMPLED_PX = 64  # percentiles of larger tiles are of every fourth row and column
+MOST_SAMPLED_PX = 64  # the percentiles of larger tiles are computed from every fourth row and column
 
 
 @settings(kw_only=False)

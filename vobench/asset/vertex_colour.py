@@ -1,4 +1,4 @@
-"""Colours of vertices, converted to a texture that has a patch for each face."""
+"""Converts the colours of vertices to a texture that has a patch for each face."""
 
 from dataclasses import replace
 
@@ -10,17 +10,18 @@ from vobench.geometry.se3 import Array
 from vobench.scene.material import Map, Material, Picture, srgb
 from vobench.scene.mesh import MeshArrays
 
-EVEN = 1 / 255  # a mesh whose colours differ by less has one colour
-LEVELS = 4095  # colours are rounded to these many steps to find faces that share a patch
+EVEN = 1 / 255  # a mesh whose colours differ by less counts as having one colour
+LEVELS = 4095  # colours are rounded to this many levels to find faces that can share a patch
 MOST_LARGE_PATCHES = 1 << 16
-FACES_AT_ONCE = 65_536  # patches drawn in one step, which bounds the memory
+FACES_AT_ONCE = 65_536  # the number of patches that are drawn in one step, to limit the memory
 
 
 def painted(mesh: MeshArrays, colours: Array, look: Look) -> tuple[MeshArrays, Look]:
-    """A mesh and its look with the linear colours (F, 3, 3) of the faces' corners.
+    """The mesh and its look, with linear colours (F, 3, 3) of the corners of the faces applied.
 
-    Even colours are multiplied into the colour of the material. Others become a texture, whose patches interpolate
-    linearly between the corners. If the material has a texture already, only the mean of the colours is used.
+    If all colours are equal, they are multiplied by the colour of the material. Otherwise they become a texture, whose
+    patches interpolate linearly between the corners. If the material has a texture already, only the mean of the
+    colours is used.
     """
     material = look.material
     largest_difference = np.ptp(colours, axis=(0, 1)).max()
@@ -42,7 +43,10 @@ def painted(mesh: MeshArrays, colours: Array, look: Look) -> tuple[MeshArrays, L
 
 
 def _with_mean(look: Look, colours: Array) -> Look:
-    """A look whose colour is multiplied by the mean of the vertices; with a note if it has a texture."""
+    """The look with its colour multiplied by the mean of the vertices' colours.
+
+    If it has a texture, a note is added.
+    """
     material = look.material
     notes = look.notes
     if material.texture:
@@ -54,7 +58,7 @@ def _with_mean(look: Look, colours: Array) -> Look:
 
 
 class _Patch:
-    """A square of `size` texels; the centres of texels `first` and `last` of its rows and columns are corners."""
+    """A square of `size` texels. Its corners are the centres of the texels `first` and `last` of rows and columns."""
 
     def __init__(self, size: int, first: int, last: int) -> None:
         self.size = size
@@ -62,7 +66,10 @@ class _Patch:
         self.last = last
 
     def drawn(self, colours: Map) -> NDArray[np.uint8]:
-        """Squares (N, size, size, 3) in sRGB of linear colours (N, 3, 1, 1, 3) at the corner, right of and below it."""
+        """Patches (N, size, size, 3) in sRGB, from linear colours (N, 3, 1, 1, 3) of three corners.
+
+        The corners are the upper left one, and those to its right and below it.
+        """
         corner, right, below = np.moveaxis(colours, 1, 0)
         length = self.last - self.first
         texel = np.arange(self.size, dtype=np.float32)[:, None]
@@ -72,7 +79,7 @@ class _Patch:
         along_v = below - corner
         interpolated = corner + u * along_u + v * along_v
 
-        # Texels beyond the triangle are only seen from far away, where the texture is averaged.
+        # Texels outside of the triangle are visible only from far away, where the texture is averaged.
         mean = (corner + right + below) / 3
         is_beyond = u + v > 1.01 + 1 / length
         return srgb(np.where(is_beyond, mean, interpolated))
@@ -83,7 +90,7 @@ SMALL_PATCH = _Patch(size=4, first=0, last=3)
 
 
 def _atlas(patch_colours: Map, patch: _Patch, columns: int) -> NDArray[np.uint8]:
-    """A square picture with a patch, row by row, for each of the colours (N, 9) of three corners."""
+    """A square picture with a patch for each of the N sets of three corner colours (N, 9), row by row."""
     chunk_count = len(patch_colours) // FACES_AT_ONCE + 1
     chunks = np.array_split(patch_colours, chunk_count)
     drawn = [patch.drawn(chunk.reshape(-1, 3, 1, 1, 3)) for chunk in chunks]
@@ -94,7 +101,7 @@ def _atlas(patch_colours: Map, patch: _Patch, columns: int) -> NDArray[np.uint8]
 
 
 def _patch_uv(patch_index: NDArray[np.int64], patch: _Patch, columns: int) -> Array:
-    """Texture coordinates (F, 3, 2) of the corners of each face in its patch (F,)."""
+    """The texture coordinates (F, 3, 2) of the corners of each face, whose patches are given by index (F,)."""
     row, column = np.divmod(patch_index, columns)
     cell = np.stack([column, row], axis=1)
     first_texel_px = cell[:, None] * patch.size + 0.5

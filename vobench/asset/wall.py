@@ -15,16 +15,16 @@ from vobench.scene.mesh import MeshArrays, joined_arrays, quad_arrays
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-# A lap lies this far behind a wall's edge and reaches this far to both sides of it.
+# The distance of a lap behind the edge of a wall, and its extent to both sides of the edge.
 LAP_BEHIND_M = 0.002
 LAP_M = 0.01
-Hole = tuple[float, float, float, float]  # first and last u, first and last v, in metres from a wall's corner
+Hole = tuple[float, float, float, float]  # first and last u, first and last v, in metres from the corner of a wall
 
 
 def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes: Sequence[Hole] = ()) -> "Trimesh":
-    """A rectangle with rectangular holes, divided into a grid along their edges, with laps behind its four borders.
+    """A rectangle with rectangular holes, which is divided into a grid along their edges, with laps behind its borders.
 
-    The laps block the light that would otherwise leak through where two walls only touch.
+    The laps block light that would otherwise leak through the line where two walls touch.
     """
     corner = np.asarray(corner_m, float)
     u = np.asarray(edge_u_m, float)
@@ -81,7 +81,7 @@ def _lap_cells(width_m: float, height_m: float) -> list[Hole]:
 
 
 def _rectangle(corner: Array, u: Array, v: Array, cell: Hole) -> MeshArrays:
-    """A cell of a wall; its texture continues that of the neighbouring cells."""
+    """A cell of a wall, whose texture continues that of the neighbouring cells."""
     u0, u1, v0, v1 = cell
     axis_u = unit(u)
     axis_v = unit(v)
@@ -92,7 +92,7 @@ def _rectangle(corner: Array, u: Array, v: Array, cell: Hole) -> MeshArrays:
 
 
 def reveal(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, hole: Hole, depth_m: float) -> "Trimesh":
-    """The four inner sides of a hole in a wall, down to depth_m behind the face of the wall."""
+    """The four inner sides of a hole in a wall, which end `depth_m` behind the face of the wall."""
     u = unit(edge_u_m)
     v = unit(edge_v_m)
     u0, u1, v0, v1 = hole

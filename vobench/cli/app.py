@@ -1,4 +1,4 @@
-"""The commands of vobench, each imported only when it is called, and how errors are reported."""
+"""The entry point of the command line: it imports the command that is called, and reports errors."""
 
 import json as json_module
 import os
@@ -18,8 +18,8 @@ from vobench.cli.terminal import warn
 from vobench.errors import InputError, SuiteError, VobenchError
 from vobench.trust import gate
 
-# The module and function of each command. The first line of its docstring is its summary. Installed distributions may
-# add commands as entry points of the group below.
+# The module and function of each command. The first line of the function's docstring is the summary of the command.
+# Installed distributions can add commands as entry points of GROUP.
 VERBS = {
     "run": "vobench.cli.run:run_command",
     "check": "vobench.cli.check:check_command",
@@ -54,14 +54,14 @@ GROUP = "vobench.commands"
 
 
 class Verbs(TyperGroup):
-    """The commands, of which only the one that is called is imported."""
+    """The group of all commands. A command's module is imported only when the command is called."""
 
     def list_commands(self, _: Any) -> list[str]:
-        """Names of vobench's commands, and of installed ones."""
+        """The names of vobench's commands, followed by those of installed commands."""
         return list(_targets())
 
     def get_command(self, _: Any, cmd_name: str) -> Any:
-        """The command with that name; None if there is none."""
+        """The command with the given name; None if there is none."""
         target = VERBS.get(cmd_name) or _installed_commands().get(cmd_name)
         if target is None:
             return None
@@ -74,31 +74,34 @@ class Verbs(TyperGroup):
         return typer.main.get_command(command_app)
 
     def format_commands(self, _: Any, formatter: Any) -> None:
-        """Write every command with its summary."""
+        """Write the name and summary of every command."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, _summary(target)) for name, target in _targets().items()])
 
 
 def _targets() -> dict[str, str]:
-    """The targets of all commands by name: vobench's in their order, then installed ones by name."""
+    """The targets (module:function) of all commands: those of VERBS, then those of installed commands, sorted."""
     installed = _installed_commands()
     names = sorted(installed.keys() - VERBS.keys())
     return {**VERBS, **{name: installed[name] for name in names}}
 
 
 def _installed_commands() -> dict[str, str]:
-    """The targets of commands that installed distributions offer, by name."""
+    """The targets (module:function) of the commands of installed distributions."""
     from importlib.metadata import entry_points
 
     return {point.name: point.value for point in entry_points(group=GROUP)}
 
 
 def _summary(target: str) -> str:
-    """The first line of a command's docstring, read from its source because importing all commands takes seconds."""
+    """The first line of a command's docstring.
+
+    It is read from the source, because importing all commands takes seconds.
+    """
     module_name, _, function_name = target.partition(":")
     try:
         spec = find_spec(module_name)
-    except Exception as error:  # of an installed command's package, which find_spec imports
+    except Exception as error:  # find_spec imports the package of an installed command, which may raise anything
         return f"cannot be imported: {_sentence(error)}"
     if spec is None:
         return f"cannot be imported: No module named '{module_name}'"
@@ -122,22 +125,22 @@ DEBUG = "--debug"
 
 
 def run() -> None:
-    """Run a command. An error that the user can correct is one line, with exit code 1."""
+    """Run a command. An error that the user can correct is printed as one line, and the exit code is 1."""
     for stream in filter(None, (sys.stdout, sys.stderr)):
-        stream.reconfigure(errors="replace")  # terminals that have no ° show a ?
+        stream.reconfigure(errors="replace")  # a terminal that cannot show ° shows ?
     try:
         _call_command()
     except SystemExit as end:
         if not isinstance(end.__context__, BrokenPipeError):
             raise
-        _discard_output()  # a reader that stops reading, such as `head`, is no failure
+        _discard_output()  # a reader that stops early, such as `head`, is not an error
     except (VobenchError, OSError) as error:
         stop.check()  # a request to stop may have caused the error
         _fail(_sentence(error), error)
 
 
 def _call_command() -> None:
-    """Call the command that the arguments name, and print all of its output. Raises SystemExit at the end."""
+    """Call the command that the arguments name, and flush its output. Always raises SystemExit or an error."""
     try:
         with gate(warn, ours=_trusted_folders, folder=_trusted_hashes):
             # --debug is accepted before and after the command.
@@ -148,11 +151,11 @@ def _call_command() -> None:
 
 
 def _flush_output() -> None:
-    """Flush standard output now, because at exit an error would print a traceback.
+    """Flush standard output now, because an error while the interpreter exits would print a traceback.
 
-    Raises InputError if the output cannot be written, say to a full disk. A closed pipe is no error.
+    Raises InputError if the output cannot be written, for example to a full disk. A closed pipe is not an error.
     """
-    if sys.stdout is None:  # closed before the start, as by >&-
+    if sys.stdout is None:  # the shell closed it, as with >&-
         return
     try:
         sys.stdout.flush()
@@ -164,26 +167,26 @@ def _flush_output() -> None:
 
 
 def _trusted_folders() -> tuple[Path, ...]:
-    """The folders whose makers run without --trust."""
+    """The folders in which scene makers may run without --trust."""
     from vobench.suite.catalog import builtin_root
 
     return builtin_root(), Path.cwd()
 
 
 def _trusted_hashes() -> Path:
-    """The folder with the hashes of makers that the user trusts."""
+    """The folder that holds the hashes of the scene makers that the user trusts."""
     from vobench.runner.key import cache_folder
 
     return cache_folder() / "state" / "trusted"
 
 
 def _discard_output() -> None:
-    """Discard what is still to be printed."""
+    """Redirect standard output to the null device, so that the rest of the output is discarded."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _sentence(error: BaseException) -> str:
-    """The error in one line; errors of the system name their file."""
+    """The message of an error as one line. An error of the operating system includes the file's name."""
     if isinstance(error, OSError) and error.filename is not None:
         return f"{error.strerror}: {error.filename}"
     if isinstance(error, SuiteError) and len(error.mistakes) > 1:
@@ -194,7 +197,7 @@ def _sentence(error: BaseException) -> str:
 
 
 def _fail(sentence: str, error: BaseException) -> None:
-    """Print an error and end with exit code 1; with --debug, raise it."""
+    """Print an error and exit with code 1. With --debug, raise the error instead."""
     if DEBUG in sys.argv:
         raise error
     if "--json" in sys.argv:
@@ -207,7 +210,7 @@ def _fail(sentence: str, error: BaseException) -> None:
 
 
 def _print_error(text: str) -> None:
-    """Print an error to standard output, if that can be written: standard error has it, too."""
+    """Print an error to standard output. A failure is ignored, because standard error gets the same error."""
     try:
         print(text, flush=True)
     except OSError:
@@ -215,7 +218,10 @@ def _print_error(text: str) -> None:
 
 
 def _mistakes(error: BaseException) -> dict[str, Any]:
-    """The mistakes in a file, each with its place, value and sentence; `asked_by` are the places that name the file."""
+    """The mistakes in a YAML file for the JSON output: for each, its place, the value there, and a sentence.
+
+    `asked_by` lists the places in other files that refer to the file.
+    """
     if not isinstance(error, SuiteError):
         return {}
     rows: list[dict[str, Any]] = []
@@ -245,4 +251,4 @@ def common(
     ] = False,
 ) -> None:
     """Define the options that every command has."""
-    del debug, version  # _fail reads the first, the callback of the second has the effect
+    del debug, version  # _fail looks for --debug in sys.argv, and _print_version handles --version

@@ -74,7 +74,7 @@ def _cell_text(cell: ShownCell) -> str:
 
 
 def _fit_matrix(title: str, names: Sequence[str], rows: Sequence[Sequence[str]], console: Console) -> _FittedTable:
-    """The matrix without the last estimators, if not all fit; at least one remains."""
+    """The matrix without the last estimators, if not all of them fit. At least one remains."""
     shown_count = len(names)
     while True:
         headings = ["case", *(_folded(name) for name in names[:shown_count])]

@@ -14,7 +14,7 @@ from vobench.cli.progress import Bars
 if TYPE_CHECKING:
     from rich.console import Console
 
-# A condition is listed with a trial or a segment if it multiplies the error by more than this.
+# A condition is listed for a trial or a segment if it multiplies the error by more than this.
 LEAST_FACTOR = 1.1
 MOST_FACTORS = 3
 CAUSE_HEADINGS = ("condition", "factor", "95 % interval", "is")

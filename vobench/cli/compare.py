@@ -15,7 +15,7 @@ from vobench.runner.bundle import merged, opened
 from vobench.runner.folder import RunFolder
 from vobench.runner.rescore import check, wrong_truths
 
-REGRESSED = 3  # exit code if a score got worse
+REGRESSED = 3  # the exit code if a score got worse
 HEADINGS = ("estimator", "verdict", "old", "new", "ratio", "p")
 RATIO_EXPLANATION = "ratio: new loss to old, 1 - lost-aware score"
 

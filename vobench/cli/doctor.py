@@ -1,4 +1,4 @@
-"""vobench doctor: what this machine lacks, and the command that installs it."""
+"""vobench doctor: finds what is missing on this machine, and the command that installs it."""
 
 import json as json_module
 import os
@@ -31,7 +31,7 @@ PATH_TRACING = "path tracing (Mitsuba)"
 
 @dataclass(frozen=True, slots=True)
 class MachineCheck:
-    """The result of one check, and the command that helps if it failed; optional dependencies may be missing."""
+    """The result of a check, and the command that helps if it failed. Optional dependencies may be missing."""
 
     check: str
     well: bool
@@ -88,7 +88,7 @@ def _check_libraries() -> MachineCheck:
 
 
 def _check_drawing() -> list[MachineCheck]:
-    """Whether a test image is correct, rendered in a process of its own, which a broken driver may kill."""
+    """Whether a test image is correct. It is rendered in a separate process, because a broken driver may crash."""
     process = stop.run([sys.executable, "-P", "-m", "vobench.rendering.self_test"])
     if process.returncode != 0:
         error_lines = process.stderr.strip().splitlines()
@@ -153,7 +153,7 @@ def _check_cache() -> MachineCheck:
 
 
 def _check_sandbox() -> MachineCheck:
-    """Whether estimators can be kept from reading the ground truth; they run without a sandbox, too."""
+    """Whether a sandbox can hide the ground truth from estimators. It is not required to run them."""
     sandbox = sandbox_here()
     if sandbox.level == "full":
         return MachineCheck(SANDBOX, True, "estimators see their own files and nothing else", optional=True)
@@ -164,7 +164,7 @@ def _check_sandbox() -> MachineCheck:
 
 
 def _check_path_tracing() -> MachineCheck:
-    """Whether Mitsuba can render, in a process of its own, which a wrong libLLVM would kill."""
+    """Whether Mitsuba can render. It is tried in a separate process, because a wrong libLLVM would crash."""
     try:
         library = mitsuba.working_library()
     except MissingDependencyError as error:

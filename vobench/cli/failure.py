@@ -90,7 +90,7 @@ def shrink_command(
     rerun: RerunOptions,
     json: Json = False,
 ) -> None:
-    """Find the shortest part of a trial that fails in the same way, and save it as a suite of its own."""
+    """Find the shortest part of a trial that fails in the same way, and save it as a suite."""
     result = shrink_trial(
         trial,
         run_plan=plan_runner(out=rerun.out, jobs=rerun.jobs),

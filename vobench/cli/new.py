@@ -13,7 +13,7 @@ from vobench.errors import InputError
 from vobench.suite.scaffold import new_scene, new_suite, require_free, require_name
 
 SCAFFOLD = Path(__file__).parent / "scaffold"
-# The next steps; {0} is the name, or the path if the name would not be found.
+# The next steps. {0} is the name, or the path if the name would not be found.
 NEXT_STEPS = {
     "estimator": "Try it: vobench try {0}\nRun it: vobench run quickstart -e {0} -e lk_epipolar",
     "suite": "Check it: vobench check {0}\nRun it: vobench run {0}",
@@ -23,7 +23,7 @@ NEXT_STEPS = {
 
 @dataclass(frozen=True, slots=True)
 class _Request:
-    """What is to be created: `source` is what is copied, `is_command` a program in any language."""
+    """The object to create. `source` is the original to copy. `is_command` selects a program in any language."""
 
     name: str
     folder: Path

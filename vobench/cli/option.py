@@ -48,7 +48,7 @@ Trust = Annotated[
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def option_group(cls: type[Group]) -> type[Group]:
-    """A class of options as a frozen dataclass."""
+    """Turn a class of options into a frozen dataclass."""
     return dataclass(frozen=True, slots=True, kw_only=True)(cls)
 
 
@@ -94,7 +94,7 @@ def _option_parameters(group_class: type) -> list[inspect.Parameter]:
 
 @option_group
 class RerunOptions:
-    """How a command runs variants of a trial again."""
+    """The options for running variants of a trial again."""
 
     estimator: Annotated[
         Path | None,

@@ -12,7 +12,7 @@ Item = TypeVar("Item")
 
 
 class Bars:
-    """Progress bars on a terminal; elsewhere one line for each stage."""
+    """Progress bars on a terminal, or one line for each stage if standard error is not a terminal."""
 
     def __init__(self) -> None:
         from rich.console import Console
@@ -20,7 +20,7 @@ class Bars:
         self._console = Console(stderr=True, markup=False)
 
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
-        """The same items, counted on a bar that disappears at the end."""
+        """Iterate over items, and count them on a bar that disappears at the end."""
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
@@ -29,7 +29,7 @@ class Bars:
 
     @contextmanager
     def step(self, what: str) -> Iterator[Callable[[float], object]]:
-        """A spinner around work of unknown length; the function it yields takes the share that is done."""
+        """A spinner around work of unknown length. It yields a function that shows the finished share."""
         from rich.progress import SpinnerColumn, TaskProgressColumn, TextColumn
 
         with self._progress(what, SpinnerColumn(), TextColumn(what), TaskProgressColumn()) as progress:
@@ -37,7 +37,7 @@ class Bars:
             yield lambda share: progress.update(task, total=1.0, completed=share)
 
     def say(self, sentence: str) -> None:
-        """Print a line of its own."""
+        """Print a separate line."""
         print(f"vobench: {sentence}", file=sys.stderr, flush=True)
 
     def _progress(self, line: str, *columns: "ProgressColumn") -> "Progress":

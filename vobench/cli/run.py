@@ -25,6 +25,7 @@ from vobench.suite.suite import read_plan
 
 if TYPE_CHECKING:
     from vobench.report.leaderboard import Board
+    from vobench.report.threshold import Threshold
     from vobench.runner.folder import RunFolder, TrialScore
 
 INCOMPLETE_RUN = 1  # exit codes
@@ -33,7 +34,7 @@ BROKEN_LIMIT = 3
 
 @option_group
 class Selection:
-    """Which trials of the suite are run."""
+    """The selection of trials that are run."""
 
     estimator: Annotated[
         list[str] | None,
@@ -55,7 +56,7 @@ class Selection:
 
 @option_group
 class Changes:
-    """What is changed in the suite."""
+    """The changes to the suite."""
 
     repeats: Annotated[int | None, typer.Option("--repeats", "-n", help="Run each trial this many times.")] = None
     changes: Annotated[
@@ -93,7 +94,7 @@ class TrialLimits:
 
 @option_group
 class Execution:
-    """Where and how tasks are performed."""
+    """The options for performing tasks."""
 
     jobs: Annotated[
         int | None,
@@ -122,7 +123,7 @@ class Execution:
 
 @option_group
 class ProgressOptions:
-    """What is shown and logged while the suite runs."""
+    """The options for showing and logging progress."""
 
     events: Annotated[
         Path | None, typer.Option(help="Log the events of all tasks to this file, one JSON object a line.")
@@ -171,7 +172,11 @@ def run_command(
         _print_remarks(folder, scores, shares_time=execution.share_time or plan.suite.share_time)
         for doubt in doubts_of_run(plan, folder):
             terminal.warn(doubt)
+    _exit_if_failed(scores, board, thresholds)
 
+
+def _exit_if_failed(scores: "Sequence[TrialScore]", board: "Board", thresholds: "Sequence[Threshold]") -> None:
+    """Warn about broken thresholds, and exit with an error code if there are any or if the run is incomplete."""
     broken_limits = list[str]()
     for threshold in thresholds:
         broken_limits += threshold.broken_by(scores, board)

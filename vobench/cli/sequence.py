@@ -1,4 +1,4 @@
-"""vobench import and export."""
+"""The commands vobench import and vobench export."""
 
 from dataclasses import dataclass
 from pathlib import Path

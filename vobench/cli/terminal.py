@@ -13,8 +13,8 @@ if TYPE_CHECKING:
 
     from vobench.suite.catalog import CatalogEntry
 
-REDIRECTED_WIDTH = 200  # columns, where standard output is not a terminal
-# Headings of columns of words; all other columns hold numbers.
+REDIRECTED_WIDTH = 200  # the number of characters in a line, if standard output is not a terminal
+# The headings of columns that contain text. All other columns contain numbers, which are aligned to the right.
 LEFT_ALIGNED = frozenset(
     {
         "case",
@@ -46,23 +46,26 @@ LEFT_ALIGNED = frozenset(
 
 
 def known(kind: str, name: str, names: Iterable[str]) -> str:
-    """The name, if it is known. Raises UnknownNameError if it is not."""
+    """Return the name if it is known. Raises UnknownNameError otherwise."""
     require_known(kind, name, names)
     return name
 
 
 def print_json(content: Any) -> None:
-    """Print one JSON object to standard output."""
+    """Print a value to standard output as one JSON document."""
     print(json_module.dumps(content, indent=1, ensure_ascii=False, allow_nan=False))
 
 
 def warn(sentence: str) -> None:
-    """Print a line to standard error."""
+    """Print a sentence to standard error, as one line that begins with "vobench: "."""
     print(printable(f"vobench: {sentence}"), file=sys.stderr)
 
 
 def warn_about_hidden(entries: "Iterable[CatalogEntry]") -> None:
-    """Warn about each estimator that replaces a built-in one of the same name; one given by its path replaces none."""
+    """Warn about each estimator that hides the built-in estimator of the same name.
+
+    An estimator that is given by its path hides none.
+    """
     from vobench.suite.catalog import builtin_root
 
     for entry in entries:
@@ -74,7 +77,7 @@ def warn_about_hidden(entries: "Iterable[CatalogEntry]") -> None:
 
 
 def console() -> "Console":
-    """Standard output without markup. If it is not a terminal, lines have a fixed width."""
+    """A console that prints to standard output without markup. Lines have a fixed width if that is not a terminal."""
     from rich.console import Console
 
     plain = Console(markup=False, highlight=False)
@@ -84,7 +87,7 @@ def console() -> "Console":
 
 
 def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> "Table":
-    """A table with a bold title; words are aligned to the left, numbers to the right."""
+    """A table with a bold title. Text is aligned to the left, and numbers are aligned to the right."""
     from rich import box
     from rich.table import Table
 

@@ -1,4 +1,4 @@
-"""The command that checks whether the files and scores of a run are unchanged."""
+"""The command vobench verify, which checks whether the files and scores of a run are unchanged."""
 
 from collections import Counter
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""ROS 1 and ROS 2 bags and foreign MCAP files, read as recordings."""
+"""Reads ROS 1 bags, ROS 2 bags and MCAP files of other programs as recordings."""
 
 import struct
 from collections.abc import Callable, Iterator, Mapping
@@ -38,14 +38,14 @@ from vobench.sequence.recording import MAGICS, METADATA, open_bag, read_first_po
 from vobench.trajectory.trajectory import Stamps
 
 BASE = "base_link"
-MOST_PROFILE = 256  # bytes of a profile's name that are read
+MOST_PROFILE = 256  # the number of bytes of a profile's name that are read
 SUPPORTED_MCAP = "supported are MCAP files in ROS 2 form (profile ros2, CDR messages)"
-MOST_WAITING = 64  # pictures held until their partner comes
+MOST_WAITING = 64  # the largest number of pictures in memory that wait for the other picture of their pair
 
 
 @dataclass(frozen=True, slots=True)
 class BagContents:
-    """What one pass through a bag finds: stamps by topic, first messages by topic, the IMU's readings, /tf_static."""
+    """The result of reading a bag once: stamps and first message of each topic, IMU readings, and /tf_static."""
 
     stamps: dict[str, Stamps]
     first: dict[str, Any]
@@ -53,12 +53,12 @@ class BagContents:
     tree: Tree
 
     def frame_of(self, topic: str) -> str:
-        """The name of the frame that the messages of a topic are in."""
+        """The name of the coordinate frame of a topic's messages."""
         return plain(self.first[topic].header.frame_id)
 
 
 def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
-    """The recording of a bag, whose pictures are read when they are iterated. Raises InputError."""
+    """The recording in a bag. Its pictures are read when they are iterated. Raises InputError."""
     refuse_lfs_pointers(path)
     if form == "mcap":
         _require_ros2(path)
@@ -102,9 +102,9 @@ def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
 
 
 def _require_ros2(path: Path) -> None:
-    """Raise InputError where an MCAP file holds messages of another kind. Source: mcap.dev/spec, Header."""
+    """Raise InputError if an MCAP file contains messages other than those of ROS 2. Source: mcap.dev/spec, Header."""
     start = head(path)
-    begin = len(MAGIC) + struct.calcsize("<BQI")  # behind opcode, length of the record and length of the profile
+    begin = len(MAGIC) + struct.calcsize("<BQI")  # after the opcode, the record length and the profile length
     if len(start) < begin or start[len(MAGIC)] != Opcode.HEADER:
         raise InputError(f"an MCAP file should begin with its header, this one does not: {path}")
     (length,) = struct.unpack_from("<I", start, begin - 4)
@@ -126,36 +126,51 @@ def _require_ros2(path: Path) -> None:
 
 def _contents(reader: Any, chosen: Chosen, path: Path) -> BagContents:
     """Read the chosen topics once, without decoding or keeping pictures. Raises InputError."""
-    wanted = {*chosen.sensors, ros.TF_STATIC.name, chosen.truth_topic}
-    first_only = (chosen.truth_topic, chosen.left_info, chosen.right_info)
-    stamps_lists: dict[str, list[int]] = {}
-    first: dict[str, Any] = {}
-    readings: list[tuple[float, ...]] = []
-    static = []
-    connections = [connection for connection in reader.connections if connection.topic in wanted]
-    for connection, _, raw in reader.messages(connections):
-        topic = connection.topic
-        if topic in first and topic in first_only:
-            continue
-        message = reader.deserialize(raw, connection.msgtype)
-        if topic == ros.TF_STATIC.name:
-            static.append(message)
-            continue
-        if topic not in first:
-            first[topic] = _without_pixels(message)
-        if hasattr(message, "header"):
-            stamps_lists.setdefault(topic, []).append(ros.stamp_ns(message))
-        if topic == chosen.imu:
-            readings.append(_imu_fields(message))
-
-    _require_pictures(chosen, first, path)
+    messages = _read_once(reader, chosen)
+    _require_pictures(chosen, messages.first, path)
     stamps = {}
-    for topic, topic_ns in stamps_lists.items():
+    for topic, topic_ns in messages.stamps_ns.items():
         stamps[topic] = _increasing(np.array(topic_ns, np.int64), topic, path)
     imu = None
     if chosen.imu in stamps:
-        imu = _readings(chosen.imu, stamps[chosen.imu], readings, path)
-    return BagContents(stamps, first, imu, tree_of(static, str(path)))
+        imu = _readings(chosen.imu, stamps[chosen.imu], messages.readings, path)
+    return BagContents(stamps, messages.first, imu, tree_of(messages.static, str(path)))
+
+
+class _Messages(NamedTuple):
+    """The unchecked result of reading a bag once.
+
+    `stamps_ns` and `first` are the stamps and the first message of each topic, `readings` those of the IMU, and
+    `static` the messages on /tf_static.
+    """
+
+    stamps_ns: dict[str, list[int]]
+    first: dict[str, Any]
+    readings: list[tuple[float, ...]]
+    static: list[Any]
+
+
+def _read_once(reader: Any, chosen: Chosen) -> _Messages:
+    """Read the messages of the chosen topics in order. Of the truth and the calibrations, only the first is read."""
+    wanted = {*chosen.sensors, ros.TF_STATIC.name, chosen.truth_topic}
+    first_only = (chosen.truth_topic, chosen.left_info, chosen.right_info)
+    messages = _Messages({}, {}, [], [])
+    connections = [connection for connection in reader.connections if connection.topic in wanted]
+    for connection, _, raw in reader.messages(connections):
+        topic = connection.topic
+        if topic in messages.first and topic in first_only:
+            continue
+        message = reader.deserialize(raw, connection.msgtype)
+        if topic == ros.TF_STATIC.name:
+            messages.static.append(message)
+            continue
+        if topic not in messages.first:
+            messages.first[topic] = _without_pixels(message)
+        if hasattr(message, "header"):
+            messages.stamps_ns.setdefault(topic, []).append(ros.stamp_ns(message))
+        if topic == chosen.imu:
+            messages.readings.append(_imu_fields(message))
+    return messages
 
 
 def _require_pictures(
@@ -169,7 +184,7 @@ def _require_pictures(
 
 
 def _without_pixels(message: Any) -> Any:
-    """A message to keep; of a picture only header and encoding, as its pixels may be a view of a larger buffer."""
+    """The message, or only the header and encoding of a picture, whose pixels may be a view of a larger buffer."""
     if not hasattr(message, "data"):
         return message
     return SimpleNamespace(header=message.header, encoding=getattr(message, "encoding", ""))
@@ -196,7 +211,7 @@ def _readings(
 
 
 def _increasing(t_ns: Stamps, topic: str, path: Path) -> Stamps:
-    """The stamps themselves. Raises InputError unless they increase."""
+    """Return the stamps if they increase. Raises InputError otherwise."""
     late = np.flatnonzero(np.diff(t_ns) <= 0)
     if late.size:
         before = int(late[0])
@@ -207,7 +222,7 @@ def _increasing(t_ns: Stamps, topic: str, path: Path) -> Stamps:
 
 
 class _Pictures(NamedTuple):
-    """The pictures of a bag, not yet read, their stamps, and notes on how they were paired."""
+    """The pictures of a bag, which have not been read, their stamps, and notes on how they were paired."""
 
     shots: Callable[[], Iterator[RecordedFrame]]
     t_ns: Stamps
@@ -228,7 +243,7 @@ def _pictures(
         pairs = partners(left_ns, right_ns, options.within_ns, str(path))
         stamps = {chosen.left: left_ns[pairs.left], chosen.right: right_ns[pairs.right]}
         notes = pairs.notes
-    indices = {}  # of frames, by topic and stamp
+    indices = {}  # the index of each frame, by topic and stamp
     for topic, t_ns in stamps.items():
         indices[topic] = {int(t): index for index, t in enumerate(t_ns)}
     frames_ns = stamps[chosen.left]
@@ -240,8 +255,8 @@ def _read_pictures(
     indices: dict[str, dict[int, int]],
     t_ns: Stamps,
 ) -> Iterator[RecordedFrame]:
-    """The frames in order; a picture is held until its partner comes, and a limited number of them at once."""
-    waiting: dict[int, dict[str, EncodedPicture]] = {}  # pictures by topic, by the frame's index
+    """The frames in order. A picture waits in memory for the other one of its pair; at most MOST_WAITING wait."""
+    waiting: dict[int, dict[str, EncodedPicture]] = {}  # for each index of a frame, its pictures by topic
     due = 0
     with open_bag(path) as reader:
         connections = [connection for connection in reader.connections if connection.topic in indices]
@@ -263,9 +278,9 @@ def _read_pictures(
 
 
 def _body(chosen: Chosen, contents: BagContents) -> tuple[str | None, Notes]:
-    """The body's frame, None for the left camera, and the note on it.
+    """The name of the body's frame, None for that of the left camera, and a note on it.
 
-    It is the frame of the truth, else base_link, if /tf_static connects it with the left camera.
+    It is the frame of the truth, or otherwise base_link, if /tf_static connects it with the left camera.
     """
     left_frame = contents.frame_of(chosen.left)
     truth_frame = _truth_frame(chosen, contents)
@@ -282,7 +297,7 @@ def _body(chosen: Chosen, contents: BagContents) -> tuple[str | None, Notes]:
 
 
 def _truth_frame(chosen: Chosen, contents: BagContents) -> str:
-    """The frame whose poses the truth has; empty where it is not named."""
+    """The frame whose poses are the truth; empty if it has no name."""
     child = chosen.truth_frames.rpartition(".")[2]
     if child:
         return child
@@ -297,7 +312,7 @@ def _rig(
     body: str | None,
     options: ReadOptions,
 ) -> CalibratedRig:
-    """The rig by the options' chain, or else by the bag."""
+    """The rig from the calibration that the options name, or otherwise from the bag."""
     if options.calibration is not None:
         return _chain_rig(options.calibration, 2 if chosen.right else 1)
     cameras = []
@@ -349,7 +364,7 @@ def _imu(
 
 
 def _begins(path: Path, suffix: str) -> bool:
-    """Whether a file has the first bytes of the files of a suffix; a sensors.mcap belongs to a sequence of vobench."""
+    """Whether a file begins like files with a suffix. A sensors.mcap, which is part of a sequence, does not count."""
     magic = next(magic for magic, known in MAGICS.items() if known == suffix)
     return path.name != ros.SENSORS_FILE and head(path).startswith(magic)
 

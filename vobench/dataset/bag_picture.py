@@ -1,4 +1,4 @@
-"""The pictures of ROS messages: raw ones in any known encoding, and compressed ones."""
+"""Converts ROS messages to pictures, from any known encoding or compressed format."""
 
 from typing import Any
 
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from vobench.dataset.picture import EncodedPicture
 from vobench.errors import InputError
 
-# Bytes of a pixel by the encodings of grey pictures, channels by those of 8-bit colour ones.
+# The bytes per pixel of each encoding of grey pictures, and the channels of each 8-bit encoding of colour pictures.
 GREY = {"mono8": 1, "8uc1": 1, "mono16": 2, "16uc1": 2}
 COLOURS = {"bgr8": 3, "8uc3": 3, "rgb8": 3, "bgra8": 4, "rgba8": 4}
-# OpenCV's conversions of colour mosaics to grey.
+# OpenCV's conversions from Bayer mosaics to grey.
 MOSAICS = {
     "bayer_rggb8": cv2.COLOR_BayerRGGB2GRAY,
     "bayer_bggr8": cv2.COLOR_BayerBGGR2GRAY,
@@ -30,7 +30,7 @@ def picture(message: Any, name: str) -> EncodedPicture:
         grey = _pixels(message, name, 1, GREY[encoding])
         return EncodedPicture(name, grey[..., 0])
     if encoding in COLOURS:
-        colour = _pixels(message, name, COLOURS[encoding], 1)[..., :3]  # without alpha
+        colour = _pixels(message, name, COLOURS[encoding], 1)[..., :3]  # the alpha channel is dropped
         blue_green_red = colour[..., ::-1] if encoding.startswith("rgb") else colour
         return EncodedPicture(name, np.ascontiguousarray(blue_green_red))
     if encoding in MOSAICS:
@@ -46,10 +46,10 @@ def _pixels(
     channels: int,
     channel_bytes: int,
 ) -> NDArray[Any]:
-    """Pixels (H, W, channels); a row of the message may be longer than its pixels need."""
+    """The pixels (H, W, channels) of a message. Its rows may be longer than the pixels require."""
     height = int(message.height)
     width = int(message.width)
-    step = int(message.step)  # bytes a row
+    step = int(message.step)  # bytes per row
     needed = width * channels * channel_bytes
     is_possible = height >= 1 and width >= 1 and step >= needed
     if not is_possible or message.data.size < height * step:

@@ -1,4 +1,4 @@
-"""The rig of a bag: lenses by CameraInfo, mounts by /tf_static."""
+"""Reads the rig of a bag: lenses from CameraInfo messages, and mounts from /tf_static."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,11 +15,11 @@ from vobench.geometry.se3 import Array
 from vobench.sequence import messages as ros
 from vobench.sequence.messages import ALL_AROUND, DOUBLE_SPHERE
 
-VOBENCH_MODELS = (DOUBLE_SPHERE, ALL_AROUND)  # camera models that ROS has no name for
-UNIT_TOLERANCE = 1e-3  # of the norm of a quaternion
+VOBENCH_MODELS = (DOUBLE_SPHERE, ALL_AROUND)  # the camera models for which ROS has no name
+UNIT_TOLERANCE = 1e-3  # the tolerance for the norm of a quaternion
 ROTATION_TOLERANCE = 1e-3
 
-Tree = Mapping[tuple[str, str], Array]  # T_parent_child of frames that never move, by the names of both
+Tree = Mapping[tuple[str, str], Array]  # T_parent_child of static frames, by the names of both
 
 
 def between(
@@ -27,8 +27,8 @@ def between(
     start: str,
     end: str,
 ) -> Array | None:
-    """T_start_end along the transforms of a tree; None where they don't connect the two frames."""
-    T_start = {start: np.eye(4)}  # T_start_frame of every frame that was reached
+    """T_start_end along the transforms of a tree; None if they do not connect the two frames."""
+    T_start = {start: np.eye(4)}  # T_start_frame of every frame that has been reached
     queue = [start]
     while queue and end not in T_start:
         frame = queue.pop(0)
@@ -48,7 +48,7 @@ def between(
 
 
 def tree_of(messages: list[Any], path: str) -> Tree:
-    """The transforms of TFMessages. Raises InputError for one that is no rigid transform."""
+    """The transforms in TFMessages. Raises InputError if one is not a rigid transform."""
     tree = {}
     for message in messages:
         for stamped in message.transforms:
@@ -64,15 +64,15 @@ def tree_of(messages: list[Any], path: str) -> Tree:
 
 
 def plain(frame: str) -> str:
-    """A frame's name without the leading slash of early versions of ROS 1."""
+    """The name of a frame without the leading slash that early versions of ROS 1 require."""
     return frame.lstrip("/")
 
 
 @dataclass(frozen=True, slots=True)
 class Info:
-    """A CameraInfo of ROS 1 or ROS 2, and whether the pictures that it belongs to are rectified.
+    """A CameraInfo message of ROS 1 or ROS 2, and whether its pictures are rectified.
 
-    ROS 1 names its fields K, R, P and D, ROS 2 names them k, r, p and d.
+    The fields are called K, R, P and D in ROS 1, and k, r, p and d in ROS 2.
     """
 
     topic: str
@@ -80,7 +80,7 @@ class Info:
     rectified: bool
 
     def matrix(self, name: str, *shape: int) -> Array:
-        """The matrix k, r or p; it is zero where the camera was not calibrated. Raises InputError."""
+        """The matrix k, r or p, which is 0 for an uncalibrated camera. Raises InputError."""
         values = np.asarray(self._field(name), float)
         if values.size != np.prod(shape) or not np.isfinite(values).all():
             raise InputError(f"{self.topic}: {name.upper()} should be finite numbers, but is {values.tolist()}")
@@ -93,7 +93,7 @@ class Info:
 
     @property
     def R_rectified_camera(self) -> Array:
-        """R (3, 3), the identity where it was not calibrated. Raises InputError where it is no rotation."""
+        """R (3, 3), or the identity for an uncalibrated camera. Raises InputError if R is not a rotation."""
         R = self.matrix("r", 3, 3)
         if not R.any():
             return np.eye(3)
@@ -103,7 +103,7 @@ class Info:
 
     @property
     def camera(self) -> Camera:
-        """The lens of the pictures: the pinhole of P where they are rectified. Raises InputError."""
+        """The camera of the pictures, which is the pinhole with matrix P if they are rectified. Raises InputError."""
         message = self.message
         size_px = (int(message.width), int(message.height))
         if self.rectified:
@@ -118,16 +118,16 @@ class Info:
 
 
 def _focal_px(K: Array) -> list[float]:
-    """fx, fy, cx, cy of K (3, 3) or P (3, 4)."""
+    """The values fx, fy, cx, cy of K (3, 3) or P (3, 4)."""
     focal_px: list[float] = K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
     return focal_px
 
 
 def by_projection(left: Info, right: Info) -> Array:
-    """T_left_right by R and P of both cameras, as ROS's stereo calibration defines them.
+    """T_left_right from R and P of both cameras, as the stereo calibration of ROS defines them.
 
-    Raises InputError where P has no baseline.
-    Source: the comments of sensor_msgs/CameraInfo: R turns into the rectified frame, Tx = -fx baseline.
+    Raises InputError if P has no baseline.
+    Source: the comments in sensor_msgs/CameraInfo. R rotates into the rectified frame, and Tx = -fx baseline.
     """
     P = right.matrix("p", 3, 4)
     baseline_m = -P[0, 3] / P[0, 0] if P[0, 0] > 0 else 0.0
@@ -141,7 +141,7 @@ def by_projection(left: Info, right: Info) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class FramedInfo:
-    """A CameraInfo and the name of its camera's frame in /tf_static."""
+    """A CameraInfo message, and the name of its camera's frame in /tf_static."""
 
     info: Info
     frame: str
@@ -152,9 +152,10 @@ def info_rig(
     tree: Tree,
     body: str | None,
 ) -> tuple[Rig, tuple[str, ...]]:
-    """The rig of one or two cameras on the frame `body`, None for the left camera, and notes on it.
+    """The rig of one or two cameras, and notes on it.
 
-    Raises InputError where the cameras or the place of the right one are not known.
+    `body` is the name of the body's frame, None for that of the left camera.
+    Raises InputError if the calibration of a camera or the pose of the right camera is unknown.
     """
     left = cameras[0]
     T_body_left = _T_body_left(left, tree, body)
@@ -162,7 +163,7 @@ def info_rig(
         return Rig(left.info.camera, None, T_body_left, None), ()
 
     right = cameras[1]
-    # /tf_static has the frames of the cameras, not those of their rectified pictures.
+    # /tf_static contains the frames of the cameras, not those of rectified pictures.
     is_rectified = left.info.rectified or right.info.rectified
     T_left_right = None if is_rectified else between(tree, left.frame, right.frame)
     notes: tuple[str, ...] = ()

@@ -1,4 +1,4 @@
-"""Which topics of a bag hold the left and right pictures, the IMU's readings and the ground truth."""
+"""Selects the topics of a bag with the left and right pictures, the IMU readings and the ground truth."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ INFO = "sensor_msgs/msg/CameraInfo"
 IMU = "sensor_msgs/msg/Imu"
 COUNTED_FROM_0 = ("cam", "camera", "image", "cam_", "camera_", "image_", "video", "fisheye")
 COUNTED_FROM_1 = ("cam", "camera", "image", "cam_", "camera_", "infra", "fisheye")
-# The parts of topics' names that tell left from right.
+# The parts of topic names that distinguish left from right.
 SIDES = (
     ("left", "right"),
     *((f"{name}0", f"{name}1") for name in COUNTED_FROM_0),
@@ -27,7 +27,7 @@ Types = Mapping[str, str]  # message type by topic
 
 @dataclass(frozen=True, slots=True)
 class Chosen:
-    """The topics to read; None for those that a bag does not have."""
+    """The topics to read; None for what a bag does not contain."""
 
     left: str
     right: str | None
@@ -39,25 +39,25 @@ class Chosen:
 
     @property
     def sensors(self) -> list[str]:
-        """The topics of cameras, their calibration and the IMU."""
+        """The topics of the cameras, of their calibration, and of the IMU."""
         topics = (self.left, self.right, self.left_info, self.right_info, self.imu)
         return [topic for topic in topics if topic]
 
     @property
     def truth_topic(self) -> str:
-        """The topic of the truth, without the frames of a transform; empty where there is none."""
+        """The topic of the truth, without the frames of a transform; empty if there is none."""
         return (self.truth or "").partition(":")[0]
 
     @property
     def truth_frames(self) -> str:
-        """The frames `parent.child` of a truth among transforms; empty where they are not named."""
+        """The frames `parent.child` of a truth that is a transform; empty if they are not given."""
         return (self.truth or "").partition(":")[2]
 
 
 def choose(types: Types, topics: Topics, path: str) -> Chosen:
-    """The topics that are named; each other one is chosen if the bag has exactly one that fits.
+    """The topics that are given, and for the others, the only topic of the bag that fits.
 
-    Raises InputError for a topic that the bag lacks, and where no or several topics of pictures fit.
+    Raises InputError for a given topic that the bag does not contain, and if no or several topics of pictures fit.
     """
     left, right = _picture_topics(types, topics, path)
     for topic, message_type in ((topics.left_info, INFO), (topics.right_info, INFO), (topics.imu, IMU)):
@@ -80,39 +80,46 @@ def _picture_topics(
     topics: Topics,
     path: str,
 ) -> tuple[str, str | None]:
+    """The topics of the left and the right pictures. The right one is None for a single camera."""
     for topic in (topics.left, topics.right):
         if topic is not None:
             _require(types, topic, (RAW, COMPRESSED), path)
     with_pictures = [topic for topic, message_type in types.items() if message_type in (RAW, COMPRESSED)]
     if topics.left is not None:
         return topics.left, topics.right or _only_partner(topics.left, with_pictures)
+    chosen = _only_pair(with_pictures, topics.right)
+    if chosen is None:
+        raise _undecided(types, with_pictures, path)
+    return chosen
 
+
+def _only_pair(with_pictures: list[str], right_topic: str | None) -> tuple[str, str | None] | None:
+    """The only pair of topics, with the given right topic if any, or the only camera; None if several fit."""
     pairs = _pairs(with_pictures)
-    if topics.right is not None:
-        pairs = [pair for pair in pairs if pair[1] == topics.right]
+    if right_topic is not None:
+        pairs = [pair for pair in pairs if pair[1] == right_topic]
     if len(pairs) == 1:
         return pairs[0]
     cameras = [topic for topic in with_pictures if not _contains(topic, NO_PICTURES)]
-    is_single_camera = not pairs and len(cameras) == 1 and topics.right is None
-    if is_single_camera:
-        return cameras[0], None
-    raise _undecided(types, with_pictures, path)
+    is_single_camera = not pairs and len(cameras) == 1 and right_topic is None
+    return (cameras[0], None) if is_single_camera else None
 
 
 def _undecided(types: Types, with_pictures: list[str], path: str) -> InputError:
+    """The error about topics that must be named."""
     if not with_pictures:
         return InputError(f"no pictures (Image or CompressedImage) in {path}; its topics: {_listed(types)}")
     return InputError(f"name the left and the right topic of {path}; with pictures: {', '.join(with_pictures)}")
 
 
 def _only_partner(left_topic: str, with_pictures: list[str]) -> str | None:
-    """The right topic of a left one; None where none or several fit."""
+    """The right topic for a left topic; None unless exactly one fits."""
     partners = [right for left, right in _pairs(with_pictures) if left == left_topic]
     return partners[0] if len(partners) == 1 else None
 
 
 def _pairs(with_pictures: list[str]) -> list[tuple[str, str]]:
-    """Topics of pictures whose names differ as left from right, each pair once."""
+    """The pairs of topics of pictures whose names differ only in left and right, without duplicates."""
     pairs = []
     for topic in with_pictures:
         if _contains(topic, NO_PICTURES):
@@ -129,7 +136,7 @@ def _contains(topic: str, words: tuple[str, ...]) -> bool:
 
 
 def _info_of(types: Types, picture_topic: str) -> str | None:
-    """The camera_info nearest to a topic of pictures, going up by its slashes."""
+    """The camera_info topic of a topic of pictures: the first one found in its namespace, or a parent of that."""
     parts = picture_topic.split("/")
     for end in range(len(parts), 0, -1):
         name = "/".join([*parts[:end], "camera_info"])
@@ -167,7 +174,7 @@ def _require(
     allowed: tuple[str, ...],
     path: str,
 ) -> None:
-    """Raise InputError unless a topic is there and has one of the allowed message types."""
+    """Raise InputError unless a topic exists and has one of the allowed message types."""
     if topic not in types:
         raise InputError(f"no topic {topic!r} in {path}; its topics: {_listed(types)}")
     if types[topic] not in allowed:

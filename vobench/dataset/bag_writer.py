@@ -1,4 +1,4 @@
-"""ROS 2 bags, written from sequences."""
+"""Writes sequences as ROS 2 bags."""
 
 import json
 from pathlib import Path
@@ -15,19 +15,19 @@ from vobench.sequence.bag import Bag
 from vobench.sequence.messages import TYPES
 
 TRUE_TF_STATIC = f"/ground_truth{ros.TF_STATIC.name}"
-VERSION: Final = 8  # of rosbag2's metadata; ROS 2 Iron and later read it
+VERSION: Final = 8  # the version of rosbag2's metadata, which ROS 2 Iron and later can read
 NOTE_NAMES = (ros.WHEELS_NOTE, ros.IMU_NOTE, ros.PROVENANCE_NOTE, ros.IMPORT_NOTE)
 ATTACHMENT_NAMES = (ros.CASE_ATTACHMENT, ros.NAMES_ATTACHMENT)
 
 
 def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
-    """Write every message of a sequence's two files, bit for bit; return notes on what was converted."""
-    del views  # a bag holds the pictures as they were recorded
+    """Write every message of a sequence's two files unchanged, and return notes on what was converted."""
+    del views  # a bag contains the pictures as recorded
     paths = [source.folder / name for name in (ros.SENSORS_FILE, ros.TRUTH_FILE)]
     paths = [path for path in paths if path.is_file()]
     true_mounts_differ = len({_mounts(path) for path in paths}) > 1
 
-    folder.rmdir()  # rosbags creates it
+    folder.rmdir()  # rosbags creates the folder
     writer = Writer(folder, version=VERSION, storage_plugin=StoragePlugin.MCAP)
     writer.set_compression(CompressionMode.STORAGE, CompressionFormat.ZSTD)
     for name, text in _custom_data(paths).items():
@@ -45,7 +45,7 @@ def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
 
 
 def _mounts(path: Path) -> tuple[bytes, ...]:
-    """The messages on /tf_static."""
+    """The messages on /tf_static, as bytes."""
     return tuple(bytes(data) for _, data in Bag.open(path).raw((ros.TF_STATIC,)))
 
 
@@ -64,8 +64,8 @@ def _custom_data(paths: list[Path]) -> dict[str, str]:
 
 
 def _copy(reader: AnyReader, writer: Writer, *, true_mounts_differ: bool) -> None:
-    """Copy every message at its time; the truth's /tf_static is renamed, or dropped where it repeats the sensors'."""
-    copies = {}  # connections of the new bag, by the id of the one that is copied
+    """Copy every message with its time. The /tf_static of the truth is renamed, or dropped if it is the same."""
+    copies = {}  # the connections of the new bag, by the id of the original connection
     for connection in reader.connections:
         name = _copied_name(connection, reader, true_mounts_differ=true_mounts_differ)
         if name is None or not connection.msgcount:
@@ -89,8 +89,8 @@ def _copied_name(
     *,
     true_mounts_differ: bool,
 ) -> str | None:
-    """A topic's name in the new bag; None for the truth's /tf_static where it repeats the sensors'."""
-    is_of_sensors = connection.owner is reader.connections[0].owner  # the sensors' file comes first
+    """The name of a topic in the new bag; None for the truth's /tf_static if it equals that of the sensors."""
+    is_of_sensors = connection.owner is reader.connections[0].owner  # the sensor file is the first one
     if connection.topic != ros.TF_STATIC.name or is_of_sensors:
         return connection.topic
     return TRUE_TF_STATIC if true_mounts_differ else None

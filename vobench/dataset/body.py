@@ -1,4 +1,4 @@
-"""Rigs whose cameras and IMU are mounted on another body."""
+"""Builds rigs from mounted cameras, and changes the body of a rig."""
 
 from dataclasses import dataclass, replace
 
@@ -9,7 +9,7 @@ from vobench.geometry.se3 import Array
 
 @dataclass(frozen=True, slots=True)
 class MountedCamera:
-    """A camera and where it is on the body."""
+    """A camera and its pose T_body_camera (4, 4)."""
 
     camera: Camera
     T_body_camera: Array
@@ -23,7 +23,7 @@ def mounted_rig(left: MountedCamera, right: MountedCamera | None = None) -> Rig:
 
 
 def on_body(rig: Rig, T_body_old: Array) -> Rig:
-    """A rig without wheels on another body, on which the old body is at T_body_old."""
+    """The same rig on another body. T_body_old (4, 4) is the pose of the old body. Wheels are dropped."""
     T_body_left = T_body_old @ rig.T_body_left
     T_body_right = None if rig.T_body_right is None else T_body_old @ rig.T_body_right
     imu = rig.imu

@@ -1,4 +1,4 @@
-"""Calibration files in YAML, parsed within bounds; sections of them are checked into frozen dataclasses by pydantic."""
+"""Reads calibration files in YAML, and checks their sections against frozen dataclasses."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -22,17 +22,20 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.setting import COMPLAINTS
 
-MOST_CHARACTERS = 1 << 16  # calibrations have a thousand or two
-OPENCV_HEAD = re.compile(r"\A%YAML:1\.0[^\n]*")  # the first line that OpenCV requires, and that YAML forbids
-MOST_BRACKETS = 500  # a camera has a dozen; the parser takes time by the square of their depth
-LONGEST_SHOWN = 120  # characters of a value in a message
-ROTATION_TOLERANCE = 1e-3  # of a printed rotation matrix
+MOST_CHARACTERS = 1 << 16  # a typical calibration file has 1000 to 2000 characters
+OPENCV_HEAD = re.compile(r"\A%YAML:1\.0[^\n]*")  # OpenCV requires this first line, which YAML forbids
+MOST_BRACKETS = 500  # a camera has about 12; the parser's time grows with the square of their nesting depth
+LONGEST_SHOWN = 120  # the largest number of characters of a value in a message
+ROTATION_TOLERANCE = 1e-3  # for the rounding errors of a printed rotation matrix
 
 Model = TypeVar("Model")
 
 
 def _rigid_transform(value: Any) -> Array:
-    """T (4, 4) of four rows, of 16 numbers, or of EuRoC's `data`; its rotation is projected onto SO(3)."""
+    """The transform T (4, 4) from four rows, from 16 numbers, or from a mapping with the key `data`, as in EuRoC.
+
+    Its rotation is projected onto SO(3).
+    """
     matrix = value.get("data") if isinstance(value, dict) else value
     try:
         cells = _numbers().validate_python(_flattened(matrix))
@@ -51,7 +54,7 @@ def _rigid_transform(value: Any) -> Array:
 
 
 def _flattened(matrix: Any) -> list[Any]:
-    """The cells of a matrix that is a list of rows, or of cells; empty for any other value."""
+    """The cells of a matrix that is given as a list of rows or as a list of cells; empty for any other value."""
     if not isinstance(matrix, list):
         return []
     cells: list[Any] = []
@@ -63,7 +66,7 @@ def _flattened(matrix: Any) -> list[Any]:
     return cells
 
 
-# The types of values in calibration files. They are strict: neither text nor true and false are read as numbers.
+# The types of values in calibration files. They are strict: a text, true or false is not accepted as a number.
 Text = Annotated[str, Strict()]
 Number = Annotated[float, Strict(), AllowInfNan(False), Gt(-1e300), Lt(1e300)]
 AboveZero = Annotated[Number, Gt(0)]
@@ -82,19 +85,19 @@ def _numbers() -> TypeAdapter[Numbers]:
 
 @dataclass(frozen=True, slots=True)
 class CalibrationFile:
-    """The keys and values of a YAML file."""
+    """The keys and values of a calibration file."""
 
     path: Path
     tree: Mapping[str, Any]
 
     def has(self, key: str) -> bool:
-        """Whether the file has a value, other than null, for a key at its top level."""
+        """Whether the file has a top-level key with a value other than null."""
         return self.tree.get(key) is not None
 
     def checked(self, kind: type[Model], section: str = "") -> Model:
-        """A dataclass filled from the keys of the file, or of one of its sections; other keys are ignored.
+        """The file, or one of its sections, as an instance of the dataclass `kind`. Keys that it lacks are ignored.
 
-        Raises InputError with the file, the key, the value seen and what would be right.
+        Raises InputError with the file, the key, the wrong value and what would be right.
         """
         if section and not self.has(section):
             raise self.missing(section, self.tree)
@@ -106,12 +109,12 @@ class CalibrationFile:
         return checked
 
     def missing(self, key: str, keys: Mapping[str, Any]) -> InputError:
-        """The error about a missing key, beside the keys that are present."""
+        """The error about a missing key of a section, which has the given keys."""
         present = _shortened(", ".join(map(str, keys)) or "none")
         return InputError(f"{self.path}: the key {key} is missing; the keys beside it are {present}")
 
     def _complaint(self, error: ValidationError, section: str) -> InputError:
-        """The first of pydantic's errors as a sentence: the file, the key, what would be right and the value seen."""
+        """The first of pydantic's errors as one sentence: the file, the key, what would be right and the value seen."""
         first = error.errors(include_url=False)[0]
         key_path = [section, *first["loc"]] if section else first["loc"]
         key = ".".join(map(str, key_path))
@@ -123,7 +126,7 @@ class CalibrationFile:
         return InputError(f"{self.path}: {key} {wanted}, but is {shown(first['input'])}")
 
 
-# The complaint for each of pydantic's types of error; {} is filled in from the context of the error.
+# The complaint for each of pydantic's error types. The fields in braces are filled in from the context of the error.
 WORDS = {
     **COMPLAINTS,
     "float_type": "should be a finite number",
@@ -139,7 +142,7 @@ WORDS = {
 
 
 def read_yaml(path: Path) -> CalibrationFile:
-    """A YAML 1.2 file with keys and values. Raises InputError, with line and column where they are known."""
+    """Read a YAML 1.2 file. Raises InputError with the line and column, if they are known."""
     text = OPENCV_HEAD.sub("", read_text(path), count=1)
     if len(text) > MOST_CHARACTERS:
         raise InputError(f"a calibration should have at most {MOST_CHARACTERS} characters, not {len(text)}: {path}")
@@ -156,7 +159,7 @@ def read_yaml(path: Path) -> CalibrationFile:
         raise InputError(f"{place}: not valid YAML: {_one_line(error.problem or error)}") from None
     except InputError:
         raise
-    except Exception as error:  # malformed text makes the parser raise errors of many kinds
+    except Exception as error:  # the parser raises many types of errors for malformed text
         raise InputError(f"{path}: not valid YAML: {type(error).__name__} {_one_line(error)}") from None
 
     if not isinstance(tree, dict):
@@ -165,7 +168,7 @@ def read_yaml(path: Path) -> CalibrationFile:
 
 
 def _refuse_aliases(text: str, path: Path) -> None:
-    """Raise InputError for an alias: a few nested ones stand for more than fits into memory."""
+    """Raise InputError for an alias, because a few nested aliases can expand to more than fits into memory."""
     for event in YAML(typ="safe", pure=True).parse(text):
         if isinstance(event, AliasEvent):
             line = event.start_mark.line + 1
@@ -173,12 +176,13 @@ def _refuse_aliases(text: str, path: Path) -> None:
 
 
 def _one_line(error: object) -> str:
+    """The text of an error as one line, shortened."""
     words = str(error).split()
     return " ".join(words)[:200]
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it, shortened."""
+    """A value as it is shown in a message, shortened."""
     return "nothing" if value is None else _shortened(repr(value))
 
 

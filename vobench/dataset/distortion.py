@@ -1,16 +1,16 @@
-"""Pinholes with lens distortion, by the names that Kalibr, EuRoC and ROS give its models."""
+"""Creates cameras from the names that Kalibr, EuRoC and ROS give to distortion models."""
 
 from collections.abc import Sequence
 
 from vobench.errors import InputError
 from vobench.geometry.camera import BrownConrady, Camera, KannalaBrandt, Pinhole
 
-# Names of each distortion model, in small letters.
+# The names of each distortion model, in lower case.
 RADTAN_NAMES = ("radtan", "radial-tangential", "plumb_bob", "rational_polynomial")
 EQUIDISTANT_NAMES = ("equidistant", "equi", "fisheye", "kannala_brandt")
 NO_DISTORTION_NAMES = ("none", "")
 
-RADTAN_COUNTS = (4, 5, 8, 12, 14)  # of coefficients in OpenCV's order; those behind the fifth have to be 0
+RADTAN_COUNTS = (4, 5, 8, 12, 14)  # the numbers of coefficients in OpenCV; those after the fifth must be 0
 RADTAN_USED = 5  # k1, k2, p1, p2, k3
 EQUIDISTANT_COUNT = 4
 
@@ -23,7 +23,10 @@ def focal_camera(
     *,
     place: str,
 ) -> Camera:
-    """The camera of fx, fy, cx, cy and a distortion model by any of its names. Raises InputError naming `place`."""
+    """The camera with fx, fy, cx, cy and a distortion model, given by any of its names.
+
+    Raises InputError, whose message begins with `place`.
+    """
     if len(focal_px) != 4 or not all(focal > 0 for focal in focal_px[:2]):
         actual = list(focal_px)
         raise InputError(f"{place}: a camera should have fx, fy, cx, cy with fx and fy above 0, but has {actual}")

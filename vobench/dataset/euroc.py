@@ -1,4 +1,4 @@
-"""The ASL layout of EuRoC and TUM-VI, read and written."""
+"""Reads and writes recordings in the ASL layout of EuRoC and TUM-VI."""
 
 from dataclasses import dataclass, replace
 from functools import partial
@@ -30,16 +30,16 @@ CAMERAS = ("cam0", "cam1")
 IMU = "imu0"
 SENSOR = "sensor.yaml"
 DATA = "data.csv"
-# In order of trust: the batch estimate, TUM-VI's poses of the IMU, and a tracker's of its marker.
+# By decreasing accuracy: the batch estimate, TUM-VI's poses of the IMU, and a motion tracker's poses of its marker.
 TRUTHS = ("state_groundtruth_estimate0", "mocap0", "vicon0")
 POSITIONS = "leica0"
-BASE = "base_link"  # a folder of vobench's exports, with the mount of vobench's body on the IMU
+BASE = "base_link"  # the folder in an export of vobench with the pose of its body on the IMU
 IMU_COLUMNS = ("t", "wx", "wy", "wz", "ax", "ay", "az")
 
 
 @dataclass(frozen=True, slots=True)
 class SensorYamlCamera:
-    """The sensor.yaml of a camera."""
+    """The keys of a camera's sensor.yaml."""
 
     camera_model: Text
     resolution: Resolution
@@ -51,7 +51,7 @@ class SensorYamlCamera:
 
 @dataclass(frozen=True, slots=True)
 class SensorYamlImu:
-    """The keys of an IMU's sensor.yaml besides the densities of its noise."""
+    """The keys of an IMU's sensor.yaml, except the noise densities."""
 
     rate_hz: AboveZero
     T_BS: RigidTransform
@@ -59,13 +59,13 @@ class SensorYamlImu:
 
 @dataclass(frozen=True, slots=True)
 class SensorYamlMount:
-    """The key of any sensor.yaml that says where the sensor is on the body; None where it does not say."""
+    """The key of a sensor.yaml with the pose of the sensor on the body; None if it is missing."""
 
     T_BS: RigidTransform | None = None
 
 
 def sensor_camera(path: Path) -> MountedCamera:
-    """The camera of a sensor.yaml. Raises InputError."""
+    """The camera that a sensor.yaml describes. Raises InputError."""
     file = read_yaml(path)
     sensor = file.checked(SensorYamlCamera)
     width, height = sensor.resolution
@@ -86,11 +86,14 @@ def sensor_camera(path: Path) -> MountedCamera:
 
 
 def read_imu_csv(path: Path) -> ImuReadings:
-    """An IMU's `t, wx, wy, wz, ax, ay, az` in ns, rad/s and m/s². Raises TrajectoryError naming file and line."""
+    """The IMU readings in a csv file with rows `t, wx, wy, wz, ax, ay, az`, in ns, rad/s and m/s².
+
+    Raises TrajectoryError with file and line.
+    """
     rows = content(read_text(path))
     if rows:
         first_cell = rows[0][1].partition(",")[0].strip()
-        has_header = not NUMBER.fullmatch(first_cell)  # one that does not begin with #
+        has_header = not NUMBER.fullmatch(first_cell)  # a header that does not begin with #
         if has_header:
             rows = rows[1:]
     if not rows:
@@ -108,7 +111,7 @@ def read_imu_csv(path: Path) -> ImuReadings:
 
 
 def sensor_mount(folder: Path) -> Array | None:
-    """T_body_sensor by the sensor.yaml of a folder; None where it does not say. Raises InputError."""
+    """T_body_sensor from the sensor.yaml in a folder; None if it does not contain the pose. Raises InputError."""
     path = folder / SENSOR
     if not path.is_file():
         return None
@@ -142,7 +145,7 @@ def read_euroc(
     *,
     form: str = "euroc",
 ) -> Recording:
-    """The recording of a folder with mav0/, or of that folder; the body is the IMU. Raises InputError."""
+    """The recording in a folder mav0, or in the folder that contains it. The body is the IMU. Raises InputError."""
     root = folder / MAV if (folder / MAV).is_dir() else folder
     cameras, picture_notes = _pictures(root, options)
     t_ns = cameras[0].t_ns
@@ -155,7 +158,7 @@ def read_euroc(
     T_imu_base = sensor_mount(root / BASE)
     body_note = "The body is the IMU."
     if T_imu_base is not None:
-        # The recording was exported by vobench: its body is the one that it had before.
+        # The recording was exported by vobench, so the original body is restored.
         rig = on_body(rig, se3.inverse(T_imu_base))
         truth = truth.of_mounted(T_imu_base) if truth else None
         body_note = f"The body is {BASE}, as its sensor.yaml places it."
@@ -192,7 +195,7 @@ def _cameras_on_imu(
     count: int,
     options: ReadOptions,
 ) -> CalibratedRig:
-    """The cameras on the IMU: by the chain of the options, by every sensor.yaml, or by a chain in the folder."""
+    """The cameras on the IMU, from the Kalibr file in the options, the sensor.yaml files, or a Kalibr file there."""
     sensors = [root / name / SENSOR for name in CAMERAS[:count]]
     missing = [path for path in sensors if not path.is_file()]
     chain = options.calibration
@@ -248,7 +251,7 @@ def _truth(
 
 
 def _tracked(folder: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
-    """A tracker's poses, moved to the body from the frame that it tracks, where its sensor.yaml says where that is."""
+    """The poses of a motion tracker, and notes. They are moved from its marker to the body if its pose is known."""
     truth, file_notes = read_truth_file(folder / DATA, frames_ns)
     T_body_tracked = sensor_mount(folder)
     if T_body_tracked is None:
@@ -265,7 +268,7 @@ def _tracked(folder: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
     return truth, (*notes, *file_notes)
 
 
-# EuRoC's names of Kalibr's distortion models.
+# The names in EuRoC of Kalibr's distortion models.
 DISTORTION_MODELS = {
     kalibr.RADTAN: "radial-tangential",
     kalibr.EQUIDISTANT: "equidistant",
@@ -278,13 +281,13 @@ IMU_HEADER = (
 
 
 def write_euroc(source: ExportSource, views: Views, folder: Path) -> list[str]:
-    """Write mav0 into a folder; return notes on what was converted.
+    """Write the folder mav0, and return notes on what was converted.
 
-    Raises SequenceError for a camera that sees all around.
+    Raises SequenceError for an equirectangular camera.
     """
     mav = folder / MAV
     rig = views.rig
-    T_base_body = rig.imu.T_body_imu if rig.imu else np.eye(4)  # base_link is vobench's body, the IMU EuRoC's
+    T_base_body = rig.imu.T_body_imu if rig.imu else np.eye(4)  # base_link is vobench's body, and the IMU is EuRoC's
     T_body_base = se3.inverse(T_base_body)
     stamps = _write_pictures(source, views, mav)
     rate = rate_hz(stamps)
@@ -362,7 +365,7 @@ def _write_imu(source: ExportSource, imu: ImuCalibration, mav: Path) -> list[str
 def _write_truth(source: ExportSource, T_base_body: Array, mav: Path) -> list[str]:
     if source.truth is None:
         return ["No truth was recorded, so there is no state_groundtruth_estimate0."]
-    columns = None  # behind the pose
+    columns = None  # the columns after the pose
     if source.twist is None:
         note = "No velocities were recorded, so the truth's rows end after the pose."
     else:
@@ -378,23 +381,23 @@ def _write_truth(source: ExportSource, T_base_body: Array, mav: Path) -> list[st
 
 
 def point_velocity(truth: Trajectory, twist: Array, lever_m: Array) -> Array:
-    """Velocities (N, 3) in the world of the point at `lever_m` on the body, of its twist (N, 6)."""
+    """The velocities (N, 3) in the world of the point `lever_m` (3,) on a body with twist (N, 6)."""
     linear_mps = twist[:, :3]
     angular_radps = twist[:, 3:]
-    point_mps = linear_mps + np.cross(angular_radps, lever_m)  # body axes
+    point_mps = linear_mps + np.cross(angular_radps, lever_m)  # in the axes of the body
     R_world_body = truth.T_world_frame[:, :3, :3]
     velocities_mps: Array = np.einsum("nij,nj->ni", R_world_body, point_mps)
     return velocities_mps
 
 
 def _biases(source: ExportSource) -> tuple[list[Array], str]:
-    """Biases (N, 6) at the truth's stamps, where there are some, and the note on them."""
+    """The biases (N, 6) at the stamps of the truth, if they were recorded, and a note on them."""
     bias = source.bias
     truth = source.truth
     if bias is None or truth is None:
         return [], "No biases of an IMU were recorded, so the truth's rows end after the velocity."
     values = np.hstack([bias.gyro_radps, bias.accel_mps2])
-    start_ns = bias.t_ns[0]  # float64 would round the stamps themselves
+    start_ns = bias.t_ns[0]  # times are relative to it, because float64 would round absolute stamps
     truth_ns = truth.t_ns - start_ns
     bias_ns = bias.t_ns - start_ns
     columns = [np.interp(truth_ns, bias_ns, column) for column in values.T]

@@ -1,4 +1,4 @@
-"""A sequence exported in the layout of a dataset, with its calibration, and read back before it gets its name."""
+"""Exports sequences in the layouts of datasets, and verifies each export by reading it."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -40,9 +40,9 @@ def export_trajectory(
     path: Path,
     form: str,
 ) -> tuple[Path, ...]:
-    """Write a trajectory, exactly, as one file, or two in KITTI's form; return their paths.
+    """Write a trajectory without loss as one file, or as two files in KITTI's form, and return their paths.
 
-    Raises InputError for an unknown form, and for a file that exists.
+    Raises InputError for an unknown form, or if a file exists.
     """
     if form not in TRAJECTORY_TEXTS:
         raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
@@ -72,7 +72,7 @@ NOMINAL = (
 
 @dataclass(frozen=True, slots=True)
 class Exported:
-    """An export: sentences on everything that was converted or left out, and the files, relative to `folder`."""
+    """An export: its files, relative to `folder`, and notes on everything that was converted or omitted."""
 
     folder: Path
     form: str
@@ -81,9 +81,9 @@ class Exported:
 
 
 def export(sequence: Path, out: Path, form: str) -> Exported:
-    """Write a sequence in another form into a new folder, and compare it, read back, with the sequence.
+    """Export a sequence in another form to a new folder, and verify it by reading it.
 
-    Raises InputError for a folder or a form that can't be used, SequenceError where reading back gives something else.
+    Raises InputError for an invalid folder or form, and SequenceError if the export differs from the sequence.
     """
     layout = writable().get(form)
     if layout is None:
@@ -109,7 +109,7 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
 
 @contextmanager
 def _building(out: Path) -> Iterator[Path]:
-    """A folder to fill, which gets its name when the context ends without an error, and is removed after one."""
+    """A folder to fill. At the end of the block it is renamed to `out`, or removed if there is an error."""
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
         part = Path(mkdtemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part"))
@@ -125,7 +125,7 @@ def _building(out: Path) -> Iterator[Path]:
 
 
 def write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:
-    """Write Kalibr's files of a rig into a folder; return notes on what they cannot hold."""
+    """Write the Kalibr files of a rig to a folder, and return notes on what they cannot represent."""
     *image_topics, imu_topic = layout.topics
     notes = kalibr.remarks(rig)
     try:
@@ -141,7 +141,7 @@ def write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:
 
 
 def _left_out(source: ExportSource, layout: Writing) -> list[str]:
-    """Sentences on what the sequence has and the layout has not."""
+    """Notes on the parts of the sequence that the layout cannot represent."""
     if layout.keeps is None:
         return []
     notes = []
@@ -163,7 +163,7 @@ def _left_out(source: ExportSource, layout: Writing) -> list[str]:
 
 
 def _has_true_calibration(source: ExportSource) -> bool:
-    """Whether the nominal calibration of the cameras is the one that the pictures were made with."""
+    """Whether the nominal calibration of the cameras is the true one."""
     nominal = source.rig
     true = source.true_rig
     for side in nominal.sides:
@@ -180,7 +180,7 @@ def _check_read_back(
     form: str,
     folder: Path,
 ) -> None:
-    """Read the export and compare rig, chain and path with what was exported. Raises SequenceError."""
+    """Read the export, and compare its rig, Kalibr files and trajectory with the sequence. Raises SequenceError."""
     recording = read(folder, form=form)
     what = f"the {form} folder, read back,"
     check_rig(what, views.rig, recording.rig)
@@ -205,7 +205,7 @@ def _expected_path(
     stamps: Stamps,
     layout: Writing,
 ) -> Trajectory | None:
-    """The left camera's path as the form should give it, cut to the pictures' time as readers do."""
+    """The trajectory of the left camera that reading the export should give, cut to the time of the pictures."""
     if source.truth is None:
         return None
     if layout.path:

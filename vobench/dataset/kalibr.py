@@ -1,4 +1,4 @@
-"""Kalibr's calibration files, written and read: camera chains (camchain.yaml) and IMUs (imu.yaml)."""
+"""Reads and writes the calibration files of Kalibr: camera chains (camchain.yaml) and IMUs (imu.yaml)."""
 
 import re
 from collections.abc import Mapping
@@ -28,7 +28,7 @@ from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirect
 from vobench.geometry.rig import ImuCalibration, Rig
 from vobench.geometry.se3 import Array
 
-# Kalibr's names of camera and distortion models.
+# The names of camera and distortion models in Kalibr.
 PINHOLE = "pinhole"
 DOUBLE_SPHERE = "ds"
 RADTAN = "radtan"
@@ -39,7 +39,7 @@ RADTAN_TERMS = ("k1", "k2", "p1", "p2")
 EQUIRECTANGULAR_UNSUPPORTED = (
     "neither Kalibr nor EuRoC has a camera model for a camera that sees all around (the form ros2 keeps it)"
 )
-# Keys of imu.yaml by the fields of ImuCalibration.
+# The keys of imu.yaml by the fields of ImuCalibration.
 DENSITIES = {
     "accel_noise": "accelerometer_noise_density",
     "accel_walk": "accelerometer_random_walk",
@@ -50,7 +50,7 @@ DEFAULT_TOPICS = ("/cam0/image_raw", "/cam1/image_raw")
 
 
 def remarks(rig: Rig) -> list[str]:
-    """Sentences on what Kalibr itself would not read in a rig's camchain."""
+    """Notes on the parts of a rig's camchain.yaml that Kalibr itself cannot read."""
     cameras = [rig.camera(side) for side in rig.sides]
     k3 = [camera.k3 for camera in cameras if isinstance(camera, BrownConrady)]
     if not any(k3):
@@ -60,9 +60,9 @@ def remarks(rig: Rig) -> list[str]:
 
 
 def number(value: float) -> str:
-    """A float with every digit and a decimal point.
+    """A float with all digits and a decimal point.
 
-    Kalibr reads YAML with PyYAML, which takes 1e-05 for text and 1.0e-05 for a number.
+    Kalibr reads YAML with PyYAML, which reads 1e-05 as text and 1.0e-05 as a number.
     """
     text = repr(float(value))
     mantissa, e, exponent = text.partition("e")
@@ -79,7 +79,10 @@ def numbers(values: ArrayLike) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Intrinsics:
-    """A camera in Kalibr's terms: models by name, and the numbers of each; k3 comes last where it is not 0."""
+    """A camera in the terms of Kalibr: the names and the numbers of its camera and distortion models.
+
+    k3 is the last coefficient, if it is not 0.
+    """
 
     camera_model: str
     intrinsics: Array
@@ -88,7 +91,7 @@ class Intrinsics:
 
 
 def intrinsics(camera: Camera) -> Intrinsics:
-    """A camera in Kalibr's terms. Raises SequenceError for a camera that sees all around."""
+    """A camera in the terms of Kalibr. Raises SequenceError for an equirectangular camera."""
     if isinstance(camera, Equirectangular):
         raise SequenceError(EQUIRECTANGULAR_UNSUPPORTED)
     if isinstance(camera, DoubleSphere):
@@ -110,7 +113,7 @@ def intrinsics(camera: Camera) -> Intrinsics:
 
 
 def camchain(rig: Rig, topics: tuple[str, ...] = DEFAULT_TOPICS) -> str:
-    """The camchain.yaml of a rig. Raises SequenceError for a camera that sees all around."""
+    """The camchain.yaml of a rig. Raises SequenceError for an equirectangular camera."""
     entries = [_chain_entry(rig, index, topics[index]) for index in range(len(rig.sides))]
     return "".join(entries)
 
@@ -147,7 +150,7 @@ def _matrix_lines(name: str, T: Array) -> list[str]:
 
 
 def imu_yaml(imu: ImuCalibration, *, topic: str) -> str:
-    """The imu.yaml of an IMU, without its mount. Raises InputError for a number that Kalibr refuses, 0 or less."""
+    """The imu.yaml of an IMU, without its pose. Raises InputError for a number that is not positive."""
     entries = {"update_rate": imu.rate_hz}
     for field, key in DENSITIES.items():
         entries[key] = getattr(imu, field)
@@ -160,7 +163,7 @@ def imu_yaml(imu: ImuCalibration, *, topic: str) -> str:
 
 @dataclass(frozen=True, slots=True)
 class ChainCamera:
-    """One camera's section of a camchain.yaml: what every camera model needs, and where the camera is."""
+    """The section of a camera in a camchain.yaml: the keys that every camera model needs, and its pose."""
 
     camera_model: Text
     intrinsics: Numbers
@@ -172,7 +175,7 @@ class ChainCamera:
 
 @dataclass(frozen=True, slots=True)
 class ChainDistortion:
-    """The keys that the section of a pinhole has in addition."""
+    """The additional keys in the section of a pinhole camera."""
 
     distortion_coeffs: Numbers
     distortion_model: Text
@@ -180,7 +183,7 @@ class ChainDistortion:
 
 @dataclass(frozen=True, slots=True)
 class ImuDensities:
-    """The noise of an IMU, under the names that Kalibr and EuRoC share; the units are those of ImuCalibration."""
+    """The noise of an IMU, with the keys of Kalibr and EuRoC. The units are those of ImuCalibration."""
 
     accelerometer_noise_density: ZeroOrMore
     accelerometer_random_walk: ZeroOrMore
@@ -207,13 +210,13 @@ class ImuRate:
 
 
 def read_camchain(path: Path) -> Rig:
-    """The rig of a camchain.yaml; the body is the IMU, or cam0 where the chain has no IMU. Raises InputError."""
+    """The rig in a camchain.yaml. The body is the IMU, or cam0 if the file has no IMU. Raises InputError."""
     file = read_yaml(path)
     return _chain_rig(file, cameras_of(file))
 
 
 def cameras_of(file: CalibrationFile) -> Mapping[str, ChainCamera]:
-    """The sections cam0 and, where there is one, cam1 of a camchain.yaml. Raises InputError."""
+    """The sections cam0 and, if it exists, cam1 of a camchain.yaml. Raises InputError."""
     names = ("cam0", "cam1") if file.has("cam1") else ("cam0",)
     return {name: file.checked(ChainCamera, name) for name in names}
 
@@ -256,7 +259,10 @@ def _camera(file: CalibrationFile, name: str, entry: ChainCamera) -> Camera:
 
 
 def read_imu(path: Path, T_body_imu: Array) -> ImuCalibration:
-    """The IMU of an imu.yaml, flat as Kalibr takes it or under `imu0` as it gives it. Raises InputError."""
+    """The IMU in an imu.yaml: with top-level keys, as Kalibr reads it, or below `imu0`, as Kalibr writes it.
+
+    Raises InputError.
+    """
     file = read_yaml(path)
     section = "imu0" if file.has("imu0") else ""
     rate = file.checked(ImuRate, section)
@@ -265,18 +271,18 @@ def read_imu(path: Path, T_body_imu: Array) -> ImuCalibration:
 
 
 def read_pair(path: Path) -> Rig:
-    """The pair of a camchain.yaml alone; the body is the left camera. Raises InputError."""
+    """The stereo pair in a camchain.yaml, without its IMU. The body is the left camera. Raises InputError."""
     rig, _ = chain_rig(path, 2, np.eye(4))
     return rig
 
 
 CHAIN_NAME = re.compile(r".*camchain.*\.ya?ml")
 IMU_NAMES = ("imu.yaml", "imu_config.yaml", "imu0.yaml")
-SEARCHED_FOLDERS = (".", "dso", "mav0")  # of a dataset, that Kalibr's files may lie in
+SEARCHED_FOLDERS = (".", "dso", "mav0")  # the folders of a dataset that may contain Kalibr's files
 
 
 def find_chain(folder: Path, options: ReadOptions) -> Path | None:
-    """The camera chain that the options name, or else the only one in a dataset's folder. Raises InputError."""
+    """The camchain.yaml in the options, or otherwise the only one in the folder of a dataset. Raises InputError."""
     if options.calibration is not None:
         return options.calibration
     chains = []
@@ -289,7 +295,7 @@ def find_chain(folder: Path, options: ReadOptions) -> Path | None:
 
 
 def find_imu(folder: Path, options: ReadOptions) -> Path | None:
-    """Kalibr's imu.yaml that the options name, or else the first one in a dataset's folder."""
+    """The imu.yaml in the options, or otherwise the first one in the folder of a dataset."""
     if options.imu is not None:
         return options.imu
     for searched in SEARCHED_FOLDERS:
@@ -301,7 +307,7 @@ def find_imu(folder: Path, options: ReadOptions) -> Path | None:
 
 
 def chain_has_imu(path: Path) -> bool:
-    """Whether a camchain.yaml says where the left camera is on an IMU. Raises InputError."""
+    """Whether a camchain.yaml contains the pose of the left camera relative to an IMU. Raises InputError."""
     cameras = cameras_of(read_yaml(path))
     return cameras["cam0"].T_cam_imu is not None
 
@@ -311,9 +317,9 @@ def chain_rig(
     cameras: int,
     T_body_left: Array | None,
 ) -> tuple[Rig, tuple[str, ...]]:
-    """The rig of the first one or two cameras of a camchain.yaml, and the notes on it.
+    """The rig of the first one or two cameras in a camchain.yaml, and notes on it.
 
-    The left camera is placed at T_body_left; without one, the body is the IMU of the chain. Raises InputError.
+    T_body_left is the pose of the left camera. Without it, the body is the IMU of the file. Raises InputError.
     """
     file = read_yaml(path)
     if cameras > 1 and not file.has("cam1"):
@@ -340,5 +346,5 @@ def chain_rig(
 
 
 def no_calibration(expected: Path) -> InputError:
-    """The error that there is no calibration, with the file that was expected."""
+    """The error about a missing calibration, with the file that was expected."""
     return InputError(f"the calibration is missing; name a camchain.yaml of Kalibr's or put it here: {expected}")

@@ -1,4 +1,4 @@
-"""The layout of KITTI's odometry benchmark, read and written."""
+"""Reads and writes recordings in the layout of KITTI's odometry benchmark."""
 
 from pathlib import Path
 
@@ -33,9 +33,9 @@ TRUTH = (
     "of the left grey camera; its world is that camera at the start, turned from "
     "x right, y down, z ahead to x ahead, y left, z up."
 )
-FIRST_SIZE_PX = (1241, 376)  # of sequences 00 to 02
-MOST_OFF_CENTER = 0.1  # of the picture's size
-SKEW_TOLERANCE = 1e-6  # of the zeros below K's diagonal, which KITTI prints with seven digits
+FIRST_SIZE_PX = (1241, 376)  # the pictures of sequences 00 to 02
+MOST_OFF_CENTER = 0.1  # the largest distance of the principal point from the centre, as a share of the picture's size
+SKEW_TOLERANCE = 1e-6  # the largest deviation of an element that should be 0 or 1; KITTI prints seven digits
 
 
 def _is_kitti(folder: Path) -> bool:
@@ -43,7 +43,10 @@ def _is_kitti(folder: Path) -> bool:
 
 
 def read_kitti(folder: Path, options: ReadOptions) -> Recording:
-    """A folder such as sequences/00; the body is the camera of image_0, its axes ahead, left, up. Raises InputError."""
+    """Read a folder such as sequences/00. Raises InputError.
+
+    The frame of the body has its origin in the camera of image_0; x points ahead, y left and z up.
+    """
     names, pair_notes = _pair(folder)
     cameras = numbered(*(folder / name for name in names))
     times = folder / TIMES
@@ -55,9 +58,9 @@ def read_kitti(folder: Path, options: ReadOptions) -> Recording:
 
     root = folder.absolute()
     poses_name = f"{root.name}.txt"
-    beside = [root / POSES, root / poses_name]
-    beside += [parent / "poses" / poses_name for parent in root.parents[:2]]
-    truth, truth_notes = truth_file(options, beside, t_ns, TRUTH, T_BODY_GREY)
+    truth_paths = [root / POSES, root / poses_name]
+    truth_paths += [parent / "poses" / poses_name for parent in root.parents[:2]]
+    truth, truth_notes = truth_file(options, truth_paths, t_ns, TRUTH, T_BODY_GREY)
 
     notes = ["The body is the left grey camera, x ahead, y left, z up."]
     notes += [*pair_notes, *calibration.notes, *truth_notes]
@@ -66,23 +69,27 @@ def read_kitti(folder: Path, options: ReadOptions) -> Recording:
 
 
 def _pair(folder: Path) -> tuple[tuple[str, ...], Notes]:
-    """The folders of the cameras, and a note: pairs come before single cameras, grey ones before colour ones."""
+    """The folders of the cameras that are used, and notes on them.
+
+    A pair is preferred to a single camera, and grey cameras are preferred to colour cameras.
+    """
     names = [*GREY_PAIR, *COLOUR_PAIR]
     present = [name for name in names if (folder / name).is_dir()]
     for pair in PAIRS:
         if set(pair) <= set(present):
-            return pair, _dropped(present, pair)
+            return pair, _note_on_unused(present, pair)
     for left, _ in PAIRS:
         if left in present:
-            return (left,), (f"There is one camera: {left} has no partner.", *_dropped(present, (left,)))
-    wanted = " or ".join(" and ".join(pair) for pair in PAIRS)
-    raise InputError(f"no folders {wanted} with pictures in {folder}")
+            note = f"There is one camera: {left} has no partner."
+            return (left,), (note, *_note_on_unused(present, (left,)))
+    pair_phrases = [" and ".join(pair) for pair in PAIRS]
+    raise InputError(f"no folders {' or '.join(pair_phrases)} with pictures in {folder}")
 
 
-def _dropped(present: list[str], used: tuple[str, ...]) -> Notes:
-    """The note on the folders of cameras that are not used; none where all are."""
-    others = [name for name in present if name not in used]
-    return (f"The pictures of {' and '.join(others)} were dropped.",) if others else ()
+def _note_on_unused(present: list[str], used: tuple[str, ...]) -> Notes:
+    """A note on the camera folders that are present but not used; empty if all are used."""
+    unused = [name for name in present if name not in used]
+    return (f"The pictures of {' and '.join(unused)} were dropped.",) if unused else ()
 
 
 def _calibrated_rig(
@@ -91,7 +98,10 @@ def _calibrated_rig(
     size_px: tuple[int, int],
     options: ReadOptions,
 ) -> CalibratedRig:
-    """The cameras by Kalibr's chain, where the options name one, or by calib.txt, which has no picture's size."""
+    """The calibration of the cameras, from the Kalibr file that the options name or otherwise from calib.txt.
+
+    `size_px` is the size of the pictures, which calib.txt does not contain.
+    """
     if options.calibration is not None:
         rig, notes = chain_rig(options.calibration, len(names), T_BODY_GREY)
         return CalibratedRig(rig, str(options.calibration), notes)
@@ -100,29 +110,30 @@ def _calibrated_rig(
         raise no_calibration(path)
 
     matrices = read_calibration(path)
-    needed = [_matrix_name(name) for name in names]
-    for matrix, name in zip(needed, names, strict=True):
-        if matrix not in matrices:
-            raise InputError(f"{path}: no matrix {matrix}, which is that of {name}")
-    rig = on_body(_rig(path, matrices, needed, size_px), T_BODY_GREY)
-    others = [name for name in matrices if name not in needed]
-    notes = (f"{', '.join(others)} of {CALIBRATION} were not used.",) if others else ()
+    matrix_names = [_matrix_name(folder_name) for folder_name in names]
+    for matrix_name, folder_name in zip(matrix_names, names, strict=True):
+        if matrix_name not in matrices:
+            raise InputError(f"{path}: no matrix {matrix_name}, which is that of {folder_name}")
+    rig = on_body(_rig(path, matrices, matrix_names, size_px), T_BODY_GREY)
+    unused = [name for name in matrices if name not in matrix_names]
+    notes = (f"{', '.join(unused)} of {CALIBRATION} were not used.",) if unused else ()
     return CalibratedRig(rig, str(path), notes)
 
 
 def _matrix_name(folder_name: str) -> str:
-    """The name in calib.txt of the matrix of a folder's camera: P0 of image_0."""
+    """The name in calib.txt of the projection matrix of a camera; image_0 has P0."""
     return f"P{folder_name[-1]}"
 
 
 def read_pair(path: Path, size_px: tuple[int, int] | None = None) -> Rig:
-    """The pair of a calib.txt: P0 and P1 if there are both, else P2 and P3; the body is the camera of P0.
+    """The stereo pair in a calib.txt: P0 and P1 if it has both, otherwise P2 and P3. The body is the camera of P0.
 
-    Without a size, that of KITTI's first sequences is used. Raises InputError, also if the camera contradicts it.
+    Without `size_px`, pictures have the size of KITTI's first sequences.
+    Raises InputError if the file is not valid, or if its principal point does not fit the assumed size.
     """
     matrices = read_calibration(path)
-    needed = _matrix_pair(path, matrices)
-    rig = _rig(path, matrices, needed, size_px or FIRST_SIZE_PX)
+    matrix_names = _matrix_pair(path, matrices)
+    rig = _rig(path, matrices, matrix_names, size_px or FIRST_SIZE_PX)
     if size_px is not None:
         return rig
     center_px = rig.left.K[:2, 2]
@@ -130,19 +141,20 @@ def read_pair(path: Path, size_px: tuple[int, int] | None = None) -> Rig:
     if off_center > MOST_OFF_CENTER:
         width, height = FIRST_SIZE_PX
         raise InputError(
-            f"{path}: {needed[0]} has its centre at {center_px.tolist()}, so pictures are not {width} x "
+            f"{path}: {matrix_names[0]} has its principal point at {center_px.tolist()}, so pictures are not {width} x "
             f"{height} as KITTI's are; give size_px"
         )
     return rig
 
 
 def _matrix_pair(path: Path, matrices: dict[str, Array]) -> list[str]:
+    """The names of the matrices of the preferred pair. Raises InputError if there is no pair."""
     for pair in PAIRS:
-        names = [_matrix_name(folder_name) for folder_name in pair]
-        if matrices.keys() >= set(names):
-            return names
+        matrix_names = [_matrix_name(folder_name) for folder_name in pair]
+        if matrices.keys() >= set(matrix_names):
+            return matrix_names
     present = ", ".join(matrices) or "none"
-    raise InputError(f"{path}: a pair needs P0 and P1, or P2 and P3; the matrices there are {present}")
+    raise InputError(f"{path}: a pair needs P0 and P1, or P2 and P3; the file has {present}")
 
 
 def _rig(
@@ -156,7 +168,7 @@ def _rig(
 
 
 def read_calibration(path: Path) -> dict[str, Array]:
-    """The matrices (3, 4) of calib.txt by name. Raises InputError that names an invalid line."""
+    """The matrices (3, 4) of a calib.txt by name. Raises InputError with the number of an invalid line."""
     lines_by_name: dict[str, int] = {}
     rows = []
     for line, body in content(read_text(path)):
@@ -181,10 +193,10 @@ def _camera(
     size_px: tuple[int, int],
     place: str,
 ) -> MountedCamera:
-    """The camera of P = K [1 | t], mounted on a body; P projects points in the axes of that body."""
+    """The camera with the projection matrix P = K [1 | t] (3, 4), which projects points in the frame of the body."""
     K = P[:, :3]
     below_diagonal = [*K[1:, 0], K[2, 1]]
-    deviations = np.abs([K[0, 1], *below_diagonal, K[2, 2] - 1])  # from fx 0 cx / 0 fy cy / 0 0 1
+    deviations = np.abs([K[0, 1], *below_diagonal, K[2, 2] - 1])  # from the form fx 0 cx / 0 fy cy / 0 0 1
     is_rectified = deviations.max() <= SKEW_TOLERANCE
     has_focal_lengths = K[0, 0] > 0 and K[1, 1] > 0
     if not (is_rectified and has_focal_lengths):
@@ -195,8 +207,8 @@ def _camera(
 
 
 def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
-    """Write pictures, calibration, times and poses into a folder; return notes on what was converted."""
-    is_exported = _covered(source)
+    """Write pictures, calibration, times and poses to a folder, and return notes on what was converted."""
+    is_exported = _is_exported(source)
     stamps = _exported_stamps(source)
     for index in range(len(views.rig.sides)):
         (folder / f"image_{index}").mkdir()
@@ -209,30 +221,31 @@ def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
     (folder / TIMES).write_text(format_times(stamps), encoding="utf-8")
 
     notes = _picture_notes(source, views)
-    left_out = np.sum(~is_exported)
-    if left_out:
-        notes.append(f"{left_out} of {len(is_exported)} frames lie before or after the truth and were left out.")
+    omitted = np.sum(~is_exported)
+    if omitted:
+        notes.append(f"{omitted} of {len(is_exported)} frames lie before or after the truth and were left out.")
     return notes + _write_poses(source, views, stamps, folder)
 
 
-def _covered(source: ExportSource) -> NDArray[np.bool_]:
-    """Which frames (N,) are exported: those within the truth's time; all frames where that is none of them."""
+def _is_exported(source: ExportSource) -> NDArray[np.bool_]:
+    """Which frames (N,) are exported: those for which the truth has a pose, or all frames if it has none for any."""
     stamps = source.sequence.frame_stamps()
-    every = np.ones(len(stamps), bool)
+    all_frames = np.ones(len(stamps), bool)
     if source.truth is None:
-        return every
-    within = _within(source.truth, stamps)
-    return within if within.any() else every
+        return all_frames
+    has_truth = _is_within(source.truth, stamps)
+    return has_truth if has_truth.any() else all_frames
 
 
-def _within(truth: Trajectory, stamps: Stamps) -> NDArray[np.bool_]:
-    """Which stamps (N,) lie between the first and the last pose of the truth, or at them."""
+def _is_within(truth: Trajectory, stamps: Stamps) -> NDArray[np.bool_]:
+    """Which stamps (N,) are neither before the first true pose nor after the last one."""
     is_within: NDArray[np.bool_] = (stamps >= truth.t_ns[0]) & (stamps <= truth.t_ns[-1])
     return is_within
 
 
 def _exported_stamps(source: ExportSource) -> Stamps:
-    return source.sequence.frame_stamps()[_covered(source)]
+    """The stamps of the frames that are exported."""
+    return source.sequence.frame_stamps()[_is_exported(source)]
 
 
 def kitti_path(
@@ -240,11 +253,11 @@ def kitti_path(
     rig: Rig,
     stamps: Stamps,
 ) -> Trajectory | None:
-    """The left camera's poses at stamps (N,), relative to the first one, as KITTI has them.
+    """The poses of the left camera at stamps (N,) in the frame of the first of them, as in KITTI.
 
-    None where none of the stamps lies within the truth's time.
+    None if the truth has a pose for none of the stamps.
     """
-    if not _within(truth, stamps).any():
+    if not _is_within(truth, stamps).any():
         return None
     T_world_left = poses_at(truth, stamps) @ rig.T_body_left
     T_first_left = se3.inverse(T_world_left[:1]) @ T_world_left
@@ -252,18 +265,18 @@ def kitti_path(
 
 
 def _calibration_text(rig: Rig) -> str:
-    """P0 and P1, each (3, 4) in a row: the projections of points in the left camera's axes to pixels."""
+    """The text of calib.txt: a line for each of P0 and P1 (3, 4), which project points in the left camera's frame."""
     positions_m = [0.0, rig.baseline_m] if rig.right else [0.0]
     lines = []
     for index, position_m in enumerate(positions_m):
-        P = projection(rig.left.K, position_m) + 0.0  # no -0.0
+        P = projection(rig.left.K, position_m) + 0.0  # turns -0.0 into 0.0
         numbers = " ".join(map(repr, P.ravel().tolist()))
         lines.append(f"P{index}: {numbers}\n")
     return "".join(lines)
 
 
 def _picture_notes(source: ExportSource, views: Views) -> list[str]:
-    """Notes on how the pictures differ from the recorded ones."""
+    """Notes on how the exported pictures differ from the recorded ones."""
     is_pair = views.rig.right is not None
     if views.source_px is None:
         return ["The pair was recorded rectified, so its pixels are unchanged."] if is_pair else []
@@ -282,6 +295,7 @@ def _write_poses(
     stamps: Stamps,
     folder: Path,
 ) -> list[str]:
+    """Write the poses at stamps (N,) to poses.txt if there is a truth, and return notes on them."""
     truth = source.truth
     if truth is None:
         return ["No truth was recorded, so there is no poses.txt."]
@@ -296,7 +310,7 @@ def _write_poses(
     if interpolated:
         gap_ms = np.diff(truth.t_ns).max() / NS_PER_MS
         notes.append(
-            f"{interpolated} poses were interpolated between true ones, which are at most {gap_ms:.3g} ms apart."
+            f"{interpolated} poses were interpolated between true poses that are at most {gap_ms:.3g} ms apart."
         )
     return notes
 
@@ -306,7 +320,7 @@ def _path_read_back(
     rig: Rig,
     stamps: Stamps,
 ) -> Trajectory | None:
-    """The left camera's path in the axes that `read_kitti` turns it into."""
+    """The trajectory of the left camera in the world that `read_kitti` defines."""
     path = kitti_path(source.truth, rig, stamps) if source.truth else None
     if path is None:
         return None

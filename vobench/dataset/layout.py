@@ -1,6 +1,6 @@
-"""Layouts of recordings: how each is recognised, read and written, and which of them a path has.
+"""The layouts of recordings: how each one is recognised, read and written.
 
-A layout is an entry of LAYOUTS in a module of this room, or an entry point of the group `vobench.datasets`.
+A layout is an element of LAYOUTS in a module of this package, or an entry point of the group `vobench.datasets`.
 """
 
 from collections.abc import Callable
@@ -24,10 +24,10 @@ HEAD_BYTES = 512
 MAGIC_BYTES_SHOWN = 8
 TAR_MAGIC = b"ustar"
 TAR_MAGIC_PLACE = slice(257, 262)
-MOST_SEARCHED = 200  # files and folders below a path, for a hint on where the recordings are
-MOST_SUGGESTED = 5  # recordings below a path
+MOST_SEARCHED = 200  # the number of files and folders that are searched for recordings to suggest
+MOST_SUGGESTED = 5  # the largest number of suggested recordings
 MOST_NAMES_SHOWN = 8
-LEVELS_ABOVE = 3  # the folder mav0/cam0/data lies three levels below its recording
+LEVELS_ABOVE = 3  # the folder mav0/cam0/data is three levels below its recording
 
 
 def _frame_stamps(source: ExportSource) -> Stamps:
@@ -36,11 +36,15 @@ def _frame_stamps(source: ExportSource) -> Stamps:
 
 @dataclass(frozen=True, slots=True)
 class Writing:
-    """How a layout is written: `write` fills a folder and returns notes on what was converted.
+    """How a layout is written.
 
-    `views` makes the pictures' rig, `stamps` are those of the exported frames, and `path` is the left camera's path
-    in the layout (None: as recorded). `topics` are those that Kalibr's files name: left, right, IMU. `keeps` names
-    what the layout has besides pictures and truth (`imu`, channels of pixels); None stands for everything.
+    `write` fills a folder, and returns notes on what was converted.
+    `views` returns the rig of the exported pictures.
+    `stamps` returns the stamps of the exported frames.
+    `path` returns the trajectory of the left camera in the layout; None means the recorded one.
+    `topics` are the topics of the left camera, the right camera and the IMU in Kalibr's files.
+    `keeps` lists what the layout can represent besides pictures and truth: `imu`, and channels of per-pixel ground
+    truth. None means everything.
     """
 
     write: Callable[[ExportSource, Views, Path], list[str]]
@@ -53,7 +57,7 @@ class Writing:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A form of recordings: how it is recognised, read and written; `heeds` names the ReadOptions that it uses."""
+    """A layout of recordings: how it is recognised, read and written. `heeds` names the ReadOptions that it uses."""
 
     name: str
     known_by: str
@@ -64,7 +68,7 @@ class Layout:
 
 
 def layouts() -> dict[str, Layout]:
-    """Every layout by its name, those of vobench first. Raises InputError for two of one name."""
+    """All layouts by name, those of vobench first. Raises InputError if two have the same name."""
     by_name = {layout.name: layout for layout in _built_in()}
     points = sorted(entry_points(group=GROUP), key=lambda point: (point.name, point.value))
     for point in points:
@@ -104,7 +108,7 @@ def writable() -> dict[str, Writing]:
 def sniff(path: Path) -> str:
     """The name of the layout of a path.
 
-    Raises InputError where the path has none, with what was looked for and what there is, or more than one.
+    Raises InputError if no layout fits, with the known layouts and the content of the path, or if several fit.
     """
     if not path.exists():
         raise InputError(f"no file or folder at {path}")
@@ -123,7 +127,7 @@ def _matching(path: Path) -> list[str]:
 
 
 def head(path: Path) -> bytes:
-    """The first bytes of a file; none of a folder. Raises InputError where it can't be read."""
+    """The first bytes of a file; empty for a folder. Raises InputError if the file cannot be read."""
     try:
         with path.open("rb") as file:
             return file.read(HEAD_BYTES)
@@ -134,7 +138,7 @@ def head(path: Path) -> bytes:
 
 
 def _unrecognised(path: Path) -> str:
-    """What is at a path that is no recording, and what to name instead."""
+    """A sentence about a path that is not a recording, and about recordings near it."""
     if not path.is_dir():
         return _unrecognised_file(path)
     for parent in path.resolve().parents[:LEVELS_ABOVE]:
@@ -163,7 +167,7 @@ def _unrecognised_file(path: Path) -> str:
 
 
 def _archive_kind(start: bytes) -> str | None:
-    """Which kind of archive a file is by its first bytes."""
+    """The kind of archive that has these first bytes; None for another file."""
     if start[TAR_MAGIC_PLACE] == TAR_MAGIC:
         return "tar"
     for magic, kind in ARCHIVES.items():
@@ -173,7 +177,7 @@ def _archive_kind(start: bytes) -> str | None:
 
 
 def _recordings_below(folder: Path) -> list[str]:
-    """Recordings one or two levels below a folder, as `name (form)`."""
+    """The recordings one or two levels below a folder, as `name (form)`."""
     first_level = _children(folder)
     second_level: list[Path] = []
     for child in first_level:
@@ -200,7 +204,10 @@ def read(
     form: str | None = None,
     options: ReadOptions | None = None,
 ) -> Recording:
-    """The recording at a path, its pictures not yet read, as `form` or by content. Raises VobenchError."""
+    """The recording at a path. Without `form`, its layout is recognised by its content. Raises VobenchError.
+
+    Its pictures are read when they are iterated.
+    """
     options = options or ReadOptions()
     try:
         known = layouts()
@@ -209,7 +216,7 @@ def read(
         layout = known[sniff(path) if form is None else form]
         _require_heeded(options, layout)
         return layout.read(path, options)
-    except OSError as error:  # a folder without permission
+    except OSError as error:  # for example, a folder without permission
         raise InputError(f"cannot read {error.filename or path}: {error.strerror or error}") from None
 
 

@@ -1,4 +1,4 @@
-"""The part of a ground truth or of sensor readings that overlaps the time of the pictures."""
+"""Cuts ground truth and sensor readings to the time of the pictures."""
 
 import numpy as np
 
@@ -8,7 +8,10 @@ from vobench.trajectory.trajectory import Stamps, Trajectory
 
 
 def overlap(t_ns: Stamps, frames_ns: Stamps) -> slice | None:
-    """From the last stamp up to the first picture to the first stamp from the last picture on; None if disjoint."""
+    """The indices of the stamps in the time of the pictures, with one stamp before and one after it.
+
+    None if no stamp is in the time of the pictures.
+    """
     first_ns = frames_ns[0]
     last_ns = frames_ns[-1]
     if not len(t_ns) or t_ns[-1] < first_ns or t_ns[0] > last_ns:
@@ -20,7 +23,7 @@ def overlap(t_ns: Stamps, frames_ns: Stamps) -> slice | None:
 
 
 def overlapping_truth(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory | None, list[str]]:
-    """The poses of the pictures' time, with one before and one after it, and notes on what was dropped."""
+    """The poses in the time of the pictures, with one before and one after it, and notes on what was dropped."""
     t_ns = truth.t_ns
     rows = overlap(t_ns, frames_ns)
     if rows is None:
@@ -39,7 +42,7 @@ def overlapping_truth(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory 
 
 
 def overlapping_imu(imu: ImuReadings, frames_ns: Stamps) -> tuple[ImuReadings | None, list[str]]:
-    """The readings of the pictures' time, with one before and one after it, and notes on what was dropped."""
+    """The readings in the time of the pictures, with one before and one after it, and notes on what was dropped."""
     rows = overlap(imu.t_ns, frames_ns)
     if rows is None:
         return None, [_disjoint("IMU", imu.t_ns, frames_ns)]

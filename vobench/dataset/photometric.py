@@ -1,6 +1,7 @@
-"""Photometric calibration in the files of TUM's monocular benchmark, which DSO and similar methods read.
+"""Writes a photometric calibration in the format of TUM's monocular benchmark, which DSO and similar methods read.
 
-camera.txt (lens), times.txt (number, s, exposure in ms), pcalib.txt (inverse response), vignette.png (16 bit).
+The files are camera.txt (lens), times.txt (number, time in s, exposure in ms), pcalib.txt (inverse response) and
+vignette.png (16 bit).
 Source: Engel, Usenko and Cremers (2016); the readme of DSO, "Geometric Calibration File".
 """
 
@@ -31,7 +32,7 @@ UNKNOWN = "Response and vignette of this camera are not known: there is no pcali
 
 @dataclass(frozen=True, slots=True)
 class Photometry:
-    """What a simulated camera does to light, by its case; `scattered` is the light that dirt and flare take away."""
+    """The photometric properties of a simulated camera. `scattered` is the share of light lost to dirt and flare."""
 
     response: Response
     black_dn: float
@@ -42,7 +43,7 @@ class Photometry:
     cameras_differ: bool
 
     def remarks(self) -> list[str]:
-        """Sentences on what the files cannot hold."""
+        """Notes on the properties that the files cannot represent."""
         sentences = []
         if self.black_dn:
             sentences.append(f"pcalib.txt includes the black level: {self.black_dn:g} grey values of linear signal.")
@@ -58,7 +59,7 @@ class Photometry:
 
 
 def photometry_of(case: Mapping[str, Any] | None) -> Photometry | None:
-    """The camera of a case; None for a recording without a case, or with one of another kind."""
+    """The photometric properties of the camera of a case; None without a case, or for a case of another kind."""
     try:
         settings = SENSOR_PRESETS.merged(_without_null((case or {})["camera"]))
         chip = settings["chip"]
@@ -76,13 +77,13 @@ def photometry_of(case: Mapping[str, Any] | None) -> Photometry | None:
 
 
 def _differ(unlike: Mapping[str, Mapping[str, Any]]) -> bool:
-    """Whether the settings of each camera change anything: None and a gain of 1 don't."""
+    """Whether any setting of a single camera has an effect. None and a gain of 1 have none."""
     values = [value for camera in unlike.values() for value in camera.values()]
     return any(value not in (None, 1) for value in values)
 
 
 def _without_null(section: Mapping[str, Any]) -> dict[str, Any]:
-    """The settings of a camera that have a value: older cases have null where the named sensor's value counts."""
+    """The settings of a camera that are not null. Older cases have null for the value of the named sensor."""
     settings = _present(section)
     return {**settings, "chip": _present(settings.get("chip", {}))}
 
@@ -97,9 +98,9 @@ def write_photometric(
     stamps: Stamps,
     folder: Path,
 ) -> list[str]:
-    """Write cam0 and cam1 into a folder; return notes on what is not known.
+    """Write the folders cam0 and cam1, and return notes on what is unknown.
 
-    `stamps` (N,) are those of the exported frames.
+    `stamps` (N,) are the stamps of the exported frames.
     """
     photometry = photometry_of(source.case)
     times, notes = _times(source, stamps)
@@ -128,13 +129,13 @@ def _write(path: Path, text: str) -> None:
 
 
 def response_text(response: Response) -> str:
-    """pcalib.txt: the linear signals, from 0 to 255, of all grey values."""
+    """The text of pcalib.txt: the linear signal, from 0 to 255, of each grey value."""
     signals_dn = linear_of_grey(response) * FULL_SCALE_DN
     return " ".join(map(repr, signals_dn.tolist())) + "\n"
 
 
 def _vignette(rays: Array, photometry: Photometry) -> NDArray[np.uint16]:
-    """The picture (H, W) of the share of light that passes the lens, relative to the largest one."""
+    """The picture (H, W) of the share of light that the lens transmits, relative to the largest share."""
     share = transmitted_share(rays, photometry)
     vignette: NDArray[np.uint16] = np.rint(share / share.max() * WHITE_16).astype(np.uint16)
     return vignette
@@ -148,9 +149,9 @@ def transmitted_share(rays: Array, photometry: Photometry) -> Array:
 
 
 def camera_text(camera: Camera) -> str | None:
-    """DSO's camera.txt; None for a lens without a model in DSO.
+    """The text of DSO's camera.txt; None for a lens for which DSO has no model.
 
-    DSO's first pixel has its centre at 0.5, vobench's at 0.
+    The centre of the first pixel is at 0.5 in DSO, and at 0 in vobench.
     """
     width = camera.width_px
     height = camera.height_px
@@ -186,7 +187,7 @@ def _camera_lines(
 
 
 def _times(source: ExportSource, stamps: Stamps) -> tuple[str, list[str]]:
-    """times.txt of frames at stamps (N,), and notes on it."""
+    """The text of times.txt for frames at stamps (N,), and notes on it."""
     exposed_ns, settings = source.sequence.exposures()
     row_of = dict(zip(exposed_ns.tolist(), settings.tolist(), strict=True))
     t_ns = stamps.tolist()

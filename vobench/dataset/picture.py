@@ -1,4 +1,4 @@
-"""Pictures of datasets, decoded to 8-bit grey, and the checks that files of datasets pass before they are read."""
+"""Reads files of datasets within limits, and decodes pictures to 8-bit grey."""
 
 import struct
 import zlib
@@ -15,14 +15,14 @@ from vobench.errors import InputError
 from vobench.sequence.picture import Header, Image, header
 from vobench.trajectory.formats import LFS_POINTER
 
-MOST_NAME = 1024  # characters of a file's name in a list, folders and all
-MOST_BYTES = 1 << 30  # an hour of IMU readings is a tenth of it
+MOST_NAME = 1024  # the largest number of characters of a path in a list
+MOST_BYTES = 1 << 30  # the largest size of a file; an hour of IMU readings has a tenth of it
 MOST_NAMES_SHOWN = 12
-LONGEST_NAME_SHOWN = 200  # characters
+LONGEST_NAME_SHOWN = 200  # the largest number of characters of a name in a message
 
 
 def read_bytes(path: Path) -> bytes:
-    """A file's bytes. Raises InputError where there is no file, it is huge, or a Git-LFS pointer stands for it."""
+    """The content of a file. Raises InputError if it is missing, too large, or a Git-LFS pointer."""
     try:
         if not path.is_file():
             problem = "not a file" if path.exists() else "no such file"
@@ -39,7 +39,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_text(path: Path) -> str:
-    """A file's text in UTF-8. Raises InputError as `read_bytes` does, and where the file is not text."""
+    """The text of a file in UTF-8. Raises InputError as in `read_bytes`, and if the file is not text."""
     data = read_bytes(path)
     try:
         text = data.decode("utf-8-sig")
@@ -52,13 +52,13 @@ def read_text(path: Path) -> str:
 
 
 def refuse_lfs_pointer(data: bytes, name: str) -> None:
-    """Raise InputError for a Git-LFS pointer."""
+    """Raise InputError if the data is a Git-LFS pointer. `name` is the name of the file."""
     if data.startswith(LFS_POINTER.encode()):
         raise InputError(f"a Git-LFS pointer, not the file itself; fetch it with git lfs pull: {name}")
 
 
 def refuse_lfs_pointers(folder: Path) -> None:
-    """Raise InputError for the first file of a folder that is a Git-LFS pointer."""
+    """Raise InputError if a file in a folder is a Git-LFS pointer."""
     for name in listed(folder):
         path = folder / name
         if path.is_file():
@@ -68,7 +68,7 @@ def refuse_lfs_pointers(folder: Path) -> None:
 
 
 def inside(folder: Path, name: str, place: str) -> Path:
-    """The file that a list names, below `folder`. Raises InputError for a name that is absolute or climbs out."""
+    """The file below `folder` that a list names. Raises InputError for a name that leads out of the folder."""
     relative = PurePosixPath(name.replace("\\", "/"))
     is_absolute = relative.is_absolute() or PureWindowsPath(name).drive != ""
     climbs_out = ".." in relative.parts
@@ -79,7 +79,7 @@ def inside(folder: Path, name: str, place: str) -> Path:
 
 
 def listed(folder: Path) -> list[str]:
-    """The names in a folder, sorted; none where there is no such folder."""
+    """The names in a folder, sorted; empty if the folder does not exist."""
     try:
         return sorted(entry.name for entry in folder.iterdir())
     except (FileNotFoundError, NotADirectoryError):
@@ -87,13 +87,13 @@ def listed(folder: Path) -> list[str]:
 
 
 def require_free(out: Path) -> None:
-    """Raise InputError unless a folder may be made there."""
+    """Raise InputError unless `out` does not exist or is an empty folder."""
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise InputError(f"should be a new or empty folder, but exists and is not empty: {out}")
 
 
 def unread(folder: Path, *used: str) -> tuple[str, ...]:
-    """The note on the files and folders that were not read; none where everything was."""
+    """A note on the files and folders that were not read; empty if all were read."""
     others = [name for name in listed(folder) if name not in used and not name.startswith(".")]
     if not others:
         return ()
@@ -101,7 +101,7 @@ def unread(folder: Path, *used: str) -> tuple[str, ...]:
 
 
 def enumerated(names: Sequence[str], most: int) -> str:
-    """The first of some names, and how many more there are."""
+    """The first of some names, and the number of the others."""
     shown = ", ".join(names[:most])
     more = len(names) - most
     return f"{shown} and {more} more" if more > 0 else shown
@@ -111,16 +111,16 @@ Form = Literal["png", "jpeg", "pixels"]
 PNG = b"\x89PNG\r\n\x1a\n"
 JPEG = b"\xff\xd8\xff"
 JPEG_END = b"\xff\xd9"
-MOST_PIXELS = 1 << 26  # 67 megapixels; a header that asks for more is a mistake or a trap
+MOST_PIXELS = 1 << 26  # 67 megapixels; a header with more is damaged or malicious
 GREY_SHARES = "0.299 red + 0.587 green + 0.114 blue"
-COLOURS = {1: "grey", 2: "grey with alpha", 3: "colour", 4: "colour with alpha"}  # by channels
+COLOURS = {1: "grey", 2: "grey with alpha", 3: "colour", 4: "colour with alpha"}  # by the number of channels
 
 
 @dataclass(frozen=True, slots=True)
 class EncodedPicture:
-    """A PNG's or JPEG's bytes, or pixels (H, W) or (H, W, 3) blue, green, red of 8 or 16 bits.
+    """The bytes of a PNG or JPEG file, or pixels (H, W) or (H, W, 3) with 8 or 16 bits, in the order blue, green, red.
 
-    `name` is for messages.
+    `name` is the name of the picture, for messages.
     """
 
     name: str
@@ -129,7 +129,7 @@ class EncodedPicture:
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Size, channels and bits a channel of a picture; a grey picture without alpha has one channel."""
+    """The size, the number of channels and the bits per channel of a picture. A grey picture has one channel."""
 
     width_px: int
     height_px: int
@@ -147,7 +147,7 @@ class Kind:
 
 
 def kind_of(picture: EncodedPicture) -> Kind:
-    """The kind of a whole picture. Raises InputError for a file that is cut off, or neither PNG nor JPEG."""
+    """The kind of a picture. Raises InputError for a file that is cut off, or is neither PNG nor JPEG."""
     content = picture.content
     if not isinstance(content, bytes):
         height, width = content.shape[:2]
@@ -167,7 +167,7 @@ def kind_of(picture: EncodedPicture) -> Kind:
 
 
 def grey(picture: EncodedPicture, kind: Kind) -> Image:
-    """The picture (H, W) in 8-bit grey; of 16 bits the upper eight. Raises InputError where it does not decode."""
+    """The picture (H, W) in 8-bit grey. Of 16 bits, the upper 8 are used. Raises InputError if it cannot be decoded."""
     content = picture.content
     pixels: NDArray[Any] = _decoded(picture, kind) if isinstance(content, bytes) else content
     if pixels.ndim == 3:
@@ -179,7 +179,10 @@ def grey(picture: EncodedPicture, kind: Kind) -> Image:
 
 
 def as_file(picture: EncodedPicture, kind: Kind) -> tuple[bytes, str]:
-    """An 8-bit grey PNG or JPEG file and its form; a file that is one already is kept. Raises InputError."""
+    """The picture as an 8-bit grey PNG or JPEG file, and the form of the file. Raises InputError.
+
+    A file that is 8-bit grey already is returned unchanged.
+    """
     if isinstance(picture.content, bytes) and kind.is_grey8:
         return picture.content, kind.form
     _, encoded = cv2.imencode(".png", grey(picture, kind))
@@ -187,7 +190,7 @@ def as_file(picture: EncodedPicture, kind: Kind) -> tuple[bytes, str]:
 
 
 def conversions(kind: Kind) -> tuple[str, ...]:
-    """Sentences on what `grey` does to pictures of a kind."""
+    """Notes on how `grey` converts pictures of a kind."""
     sentences = []
     if kind.channels > 2:
         sentences.append(f"Colour pictures were converted to grey: {GREY_SHARES} (ITU-R BT.601).")
@@ -212,7 +215,7 @@ def _decoded(picture: EncodedPicture, kind: Kind) -> NDArray[Any]:
         height, width = pixels.shape[:2]
         raise InputError(f"the header states {kind}, but {width} x {height} were decoded: {picture.name}")
     if pixels.ndim == 3 and kind.channels == 2:
-        return pixels[..., 0]  # OpenCV repeats a grey channel that has an alpha
+        return pixels[..., 0]  # OpenCV decodes grey with alpha to three equal channels and alpha
     return pixels
 
 
@@ -240,12 +243,12 @@ def _header(data: bytes, form: str, name: str) -> Header:
     return stated
 
 
-CHUNK_OVERHEAD = 12  # bytes of a chunk besides its data: length, kind and checksum
+CHUNK_OVERHEAD = 12  # the bytes of a chunk besides its data: length, type and checksum
 CHECKSUM_BYTES = 4
 
 
 def _png_chunks(data: bytes, name: str) -> set[bytes]:
-    """The kinds of the chunks. Raises InputError unless every checksum is right and the last chunk is the end."""
+    """The types of the chunks in a PNG. Raises InputError for a wrong checksum, or if the end chunk is missing."""
     place = len(PNG)
     kinds = set()
     while place + CHUNK_OVERHEAD <= len(data):

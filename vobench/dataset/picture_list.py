@@ -1,4 +1,4 @@
-"""Which picture files a dataset has: lists of stamps and names, folders of numbered files, and stereo pairs of them."""
+"""Finds the picture files of a dataset, from lists of stamps and names or from their numbers, and pairs them."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -18,19 +18,19 @@ from vobench.trajectory.formats import NUMBER, StampUnit, TrajectoryTable, conte
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
-LONGEST_ROW_SHOWN = 80  # characters of a row in a message
+LONGEST_ROW_SHOWN = 80  # the largest number of characters of a row in a message
 
 
 @dataclass(frozen=True, slots=True)
 class PictureList:
-    """The pictures of one camera in order of time: stamps (N,) and files, which may be absent."""
+    """The pictures of one camera in order of time: stamps (N,) and paths of files, which may not exist."""
 
     name: str
     t_ns: Stamps
     paths: tuple[Path, ...]
 
     def at(self, index: Stamps) -> "PictureList":
-        """The pictures at some indices (K,)."""
+        """The pictures with some indices (K,)."""
         paths = tuple(self.paths[i] for i in index.tolist())
         return PictureList(self.name, self.t_ns[index], paths)
 
@@ -42,7 +42,7 @@ def read_list(
     separator: str | None,
     unit: StampUnit,
 ) -> PictureList:
-    """A list of stamps and names of pictures below `folder`. Raises InputError naming file and line."""
+    """Read a list of stamps and names of pictures below `folder`. Raises InputError with file and line."""
     rows = content(read_text(path))
     if not rows:
         raise InputError(f"the list has no picture: {path}")
@@ -85,8 +85,8 @@ def listed_pictures(
 ) -> tuple[list[PictureList], Notes]:
     """The existing pictures of one or two cameras, and notes on what was dropped.
 
-    Each of `lists` is the file with a camera's list and the folder that its names start from. Pictures up to
-    `within_ns` apart are a pair. Raises InputError as `read_list` does, and where there is no pair.
+    Each of `lists` is the file with the list of a camera, and the folder at which its names start. Two pictures are a
+    pair if their stamps differ by at most `within_ns`. Raises InputError as in `read_list`, and if there is no pair.
     """
     cameras = [read_list(path, folder, separator=separator, unit=unit) for path, folder in lists]
     notes = Notes()
@@ -100,9 +100,9 @@ def listed_pictures(
 
 
 def _present(cameras: list[PictureList]) -> tuple[list[PictureList], Notes]:
-    """The pictures whose files exist for every camera, and the note on the others."""
+    """The pictures whose files exist for every camera, and a note on the others."""
     rows = list(zip(*(camera.paths for camera in cameras), strict=True))
-    # pathlib's own is_file raises for a name that is too long.
+    # Path.is_file raises an error for a name that is too long.
     exists = np.array([all(map(isfile, paths)) for paths in rows])
     if exists.all():
         return cameras, ()
@@ -126,7 +126,7 @@ def _dropped(
     t_ns: Stamps,
     what: str,
 ) -> str:
-    """How many pictures are missing, and where: those between others leave gaps."""
+    """The number of missing pictures, and how many of them leave gaps between others."""
     indices = np.flatnonzero(exists)
     dropped = len(exists) - len(indices)
     at_start = int(indices[0])
@@ -150,7 +150,7 @@ NUMBERED = re.compile(r"([0-9]{1,12})[A-Za-z_]*\.(?:png|jpg|jpeg)", re.IGNORECAS
 def numbered(*folders: Path) -> list[tuple[Path, ...]]:
     """The numbered pictures of one or two cameras.
 
-    Raises InputError naming a picture, where a number is missing or repeated, or cameras have other numbers.
+    Raises InputError with a picture if a number is missing or repeated, or if the cameras have different numbers.
     """
     cameras = [_numbered(folder) for folder in folders]
     first_camera = cameras[0]
@@ -166,7 +166,7 @@ def numbered(*folders: Path) -> list[tuple[Path, ...]]:
 
 
 def _numbered(folder: Path) -> dict[int, Path]:
-    """The pictures of a folder by their numbers, which have no gap."""
+    """The pictures in a folder by number. Raises InputError if a number is missing or repeated."""
     names = []
     for name in listed(folder):
         match = NUMBERED.fullmatch(name)
@@ -186,14 +186,14 @@ def _numbered(folder: Path) -> dict[int, Path]:
 
 
 def _renumbered(name: str, number: int) -> str:
-    """A numbered picture's name with another number."""
+    """The name of a numbered picture with another number."""
     stem = name.partition(".")[0]
     width = sum(character.isdigit() for character in stem)
     return f"{number:0{width}d}{name[width:]}"
 
 
 class Partners(NamedTuple):
-    """Indices (K,) of the left and the right pictures that make pairs, and notes on them."""
+    """The indices (K,) of the left and right pictures of all pairs, and notes on them."""
 
     left: Stamps
     right: Stamps
@@ -206,7 +206,7 @@ def partners(
     within_ns: int,
     name: str,
 ) -> Partners:
-    """The stereo pairs of pictures whose stamps are up to `within_ns` apart. Raises InputError where there is none."""
+    """The pairs of pictures whose stamps differ by at most `within_ns`. Raises InputError if there are none."""
     pairs = associate(left_ns, right_ns, max_diff_ns=within_ns)
     if not len(pairs):
         raise InputError(f"no left and right picture have stamps within {within_ns} ns of each other in {name}")
@@ -223,9 +223,9 @@ def partners(
 
 
 def picture_files(t_ns: Stamps, *cameras: Sequence[Path]) -> PictureStream:
-    """The pictures of one or two cameras, each read from its file when its turn comes.
+    """The pictures of one or two cameras. Each file is read when it is iterated.
 
-    Raises InputError where the first pictures can't be read.
+    Raises InputError if the first pictures cannot be read.
     """
 
     def shots() -> Iterator[RecordedFrame]:

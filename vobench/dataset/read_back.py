@@ -1,4 +1,4 @@
-"""The comparison of an export, read back, with what was exported: known points and the true path."""
+"""Compares an export that was read back with the original sequence."""
 
 import numpy as np
 
@@ -10,17 +10,17 @@ from vobench.geometry.se3 import Array
 from vobench.trajectory.trajectory import Trajectory
 
 PIXEL_TOLERANCE = 1e-6
-POSE_TOLERANCE = 1e-9  # metres, and entries of rotations
+POSE_TOLERANCE = 1e-9  # for positions in m and elements of rotation matrices
 DEPTHS_M = (0.3, 1.0, 5.0, 30.0, 1000.0)
-GRID = 9  # points across a picture and down it
+GRID = 9  # the number of points across and down a picture
 
 
 def known_points(camera: Camera) -> Array:
-    """Points (N, 3) in front of a camera, evenly over its picture and at several depths."""
+    """Points (N, 3) in front of a camera, which are spread evenly over its picture and have several depths."""
     u = np.linspace(0, camera.width_px - 1, GRID)
     v = np.linspace(0, camera.height_px - 1, GRID)
     pixels = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
-    rays = camera.rays(pixels)  # (81, 3), NaN outside the lens's field of view
+    rays = camera.rays(pixels)  # (81, 3), NaN outside of the lens's field of view
     visible = rays[np.isfinite(rays).all(1)]
     depths_m = np.array(DEPTHS_M)[:, None, None]
     points_m: Array = (visible * depths_m).reshape(-1, 3)
@@ -28,9 +28,9 @@ def known_points(camera: Camera) -> Array:
 
 
 def pixel_difference(expected: Rig, actual: Rig) -> float:
-    """The largest distance in px between two rigs' projections of the same points.
+    """The largest distance in px between the projections of known points by two rigs.
 
-    It is infinite for rigs with other cameras, or pictures of another size.
+    It is infinite if the rigs have different cameras or picture sizes.
     """
     if expected.sides != actual.sides:
         return np.inf
@@ -50,7 +50,7 @@ def _size_px(camera: Camera) -> tuple[int, int]:
 
 
 def _projected(rig: Rig, points_left_m: Array, side: Side) -> Array:
-    """Pixels (N, 2) in one camera of points (N, 3) in the left camera's axes."""
+    """The pixels (N, 2) in one camera of points (N, 3) in the frame of the left camera."""
     if side == "left":
         return rig.left.project(points_left_m)
     points_right_m = se3.apply(se3.inverse(rig.T_left_right), points_left_m)
@@ -68,7 +68,7 @@ def _largest_distance(expected_px: Array, actual_px: Array) -> float:
 
 
 def check_rig(what: str, expected: Rig, actual: Rig) -> None:
-    """Raise SequenceError unless a rig that was read back projects known points as the exported one does."""
+    """Raise SequenceError unless the rig that was read back projects known points like the original rig."""
     distance_px = pixel_difference(expected, actual)
     if not distance_px < PIXEL_TOLERANCE:
         raise SequenceError(
@@ -89,7 +89,7 @@ def _T_left_imu(rig: Rig, imu: ImuCalibration) -> Array:
 
 
 def check_path(what: str, expected: Trajectory, actual: Trajectory) -> None:
-    """Raise SequenceError unless a path that was read back has the same stamps, and poses to 1e-9."""
+    """Raise SequenceError unless the trajectory that was read back has the original stamps and poses."""
     if not np.array_equal(expected.t_ns, actual.t_ns):
         raise SequenceError(f"{what} has other stamps than were exported: {_stamp_difference(expected, actual)}")
     difference = _pose_difference(expected.T_world_frame, actual.T_world_frame)

@@ -1,4 +1,4 @@
-"""A recording made elsewhere: rig, truth, sensor readings, pictures not yet read, and notes on every assumption."""
+"""A recording from another source: rig, truth, sensor readings, unread pictures, and notes on assumptions."""
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -20,7 +20,7 @@ from vobench.trajectory.trajectory import Stamps, Trajectory
 
 @dataclass(frozen=True, slots=True)
 class Topics:
-    """Topics of a bag by what they are; a topic that is None is chosen by the names in the bag."""
+    """The topics of a bag by their content. A topic that is None is chosen by the names in the bag."""
 
     left: str | None = None
     right: str | None = None
@@ -32,10 +32,12 @@ class Topics:
 
 @dataclass(frozen=True, slots=True)
 class ReadOptions:
-    """What a dataset does not say itself, or what should replace it.
+    """Information that a dataset does not contain, or that replaces the information in it.
 
-    `calibration` is Kalibr's camchain.yaml, `imu` Kalibr's imu.yaml, `truth` a trajectory file; `topics` are those of
-    a bag. `rate_hz` is for pictures without stamps. Pictures of both cameras are one pair up to `within_ns` apart.
+    `calibration` is a camchain.yaml of Kalibr, `imu` an imu.yaml of Kalibr, and `truth` a trajectory file.
+    `topics` are the topics of a bag.
+    `rate_hz` is the frame rate of pictures without stamps.
+    `within_ns` is the largest difference between the stamps of the two pictures of a pair.
     """
 
     calibration: Path | None = None
@@ -55,19 +57,22 @@ class RecordedFrame:
 
 
 Shots = Callable[[], Iterator[RecordedFrame]]
-Notes = tuple[str, ...]  # sentences on what was assumed, converted or dropped
+Notes = tuple[str, ...]  # sentences about what was assumed, converted or dropped
 
 
 @dataclass(frozen=True, slots=True)
 class PictureStream:
-    """Frames that can be iterated again and again, one in memory at a time; `kinds` are those of the first frame."""
+    """Frames that can be iterated several times, with one frame in memory at a time.
+
+    `kinds` are the kinds of the pictures in the first frame.
+    """
 
     shots: Shots
     kinds: tuple[Kind, ...]
 
     @classmethod
     def open(cls, shots: Shots) -> "PictureStream":
-        """The stream of `shots`, whose first frame is read. Raises InputError where its pictures can't be read."""
+        """The stream of `shots`. The first frame is read. Raises InputError if its pictures cannot be read."""
         first = next(shots(), None)
         if first is None:
             raise InputError("a recording should have one picture or more, but has none")
@@ -76,11 +81,11 @@ class PictureStream:
 
     @property
     def size_px(self) -> tuple[int, int]:
-        """Width and height of the first left picture."""
+        """The width and height of the first left picture."""
         return self.kinds[0].width_px, self.kinds[0].height_px
 
     def require(self, rig: Rig, calibration: str) -> None:
-        """Raise InputError unless the pictures have the sizes of the rig's; `calibration` is the file with those."""
+        """Raise InputError unless the pictures have the size of the rig's. `calibration` is the file of the rig."""
         for side, kind in zip(SIDES, self.kinds, strict=False):
             camera = rig.camera(side)
             picture_px = (kind.width_px, kind.height_px)
@@ -91,19 +96,19 @@ class PictureStream:
                 )
 
     def frames(self) -> Iterator[StereoFrame]:
-        """The pictures, 8-bit grey. Raises InputError, naming the file, for one that is not as the first."""
+        """The pictures in 8-bit grey. Raises InputError with the file for a picture that differs from the first."""
         for index, shot in enumerate(self.shots()):
             pictures = [grey(picture, kind) for picture, kind in self._checked(shot)]
             right = pictures[1] if len(pictures) > 1 else None
             yield StereoFrame(index, shot.t_ns, pictures[0], right)
 
     def encoded_frames(self) -> Iterator[EncodedFrame]:
-        """The pictures as PNG or JPEG files; 8-bit grey files are kept. Raises InputError as `frames`."""
+        """The pictures as PNG or JPEG files. 8-bit grey files are not decoded. Raises InputError as in `frames`."""
         for index, shot in enumerate(self.shots()):
             checked = list(self._checked(shot))
             files = [as_file(picture, kind) for picture, kind in checked]
             forms = {form for _, form in files}
-            if len(forms) > 1:  # both pictures of a pair have to have one form
+            if len(forms) > 1:  # both pictures of a pair must have the same form
                 files = [_as_png(picture, kind) for picture, kind in checked]
             left, form = files[0]
             right = files[1][0] if len(files) > 1 else None
@@ -124,7 +129,7 @@ def _as_png(picture: EncodedPicture, kind: Kind) -> tuple[bytes, str]:
 
 @dataclass(frozen=True, slots=True)
 class CalibratedRig:
-    """A rig, the file or the words that messages name as the source of its calibration, and notes on it."""
+    """A rig, the source of its calibration for messages, and notes on it."""
 
     rig: Rig
     source: str
@@ -133,7 +138,7 @@ class CalibratedRig:
 
 @dataclass(frozen=True, slots=True)
 class CalibratedImu:
-    """The readings of an IMU and its calibration, both None where either is missing, and notes on them."""
+    """The readings and the calibration of an IMU, and notes on them. Both are None if one of them is missing."""
 
     readings: ImuReadings | None
     calibration: ImuCalibration | None
@@ -145,12 +150,15 @@ NO_TRUTH = "There is no ground truth."
 
 @dataclass(frozen=True, slots=True)
 class Recording:
-    """A recording of any form; its pictures are read and checked when they are iterated.
+    """A recording of any form. Its pictures are read and checked when they are iterated.
 
-    `frames` gives them decoded, `encoded_frames` as files. `t_ns` (N,) are the pictures' stamps; `truth` is the path
-    of the body in its world. Exposures are their stamps (N,), and times in s and gains in dB (N, 2); encoders are
-    their stamps (M,) and counts (M, 2). None stands for what was not recorded. `notes` are sentences on everything
-    that was assumed, converted or dropped.
+    `frames` iterates over decoded pictures, and `encoded_frames` over picture files.
+    `t_ns` (N,) are the stamps of the pictures.
+    `truth` is the trajectory of the body in its world.
+    Exposures consist of stamps (N,), and of times in s and gains in dB (N, 2).
+    Encoder readings consist of stamps (M,) and counts (M, 2).
+    `notes` are sentences about everything that was assumed, converted or dropped.
+    What was not recorded is None.
     """
 
     form: str
@@ -167,7 +175,7 @@ class Recording:
 
     @property
     def frame_count(self) -> int:
-        """How many pictures, or pairs of them, there are."""
+        """The number of pictures, or of pairs of pictures."""
         return len(self.t_ns)
 
 
@@ -188,7 +196,10 @@ def assemble(
     notes: Iterable[str] = (),
     calibration: str,
 ) -> Recording:
-    """A recording at stamps t_ns (N,) by the rig of the file `calibration`. Raises InputError where they do not fit."""
+    """The recording with pictures at stamps t_ns (N,) and a rig. Raises InputError if its parts do not fit together.
+
+    `calibration` is the file of the rig, for messages.
+    """
     stream.require(rig, calibration)
     all_notes = [*notes, *_pair_notes(rig, calibration)]
     for kind in stream.kinds:
@@ -219,7 +230,7 @@ def assemble(
         start_ns=min(starts_ns),
         truth=truth,
         imu=imu,
-        notes=tuple(dict.fromkeys(all_notes)),  # each sentence once
+        notes=tuple(dict.fromkeys(all_notes)),  # without duplicates
     )
 
 
@@ -236,7 +247,7 @@ def _pair_notes(rig: Rig, calibration: str) -> Notes:
 
 
 def _checked_start_ns(t_ns: Stamps, what: str) -> int:
-    """The first stamp. Raises InputError where a stamp is outside ROS's range."""
+    """The first stamp. Raises InputError if a stamp is outside of the range of ROS stamps."""
     first_ns = int(t_ns[0])
     last_ns = int(t_ns[-1])
     if first_ns < 0 or last_ns >= END_OF_STAMPS_NS:

@@ -1,4 +1,4 @@
-"""Sequences of vobench: read as a recording, and any recording written as one, a pair of pictures at a time."""
+"""Reads sequences of vobench as recordings, and writes recordings as sequences."""
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
@@ -18,7 +18,7 @@ LEFT_OUT = "The sequence's case, true rig, true velocities and per-pixel ground 
 
 
 def is_sequence(path: Path) -> bool:
-    """Whether a path is a sensors.mcap or a folder with one, which may be unfinished or damaged."""
+    """Whether a path is a sensors.mcap or a folder that contains one. The file may be incomplete or damaged."""
     sensors = path / SENSORS_FILE if path.is_dir() else path
     if sensors.name != SENSORS_FILE:
         return False
@@ -26,7 +26,7 @@ def is_sequence(path: Path) -> bool:
 
 
 def read_own(path: Path, _options: ReadOptions) -> Recording:
-    """The sensors' messages of a sequence, and its true path. Raises SequenceError."""
+    """The sensor readings and the true trajectory of a sequence. Raises SequenceError."""
     folder = path.parent if path.is_file() else path
     sequence = Sequence.open(folder)
     frames_ns = sequence.frame_stamps()
@@ -63,7 +63,7 @@ def convert(
     *,
     provenance: Mapping[str, str] | None = None,
 ) -> None:
-    """Write a recording as a sequence: stamps exactly, 8-bit grey pictures bit for bit. Raises VobenchError."""
+    """Write a recording as a sequence. Stamps and 8-bit grey pictures are not changed. Raises VobenchError."""
     notes = {"form": recording.form}
     for index, note in enumerate(recording.notes, 1):
         notes[f"note_{index:02d}"] = note
@@ -76,20 +76,20 @@ def convert(
         notes=notes,
         provenance=provenance,
     ) as writer:
-        if truth := recording.truth:  # without a twist, which is not known
+        if truth := recording.truth:  # the twist is unknown
             for t_ns, T_world_body in zip(truth.t_ns.tolist(), truth.T_world_frame, strict=True):
                 writer.write_truth(t_ns, T_world_body, None)
-        # Readings come before the picture of their stamp: `merge` keeps the order of streams at equal stamps.
+        # `merge` keeps the order of streams at equal stamps, so a reading comes before the picture with its stamp.
         streams = [*_reading_writes(writer, recording), _picture_writes(writer, recording)]
         for _, write in merge(*streams, key=itemgetter(0)):
             write()
 
 
-Writes = Iterator[tuple[int, Callable[[], None]]]  # a stamp in ns, and the call that writes what has it
+Writes = Iterator[tuple[int, Callable[[], None]]]  # stamps in ns, and calls that write the data of the stamp
 
 
 def _reading_writes(writer: SequenceWriter, recording: Recording) -> Iterator[Writes]:
-    """The readings of the IMU and of the encoders."""
+    """The writes of the readings of the IMU and of the encoders."""
     if imu := recording.imu:
         yield ((int(t), partial(_write_imu, writer, imu, index)) for index, t in enumerate(imu.t_ns))
     if encoders := recording.encoders:
@@ -103,7 +103,7 @@ def _write_imu(writer: SequenceWriter, imu: ImuReadings, index: int) -> None:
 
 
 def _picture_writes(writer: SequenceWriter, recording: Recording) -> Writes:
-    """The pictures, each with its exposure. Raises InputError where their number differs from the recording's."""
+    """The writes of the pictures, each with its exposure. Raises InputError for a wrong number of pictures."""
     exposed_ns, settings = recording.exposures or ((), ())
     exposure_of = dict(zip(map(int, exposed_ns), settings, strict=True))
     count = 0

@@ -1,4 +1,4 @@
-"""A sequence as the writers of layouts see it: its rig, pictures, truth and readings, and rectified views."""
+"""The content of a sequence that is exported: its rig, readings, ground truth, and rectified pictures."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -31,28 +31,29 @@ from vobench.sequence.picture import Image, decode, encode
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-FAR_PX = 30_000.0  # outside any picture; OpenCV resamples NaN from an arbitrary pixel
+FAR_PX = 30_000.0  # outside of every picture; replaces NaN, for which OpenCV returns an arbitrary pixel
+PNG = "png"
 
 
 @dataclass(frozen=True, slots=True)
 class Views:
-    """The rig of exported pictures, and how these are resampled from the recorded ones.
+    """The rig of the exported pictures, and how they are resampled from the recorded ones.
 
-    source_px: the position (H, W, 2) in the recorded picture of each pixel, NaN if it shows nothing; None if pictures
-    are exported as recorded.
+    `source_px` maps each side to the positions (H, W, 2) of the exported pixels in the recorded picture. A position is
+    NaN if no point of the recorded picture corresponds to it. None exports the pictures without resampling.
     """
 
     rig: Rig
     source_px: dict[Side, Array] | None = None
 
     def rays_of(self, side: Side, camera: Camera) -> Array:
-        """Rays (H, W, 3) of this view's pixels in the frame of the recording camera; NaN for pixels without one."""
+        """The rays (H, W, 3) of the exported pixels in the frame of the recording camera; NaN if there is none."""
         if self.source_px is None:
             return camera.rays(pixel_grid(camera))
         return camera.rays(self.source_px[side])
 
     def show(self, side: Side, picture: Image) -> Image:
-        """A recorded picture in this view: linear between its pixels, black where it shows nothing."""
+        """A recorded picture, resampled by linear interpolation; pixels outside of it are black."""
         if self.source_px is None:
             return picture
         finite_px = np.nan_to_num(self.source_px[side], nan=-FAR_PX)
@@ -62,7 +63,7 @@ class Views:
         return shown.astype(np.uint8, copy=False)
 
     def dark_share(self, side: Side, recorded: Camera) -> float:
-        """The share of this view's pixels that lie outside the recorded picture."""
+        """The share of exported pixels that lie outside of the recorded picture."""
         if self.source_px is None:
             return 0.0
         pixels = self.source_px[side]
@@ -72,34 +73,36 @@ class Views:
 
 
 def rectified(rig: Rig) -> Views:
-    """The rectified pair of a rig; pictures of a rig that is rectified already are left as recorded.
+    """The rectified views of a rig. Pictures are not resampled if the rig is already rectified.
 
-    Raises SequenceError where the pair cannot be rectified.
+    Raises SequenceError if the pair cannot be rectified.
     """
-    flat = _rectified_rig(rig)
-    if pixel_difference(rig, flat.rig) < PIXEL_TOLERANCE:
-        return Views(flat.rig)
-    rays = flat.rig.left.rays(pixel_grid(flat.rig.left))  # (H, W, 3), the same for both views
+    rectified_rig = _rectified_rig(rig)
+    if pixel_difference(rig, rectified_rig.rig) < PIXEL_TOLERANCE:
+        return Views(rectified_rig.rig)
+    view = rectified_rig.rig.left
+    rays_view = view.rays(pixel_grid(view))  # (H, W, 3), the same for both views
     source_px = {}
     for side in rig.sides:
-        rays_camera = rays @ flat.R_view_camera[side]
+        rays_camera = rays_view @ rectified_rig.R_view_camera[side]
         source_px[side] = rig.camera(side).project(rays_camera)
-    return Views(flat.rig, source_px)
+    return Views(rectified_rig.rig, source_px)
 
 
-class _Rectified(NamedTuple):
-    """A rig of pinholes side by side, without wheels and IMU, and the rotation of each from the recorded camera."""
+class _RectifiedRig(NamedTuple):
+    """A rig of parallel pinhole cameras, and the rotation (3, 3) from each recorded camera to its view."""
 
     rig: Rig
     R_view_camera: dict[Side, Array]
 
 
-def _rectified_rig(rig: Rig) -> _Rectified:
+def _rectified_rig(rig: Rig) -> _RectifiedRig:
+    """The rectified cameras of a rig. Raises SequenceError if the pair cannot be rectified."""
     views = rectification(rig)
     if rig.right and views is None:
         raise SequenceError(
             "the right camera is not to the right of the left one and looking the same way, so the pair cannot be "
-            "rectified, as KITTI needs it; the forms euroc and ros2 keep it as it is"
+            "rectified, which KITTI requires; the forms euroc and ros2 export it unchanged"
         )
 
     fx_fy_cx_cy_px = rig.left.K[[0, 1, 0, 1], [0, 1, 2, 2]]
@@ -107,21 +110,21 @@ def _rectified_rig(rig: Rig) -> _Rectified:
     R_view_left = np.eye(3) if views is None else views.R_view_left
     T_body_left = rig.T_body_left @ se3.transform(R_view_left.T, np.zeros(3))
     if views is None:
-        return _Rectified(Rig(pinhole, None, T_body_left, None), {"left": R_view_left})
+        return _RectifiedRig(Rig(pinhole, None, T_body_left, None), {"left": R_view_left})
 
     T_body_right = T_body_left @ side_by_side(views.baseline_m)
     R_view_camera: dict[Side, Array] = {"left": R_view_left, "right": views.R_view_right}
-    return _Rectified(Rig(pinhole, pinhole, T_body_left, T_body_right), R_view_camera)
-
-
-PNG = "png"
+    return _RectifiedRig(Rig(pinhole, pinhole, T_body_left, T_body_right), R_view_camera)
 
 
 @dataclass(frozen=True, slots=True)
 class ExportSource:
-    """What there is to export; None for what was not recorded.
+    """A sequence with its readings and ground truth. What was not recorded is None.
 
-    `truth` is the path of the body, `twist` (N, 6) its velocities in its own axes, linear m/s and angular rad/s.
+    `truth` is the trajectory of the body.
+    `twist` (N, 6) is the linear velocity (m/s) and the angular velocity (rad/s) of the body, in the axes of the body.
+    `channels` lists the recorded channels of per-pixel ground truth.
+    `case` is the description of the simulated case.
     """
 
     folder: Path
@@ -136,14 +139,14 @@ class ExportSource:
 
     @property
     def rig(self) -> Rig:
-        """The reported calibration; an IMU without a reading is left out."""
+        """The nominal calibration, without the IMU if it has no readings."""
         rig = self.sequence.rig
         return rig if self.imu else replace(rig, imu=None)
 
 
 @dataclass(frozen=True, slots=True)
 class PngFrame:
-    """The pictures of one instant as PNG files, by the side of their camera."""
+    """The pictures of one frame as PNG files, one per camera."""
 
     index: int
     t_ns: int
@@ -151,7 +154,7 @@ class PngFrame:
 
 
 def open_source(folder: Path) -> ExportSource:
-    """What a sequence's two files hold for an export. Raises SequenceError where they are not whole."""
+    """Open the sequence in a folder for an export. Raises SequenceError if one of its files is incomplete."""
     sequence = Sequence.open(folder)
     imu = sequence.imu()
     readings = imu if len(imu.t_ns) else None
@@ -174,19 +177,20 @@ def open_source(folder: Path) -> ExportSource:
 
 
 def _case(folder: Path) -> Mapping[str, Any] | None:
+    """The description of the simulated case; None if the sequence has none. Raises SequenceError if it is not JSON."""
     try:
         text = read_case(folder)
     except SequenceError:
         return None
     try:
         case = json.loads(text)
-    except ValueError as error:  # of JSON, or of UTF-8
+    except ValueError as error:  # the text is not JSON, or not UTF-8
         raise SequenceError(f"the attachment {CASE_ATTACHMENT} is not JSON ({error}): {folder / TRUTH_FILE}") from None
     return case if isinstance(case, dict) else None
 
 
 def png_frames(sequence: Sequence, views: Views) -> Iterator[PngFrame]:
-    """The pictures as PNG files of these views; files that are PNG already and not resampled are kept."""
+    """The pictures of a sequence in these views, as PNG files. PNG files that are not resampled are not decoded."""
     for frame in sequence.encoded_frames():
         recorded: dict[Side, bytes | None] = {"left": frame.left, "right": frame.right}
         pictures = {}
@@ -211,7 +215,7 @@ def _as_png(
 
 
 def rate_hz(t_ns: Stamps) -> float:
-    """The mean rate of stamps (N,); 0 if they span no time."""
+    """The mean rate of stamps (N,); 0 for fewer than two different stamps."""
     if len(t_ns) < 2:
         return 0.0
     span_ns = int(t_ns[-1]) - int(t_ns[0])

@@ -1,4 +1,4 @@
-"""Recordings in TartanAir's two layouts: simulated pinholes without stamps, axes north-east-down."""
+"""Reads recordings in the two layouts of TartanAir, which have no stamps and use axes north, east, down."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,16 +20,16 @@ from vobench.trajectory.nanoseconds import NS_PER_S
 RATE_HZ = 25.0
 MOST_HZ = 1e6
 BASELINE_M = 0.25
-FOCAL_PX = 320.0  # 90° across 640 pixels; the centre is half the size, as its authors give it
+FOCAL_PX = 320.0  # 90° for 640 pixels; the principal point is at half the size, as specified by the authors
 SIZES_PX = ((640, 480), (640, 640))
-T_NED_FLU = se3.transform(np.diag([1.0, -1.0, -1.0]), np.zeros(3))  # its own inverse
+T_NED_FLU = se3.transform(np.diag([1.0, -1.0, -1.0]), np.zeros(3))  # equals its inverse
 SIMULATED = "TartanAir's own"
 TRUTH = "of the left camera; world and body were turned from x ahead, y right, z down (NED) to x ahead, y left, z up."
 
 
 @dataclass(frozen=True, slots=True)
 class Version:
-    """The names of one version of the data set: folders of the left and right pictures, and the file of poses."""
+    """The names in one version of the dataset: the folders of left and right pictures, and the file of poses."""
 
     left: str
     right: str
@@ -51,7 +51,10 @@ def _is_tartanair(folder: Path) -> bool:
 
 
 def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
-    """A folder such as P000; the body is the left camera, its axes ahead, left, up. Raises InputError."""
+    """Read a folder such as P000. Raises InputError.
+
+    The frame of the body has its origin in the left camera; x points ahead, y left and z up.
+    """
     version = _version_of(folder)
     if version is None:
         names = " or ".join(version.left for version in VERSIONS)

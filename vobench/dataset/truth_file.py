@@ -1,4 +1,4 @@
-"""A ground truth read from a trajectory file in any form of text."""
+"""Reads a ground truth from a trajectory file in any text format."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -13,14 +13,15 @@ from vobench.geometry.se3 import Array
 from vobench.trajectory.formats import ParsedTrajectory, parse_any
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-EXACT = 1e-9  # |RᵀR - I| up to which a rotation was written with all its digits
+EXACT = 1e-9  # the largest |RᵀR - I| of a rotation that was written with all digits
 
 
 def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
-    """A trajectory, and notes on what was done to it; a row without a stamp gets that of its picture.
+    """The trajectory in a file, and notes on its conversion. A row without a stamp gets the stamp of its picture.
 
-    A row of 13 numbers is KITTI's behind the picture's number, from 0. Of rows with one stamp the first is kept.
-    Raises TrajectoryError naming file and line for an invalid pose, InputError where rows and pictures differ.
+    A row of 13 numbers has the number of the picture, from 0, before a pose in KITTI's format. If several rows have the
+    same stamp, the first one is used.
+    Raises TrajectoryError with file and line for an invalid pose, and InputError if rows and pictures do not match.
     """
     parsed = parse_any(read_text(path), name=str(path))
     t_ns = parsed.stamped_by(frames_ns) if parsed.t_ns is None else parsed.t_ns
@@ -60,10 +61,10 @@ def truth_file(
     whose: str,
     turn: Array | None = None,
 ) -> tuple[Trajectory | None, Notes]:
-    """The truth that the options name, or else the first existing file of `beside`, and notes on it.
+    """The truth in the file that the options name, or otherwise in the first existing file of `beside`, and notes.
 
-    `turn` (4, 4) is the change of axes that is applied to the world and to the body. `whose` ends the sentence that
-    names the file.
+    `turn` (4, 4) is the change of axes that is applied to the world and to the body. `whose` says what the poses are;
+    it is the end of the note that names the file.
     """
     path = options.truth
     if path is None:

@@ -1,4 +1,4 @@
-"""The layout of the TUM RGB-D benchmark, read and written."""
+"""Reads and writes recordings in the layout of the TUM RGB-D benchmark."""
 
 import re
 from collections.abc import Iterable
@@ -33,7 +33,7 @@ CAMERAS: dict[str, Camera] = {
     "freiburg3": Pinhole(640, 480, 535.4, 539.2, 320.1, 247.6),
 }
 ROBOT = re.compile(r"(?:freiburg|fr)_?([123])(?![0-9])", re.IGNORECASE)
-TITLE_LINES = 3  # comments at the start of rgb.txt; they name the bag that it was made from
+TITLE_LINES = 3  # the number of comments at the start of rgb.txt, which name the original bag
 
 
 def _is_tum(folder: Path) -> bool:
@@ -41,7 +41,7 @@ def _is_tum(folder: Path) -> bool:
 
 
 def read_tum(folder: Path, options: ReadOptions) -> Recording:
-    """A folder with rgb.txt; the body is its camera. Raises InputError naming the file."""
+    """Read a folder that contains rgb.txt. The body is the camera. Raises InputError with the file."""
     (pictures,), absence_notes = listed_pictures((folder / LIST, folder), separator=None, unit="s")
     stream = picture_files(pictures.t_ns, pictures.paths)
     calibration = _rig(folder, options)
@@ -74,7 +74,7 @@ def _rig(folder: Path, options: ReadOptions) -> CalibratedRig:
     return CalibratedRig(rig, f"{robot}'s published one", (note,))
 
 
-DEPTH_PER_M = 5000  # grey values of 16 bits; 0 is unknown
+DEPTH_PER_M = 5000  # 16-bit grey values; 0 is unknown
 FARTHEST_M = 65535 / DEPTH_PER_M
 DEPTH_TOPIC = "depth"
 
@@ -84,11 +84,11 @@ def _left_view(rig: Rig) -> Views:
 
 
 def write_tum(source: ExportSource, views: Views, folder: Path) -> list[str]:
-    """Write pictures, depth, readings and path into a folder; return notes on what was converted.
+    """Write pictures, depth, readings and trajectory to a folder, and return notes on what was converted.
 
-    Raises SequenceError for a camera that sees all around.
+    Raises SequenceError for an equirectangular camera.
     """
-    kalibr.intrinsics(views.rig.left)  # camchain.yaml is the only place that the layout has for a lens
+    kalibr.intrinsics(views.rig.left)  # the layout can represent a lens only in camchain.yaml
     notes = ["TUM's layout has one camera: the right one was left out."] if source.rig.right else []
     (folder / "rgb").mkdir()
     stamps = []
@@ -116,7 +116,7 @@ def _picture_name(folder_name: str, t_ns: int) -> str:
 
 
 def _write_depth(source: ExportSource, folder: Path) -> list[str]:
-    """Write depth/ and depth.txt of the per-pixel ground truth, where depth was recorded; return notes."""
+    """Write depth/ and depth.txt if depth was recorded, and return notes."""
     if DEPTH_TOPIC not in source.channels:
         return []
     if source.true_rig.left.depth_along != "axis":
@@ -146,7 +146,7 @@ def _write_depth(source: ExportSource, folder: Path) -> list[str]:
 
 
 def depth_values(depth_m: Floats) -> Ids:
-    """Depth (H, W) in metres as TUM's 16-bit values; 0 where it is unknown, not positive or too large."""
+    """The 16-bit values (H, W) of depths in metres; 0 if a depth is unknown, not positive or too large."""
     is_known = np.isfinite(depth_m) & (depth_m > 0) & (depth_m <= FARTHEST_M)
     known_m = np.where(is_known, depth_m, 0.0).astype(float)
     values: Ids = np.rint(known_m * DEPTH_PER_M).astype(np.uint16)

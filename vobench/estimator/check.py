@@ -1,4 +1,4 @@
-"""The check of an estimator's answers: nothing of an answer is used before it."""
+"""Checks the answers of an estimator before anything else uses them."""
 
 from collections.abc import Mapping
 from math import isfinite
@@ -11,25 +11,25 @@ from vobench.estimator.protocol import Result, Status, Tracks
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
-FARTHEST_M = 1e12  # beyond any path, and small enough for sums of squares to stay finite
+FARTHEST_M = 1e12  # farther than any path, and small enough for finite sums of squares
 REASON_LETTERS = 500
 NAME_LETTERS = 80
-REAL_KINDS = "fiub"  # numpy's kinds of float, signed and unsigned integer, and bool
+REAL_KINDS = "fiub"  # NumPy's kinds float, signed integer, unsigned integer and bool
 
 
 class InvalidOutputError(VobenchError):
-    """An estimator's answer that breaks the contract."""
+    """An answer of an estimator violates the contract."""
 
 
 def in_one_line(text: object, limit: int = REASON_LETTERS) -> str:
-    """A text from outside as it may be printed: without control characters or lone surrogates, cut at `limit`."""
+    """A text of unknown origin as one printable line, without control characters, and cut to `limit` characters."""
     beginning = str(text)[: 4 * limit]
     words = printable(beginning).split()
     return " ".join(words)[:limit]
 
 
 def checked(answer: Any, frame: int) -> Result:
-    """The answer as a Result of plain types. Raises InvalidOutputError, naming the frame."""
+    """The answer as a Result with plain types. Raises InvalidOutputError with the number of the frame."""
     if not isinstance(answer, Result):
         raise InvalidOutputError(
             f"frame {frame}: process() must return a vobench.estimator.Result, got {type(answer).__name__}"
@@ -94,7 +94,7 @@ def _points(points: Any) -> Array:
 
 
 def checked_revision(revised: Any) -> dict[int, Array]:
-    """Poses by their frame's index, as `finish` returns them. Raises InvalidOutputError."""
+    """The revised poses that `finish` returned, by the index of their frame. Raises InvalidOutputError."""
     if not isinstance(revised, Mapping):
         raise InvalidOutputError(f"finish() must return poses by their frame's index, got {type(revised).__name__}")
     try:
@@ -126,7 +126,7 @@ def _tracks(tracks: Any) -> Tracks:
 
 
 def _stats(stats: Any) -> dict[str, float]:
-    """Numbers by name, without those that are not finite."""
+    """The finite statistics by name. Raises InvalidOutputError if one is not a number."""
     if not isinstance(stats, Mapping):
         raise InvalidOutputError(f"stats should be numbers by name, got {type(stats).__name__}")
     try:

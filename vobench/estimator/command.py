@@ -1,4 +1,4 @@
-"""A program in any language that reads a whole recording from files and writes all its poses to one file."""
+"""Runs an estimator that is a program in any language: it reads a recording from files and writes a trajectory."""
 
 import shutil
 import time
@@ -23,13 +23,13 @@ from vobench.trajectory.trajectory import Stamps
 
 UNITS: tuple[StampUnit | None, ...] = (None, "ns", "us", "ms")
 CALIBRATION = "camchain.yaml"
-# More than any form of poses takes; a frame's pose has a line.
+# Larger than the line of a pose in any format.
 OUT_BYTES = 1 << 20
 OUT_BYTES_PER_FRAME = 4096
 
 
 def filled(argv: Sequence[str], folder: Path, values: Mapping[str, Any]) -> list[str]:
-    """A manifest's argv for the system: each {name} is replaced by its value, and ./ by the manifest's folder.
+    """The argv of a manifest in which each {name} is replaced by its value, and ./ by the folder of the manifest.
 
     Raises EstimatorFailure if there is no such program.
     """
@@ -46,9 +46,9 @@ def filled(argv: Sequence[str], folder: Path, values: Mapping[str, Any]) -> list
 
 
 class CommandProgram:
-    """A program that runs once at the start; each frame is then answered with the pose that the program wrote.
+    """An estimator whose program runs once, at the start. Each frame is answered with a pose that the program wrote.
 
-    `write_dataset` fills the folder of {dataset}; the program's cost is divided evenly among all frames (N,).
+    `write_dataset` fills the folder {dataset}. The cost of the program is divided evenly among all frames (N,).
     """
 
     def __init__(
@@ -71,14 +71,14 @@ class CommandProgram:
         self._t_ns = t_ns
         self._write_dataset = write_dataset
         self._hidden = hidden
-        self._wall_ms = 0.0  # a frame's share
+        self._wall_ms = 0.0  # per frame
         self._cpu_ms = 0.0
         self._memory_mib = 0.0
         self._poses = dict[int, Array]()
-        self.sandbox: Sandbox | None = None  # what the program could see; None if it has not been started
+        self.sandbox: Sandbox | None = None  # None until the program has been started
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Write the recording, run the program on it and read its poses. Raises EstimatorFailure."""
+        """Write the recording, run the program, and read its poses. Raises EstimatorFailure."""
         del rig  # it is in the files
         frame_count = len(self._t_ns)
         with Home(self._log) as home:
@@ -112,7 +112,7 @@ class CommandProgram:
         self._memory_mib = program.peak_mib
 
     def _written_dataset(self, home: Home) -> Path:
-        """The folder with the recording. Raises EstimatorFailure if its layout cannot hold this recording."""
+        """Write the recording to a folder. Raises EstimatorFailure if its layout cannot represent this recording."""
         dataset = home.path / "dataset"
         dataset.mkdir()
         try:
@@ -128,18 +128,18 @@ class CommandProgram:
         return Answer(result, self._wall_ms, self._cpu_ms, self._memory_mib)
 
     def finish(self) -> dict[int, Array]:
-        """Nothing: revised poses are in its file already."""
+        """No revised poses, because the program has written its final poses already."""
         return {}
 
     def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:
-        """The program has ended at the start."""
+        """Nothing to do, because the program has ended already."""
 
 
 def rate_hz(t_ns: Stamps) -> float:
-    """Frames per second, by the median of the steps of stamps (N,)."""
+    """The frame rate of stamps (N,), from the median of their steps."""
     if len(t_ns) < 2:
         return 1.0
     step_ns = float(np.median(np.diff(t_ns)))
@@ -147,9 +147,10 @@ def rate_hz(t_ns: Stamps) -> float:
 
 
 def poses_in(text: str, t_ns: Stamps) -> dict[int, Array]:
-    """The poses that a program wrote, by the stamps of the frames (N,), each within half a step of its own.
+    """The poses that a program wrote, by the stamps (N,) of their frames.
 
-    Any form that `vobench score` reads; one without stamps has a pose for each frame. Raises EstimatorFailure.
+    The text can have any format that `vobench score` reads. Without stamps, it must have one pose for each frame. With
+    stamps, each must be within half a step of that of a frame. Raises EstimatorFailure.
     """
     if not content(text):
         raise EstimatorFailure("lost", "it ended well, but {out} is empty")
@@ -157,7 +158,7 @@ def poses_in(text: str, t_ns: Stamps) -> dict[int, Array]:
     for unit in UNITS:
         try:
             parsed = parse_any(text, name="{out}", unit=unit)
-            if not (unit and parsed.notes):  # too fine a unit makes one stamp of several
+            if not (unit and parsed.notes):  # too fine a unit makes several stamps equal
                 return _matched(parsed, t_ns)
         except TrajectoryError as error:
             errors.append(" ".join(str(error).split()))
@@ -165,9 +166,9 @@ def poses_in(text: str, t_ns: Stamps) -> dict[int, Array]:
 
 
 def _matched(parsed: ParsedTrajectory, t_ns: Stamps) -> dict[int, Array]:
-    """Each pose by the stamp of the nearest frame.
+    """The poses by the stamp of the nearest frame.
 
-    Raises TrajectoryError if a pose is too far away, or if a frame has no pose of its own stamp or several.
+    Raises TrajectoryError if a pose is too far from any frame, or if a frame has several poses.
     """
     stamps = parsed.stamped_by(t_ns) if parsed.t_ns is None else parsed.t_ns
     if stamps is None:
@@ -188,7 +189,7 @@ def _matched(parsed: ParsedTrajectory, t_ns: Stamps) -> dict[int, Array]:
 
 
 def _nearest(t_ns: Stamps, stamps: Stamps) -> NDArray[np.intp]:
-    """The index (M,) of the stamp in t_ns (N,) that is nearest to each of these stamps (M,); the later one of two."""
+    """The index (M,) of the frame in t_ns (N,) that is nearest to each stamp (M,); of two, the later one."""
     if len(t_ns) == 1:
         return np.zeros(len(stamps), np.intp)
     after = np.clip(np.searchsorted(t_ns, stamps), 1, len(t_ns) - 1)

@@ -1,7 +1,8 @@
-"""The common error of all disparities of a stereo pair, estimated from tracks between views.
+"""Estimates the common error of all disparities of a stereo pair from tracks between keyframes.
 
-R, t       T_now_last: a point X of the last view is at R X + t in this one
-rays       (N, 3) with z = 1 in the view's axes; disparity in px, inverse depth = disparity / (K[0, 0] baseline)
+R, t       T_now_last: a point X in the frame of the last view is R X + t in the frame of the current view
+rays       (N, 3) with z = 1 in the frame of a view
+disparity  in px; the inverse depth is disparity / (K[0, 0] baseline)
 """
 
 from dataclasses import dataclass
@@ -21,15 +22,15 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
 OFFSET_PRIOR_PX = 0.3  # standard deviation of the prior
-# An offset is applied if it is larger than this many sigmas, and than this.
+# An offset is applied if it exceeds both limits: one in standard deviations, one in px.
 APPLIED_SIGMAS = 3.0
 LEAST_APPLIED_PX = 0.15
 FIT_STEPS = 5
-# Noise of a disparity: relative to that of a track, and at least.
+# The noise of a disparity: relative to the noise of a track, and its minimum.
 NOISE_RATIO = 2.0
 LEAST_NOISE_PX = 0.1
 MOST_BIAS_PX = 0.05
-CORRELATED = 8.0  # errors of near tracks are correlated: so many count as one
+CORRELATED = 8.0  # the number of neighbouring tracks that count as one, because their errors are correlated
 # Parameters of the fit.
 MOTION = slice(0, 6)
 OFFSET = 6
@@ -37,9 +38,9 @@ OFFSET = 6
 
 @dataclass(frozen=True, slots=True)
 class DisparityOffset:
-    """The estimated excess of all disparities of a pair, learnt view by view from a prior of zero.
+    """The estimated offset of all disparities of a pair, updated with each pair of views. Its prior is 0.
 
-    Sums of information in 1/px² and of information times offset in 1/px.
+    The fields are the sum of information (1/px²), and the sum of information times offset (1/px).
     """
 
     information: float = 1 / OFFSET_PRIOR_PX**2
@@ -47,12 +48,12 @@ class DisparityOffset:
 
     @property
     def estimate_px(self) -> float:
-        """The best estimate."""
+        """The estimate of the offset in px."""
         return self.weighted / self.information
 
     @property
     def px(self) -> float:
-        """The correction to subtract from every disparity: zero until the estimate is large and certain enough."""
+        """The offset to subtract from every disparity: 0 until the estimate is large and certain enough."""
         sigma_px = self.information**-0.5
         threshold_px = max(APPLIED_SIGMAS * sigma_px, LEAST_APPLIED_PX)
         return self.estimate_px if abs(self.estimate_px) > threshold_px else 0.0
@@ -60,10 +61,10 @@ class DisparityOffset:
     def after(
         self, rays0: Array, rays1: Array, disparity_px: Array, T_now_last: Array, pair: StereoPair
     ) -> "DisparityOffset":
-        """The offset after one more pair of views.
+        """The estimate after another pair of views.
 
-        Takes tracks as rays (N, 3) of the last view and of this one, the disparities (N,) measured in the last,
-        NaN for none, and the estimated motion between both: motion and offset are fitted together.
+        Tracks are given by their rays (N, 3) in the last and in the current view, and by their disparities (N,) in the
+        last view, NaN if unknown. The motion between the views is refined together with the offset.
         """
         has_rays = np.isfinite(rays0).all(1) & np.isfinite(rays1).all(1)
         known = np.isfinite(disparity_px) & has_rays
@@ -78,9 +79,10 @@ class DisparityOffset:
 
 @dataclass(frozen=True, slots=True)
 class _Linearization:
-    """The tracks' residuals (N, 2) in px at a motion and an offset, with their weights and derivatives.
+    """The residuals (N, 2) in px of tracks at a motion and an offset, with their weights and derivatives.
 
-    `by_point` (N, 2, 3) is by the moved point, `jacobian` (N, 2, 7) by translation, rotation and offset.
+    `by_point` (N, 2, 3) are the derivatives with respect to the moved point, and `jacobian` (N, 2, 7) those with
+    respect to translation, rotation and offset.
     """
 
     residual_px: Array
@@ -98,10 +100,10 @@ class _Tracks:
     pair: StereoPair
 
     def fitted_offset(self, T: Array, offset_px: float) -> tuple[float, float]:
-        """An offset of disparity and its information in 1/px², without what the motion could explain.
+        """The offset that fits the tracks, and its information in 1/px² after the motion is eliminated.
 
-        A point of ray x0 comes to R x0 + t (d - o) / (f b): least squares in t, R and o with Cauchy's weights. Where
-        depths differ by little more than their noise, the fit would take the noise for depth: no information.
+        A point with ray x0 and disparity d moves to R x0 + t (d - o) / (f b). The offset o, t and R are fitted by
+        least squares with Cauchy weights. The information is 0 if the depths vary hardly more than their noise.
         """
         for _ in range(FIT_STEPS):
             fit = self._linearized(T, offset_px)
@@ -119,7 +121,7 @@ class _Tracks:
         return offset_px - bias_px, marginal / (CORRELATED * fit.noise_px**2)
 
     def _linearized(self, T: Array, offset_px: float) -> _Linearization:
-        focal_px = np.diag(self.pair.K)[:2]  # of columns and of rows
+        focal_px = np.diag(self.pair.K)[:2]  # (2,), horizontal and vertical
         rho_per_px = 1 / self.pair.focal_baseline
         rho = (self.disparity_px - offset_px) * rho_per_px
         turned = self.rays0 @ T[:3, :3].T
@@ -138,7 +140,10 @@ class _Tracks:
         return _Linearization(residual_px, noise_px, cauchy_weights(residual_px, noise_px), by_point, jacobian)
 
     def _bias_px(self, fit: _Linearization, information: Array, t_m: Array) -> float:
-        """The expected error of the offset: noise in depth shortens t, and the offset with it (errors in variables)."""
+        """The expected error of the offset. Noise of the depths biases t, and thereby the offset, towards 0.
+
+        This is the bias of a regression with errors in variables.
+        """
         noise_rho = max(NOISE_RATIO * fit.noise_px, LEAST_NOISE_PX) * (1 / self.pair.focal_baseline)
         weighted = np.einsum("nij,ni,nik->jk", fit.by_point, fit.weight, fit.by_point)
         pull_on_t = noise_rho**2 * weighted @ t_m

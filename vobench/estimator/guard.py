@@ -1,8 +1,8 @@
-"""The parent of an estimator's processes: none of them outlives the trial or vobench, whatever session it is in.
+"""The guard of an estimator: the parent process of its processes, which none of them outlives, in whatever session.
 
-Where the kernel allows it they are isolated (`isolation`): they see no other processes, and no files but their own.
+Where the kernel allows it, the processes are isolated (`isolation`): they see only their own processes and files.
 
-Run by a bare interpreter, because a start should cost next to nothing: nothing of vobench is imported.
+It runs in a bare interpreter and imports nothing else of vobench, because it should start quickly.
 """
 
 import _socket
@@ -18,7 +18,7 @@ from contextlib import suppress
 
 try:
     from vobench.estimator import isolation
-except ModuleNotFoundError:  # in the bare interpreter, which has this folder alone to look in
+except ModuleNotFoundError:  # the bare interpreter finds modules only in this folder
     import isolation  # type: ignore[import-not-found,no-redef]
 
 TYPE_CHECKING = False
@@ -28,31 +28,32 @@ if TYPE_CHECKING:
 # linux/prctl.h
 PR_SET_PDEATHSIG = 1
 PR_SET_CHILD_SUBREAPER = 36
-LOOK_S = 0.5  # how often we look whether vobench lives, should its end of the line be held open by another
-KILL_S = 0.002
+LOOK_S = 0.5  # period at which the guard checks that vobench is alive; another process may hold its socket open
+KILL_S = 0.002  # pause between two rounds of kills
 CANNOT_START = 127
 PLAN_BYTES = 1 << 20
 
 
 def main() -> "NoReturn":
-    """Guard the program of the plan that is sent on the line, whose descriptor is the first argument."""
+    """Guard the program whose plan arrives on a socket. The first argument is the descriptor of the socket."""
     line = _socket.socket(fileno=int(sys.argv[1]))
     plan = marshal.loads(line.recv(PLAN_BYTES))
     guard(line, plan)
 
 
 def guard(line: _socket.socket, plan: "dict[str, Any]") -> "NoReturn":
-    """Start a program, report on the line how that went, and end as it ends, or when the line is cut.
+    """Start a program, report its start to vobench, and end as the program ends, or when the socket is closed.
 
-    `plan` is that of `sandbox.plan`. Two messages go down the line: what the program can see beyond its own, with the
-    descriptors of `isolation.enter`, and the errno of its start, 0 where it runs.
+    `plan` is the result of `sandbox.plan`. `line` is the socket to vobench. The guard sends two messages: what the
+    program can see besides its own files and processes, with the descriptors of `isolation.enter`; and the errno of
+    the start, which is 0 if the program runs.
     """
     os.set_inheritable(line.fileno(), False)
     parent = os.getppid()
     for limit, value in ((resource.RLIMIT_FSIZE, plan["file_bytes"]), (resource.RLIMIT_CORE, 0)):
-        with suppress(ValueError):  # where we are given less ourselves
+        with suppress(ValueError):  # the limit of the guard itself is lower
             resource.setrlimit(limit, (value, value))
-    _prctl(PR_SET_CHILD_SUBREAPER, 1)  # the orphans of all below us become our own
+    _prctl(PR_SET_CHILD_SUBREAPER, 1)  # orphaned descendants become children of the guard
     heard, hears = os.pipe()
     os.set_blocking(heard, False)
     os.set_blocking(hears, False)
@@ -62,7 +63,7 @@ def guard(line: _socket.socket, plan: "dict[str, Any]") -> "NoReturn":
     main = _started(plan, line, writes)
     status = None
     os.close(writes)
-    for fd in (0, 1):  # the program's alone, whose end is then seen at the other side
+    for fd in (0, 1):  # only the program holds them, so vobench notices when the program closes them
         os.close(fd)
     while status is None:
         ready, _, _ = select.select([line.fileno(), heard], [], [], LOOK_S)
@@ -76,14 +77,17 @@ def guard(line: _socket.socket, plan: "dict[str, Any]") -> "NoReturn":
 
 
 def _started(plan: "dict[str, Any]", line: _socket.socket, ended: int) -> int:
-    """The id of the program's process, or of the first in its namespace, which writes the program's end on `ended`."""
+    """Start the program's process, or the first process of its namespace, and return its id.
+
+    The first process of the namespace writes the status of the program to the descriptor `ended`.
+    """
     is_isolated = plan["is_isolated"]
     has_pid_namespace = is_isolated and isolation.new_pid_namespace()
     reads, writes = os.pipe()
     pid = os.fork()
     if pid == 0:
         signal.set_wakeup_fd(-1)
-        for number in (signal.SIGCHLD, signal.SIGPIPE, signal.SIGXFSZ):  # which our interpreter has changed
+        for number in (signal.SIGCHLD, signal.SIGPIPE, signal.SIGXFSZ):  # the interpreter has changed these handlers
             signal.signal(number, signal.SIG_DFL)
         _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if is_isolated:
@@ -101,13 +105,13 @@ def _started(plan: "dict[str, Any]", line: _socket.socket, ended: int) -> int:
     while more := os.read(reads, 16):
         failed += more
     os.close(reads)
-    with suppress(OSError):  # where vobench has gone meanwhile
+    with suppress(OSError):  # vobench has ended
         line.send(failed or b"0")
     return pid
 
 
 def _isolate(plan: "dict[str, Any]", line: _socket.socket, *, has_pid_namespace: bool) -> None:
-    """Isolate this process, and send what it can see all the same, why, and the descriptors of its file systems."""
+    """Isolate this process, and send a report: what it can still see, why, and the descriptors of its file systems."""
     sees, why, descriptors = isolation.enter(plan, has_pid_namespace=has_pid_namespace)
     report = marshal.dumps((sees, why, has_pid_namespace))
     packed = b"".join(descriptor.to_bytes(4, sys.byteorder) for descriptor in descriptors)
@@ -118,7 +122,10 @@ def _isolate(plan: "dict[str, Any]", line: _socket.socket, *, has_pid_namespace:
 
 
 def _be_first(writes: int, ended: int) -> None:
-    """Become the first process of our namespace, with which all others go; come back as the program's alone."""
+    """Make this process the first of its namespace, and return only in a child process, which becomes the program.
+
+    When the first process of a namespace ends, the kernel kills all others.
+    """
     isolation.hide_from_children()
     pid = os.fork()
     if pid == 0:
@@ -134,7 +141,7 @@ def _be_first(writes: int, ended: int) -> None:
 
 
 def _buried(main: int) -> int | None:
-    """The status of the program's process, where it has ended; all that have ended are taken off the system's list."""
+    """Reap all processes that have ended, and return the status of the process `main` if it is one of them."""
     status = None
     with suppress(ChildProcessError):
         while (ended := os.waitpid(-1, os.WNOHANG))[0]:
@@ -143,7 +150,7 @@ def _buried(main: int) -> int | None:
 
 
 def _end_all() -> None:
-    """Kill until nobody is left: whoever loses its parent becomes our child."""
+    """Kill all descendants. Those that lose their parent become children of the guard, so that none is missed."""
     with suppress(ChildProcessError):
         while True:
             for pid in descendants(os.getpid()):
@@ -155,35 +162,39 @@ def _end_all() -> None:
 
 
 def _end_as(status: int) -> "NoReturn":
-    """End with the exit code or by the signal of another process."""
+    """End this process with the exit code of another process, or by the signal that ended it."""
     if os.WIFSIGNALED(status):
-        with suppress(OSError):  # SIGKILL has no other handler
+        with suppress(OSError):  # the handler of SIGKILL cannot be set
             signal.signal(os.WTERMSIG(status), signal.SIG_DFL)
         os.kill(os.getpid(), os.WTERMSIG(status))
     os._exit(os.waitstatus_to_exitcode(status))
 
 
 def _prctl(option: int, value: int) -> None:
-    """Where it is Linux that we run on."""
+    """Call prctl(2), which exists only on Linux."""
     with suppress(OSError, AttributeError):
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 def descendants(ancestor: int) -> list[int]:
-    """The ids of all processes that come of one; none where there is no /proc."""
-    pids = [int(pid) for pid in os.listdir("/proc") if pid.isdigit()] if sys.platform == "linux" else []
+    """The ids of all descendants of a process; empty on a system without /proc."""
+    names = os.listdir("/proc") if sys.platform == "linux" else []
+    pids = [int(name) for name in names if name.isdigit()]
     children = dict[int, list[int]]()
     for pid in pids:
         if fields := stat(pid):
             children.setdefault(int(fields[1]), []).append(pid)
-    found = [ancestor]
-    for pid in found:  # which grows as we go
-        found += children.get(pid, [])
-    return found[1:]
+    family = [ancestor]
+    for pid in family:  # the loop also visits the ids that it appends
+        family += children.get(pid, [])
+    return family[1:]
 
 
 def stat(pid: int) -> list[str]:
-    """What /proc/<pid>/stat says behind the name: state, parent, group, session, ... (proc(5)); nothing once gone."""
+    """The fields of /proc/<pid>/stat after the name: state, parent, group, session and so on (see proc(5)).
+
+    Empty if the process no longer exists.
+    """
     with suppress(OSError), open(f"/proc/{pid}/stat", errors="replace") as file:
         return file.read().rpartition(")")[2].split()
     return []

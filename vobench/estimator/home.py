@@ -1,6 +1,6 @@
-"""The folder that a program works in: made, read and removed without following what the program has put there.
+"""The folder that a program works in. It is created, read and removed without following the program's links.
 
-A home is a temporary folder of vobench's (`temporary`): what a killed vobench has left is removed by the next.
+A home is a temporary folder of vobench (`temporary`). If vobench is killed, its next process removes the folder.
 """
 
 import os
@@ -14,19 +14,22 @@ from vobench import stop
 from vobench.temporary import FOLLOW_NOTHING, locked_folder, names, remove_below
 
 HOME = "home"
-DEEPEST = 256  # nested folders whose sizes are added up; each takes a descriptor meanwhile
+DEEPEST = 256  # the largest depth of nested folders whose sizes are added up; each level takes a descriptor
 READ_BYTES = 1 << 20
 
 
 class UnreadableFileError(Exception):
-    """A file that a program should have written is none that is read; the message says why."""
+    """An output file of a program cannot be read safely.
+
+    The message is a predicate for the file, such as "is empty".
+    """
 
 
 class Home:
-    """A new folder for a program to work in; it is gone after the block, whatever the program has made of it.
+    """A new folder for a program to work in. It is removed at the end of the block.
 
     `path` is free of links; `descriptor` stays that of the folder, also where the program renames it. What cannot be
-    removed is noted in the log.
+    `path` contains no links. `descriptor` refers to the folder even if the program renames it.
     """
 
     def __init__(self, log: Path) -> None:
@@ -38,7 +41,7 @@ class Home:
 
     @property
     def base(self) -> Path:
-        """The folder of all homes of this user."""
+        """The folder that holds all homes of this user."""
         return self._locked.parent
 
     def __enter__(self) -> Self:
@@ -50,7 +53,10 @@ class Home:
         self._undone.__exit__(None, None, None)
 
     def close(self) -> None:
-        """Remove the folder, wherever it is by now, and what has taken its place; a second call does nothing."""
+        """Remove the folder, even if the program has moved it, and what is now in its place.
+
+        Files that cannot be removed are noted in the log. A second call does nothing.
+        """
         if self._lock < 0:
             return
         lock = self._lock
@@ -62,29 +68,31 @@ class Home:
         with suppress(OSError):
             self._locked.rmdir()
         os.close(lock)
-        with suppress(OSError):  # others are in use
+        with suppress(OSError):  # other homes are in use
             self.base.rmdir()
         if left:
             with suppress(OSError), self._log.open("a", encoding="utf-8") as log:
                 log.write(f"\n[vobench: {len(left)} files of its folder could not be removed: {left[0]!r}]\n")
 
     def _remove_renamed(self) -> list[str]:
-        """Remove the emptied folder from the place that the program has moved it to; what could not be removed."""
+        """Remove the empty folder if the program has moved it, and return its path if that fails."""
         with suppress(OSError):
-            now = os.readlink(f"/proc/self/fd/{self.descriptor}")
-            if now == str(self.path) or not os.path.samestat(os.fstat(self.descriptor), os.lstat(now)):
+            current_path = os.readlink(f"/proc/self/fd/{self.descriptor}")
+            is_unmoved = current_path == str(self.path)
+            if is_unmoved or not os.path.samestat(os.fstat(self.descriptor), os.lstat(current_path)):
                 return []
             try:
-                os.rmdir(now)
+                os.rmdir(current_path)
             except OSError:
-                return [now]
+                return [current_path]
         return []
 
 
 def read_below(folder: int, name: str, *, most_bytes: int, check: Callable[[], object]) -> bytes:
-    """The content of the file `name` below the folder of a descriptor; no link is followed on the way.
+    """The content of the file `name` below a folder, which is given by its descriptor. No link is followed.
 
-    `check` is called between parts and may raise. Raises UnreadableFileError, and FileNotFoundError.
+    `check` is called before each part of the file is read, and may raise.
+    Raises FileNotFoundError if there is no such file, and UnreadableFileError if it is not safe to read or too large.
     """
     *folders, last = Path(name).parts
     place = os.dup(folder)
@@ -109,6 +117,7 @@ def read_below(folder: int, name: str, *, most_bytes: int, check: Callable[[], o
 
 
 def _opened(name: str, flags: int, folder: int) -> int:
+    """The descriptor of a file in a folder, opened for reading. Raises UnreadableFileError for a link."""
     if name in ("..", "/"):
         raise UnreadableFileError("is outside of its folder")
     try:
@@ -122,6 +131,7 @@ def _opened(name: str, flags: int, folder: int) -> int:
 
 
 def _content(file: int, most_bytes: int, check: Callable[[], object]) -> bytes:
+    """The content of an open file. Raises UnreadableFileError if it is larger than `most_bytes`."""
     content = bytearray()
     while True:
         check()
@@ -137,9 +147,9 @@ def _content(file: int, most_bytes: int, check: Callable[[], object]) -> bytes:
 
 
 def held_bytes(folder: int, *, most: int) -> int:
-    """What the files below a folder take up, a block at least for each, counted until that is more than `most`.
+    """The disk space of all files below a folder, at least one block for each. Counting stops above `most`.
 
-    Folders nested deeper than DEEPEST are more than any limit.
+    For folders that are nested deeper than DEEPEST, the result is `most` + 1.
     """
     held = 0
     walks = [_Walk(os.dup(folder))]
@@ -165,7 +175,7 @@ def held_bytes(folder: int, *, most: int) -> int:
 
 
 class _Walk:
-    """A folder whose names are yet to be looked at."""
+    """A folder, and the names in it that have not been visited."""
 
     def __init__(self, folder: int) -> None:
         self.folder = folder

@@ -1,9 +1,9 @@
-"""What an estimator's process may see and do: a mount tree of its own, namespaces, no capabilities, few system calls.
+"""Isolates the process of an estimator: a private mount tree, namespaces, no capabilities, and few system calls.
 
-`enter` is called by the process that is about to become the estimator, or the first of its namespace. What the kernel
-does not allow is left out and reported. See namespaces(7), pivot_root(2), capabilities(7), seccomp(2), landlock(7).
+The process that becomes the estimator, or the first process of its namespace, calls `enter`. A layer that the kernel
+does not allow is omitted and reported. See namespaces(7), pivot_root(2), capabilities(7), seccomp(2), landlock(7).
 
-Run by a bare interpreter, because a start should cost next to nothing: nothing of vobench is imported.
+This module runs in a bare interpreter and imports nothing of vobench, because an estimator should start quickly.
 """
 
 import ctypes
@@ -11,7 +11,7 @@ import errno
 import os
 import struct
 
-# What an estimator can see beyond its own, where the kernel does not give a layer.
+# What an estimator can see if the kernel does not allow a layer of the isolation.
 FILES = "the user's files"
 NAMES = "names and permissions of the user's files"
 PROCESSES = "other processes"
@@ -72,7 +72,7 @@ SYSTEM = (
     "/gnu/store",
     "/run/current-system",
 )
-# What the loader, programs with alternatives, fonts and drivers look up.
+# Settings that the loader, fonts, drivers and programs with alternatives read.
 SETTINGS = (
     "/etc/alternatives",
     "/etc/fonts",
@@ -86,7 +86,7 @@ SETTINGS = (
     "/etc/vulkan",
 )
 DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
-# Graphics processors: NVIDIA's, those of Mesa's drivers, AMD's compute, and that of WSL.
+# The devices of graphics processors: Mesa's drivers, AMD's compute driver, WSL, and those of NVIDIA by their prefix.
 GRAPHICS = ("/dev/dri", "/dev/kfd", "/dev/dxg")
 GRAPHICS_PREFIX = "nvidia"
 PROCESSORS = ("/sys/devices/system/cpu", "/sys/devices/system/node")
@@ -97,13 +97,16 @@ LINKS_OF_DEV = (
     ("/dev/stderr", "/proc/self/fd/2"),
 )
 ROOT_SIZE = "16m"
-INODE_BYTES = 4096  # a file takes a block at least, as where the size of a folder is counted
+INODE_BYTES = 4096  # each file takes at least one block
 
 libc = ctypes.CDLL(None, use_errno=True)
 
 
 def new_pid_namespace() -> bool:
-    """Whether the children of this process are in a process namespace of their own: as root, or in a user namespace."""
+    """Put future children of this process in a new process namespace, and return whether the kernel allows it.
+
+    Without the privileges of root, this requires a new user namespace.
+    """
     user = os.getuid()
     group = os.getgid()
     try:
@@ -121,10 +124,11 @@ def new_pid_namespace() -> bool:
 
 
 def enter(plan: dict[str, object], *, has_pid_namespace: bool) -> tuple[list[str], str, list[int]]:
-    """Isolate this process and all that come of it, as far as the kernel allows.
+    """Isolate this process and all of its descendants, as far as the kernel allows.
 
-    `plan` is that of `sandbox.plan`. Returns what can still be seen, why the mount tree could not be had (empty where
-    it could), and descriptors: of the writable file system, of the home in it, and of the shared memory.
+    `plan` is the result of `sandbox.plan`. Returns what the process can still see; the reason why the kernel did not
+    allow a private mount tree, empty if it did; and the descriptors of the private file systems, as in
+    `_Tree.descriptors`.
     """
     sees = []
     why = ""
@@ -152,7 +156,7 @@ def enter(plan: dict[str, object], *, has_pid_namespace: bool) -> tuple[list[str
 
 
 def hide_from_children() -> None:
-    """Keep children from this process's memory and descriptors, though they have the same user."""
+    """Deny the children of this process, which run as the same user, access to its memory and descriptors."""
     _prctl(PR_SET_DUMPABLE, 0)
 
 
@@ -160,9 +164,9 @@ def hide_from_children() -> None:
 
 
 def _enter_mount_tree(plan: dict[str, object], *, has_pid_namespace: bool) -> tuple[bool, list[int]]:
-    """Build the tree below the home's folder and make it the root; on an error all is as it was. Raises OSError.
+    """Build a mount tree below the home, and make it the root. An error leaves all mounts unchanged. Raises OSError.
 
-    Returns whether /proc is its own, and the descriptors of `enter`.
+    Returns whether /proc shows only processes of the namespace, and the descriptors of the private file systems.
     """
     if not has_pid_namespace:
         raise OSError(errno.EPERM, "no process namespace")
@@ -196,23 +200,23 @@ def _enter_mount_tree(plan: dict[str, object], *, has_pid_namespace: bool) -> tu
 
 
 class _Tree:
-    """A mount tree while it is built: `root` will be /, `writable` are mounts that are not made read-only."""
+    """A mount tree that is being built. `root` becomes /, and the mounts in `writable` are not made read-only."""
 
     def __init__(self, root: str) -> None:
         self.root = root
         self.writable = [root + "/tmp", root + "/dev/shm"]
-        self.readable: dict[str, bool] = {}  # by path: whether all below it is readable, or hidden
+        self.readable: dict[str, bool] = {}  # for each path: whether everything below it is readable, or hidden
         self.has_own_proc = True
 
     def build(self, plan: dict[str, object], given: int) -> None:
-        """Mount all that an estimator may see; `given` is the folder whose entries its home has from the start."""
+        """Mount everything that an estimator may see. `given` is the descriptor of the folder with its input."""
         home = str(plan["home"])
         self._mount_writable(int(plan["disk_bytes"]), int(plan["memory_bytes"]))  # type: ignore[call-overload]
         self._mount_proc()
         self._bind_devices(bool(plan["graphics"]))
         read = [(path, True) for path in (*SYSTEM, *SETTINGS, *PROCESSORS, *plan["read"])]  # type: ignore[misc]
         hidden = [(path, False) for path in plan["hidden"]]  # type: ignore[attr-defined]
-        # The shallow ones first, so that a folder to be read may lie in a hidden one, and the other way round.
+        # By depth, so that a readable folder can be inside of a hidden one and vice versa.
         for path, is_read in sorted([*read, *hidden], key=lambda entry: (entry[0].count("/"), entry[1])):
             if is_read:
                 self._read(path)
@@ -223,16 +227,16 @@ class _Tree:
             self._bind(f"/proc/self/fd/{given}/{name}", f"{home}/{name}")
 
     def _mount_writable(self, disk_bytes: int, memory_bytes: int) -> None:
-        """The file system of the home, and shared memory: both end with the namespace, however that ends."""
+        """Mount the file system of the home and shared memory. The kernel removes both with the namespace."""
         for path, size, inodes in (("/tmp", disk_bytes, disk_bytes // INODE_BYTES), ("/dev/shm", memory_bytes, 65536)):
             os.makedirs(self.root + path)
             limits = f"mode=0755,size={size},nr_inodes={inodes}"
             _mount("tmpfs", self.root + path, "tmpfs", MS_NOSUID | MS_NODEV, limits)
 
     def _mount_proc(self) -> None:
-        """A /proc of the namespace's processes alone, whose settings of the kernel cannot be written.
+        """Mount a read-only /proc that shows only the processes of the namespace.
 
-        In a container that masks some of it the kernel may refuse that; then it is the system's.
+        The kernel may refuse this in a container that hides parts of /proc. The system's /proc is bound then.
         """
         os.mkdir(self.root + "/proc")
         try:
@@ -251,11 +255,11 @@ class _Tree:
                 self._bind(path, path)
         for link, target in LINKS_OF_DEV:
             os.symlink(target, self.root + link)
-        if has_graphics:  # drivers look up their device there
+        if has_graphics:  # drivers look up their devices in /sys
             self._bind("/sys", "/sys")
 
     def _read(self, path: str) -> None:
-        """Make a file or folder readable, under the name that is given and under its real one."""
+        """Make a file or folder readable, by the given path and by its real path."""
         real = os.path.realpath(path)
         if not os.path.exists(real):
             return
@@ -265,13 +269,13 @@ class _Tree:
             self._link(path, real)
 
     def _link(self, path: str, real: str) -> None:
-        """Give a place that is readable its other name."""
+        """Create a symbolic link from a path to its real path, which is readable already."""
         place = self.root + path
         os.makedirs(os.path.dirname(place), exist_ok=True)
         os.symlink(os.path.relpath(real, os.path.dirname(path)), place)
 
     def _is_readable(self, real: str) -> bool:
-        """Whether a path lies in a tree that is bound, and in none in it that is hidden."""
+        """Whether a path is in a readable folder, and not in a hidden folder inside of it."""
         place = real
         while place not in self.readable and place != "/":
             place = os.path.dirname(place)
@@ -288,7 +292,7 @@ class _Tree:
         self.readable[path] = True
 
     def _hide(self, path: str) -> None:
-        """Put something empty in the place of what lies in a readable folder."""
+        """Cover a file or folder inside of a readable folder by an empty one."""
         target = self.root + path
         if not self._is_readable(path) or not os.path.lexists(target):
             return
@@ -299,7 +303,7 @@ class _Tree:
         self.readable[path] = False
 
     def _make_home(self, home: str, homes: str) -> None:
-        """The home as an empty folder of the writable file system; those of others are not there."""
+        """Create the home as an empty folder of the writable file system. The homes of other estimators are hidden."""
         place = self.root + home
         if self._is_readable(homes):
             os.mkdir(self.root + "/tmp/.homes")
@@ -312,12 +316,12 @@ class _Tree:
             self.writable.append(place)
 
     def descriptors(self, home: str) -> list[int]:
-        """Of the writable file system, of the home, and of shared memory."""
+        """The descriptors of the writable file system, of the home in it, and of shared memory."""
         flags = os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC
         return [os.open(self.root + path, flags) for path in ("/tmp", home, "/dev/shm")]
 
     def lock(self) -> None:
-        """Make all mounts read-only that are not to be written, those within a bound folder included."""
+        """Make all mounts read-only except `writable`, including the mounts inside of bound folders."""
         with open("/proc/self/mountinfo", errors="surrogateescape") as file:
             mounts = [line.split(" ")[4:6] for line in file]
         for escaped, options in mounts:
@@ -327,26 +331,30 @@ class _Tree:
             if point in self.writable:
                 continue
             flags = MS_REMOUNT | MS_BIND | MS_RDONLY | MS_NOSUID
-            if not point.startswith(self.root + "/dev/"):  # where devices are still devices
+            if not point.startswith(self.root + "/dev/"):  # devices work only below /dev
                 flags |= MS_NODEV
             if "noexec" in options.split(","):
                 flags |= MS_NOEXEC
             try:
                 _mount(None, point, None, flags)
             except OSError as error:
-                # The path leads to no mount: another covers it, so nobody gets there.
+                # The mount is covered by another one, so it cannot be reached.
                 if error.errno not in (errno.EINVAL, errno.ENOENT):
                     raise
 
 
 def _unescaped(text: str) -> str:
-    """A path of mountinfo as it is; a blank is written there as a backslash and 040."""
-    parts = text.split("\\")
-    return parts[0] + "".join(chr(int(part[:3], 8)) + part[3:] for part in parts[1:])
+    """A path of mountinfo without escapes. A blank, for example, is escaped as a backslash and 040."""
+    first, *escaped = text.split("\\")
+    plain = first
+    for part in escaped:
+        octal_code = part[:3]
+        plain += chr(int(octal_code, 8)) + part[3:]
+    return plain
 
 
 def _mount(source: str | None, target: str, kind: str | None, flags: int, data: str | None = None) -> None:
-    """mount(2). Raises OSError, which names the target."""
+    """Call mount(2). Raises OSError with the target."""
     words = [None if word is None else os.fsencode(word) for word in (source, target, kind)]
     if libc.mount(*words, ctypes.c_ulong(flags), None if data is None else data.encode()):
         raise _last_error(f"mount {target}")
@@ -357,14 +365,14 @@ def _last_error(what: str) -> OSError:
     return OSError(number, f"{what}: {os.strerror(number)}")
 
 
-# Files, where there are no mounts
+# Restricts files by landlock(7), if mounts are not allowed
 
 LANDLOCK_CREATE_RULESET = 444
 LANDLOCK_ADD_RULE = 445
 LANDLOCK_RESTRICT_SELF = 446
 LANDLOCK_VERSION_ASKED = 1
 LANDLOCK_RULE_PATH_BENEATH = 1
-# linux/landlock.h: bits of access, of which each version knows more than the one before
+# linux/landlock.h: the bits of access rights. Each version adds rights to those of the version before.
 EXECUTE_READ_LIST = 0b1101
 LIST = 0b1000
 READ_WRITE = 0b110
@@ -378,40 +386,59 @@ SINCE_SCOPES = 6
 
 
 def _restrict_files(plan: dict[str, object]) -> bool:
-    """Whether this process can open no files but those of the plan: by landlock(7), which needs no namespace."""
+    """Allow this process only the files of the plan, and return whether that succeeds.
+
+    It uses landlock(7), which needs no namespace.
+    """
     version = libc.syscall(ctypes.c_long(LANDLOCK_CREATE_RULESET), None, ctypes.c_size_t(0), LANDLOCK_VERSION_ASKED)
-    read = [os.path.realpath(path) for path in (*SYSTEM, *SETTINGS, *PROCESSORS, *plan["read"])]  # type: ignore[misc]
+    readable = [os.path.realpath(path) for path in (*SYSTEM, *SETTINGS, *PROCESSORS, *plan["read"])]  # type: ignore[misc]
     hidden = [str(path) for path in plan["hidden"]]  # type: ignore[attr-defined]
-    holds_hidden = any(f"{path}/".startswith(f"{folder}/") for path in hidden for folder in read)
-    if version < 1 or holds_hidden:  # what is allowed for a folder is allowed for all that is in it
+    if version < 1 or _has_hidden_path(readable, hidden):  # landlock cannot hide a part of a readable folder
         return False
     every_access = (1 << BITS_OF_VERSION.get(version, BITS_SINCE_5)) - 1
-    scopes = ABSTRACT_SOCKETS_AND_SIGNALS if version >= SINCE_SCOPES else 0
-    attributes = struct.pack("QQQ", every_access, 0, scopes)
-    size = 8  # one field of 64 bits, and one more for each of these
-    if version >= SINCE_NETWORK:
-        size += 8
-    if version >= SINCE_SCOPES:
-        size += 8
-    ruleset = libc.syscall(ctypes.c_long(LANDLOCK_CREATE_RULESET), attributes, ctypes.c_size_t(size), 0)
+    ruleset = _new_ruleset(version, every_access)
     if ruleset < 0:
         return False
-    devices = [*DEVICES, *GRAPHICS, *(f"/dev/{name}" for name in os.listdir("/dev") if GRAPHICS_PREFIX in name)]
-    rules = [(path, EXECUTE_READ_LIST) for path in (*read, "/proc")]
-    # Python lists a folder to find a package in it: that in which vobench lies is not in `read` where it is a clone.
-    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
-    rules.append((os.path.dirname(package), LIST))
-    rules += [(path, READ_WRITE | IOCTL_BIT) for path in devices]
-    rules += [(str(plan["home"]), every_access), ("/dev/shm", every_access)]
-    for path, access in rules:
+    for path, access in _access_rules(plan, readable, every_access):
         _allow(ruleset, path, access & every_access)
     failed = libc.syscall(ctypes.c_long(LANDLOCK_RESTRICT_SELF), ctypes.c_int(ruleset), 0)
     os.close(ruleset)
     return bool(failed == 0)
 
 
+def _has_hidden_path(readable: list[str], hidden: list[str]) -> bool:
+    """Whether one of the hidden paths is in one of the readable folders."""
+    prefixes = tuple(f"{folder}/" for folder in readable)
+    return any(f"{path}/".startswith(prefixes) for path in hidden)
+
+
+def _new_ruleset(version: int, every_access: int) -> int:
+    """The descriptor of a ruleset that denies every access; negative if the kernel refuses it."""
+    scopes = ABSTRACT_SOCKETS_AND_SIGNALS if version >= SINCE_SCOPES else 0
+    attributes = struct.pack("QQQ", every_access, 0, scopes)
+    size = 8  # the field for files; newer versions have one more field for the network, and one for scopes
+    if version >= SINCE_NETWORK:
+        size += 8
+    if version >= SINCE_SCOPES:
+        size += 8
+    ruleset = libc.syscall(ctypes.c_long(LANDLOCK_CREATE_RULESET), attributes, ctypes.c_size_t(size), 0)
+    return int(ruleset)
+
+
+def _access_rules(plan: dict[str, object], readable: list[str], every_access: int) -> list[tuple[str, int]]:
+    """The paths that the process may use, each with its rights."""
+    rules = [(path, EXECUTE_READ_LIST) for path in (*readable, "/proc")]
+    # Python lists the folder that contains a package. If vobench is a clone, that folder is not in `readable`.
+    package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    rules.append((os.path.dirname(package), LIST))
+    graphics = [f"/dev/{name}" for name in os.listdir("/dev") if GRAPHICS_PREFIX in name]
+    rules += [(path, READ_WRITE | IOCTL_BIT) for path in (*DEVICES, *GRAPHICS, *graphics)]
+    rules += [(str(plan["home"]), every_access), ("/dev/shm", every_access)]
+    return rules
+
+
 def _allow(ruleset: int, path: str, access: int) -> None:
-    """Add a rule for a file or folder, where it exists; nothing is allowed by default."""
+    """Allow access to a file or folder if it exists. Everything without a rule is denied."""
     try:
         place = os.open(path, os.O_PATH | os.O_CLOEXEC)
     except OSError:
@@ -423,11 +450,11 @@ def _allow(ruleset: int, path: str, access: int) -> None:
     os.close(place)
 
 
-# The network, privileges
+# The network and privileges
 
 
 def _leave_network() -> bool:
-    """Whether this process has a network of its own, with nothing in it but itself."""
+    """Move this process to a new network namespace with only the loopback device, and return whether that succeeds."""
     if libc.unshare(CLONE_NEWNET):
         return False
     try:
@@ -439,13 +466,13 @@ def _leave_network() -> bool:
         request_to_set_flags = 0x8914  # linux/sockios.h
         fcntl.ioctl(device.fileno(), request_to_set_flags, struct.pack("16sh14x", b"lo", is_up_and_running))
         device.close()
-    except OSError:  # then 127.0.0.1 cannot be reached either
+    except OSError:  # 127.0.0.1 cannot be reached either, which is acceptable
         pass
     return True
 
 
 def _drop_capabilities() -> None:
-    """Give up what root, or the first of a user namespace, may do beyond others, for good."""
+    """Give up all capabilities of root, or of the first process of a user namespace, irrevocably."""
     for capability in range(MOST_CAPABILITIES):
         _prctl(PR_CAPBSET_DROP, capability)
     _prctl(PR_CAP_AMBIENT, PR_CAP_AMBIENT_CLEAR_ALL)
@@ -461,7 +488,7 @@ def _prctl(option: int, value: int) -> bool:
 
 # System calls
 
-# By name: the number on x86-64 and on arm64; -1 where there is none.
+# The number of each refused system call on x86-64 and on arm64; -1 if there is none.
 REFUSED = {
     "acct": (163, 89),
     "add_key": (248, 217),
@@ -540,14 +567,17 @@ SECOND_ARGUMENT = 24
 ALLOW = 0x7FFF0000
 FAIL = 0x00050000
 SECCOMP_SET_MODE_FILTER = 1
-SECCOMP_FILTER_FLAG_SPEC_ALLOW = 4  # else older kernels slow down all that the process computes
+SECCOMP_FILTER_FLAG_SPEC_ALLOW = 4  # without it, older kernels slow down the whole process
 SECCOMP_MODE_FILTER = 2
 
-Instruction = tuple[int, int, int, int]  # code, how far to jump if true, and if false, operand
+Instruction = tuple[int, int, int, int]  # code, number of instructions to skip if true and if false, operand
 
 
 def system_call_filter(machine: str, *, kills_all: bool) -> list[Instruction]:
-    """The filter for a machine, `x86_64` or `aarch64`; `kills_all` allows signals to all processes that it can see."""
+    """The seccomp filter for a machine, which is `x86_64` or `aarch64`.
+
+    `kills_all` allows a signal to all visible processes at once.
+    """
     column, architecture = MACHINES[machine]
     fails = FAIL | errno.EPERM
     program: list[Instruction] = [
@@ -561,7 +591,7 @@ def system_call_filter(machine: str, *, kills_all: bool) -> list[Instruction]:
     for numbers in REFUSED.values():
         if numbers[column] >= 0:
             program += [(JUMP_IF_EQUAL, 0, 1, numbers[column]), (RETURN, 0, 0, fails)]
-    # Libraries fall back on clone, whose flags can be looked at.
+    # Libraries fall back to clone, whose flags a filter can check, unlike those of clone3.
     program += [(JUMP_IF_EQUAL, 0, 1, CLONE3[column]), (RETURN, 0, 0, FAIL | errno.ENOSYS)]
     new_namespace = [(JUMP_IF_ANY_BIT, 0, 1, CLONE_ANY_NEW & ~0xFF), (RETURN, 0, 0, fails)]
     program += _of_call(CLONE[column], FIRST_ARGUMENT, new_namespace)
@@ -577,12 +607,12 @@ def system_call_filter(machine: str, *, kills_all: bool) -> list[Instruction]:
 
 
 def _of_call(number: int, argument: int, body: list[Instruction]) -> list[Instruction]:
-    """Instructions on an argument of one system call, at whose end it is allowed; of all others they are skipped."""
+    """Instructions that check an argument of one system call and allow it at their end. Other calls skip them."""
     return [(JUMP_IF_EQUAL, 0, len(body) + 2, number), (LOAD, 0, 0, argument), *body, (RETURN, 0, 0, ALLOW)]
 
 
 def _filter_system_calls(*, kills_all: bool) -> bool:
-    """Whether the filter is in force."""
+    """Install the filter of system calls, and return whether that succeeds."""
     machine = os.uname().machine
     if machine not in MACHINES:
         return False

@@ -1,4 +1,4 @@
-"""The settings of an estimator's `estimator.yaml`: how it is run, its sensors, its claims and its limits."""
+"""The manifest of an estimator, `estimator.yaml`: how it is run, its sensors, its claims and its limits."""
 
 import re
 from dataclasses import field
@@ -25,7 +25,7 @@ Argv = tuple[Annotated[str, MinLen(1)], ...]
 
 @settings()
 class Limits:
-    """Limits of an estimator's processes together; the clock of `trial_s` runs from its start."""
+    """Limits for all processes of an estimator together. `trial_s` is measured from the start of the program."""
 
     start_s: Positive = 60.0
     frame_s: Positive = 20.0
@@ -89,7 +89,7 @@ class Manifest:
         self._check_placeholders("stream", self.stream, IN_STREAM)
 
     def _check_placeholders(self, key: str, argv: Argv, placeholders: tuple[str, ...]) -> None:
-        """Raise SettingError if an argv has a placeholder that is neither one of these nor a parameter."""
+        """Raise SettingError if an argv has a placeholder that is neither in `placeholders` nor a parameter."""
         known = [*placeholders, *self.params]
         for name in PLACEHOLDER.findall(" ".join(argv)):
             if name not in known:
@@ -97,7 +97,7 @@ class Manifest:
 
     @property
     def described(self) -> str:
-        """The summary or, without one, how the estimator is run and which sensors it needs."""
+        """The summary. Without one, how the estimator is run and which sensors it needs."""
         if self.summary:
             return self.summary
         argv = self.command or self.stream
@@ -107,7 +107,7 @@ class Manifest:
 
     @property
     def claims(self) -> tuple[str, ...]:
-        """The claims that a board shows beside the name: those that most estimators do not make."""
+        """The claims that the leaderboard shows beside the name, which most estimators do not make."""
         claims = {
             "Sim(3)": not self.metric,
             "whole recording": bool(self.command),

@@ -1,7 +1,8 @@
-"""The messages between vobench and an estimator, as bytes: the calibration and frames out, answers back.
+"""Encodes and decodes the messages between vobench and an estimator: calibration, frames and answers.
 
-docs/estimators.md has the specification. Every message is a tag of four letters, the length of its payload in bytes
-(uint32), and the payload; all numbers are little-endian. Answers are numbers and text: nothing of them is unpickled.
+docs/estimators.md has the specification. A message consists of a tag of four letters, the length of its payload in
+bytes (uint32), and the payload. All numbers are little-endian. Answers contain only numbers and text, and are never
+unpickled.
 """
 
 import json
@@ -23,8 +24,8 @@ from vobench.geometry.se3 import Array
 VERSION = 1
 HEADER = struct.Struct("<4sI")
 FRAME = struct.Struct("<qqIIIIII")  # index, t_ns, width, height, channels, pictures, IMU readings, encoder readings
-STAMP = struct.Struct("<q")  # t_ns of a reading, or a frame's index
-ANSWER = struct.Struct("<qII")  # index, status, contents: the sum of these bits
+STAMP = struct.Struct("<q")  # t_ns of a reading, or the index of a frame
+ANSWER = struct.Struct("<qII")  # index, status, contents (a sum of the bits below)
 POSE = 1
 COVARIANCE = 2
 STATS = 4
@@ -33,15 +34,18 @@ POINTS = 16
 COUNT = struct.Struct("<I")
 STATUSES = tuple(Status)
 LAST_ROW = np.array([0.0, 0.0, 0.0, 1.0])
-# Tags of failures, which may come instead of an answer, and the status of the trial then.
+# The tags of failures, which can be sent instead of an answer, and the resulting status of the trial.
 FAILURES = {b"FAIL": "refused", b"CRSH": "crashed", b"NMEM": "out_of_memory", b"WRNG": "invalid_output"}
-ANSWER_BYTES = 64 << 20  # limit of an answer; more than this is noise on the connection
+ANSWER_BYTES = 64 << 20  # the limit of an answer; a larger length means that the bytes are not a message
 STATS_BYTES = 1 << 16
 REASON_BYTES = 1 << 12
 
 
 def calibration(rig: Rig) -> dict[str, Any]:
-    """A rig as JSON: cameras by their models, the left one first; poses as (4, 4) by rows; None for no sensor."""
+    """The content of a rig for JSON: cameras, the left one first, and poses (4, 4) by rows.
+
+    A missing sensor is None.
+    """
     cameras = []
     for side in rig.sides:
         T_body_camera = rig.T_body_camera(side)
@@ -58,7 +62,7 @@ def _camera(camera: Camera, T_body_camera: Array) -> dict[str, Any]:
 
 
 def framed(frame: Frame) -> list[bytes | memoryview]:
-    """A frame's parts: FRAME, the pictures row by row, IMU readings and encoder counts, each after its stamp."""
+    """The parts of a frame: FRAME, the pictures by rows, and the IMU readings and encoder counts with their stamps."""
     parts: list[bytes | memoryview] = [_frame_head(frame)]
     parts += [np.ascontiguousarray(picture).tobytes() for picture in _pictures(frame)]
     if frame.imu is not None:
@@ -88,7 +92,7 @@ def _frame_head(frame: Frame) -> bytes:
 
 
 def pickled(frame: Frame) -> list[bytes | memoryview]:
-    """A frame's parts for vobench's own worker: its pickle and its arrays in memory order, each after its length."""
+    """The parts of a frame for vobench's worker: its pickle and its arrays, each after its length."""
     arrays = list[pickle.PickleBuffer]()
     head = pickle.dumps(frame, 5, buffer_callback=arrays.append)
     contents: list[bytes | memoryview] = [head, *(array.raw() for array in arrays)]
@@ -99,7 +103,7 @@ def pickled(frame: Frame) -> list[bytes | memoryview]:
 
 
 def unpickled(payload: bytearray) -> Frame:
-    """The frame of these parts; its arrays share the payload's memory."""
+    """The frame in a payload of `pickled` parts. Its arrays share the memory of the payload."""
     view = memoryview(payload)
     contents = list[memoryview]()
     while view:
@@ -112,7 +116,7 @@ def unpickled(payload: bytearray) -> Frame:
 
 
 def answered(result: Result, index: int) -> bytes:
-    """The payload of a POSE: a checked result of a frame as bytes. Raises InvalidOutputError if it is too long."""
+    """The payload of a POSE with the checked result of a frame. Raises InvalidOutputError if it is too long."""
     contents = 0
     parts = list[bytes]()
     if result.T_odom_frame is not None:
@@ -151,7 +155,7 @@ def _numbers(array: Array) -> bytes:
 
 
 def read_answer(payload: bytes, requested: int) -> Result:
-    """The checked result in a POSE, of the frame that was requested. Raises InvalidOutputError."""
+    """The checked result in the payload of a POSE. Raises InvalidOutputError, also for another frame."""
     try:
         with np.errstate(all="ignore"):
             return checked(_read_result(payload, requested), requested)
@@ -179,12 +183,12 @@ def _read_result(payload: bytes, requested: int) -> Result:
 
 
 def revision(index: int, T_odom_frame: Array) -> bytes:
-    """The payload of a REVI: a revised pose."""
+    """The payload of a REVI with a revised pose."""
     return STAMP.pack(index) + _numbers(T_odom_frame[:3])
 
 
 def read_revision(payload: bytes) -> Mapping[int, Array]:
-    """The checked pose of a REVI, by its frame's index. Raises InvalidOutputError."""
+    """The checked pose in the payload of a REVI, by the index of its frame. Raises InvalidOutputError."""
     try:
         (index,) = STAMP.unpack_from(payload)
         T_odom_frame = _Reader(payload, STAMP.size).pose()
@@ -195,7 +199,7 @@ def read_revision(payload: bytes) -> Mapping[int, Array]:
 
 
 class _Reader:
-    """Reads one part after another from a message. Raises ValueError where it is too short."""
+    """Reads the parts of a message in their order. Raises ValueError if the message is too short."""
 
     def __init__(self, payload: bytes, start: int) -> None:
         self._payload = payload
@@ -214,26 +218,26 @@ class _Reader:
         return int(count)
 
     def counted(self, limit: int) -> bytes:
-        """The bytes that a uint32 before them counts, `limit` at most."""
+        """A run of bytes whose length, a uint32 of at most `limit`, comes before it."""
         length = self.count()
         if length > limit:
             raise ValueError(f"{length} bytes of stats, where {limit} are the limit")
         return self._take(length)
 
     def numbers(self, rows: int, columns: int) -> NDArray[np.float64]:
-        """A table of float64."""
+        """A table (rows, columns) of float64."""
         values = np.frombuffer(self._take(8 * rows * columns), "<f8")
         return values.reshape(rows, columns)
 
     def pose(self) -> NDArray[np.float64]:
-        """A transform (4, 4), of which the message has three rows."""
+        """A transform (4, 4), whose first three rows are in the message."""
         return np.vstack([self.numbers(3, 4), LAST_ROW])
 
     def tracks(self) -> Tracks:
-        """Tracks, a row of the message each: pixel before, pixel now, inlier."""
+        """Tracks, one per row: the last pixel, the current pixel, and whether it is an inlier."""
         rows = self.numbers(self.count(), 5)
         return Tracks(rows[:, :2], rows[:, 2:4], rows[:, 4] != 0)
 
     def rest(self, limit: int) -> bytes:
-        """The bytes that are left, `limit` at most."""
+        """The remaining bytes, at most `limit`."""
         return self._payload[self._position : self._position + limit]

@@ -1,4 +1,4 @@
-"""`noisy_truth`: the ground truth with noise of a stated level, drawn by the harness itself; no plugin runs."""
+"""The estimator `noisy_truth`: the ground truth with noise of a known level. It runs in vobench, not as a plugin."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -12,13 +12,14 @@ from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.trajectory.trajectory import Trajectory
 
-NOISE_STREAM = 20260101  # sets this noise apart from other streams of a seed
+NOISE_STREAM = 20260101  # separates this noise from the other random streams of a seed
 
 
 class NoisyTruth:
-    """True poses of the left camera with independent noise of the standard deviations `position_m` and `rotation_rad`.
+    """The true poses of the left camera with independent noise, whose level is given by standard deviations.
 
-    The stated covariance is that of the noise, times `stated`.
+    The parameters `position_m` and `rotation_rad` are the standard deviations of the noise. The reported covariance is
+    the covariance of the noise times the parameter `stated`.
     """
 
     def __init__(self, gt: Trajectory) -> None:
@@ -26,7 +27,7 @@ class NoisyTruth:
         self._T_odom_left = dict(zip(gt.t_ns.tolist(), T_odom_left, strict=True))
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Take the level of noise. Raises EstimatorFailure if it is not positive."""
+        """Set the level of noise from the parameters. Raises EstimatorFailure if it is not positive."""
         del rig
         self._sigmas = np.repeat([params["position_m"], params["rotation_rad"]], 3)
         self._stated = params["stated"]
@@ -36,7 +37,7 @@ class NoisyTruth:
             raise EstimatorFailure("refused", "position_m, rotation_rad and stated should be more than 0")
 
     def process(self, frame: Frame) -> Answer:
-        """The true pose at a frame with noise about the axes of odom."""
+        """The true pose at a frame, with noise in the axes of odom."""
         noise = self._rng.normal(size=6) * self._sigmas
         T = self._T_odom_left.get(frame.t_ns)
         if T is None:
@@ -48,14 +49,14 @@ class NoisyTruth:
         return Answer(Result(T_noisy, covariance=covariance), 0.0, 0.0)
 
     def finish(self) -> dict[int, Array]:
-        """Nothing to revise."""
+        """No revised poses."""
         return {}
 
     def __enter__(self) -> "NoisyTruth":
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Nothing to end."""
+        """Nothing to do, because there is no process."""
 
 
 def _rotation(vector: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The parameters of an estimator, from its manifest."""
+"""Reads the parameters of an estimator into a dataclass."""
 
 from collections.abc import Mapping
 from dataclasses import fields
@@ -10,7 +10,7 @@ Kind = TypeVar("Kind")
 
 
 def parameters(kind: type[Kind], params: Mapping[str, Any], name: str) -> Kind:
-    """A dataclass of numbers from a manifest's parameters.
+    """The parameters of a manifest as a dataclass whose fields are numbers.
 
     Raises VobenchError if a parameter is unknown or missing, or if a value is not a number of at least 0.
     """

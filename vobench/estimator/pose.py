@@ -1,6 +1,6 @@
-"""The motion of a view from points of known depth, by RANSAC and robust least squares.
+"""Estimates the motion of a view from points with known depth, by RANSAC and robust least squares.
 
-R, t       T_now_last: a point X of the last view is at R X + t in this one
+R, t       T_now_last: a point X in the frame of the last view is R X + t in the frame of the current view
 """
 
 from dataclasses import dataclass
@@ -18,17 +18,17 @@ POSE_STEPS = 10
 CONVERGED_STEP = 1e-9  # m and rad
 MIN_POINTS = 6
 NOISE_FLOOR_PX = 0.03  # smallest scale of robust weights: the accuracy of sub-pixel tracks
-SIGMA_OF_MEDIAN = 1.4826  # standard deviation over median absolute deviation of normal errors
-CAUCHY_SIGMAS = 2.4  # residual, in standard deviations, at which Cauchy's weight is one half
+SIGMA_OF_MEDIAN = 1.4826  # the ratio of standard deviation and median absolute deviation of normal errors
+CAUCHY_SIGMAS = 2.4  # the residual, in standard deviations, at which the Cauchy weight is one half
 DAMPING = 1e-9  # keeps the normal equations solvable
 EPSILON = np.finfo(float).eps
 
 
 @dataclass(frozen=True, slots=True)
 class PoseFit:
-    """A motion T_now_last of the view, its inliers (N,), and their median reprojection error in px.
+    """A motion T_now_last of the view, its inliers (N,), and the median reprojection error of the inliers in px.
 
-    `covariance` (6, 6) is of the error's translation and rotation, applied from the left, in m and rad.
+    `covariance` (6, 6) is that of an error applied from the left: translation in m, then rotation in rad.
     """
 
     T_now_last: Array
@@ -46,10 +46,11 @@ def pose_from_points(
     baseline_m: float = 0.0,
     ransac_px: float = 1.0,
 ) -> PoseFit | None:
-    """The motion that brings points (N, 3) to pixels (N, 2) of a pinhole K; None if there is none.
+    """The motion after which points (N, 3) project to pixels (N, 2) of a pinhole K; None if no motion fits.
 
-    For a stereo pair, `disparity_px` (N,) are the points' present disparities, NaN for a point that the right camera
-    does not see. AP3P in RANSAC, then least squares with Cauchy's weights on left column, row and right column.
+    For a stereo pair, `disparity_px` (N,) are the current disparities, NaN for points that the right camera does not
+    see. AP3P with RANSAC finds an initial motion. It is refined by least squares with Cauchy weights on the left
+    column, the row and the right column.
     Source: Ke and Roumeliotis (2017); Fischler and Bolles (1981).
     """
     if len(points_m) < MIN_POINTS:
@@ -73,7 +74,7 @@ def pose_from_points(
 
 
 def _ransac_pose(points_m: Array, uv_px: Array, K: Array, ransac_px: float) -> tuple[Array, Mask] | None:
-    """A first motion T_now_last and its inliers (N,); None if there are too few."""
+    """An initial motion T_now_last and its inliers (N,); None if there are too few."""
     is_solved, rotvec, t_m, inliers = cv2.solvePnPRansac(
         points_m,
         np.ascontiguousarray(uv_px),
@@ -97,7 +98,10 @@ def _ransac_pose(points_m: Array, uv_px: Array, K: Array, ransac_px: float) -> t
 def _least_squares_pose(
     T: Array, points_m: Array, measured_px: Array, K: Array, baseline_m: float
 ) -> tuple[Array, Array]:
-    """Gauss-Newton from T, and the covariance: the last step's inverse information, scaled by the residuals' noise."""
+    """The motion refined by Gauss-Newton from T, and its covariance.
+
+    The covariance is the inverse information of the last step, scaled by the noise of the residuals.
+    """
     known = np.isfinite(measured_px)
     information = np.eye(6)
     noise_px = NOISE_FLOOR_PX
@@ -117,20 +121,23 @@ def _least_squares_pose(
 
 
 def robust_noise_px(residual_px: Array) -> float:
-    """Standard deviation of residuals by their median absolute deviation, NOISE_FLOOR_PX at least."""
+    """The standard deviation of residuals from their median absolute deviation; at least NOISE_FLOOR_PX."""
     median_px = float(np.median(np.abs(residual_px)))
     return max(SIGMA_OF_MEDIAN * median_px, NOISE_FLOOR_PX)
 
 
 def cauchy_weights(residual_px: Array, noise_px: float) -> Array:
-    """Cauchy's weights of residuals: 1 at zero, one half at CAUCHY_SIGMAS standard deviations."""
+    """The Cauchy weights of residuals: 1 at 0, and one half at CAUCHY_SIGMAS standard deviations."""
     relative = residual_px / (CAUCHY_SIGMAS * noise_px)
     weights: Array = 1 / (1 + relative**2)
     return weights
 
 
 def normal_equations(jacobian: Array, weight: Array, residual: Array) -> tuple[Array, Array]:
-    """Information (P, P) and gradient (P,) of weighted least squares; jacobian is (N, M, P), the others are (N, M)."""
+    """The information (P, P) and the gradient (P,) of weighted least squares.
+
+    `jacobian` is (N, M, P). `weight` and `residual` are (N, M).
+    """
     size = jacobian.shape[-1]
     information: Array = np.einsum("nij,ni,nik->jk", jacobian, weight, jacobian)
     gradient: Array = np.einsum("nij,ni->j", jacobian, weight * residual)
@@ -138,7 +145,10 @@ def normal_equations(jacobian: Array, weight: Array, residual: Array) -> tuple[A
 
 
 def _stereo_pixels(points_m: Array, K: Array, baseline_m: float) -> Array:
-    """Left column, row and right column (N, 3) of points in the view's axes; far outside for points behind it."""
+    """The left column, row and right column (N, 3) in px of points (N, 3) in the frame of the view.
+
+    Points behind the camera get values far outside of the picture.
+    """
     z_m = _positive(points_m[:, 2])
     uv_px = (points_m / z_m[:, None]) @ K.T
     right_px = uv_px[:, 0] - K[0, 0] * baseline_m / z_m
@@ -147,7 +157,7 @@ def _stereo_pixels(points_m: Array, K: Array, baseline_m: float) -> Array:
 
 
 def _stereo_jacobian(points_m: Array, K: Array, baseline_m: float) -> Array:
-    """Derivatives (N, 3, 6) of these pixels by a small translation and rotation (6,) of the points."""
+    """The derivatives (N, 3, 6) of `_stereo_pixels` with respect to a small translation and rotation of the points."""
     fx = K[0, 0]
     skew = K[0, 1]
     fy = K[1, 1]
@@ -167,12 +177,12 @@ def _stereo_jacobian(points_m: Array, K: Array, baseline_m: float) -> Array:
 
 
 def _positive(z: Array) -> Array:
-    """Depths, a tiny one in place of those behind the camera."""
+    """The depths, with a tiny positive value for points behind the camera."""
     return np.where(z > 0, z, EPSILON)
 
 
 def cross_matrix(vectors: Array) -> Array:
-    """Matrices (N, 3, 3) that take the cross product with vectors (N, 3) from the left."""
+    """The matrices (N, 3, 3) whose product with a vector is the cross product of vectors (N, 3) and that vector."""
     x, y, z = vectors.T
     zero = np.zeros_like(x)
     row_x = np.stack([zero, -z, y], -1)
@@ -182,7 +192,7 @@ def cross_matrix(vectors: Array) -> Array:
 
 
 def adjoint(T_a_b: Array) -> Array:
-    """The matrix (6, 6) that takes a small translation and rotation in b to the same motion in a."""
+    """The matrix (6, 6) that transforms a small translation and rotation from frame b to frame a."""
     R = T_a_b[:3, :3]
     t = T_a_b[:3, 3]
     zero = np.zeros((3, 3))
@@ -191,13 +201,13 @@ def adjoint(T_a_b: Array) -> Array:
 
 
 def twist(step: Array) -> Array:
-    """The small motion (4, 4) of a translation and a rotation vector (6,)."""
+    """The small motion (4, 4) with a translation and a rotation vector, which are given as `step` (6,)."""
     R = cv2.Rodrigues(step[3:])[0].astype(float)
     return se3.transform(R, step[:3])
 
 
 def carried_on(T_odom_before: Array, T_odom_now: Array, share: float = 1.0) -> Array:
-    """The pose after a body goes on as it did from one pose to the next, for `share` of that time."""
+    """The pose of a body that continues its motion between two poses, after `share` of the time between them."""
     T_before_now = se3.inverse(T_odom_before) @ T_odom_now
     rotvec = cv2.Rodrigues(T_before_now[:3, :3])[0].ravel()
     step = np.r_[T_before_now[:3, 3], rotvec]

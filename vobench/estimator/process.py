@@ -1,6 +1,6 @@
-"""A running estimator that is sent one frame at a time: a program in any language, or vobench's worker with a class.
+"""Runs an estimator that gets one frame at a time: a program in any language, or a Python class in a worker process.
 
-Its messages are data: read up to their stated length, within one deadline for sending and receiving, and checked.
+Its answers are not trusted: their length is limited, they are checked, and each must arrive before a deadline.
 """
 
 import fcntl
@@ -45,14 +45,17 @@ WORKER = (sys.executable, "-P", "-m", "vobench.estimator.worker")
 
 @dataclass(frozen=True, slots=True)
 class Connector:
-    """How an estimator is called: its argv and the payload of CALB for a trial, and the parts of a FRAM."""
+    """The protocol of a kind of estimator.
+
+    `opened` returns the argv and the payload of the message CALB. `framed` returns the parts of the message FRAM.
+    """
 
     opened: Callable[[Rig, Mapping[str, Any], int], tuple[Sequence[str], bytes]]
     framed: Callable[[Frame], list[bytes | memoryview]]
 
 
 class EstimatorProcess:
-    """A running estimator; what it prints goes to `log`. Its methods raise EstimatorFailure."""
+    """A running estimator, whose output is written to `log`. Its methods raise EstimatorFailure."""
 
     def __init__(
         self, door: Connector, *, log: Path, limits: Limits, hidden: Sequence[Path] = (), folder: Path | None = None
@@ -81,7 +84,10 @@ class EstimatorProcess:
         is_watched: bool = False,
         hidden: Sequence[Path] = (),
     ) -> Self:
-        """A class in Python, in a process of its own; one that `is_watched` fails if it changes a frame."""
+        """An estimator that is a Python class. It runs in a worker process.
+
+        With `is_watched`, it fails if it modifies a frame.
+        """
         folder = folder.resolve()
         memory_bytes = limits.memory_mib << 20
         argv = [*WORKER, str(folder), class_path, name, str(memory_bytes)]
@@ -102,7 +108,7 @@ class EstimatorProcess:
         rate_hz: float,
         hidden: Sequence[Path] = (),
     ) -> Self:
-        """A program that takes frames on standard input and gives poses on standard output."""
+        """An estimator that is a program. It reads frames from standard input and writes poses to standard output."""
 
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
             content = {
@@ -118,7 +124,7 @@ class EstimatorProcess:
         return cls(Connector(opened, framed), log=log, limits=limits, hidden=hidden, folder=folder)
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Start it, send the calibration, and wait until it is ready; a second call starts it again."""
+        """Start the estimator, send the calibration, and wait until it is ready. A second call starts it again."""
         argv, payload = self._door.opened(rig, params, seed)
         if self._running is None:
             self._open(list(argv))
@@ -146,11 +152,11 @@ class EstimatorProcess:
         self._input = process.stdin.fileno()
         self._output = process.stdout.fileno()
         os.set_blocking(self._input, False)
-        with suppress(OSError, AttributeError):  # on Linux only, so that a picture is sent in one piece
+        with suppress(OSError, AttributeError):  # only Linux can enlarge a pipe so that a picture fits into it
             fcntl.fcntl(self._input, fcntl.F_SETPIPE_SZ, PIPE_BYTES)
 
     def process(self, frame: Frame) -> Answer:
-        """Send the next frame; its checked answer."""
+        """Send the next frame, and return the checked answer."""
         cpu_before_s = self._program.cpu_s
         parts = self._door.framed(frame)
         self._refuse_early_answer(f"frame {frame.index}")
@@ -171,7 +177,7 @@ class EstimatorProcess:
         return Answer(result, 1e3 * wall_s, 1e3 * cpu_s, self._program.peak_mib)
 
     def finish(self) -> dict[int, Array]:
-        """Tell it that there are no more frames; the poses that it revises before it is done or ends well."""
+        """Tell the estimator that there are no more frames, and return the poses that it revises."""
         self._refuse_early_answer("the end")
         revised = dict[int, Array]()
         until = self._until(self._program.left_s())
@@ -184,10 +190,10 @@ class EstimatorProcess:
                 revised.update(read_revision(payload))
             except InvalidOutputError as error:
                 raise EstimatorFailure("invalid_output", str(error)) from None
-        raise EstimatorFailure("invalid_output", f"the end: more poses revised than the {self._frames} frames it had")
+        raise EstimatorFailure("invalid_output", f"the end: more revised poses than the {self._frames} frames it had")
 
     def _refuse_early_answer(self, what: str) -> None:
-        """Raise EstimatorFailure if it has answered before the request."""
+        """Raise EstimatorFailure if the estimator has sent an answer before the request."""
         readable, _, _ = select.select([self._output], [], [], 0)
         if readable:
             self._receive(f"{what}, before it was asked", set(), self._until(self._limits.frame_s))
@@ -208,19 +214,19 @@ class EstimatorProcess:
                     continue
                 except BrokenPipeError:
                     if tag != b"DONE":
-                        self._receive("its input", set(), until)  # a failure, if it reports one
+                        self._receive("its input", set(), until)  # raises the failure that the estimator reports
                     return
                 unsent = unsent[sent:]
 
     def _receive(self, what: str, tags: set[bytes], until: float) -> tuple[bytes, bytes]:
-        """The next message; an empty tag if the program has ended well, where that is among the tags."""
+        """The tag and payload of the next message. The tag is empty if the program has ended and `tags` allows that."""
         head = self._read(HEADER.size, what, until, may_end=b"" in tags)
         if not head:
             return b"", b""
         tag, length = HEADER.unpack(head)
         if tag in FAILURES:
             reason = self._read(min(length, REASON_BYTES), what, until).decode("utf-8", "replace")
-            self._program.look(at_once=True)  # the failure may follow from a limit, which is then the cause
+            self._program.look(at_once=True)  # if a limit was exceeded, that is the cause of the failure
             is_isolated = self._program.sandbox.level != "none"
             if is_isolated and "ModuleNotFoundError" in reason:
                 reason += hint_on_modules(self._folder)
@@ -249,7 +255,7 @@ class EstimatorProcess:
         return bytes(content)
 
     def _end(self, what: str) -> tuple[str, str]:
-        """Status and reason of a premature end."""
+        """The status and the reason of a premature end."""
         kind, reason = self._program.death()
         return kind, f"{what}: {reason}" if kind == "invalid_output" else reason
 
@@ -267,6 +273,6 @@ class EstimatorProcess:
         return self
 
     def __exit__(self, *end: Any) -> None:
-        """End it, and whatever it has started."""
+        """End the estimator and all processes that it has started."""
         if self._running:
             self._running.__exit__(*end)

@@ -1,4 +1,4 @@
-"""A program in a session and a folder of its own, under limits: what all its processes use, and how it ended."""
+"""Runs a program in a sandbox and with limits, measures the resources of all its processes, and reports its end."""
 
 import marshal
 import os
@@ -40,22 +40,22 @@ KEPT_ENVIRONMENT = (
     *VARIABLES,
 )
 LOG_BYTES = 1 << 20
-LAST_LINES_BYTES = 4096  # of a log, in which the last line is searched
+LAST_LINES_BYTES = 4096  # the end of a log that is searched for the last line
 LOOK_S = 0.1  # period at which memory and time of a running program are measured
-WEIGH_S = 1.0  # period at which its files are
-DEATH_S = 5.0  # for a program that has closed its output to end
-SHARED = "/dev/shm/"  # Linux's shared memory, where it has a name
-DIE_S = 0.005  # for a process that is killed to be gone
-GUARD_S = 2.0  # the guard's time to end what it guards
+WEIGH_S = 1.0  # period at which the disk space of its files is measured
+DEATH_S = 5.0  # a program must end within this time after it has closed its output
+SHARED = "/dev/shm/"  # the folder of named shared memory on Linux
+DIE_S = 0.005  # the time for a killed process to end
+GUARD_S = 2.0  # the time for the guard to end the program's processes
 GUARD_CODE = "import sys; sys.path.append(sys.argv.pop(1)); import guard; guard.main()"
 GUARD = (sys.executable, "-I", "-S", "-c", GUARD_CODE, str(Path(__file__).parent))
 MESSAGE_BYTES = 1 << 16
 MEBIBYTE = 1 << 20
-CPUCLOCK_SCHED = 2  # of another process's clock: linux/posix-timers.h
+CPUCLOCK_SCHED = 2  # the CPU-time clock of another process: linux/posix-timers.h
 TICKS_PER_S = os.sysconf("SC_CLK_TCK")
 LINE_LETTERS = 160
 STAT_BLOCK_BYTES = 512  # the unit of st_blocks
-ENTRY_BYTES = 4096  # of a folder's entry, about
+ENTRY_BYTES = 4096  # the approximate size of an entry of a folder
 # Fields of /proc/PID/stat after the name: proc(5).
 OWN_TICKS = slice(11, 13)
 CHILDREN_TICKS = slice(13, 15)
@@ -63,7 +63,7 @@ RESIDENT_PAGES = 21
 
 
 class EstimatorFailure(Exception):  # noqa: N818 - a result, not an error of vobench
-    """The end of a trial without success: `kind` is the trial's status, `reason` one line."""
+    """The unsuccessful end of a trial. `kind` is the status of the trial, and `reason` is one line."""
 
     def __init__(self, kind: str, reason: str) -> None:
         self.kind = kind
@@ -73,7 +73,7 @@ class EstimatorFailure(Exception):  # noqa: N818 - a result, not an error of vob
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """A checked result and its cost by vobench's clocks; memory is the largest so far."""
+    """A checked result and its cost, measured by vobench. `memory_mib` is the peak so far."""
 
     result: Result
     wall_ms: float
@@ -82,12 +82,12 @@ class Answer:
 
 
 class Program:
-    """A running program; what it prints goes to `log`. Its methods raise EstimatorFailure.
+    """A running program. Its methods raise EstimatorFailure.
 
     It has a folder of its own to work in, no shell, and of vobench's environment KEPT_ENVIRONMENT alone. All that it
     starts, in whatever session, has a guard for an ancestor, and is killed with it. It sees the files of
     `sandbox.plan`, of which `folder` is its own, except those that are `hidden`; `sandbox` has what it could see
-    beyond these.
+    Its output is written to `log`. It works in a home folder, and has only the variables KEPT_ENVIRONMENT of vobench's
     """
 
     def __init__(
@@ -114,8 +114,8 @@ class Program:
         self._shared = set[str]()
         self._shared_before = {str(path) for path in Path(SHARED).glob("*")}
         self.sandbox = sandbox.unsandboxed()
-        self.is_apart = False  # whether it has a process namespace of its own
-        # Descriptors of its file systems, if it has some of its own.
+        self.is_apart = False  # whether it has a private process namespace
+        # The descriptors of its private file systems; -1 if it has none.
         self._disk = -1
         self._shared_memory = -1
         with ExitStack() as undone:
@@ -145,7 +145,7 @@ class Program:
             self._undone = undone.pop_all()
 
     def _start_guard(self, guard_line: socket.socket, name: str, streams: dict[str, Any]) -> "subprocess.Popen[bytes]":
-        """Start the guard, which waits on the line for the plan of the program."""
+        """Start the guard, which then waits for the plan of the program."""
         options = {
             "stdin": subprocess.DEVNULL,
             "stdout": self._log,
@@ -158,11 +158,11 @@ class Program:
         command = [*GUARD, str(guard_line.fileno())]
         try:
             return subprocess.Popen(command, start_new_session=True, **options)
-        except (OSError, ValueError) as error:  # no memory for it, or a NUL in its words
+        except (OSError, ValueError) as error:  # there is too little memory, or an argument contains NUL
             raise EstimatorFailure("refused", f"{name} cannot be started ({error})") from None
 
     def _start_program(self, plan: dict[str, Any], folder: Path | None) -> None:
-        """Have the guard start the program, and take its reports."""
+        """Send the plan to the guard, which starts the program, and receive its reports."""
         start_s = self.limits.start_s
         self._line.settimeout(start_s)
         try:
@@ -172,13 +172,13 @@ class Program:
             error_number = int(self._line.recv(MESSAGE_BYTES) or b"0")
         except TimeoutError:
             raise EstimatorFailure("timeout", f"it did not run within {start_s:g} s") from None
-        except OSError:  # the guard is gone, and its status says why
+        except OSError:  # the guard has ended, and its exit status says why
             return
         if error_number:
             raise EstimatorFailure("refused", self._why_not_started(plan["argv"][0], error_number, folder))
 
     def _environment(self) -> dict[str, str]:
-        """The variables of the program: few of vobench's, its threads, and its folder as HOME and TMPDIR."""
+        """The environment variables of the program. HOME and TMPDIR are its home folder."""
         home = str(self.home)
         kept = {name: value for name, value in os.environ.items() if name in KEPT_ENVIRONMENT}
         threads = dict.fromkeys(THREADS, str(self.limits.threads))
@@ -186,7 +186,7 @@ class Program:
         return {**kept, **threads, **fixed, **sandbox.user_packages()}
 
     def _take_report(self) -> None:
-        """Take the guard's report of the sandbox, and the descriptors of the program's file systems."""
+        """Receive the guard's report on the sandbox, and the descriptors of the program's file systems."""
         message, descriptors, _, _ = socket.recv_fds(self._line, MESSAGE_BYTES, maxfds=3)
         if not message:
             return
@@ -202,7 +202,7 @@ class Program:
         return sentence
 
     def _kill(self) -> None:
-        """Have the guard end all processes; then end the guard and the processes that name our folder."""
+        """End all processes of the program through the guard, then the guard, then processes that were missed."""
         with suppress(OSError):
             self._line.shutdown(socket.SHUT_RDWR)
         with suppress(subprocess.TimeoutExpired):
@@ -232,7 +232,7 @@ class Program:
                 os.unlink(path)
 
     def read(self, name: str, *, most_bytes: int) -> bytes:
-        """The content of a file below its folder. Raises EstimatorFailure, also if that is a link or no file."""
+        """The content of a file below the home folder. Raises EstimatorFailure if it is missing or not safe to read."""
         try:
             return read_below(self._files, name, most_bytes=most_bytes, check=self._check_time)
         except FileNotFoundError:
@@ -241,17 +241,20 @@ class Program:
             raise EstimatorFailure("invalid_output", f"{{out}} {error}") from None
 
     def left_s(self) -> float:
-        """Seconds left of the trial's limit."""
+        """The time until the limit of the trial, in seconds."""
         return self._began + self.limits.trial_s - time.monotonic()
 
     def _check_time(self) -> None:
-        """Raise EstimatorFailure if the trial takes too long."""
+        """Raise EstimatorFailure if the trial has exceeded its limit of time."""
         stop.check()
         if self.left_s() < 0:
             raise EstimatorFailure("timeout", f"the whole trial took more than {self.limits.trial_s:g} s")
 
     def look(self, *, at_once: bool = False) -> None:
-        """Measure what all its processes use, if it is time or `at_once`. Raises EstimatorFailure beyond a limit."""
+        """Measure the resources of all processes, if LOOK_S has passed or `at_once` is set.
+
+        Raises EstimatorFailure if a limit is exceeded.
+        """
         self._check_time()
         is_time = time.monotonic() > self._looked + LOOK_S
         if is_time:
@@ -265,7 +268,7 @@ class Program:
         cpu_s = sum(_cpu_s(pid, fields) for pid, fields in stats.items())
         self.cpu_s = max(self.cpu_s, cpu_s)
 
-        # The guard, and the first process of a namespace, are vobench's own.
+        # The guard and the first process of the namespace belong to vobench, so their memory does not count.
         for pid in self._pids[: 1 + self.is_apart]:
             stats.pop(pid, None)
         memory_mib = self._memory_mib(stats)
@@ -280,10 +283,11 @@ class Program:
             self._weigh_files()
 
     def _memory_mib(self, stats: dict[int, list[str]]) -> float:
-        """The memory of processes by their `stat`, with the content of shared memory.
+        """The memory of processes with the given `stat` fields, including the content of shared memory.
 
         Resident pages are added up, which counts a page that processes share once for each. If the sum is beyond the
-        limit, or includes shared memory with a name, each page is divided by the number of its processes (PSS).
+        The resident pages of all processes are added up, so that shared pages count several times. If the sum exceeds
+        the limit, or if there is named shared memory, each page is divided by the number of its processes (PSS).
         """
         in_files = _used_bytes(self._shared_memory) if self._shared_memory >= 0 else 0
         resident_pages = {pid: int(fields[RESIDENT_PAGES]) for pid, fields in stats.items()}
@@ -299,7 +303,7 @@ class Program:
         return memory / MEBIBYTE
 
     def _weigh_disk(self) -> None:
-        """Raise EstimatorFailure if the file system of its folder holds more than the limit."""
+        """Raise EstimatorFailure if the file system of the home folder holds more than the limit."""
         if self._is_disk_full():
             raise self._files_failure()
         if time.monotonic() > self._weighed + WEIGH_S:
@@ -313,7 +317,7 @@ class Program:
         return EstimatorFailure("out_of_memory", sentence)
 
     def _weigh_files(self) -> None:
-        """Raise EstimatorFailure if its folder and the nameless files that it holds open are beyond the limit."""
+        """Raise EstimatorFailure if the home folder and the open files without a name exceed the limit together."""
         if self._disk >= 0:
             self._weigh_nameless(0)
             return
@@ -335,14 +339,14 @@ class Program:
             raise self._files_failure()
 
     def _cut_log(self) -> None:
-        """Keep the beginning of a log that grows without end."""
+        """Cut the log to LOG_BYTES, and count the bytes that were removed."""
         size = os.fstat(self._log).st_size
         if size > LOG_BYTES:
             self._printed += size - LOG_BYTES
             os.ftruncate(self._log, LOG_BYTES)
 
     def wait(self) -> None:
-        """Wait for its end. Raises EstimatorFailure unless it ends well."""
+        """Wait until the program ends. Raises EstimatorFailure unless its exit code is 0."""
         while self.process.poll() is None:
             self.look()
             time.sleep(LOOK_S / 5)
@@ -352,7 +356,7 @@ class Program:
             raise EstimatorFailure(*self.death())
 
     def death(self) -> tuple[str, str]:
-        """Status and reason of a premature end, with the last line that it printed."""
+        """The status and the reason of a premature end. The reason includes the last line that the program printed."""
         try:
             code = self.process.wait(timeout=DEATH_S)
         except subprocess.TimeoutExpired:
@@ -388,7 +392,7 @@ class Program:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         with suppress(EstimatorFailure):
-            self._weigh_files()  # finds what it would leave in shared memory
+            self._weigh_files()  # finds the shared memory that has to be freed
         if self.process.stdin:
             self.process.stdin.close()
         with suppress(subprocess.TimeoutExpired):
@@ -396,7 +400,7 @@ class Program:
         self._undone.close()
 
     def _close_log(self) -> None:
-        """Cut the log a last time, and restore its mode, since the program has its descriptor, too."""
+        """Cut the log a last time. Restore its mode, which the program can change because it has the descriptor."""
         self._cut_log()
         if self._printed:
             printed_bytes = LOG_BYTES + self._printed
@@ -407,14 +411,14 @@ class Program:
 
 
 def _open_log(path: Path) -> int:
-    """The descriptor of an empty log, which is written at its end, also after it is cut."""
+    """Create an empty log, and return its descriptor. Writes always append, even after the log is cut."""
     flags = os.O_RDWR | os.O_APPEND | os.O_CREAT | os.O_TRUNC | os.O_CLOEXEC
     return os.open(path, flags, 0o666)
 
 
 @cache
 def sandbox_here() -> Sandbox:
-    """What a program on this machine could see; it is tried once."""
+    """The sandbox that a program gets on this machine. It is tried with a program once per process."""
     with temporary_folder() as folder:
         try:
             with Program(["true"], log=folder / "log.txt", limits=Limits()) as program:
@@ -424,12 +428,12 @@ def sandbox_here() -> Sandbox:
 
 
 def sandbox_works() -> bool:
-    """Whether this machine can show a program its own files and nothing else."""
+    """Whether this machine can isolate a program completely."""
     return sandbox_here().level == "full"
 
 
 def _strays(home: Path) -> list[int]:
-    """Processes whose environment names this folder, as it does unless they have changed it."""
+    """The ids of processes that were started with this folder as TMPDIR, unless they have changed their environment."""
     mark = f"\0TMPDIR={home}\0".encode()
     names = os.listdir("/proc") if sys.platform == "linux" else []
     strays = []
@@ -452,7 +456,7 @@ def _stats(pids: Iterable[int]) -> dict[int, list[str]]:
 
 
 def _cpu_s(pid: int, fields: list[str]) -> float:
-    """CPU seconds of a process, by its own clock of ns, and of its ended children, by ticks."""
+    """The CPU time of a process, which its clock measures in ns, and of its ended children, which is in ticks."""
     of_children_s = sum(map(int, fields[CHILDREN_TICKS])) / TICKS_PER_S
     try:
         own_s = time.clock_gettime(~pid << 3 | CPUCLOCK_SCHED)
@@ -462,7 +466,7 @@ def _cpu_s(pid: int, fields: list[str]) -> float:
 
 
 def _used_bytes(descriptor: int) -> int:
-    """Bytes used of a file system that is the program's alone; an empty file counts as a block."""
+    """The used bytes of a private file system. An empty file counts as one block."""
     facts = os.fstatvfs(descriptor)
     in_blocks = (facts.f_blocks - facts.f_bfree) * facts.f_frsize
     in_entries = (facts.f_files - facts.f_ffree) * ENTRY_BYTES
@@ -470,9 +474,9 @@ def _used_bytes(descriptor: int) -> int:
 
 
 def _proportional_bytes(pid: int, resident_pages: int) -> tuple[int, int]:
-    """A process's proportional memory, private with files, and shared (proc(5), smaps_rollup).
+    """The proportional memory of a process in bytes: that of private pages and files, and that of shared memory.
 
-    Where the kernel does not state it, all resident pages.
+    Source: proc(5), smaps_rollup. If the kernel does not report it, all resident pages count as private.
     """
     with suppress(OSError, ValueError), open(f"/proc/{pid}/smaps_rollup", encoding="ascii") as file:
         kib = {}
@@ -487,7 +491,7 @@ def _proportional_bytes(pid: int, resident_pages: int) -> tuple[int, int]:
 
 @dataclass(frozen=True, slots=True)
 class _OpenFile:
-    """A file that a process holds open: its device, its size on disk in bytes, and its path as the kernel names it."""
+    """A file that a process holds open: its device, its size on disk in bytes, and its path in /proc."""
 
     device: int
     size: int
@@ -495,7 +499,7 @@ class _OpenFile:
 
 
 def _nameless(pids: Iterable[int]) -> list[_OpenFile]:
-    """The files held open that no folder shows, and those in shared memory, each once."""
+    """The open files of processes that are deleted or in shared memory, without duplicates."""
     files = dict[tuple[int, int], _OpenFile]()
     for pid in pids:
         folder = f"/proc/{pid}/fd"
@@ -512,6 +516,6 @@ def _nameless(pids: Iterable[int]) -> list[_OpenFile]:
 
 
 def _buried_s() -> float:
-    """CPU seconds of all ended processes that this one has started, and of theirs."""
+    """The CPU time of all ended descendants of this process."""
     usage = resource.getrusage(resource.RUSAGE_CHILDREN)
     return usage.ru_utime + usage.ru_stime

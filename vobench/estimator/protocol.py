@@ -16,7 +16,7 @@ Image = NDArray[np.uint8]
 
 
 class Status(StrEnum):
-    """What an estimator says of one frame."""
+    """The status of an estimator at one frame."""
 
     INIT = "init"  # the first frame, or a fresh start
     OK = "ok"
@@ -27,7 +27,7 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class EncoderReadings:
-    """Wheel encoder counts since the start: t_ns (M,) int64, ticks (M, 2) int64 left and right."""
+    """Wheel encoder counts since the start: stamps t_ns (M,) int64, and ticks (M, 2) int64 of left and right wheel."""
 
     t_ns: NDArray[np.int64]
     ticks: NDArray[np.int64]
@@ -35,11 +35,11 @@ class EncoderReadings:
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """All that an estimator sees of one instant: pictures, and the encoders' and the IMU's readings up to it.
+    """The pictures of one instant, and the sensor readings up to it.
 
-    Pictures are grey (H, W) uint8, or (H, W, 3) red, green, blue for one that needs colour: both for an estimator
-    that needs stereo, the left one for mono. `encoders` and `imu`
-    hold the readings after the last frame up to and including this one's stamp. What was not asked for is None.
+    `left` and `right` are grey (H, W) uint8, or RGB (H, W, 3) uint8 for an estimator that needs colour.
+    `encoders` and `imu` hold the readings after the last frame, up to and including the stamp of this one.
+    Data of sensors that the estimator does not need is None.
     """
 
     index: int
@@ -52,9 +52,9 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """Points followed from the last frame to this one in the left picture.
+    """Points that are tracked from the last frame to this one in the left picture.
 
-    uv_last_px and uv_px are (N, 2); inlier (N,) bool says which the accepted motion explains.
+    `uv_last_px` and `uv_px` are (N, 2). `inlier` (N,) bool marks the tracks that fit the accepted motion.
     """
 
     uv_last_px: Array
@@ -64,12 +64,13 @@ class Tracks:
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What an estimator says of one frame; T_odom_frame is None where it has no pose.
+    """The answer of an estimator to one frame. `T_odom_frame` (4, 4) is None if it has no pose.
 
-    `frame` is the left camera or the body, as the manifest's `pose_of` says; odom is that frame at
-    the start. `reason` is one word for a status that is not ok; `stats` are numbers worth plotting.
-    `covariance` (6, 6) is of the pose: position in m, then rotation vector in rad, about the fixed axes of odom.
-    `points` (N, 3) are what it takes the scene to be, in odom, in m.
+    `frame` is the left camera or the body, as `pose_of` in the manifest says. odom is that frame at the start.
+    `reason` is one word for a status other than ok.
+    `stats` are numbers to plot.
+    `covariance` (6, 6) is that of the pose, in the axes of odom: position in m, then rotation vector in rad.
+    `points` (N, 3) are the estimated points of the scene in odom, in m.
     """
 
     T_odom_frame: Array | None
@@ -82,14 +83,14 @@ class Result:
 
 
 class Estimator(Protocol):
-    """A visual-odometry estimator that is fed one frame at a time, in order.
+    """A visual-odometry estimator that processes one frame at a time, in order.
 
-    It may have a method `finish()`, called after the last frame, which returns revised poses T_odom_frame (4, 4) by
-    their frame's index, all or some: they are scored as a second track.
+    It may have a method `finish()`, which is called after the last frame. It returns revised poses T_odom_frame (4, 4)
+    of some or all frames, by the index of the frame. They are scored as a second trajectory.
     """
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
-        """Take the calibration and the manifest's parameters, as the suite may have changed them."""
+        """Get the calibration, and the parameters of the manifest with the changes of the suite."""
 
     def process(self, frame: Frame) -> Result:
-        """Take the next frame; say where the camera is now."""
+        """Process the next frame, and return the current pose."""

@@ -1,4 +1,4 @@
-"""What an estimator may see: the files that it is given, what it saw beyond them, and the sentence on that."""
+"""The sandbox of estimators: the files that they may read, and a record of how well each one was isolated."""
 
 import os
 import shutil
@@ -15,10 +15,10 @@ from vobench.estimator.manifest import Limits
 READ = "VOBENCH_SANDBOX_READ"
 SWITCH = "VOBENCH_SANDBOX"
 OFF = "off"
-# Never opened: an estimator has /dev, /proc, /sys and /tmp of its own, and / would be all files.
+# The user cannot open these folders. An estimator has a private /dev, /proc, /sys and /tmp, and / holds all files.
 NEVER_READ = ("/", "/dev", "/proc", "/sys", "/tmp")
 MEBIBYTE = 1 << 20
-DISK_ALLOWANCE_BYTES = MEBIBYTE  # beyond the limit, so that an estimator can exceed it and this is noticed
+DISK_ALLOWANCE_BYTES = MEBIBYTE  # the disk is larger than the limit by this, so that an excess can be detected
 
 Level = Literal["full", "partial", "none"]
 EVERYTHING = (isolation.FILES, isolation.PROCESSES, isolation.NETWORK)
@@ -28,8 +28,9 @@ EVERYTHING = (isolation.FILES, isolation.PROCESSES, isolation.NETWORK)
 class Sandbox:
     """How well an estimator was isolated.
 
-    sees: what it could see beyond its own files and processes. read: the folders that the user has opened to it.
-    why: the reason that the kernel did not allow a mount tree of its own; empty if it did.
+    `sees` lists what the estimator could see besides its own files and processes.
+    `read` lists the folders that the user has opened to all estimators.
+    `why` is the reason why the kernel did not allow a private mount tree; empty if it did.
     """
 
     level: Level
@@ -39,23 +40,26 @@ class Sandbox:
 
     @property
     def sentence(self) -> str:
-        """What the estimator saw, for a person."""
-        opened = [f"{path} ({READ})" for path in self.read]
+        """A sentence that says what the estimator could see."""
+        opened_folders = [f"{path} ({READ})" for path in self.read]
         if self.level == "none":
             return f"not sandboxed: it could see {_listed(self.sees)}"
         files = [] if isolation.FILES in self.sees else ["only its own files"]
-        return f"saw {_listed([*files, *opened, *self.sees])}"
+        return f"saw {_listed([*files, *opened_folders, *self.sees])}"
 
 
-def _listed(things: Sequence[str]) -> str:
-    """Things as a sentence lists them."""
-    if len(things) < 2:
-        return "".join(things)
-    return f"{', '.join(things[:-1])} and {things[-1]}"
+def _listed(phrases: Sequence[str]) -> str:
+    """The phrases joined by commas, with "and" before the last one."""
+    if len(phrases) < 2:
+        return "".join(phrases)
+    return f"{', '.join(phrases[:-1])} and {phrases[-1]}"
 
 
 def of_report(sees: Sequence[str], why: str) -> Sandbox:
-    """The record of a program that is isolated but for what it sees."""
+    """The record of an isolated program, from the guard's report.
+
+    `sees` lists what the program can see in spite of the isolation. `why` is as in `Sandbox`.
+    """
     level: Level = "partial" if sees else "full"
     if isolation.FILES in sees and isolation.PROCESSES in sees:
         level = "none"
@@ -63,34 +67,34 @@ def of_report(sees: Sequence[str], why: str) -> Sandbox:
 
 
 def unsandboxed() -> Sandbox:
-    """The record of a program that runs as any other, since the user or the system has it so."""
+    """The record of a program that is not isolated, because the user has switched the sandbox off or it needs Linux."""
     why = f"{SWITCH}={OFF}" if is_switched_off() else "not Linux"
     return Sandbox("none", EVERYTHING, why=why)
 
 
 def is_switched_off() -> bool:
-    """Whether the user wants no sandbox, say for programs that start containers."""
+    """Whether the user has switched the sandbox off, for example to run programs that start containers."""
     return os.environ.get(SWITCH, "").lower() == OFF
 
 
 def opened() -> tuple[str, ...]:
-    """The folders that the user has opened to all estimators by $VOBENCH_SANDBOX_READ."""
+    """The folders that the user has opened to all estimators with $VOBENCH_SANDBOX_READ."""
     return tuple(path for path in _named_folders() if not _is_never_read(path))
 
 
 def note_on_unopened() -> str:
-    """Why some folders in $VOBENCH_SANDBOX_READ are not opened, as one sentence; empty if all are."""
+    """A sentence about the folders in $VOBENCH_SANDBOX_READ that are not opened; empty if all of them are."""
     unopened = [path for path in _named_folders() if _is_never_read(path)]
     if not unopened or is_switched_off():
         return ""
     return (
         f"{READ} does not open {_listed(unopened)}: estimators have their own /dev, /proc, /sys and /tmp, "
-        "and / holds all files; name the folders inside that they need"
+        "and / holds all files; name the subfolders that they need"
     )
 
 
 def _named_folders() -> list[str]:
-    """The folders in $VOBENCH_SANDBOX_READ."""
+    """The absolute paths of the folders in $VOBENCH_SANDBOX_READ."""
     words = [word for word in os.environ.get(READ, "").split(os.pathsep) if word]
     return [os.path.abspath(os.path.expanduser(word)) for word in words]
 
@@ -100,7 +104,7 @@ def _is_never_read(path: str) -> bool:
 
 
 def libraries() -> list[str]:
-    """The interpreter and its libraries: prefixes, the user's site-packages, and the package vobench."""
+    """The folders of Python: its prefixes, the user's site-packages, and the package vobench."""
     folders = [sys.prefix, sys.base_prefix, sys.exec_prefix, str(Path(__file__).parents[1])]
     if site.ENABLE_USER_SITE and os.path.isdir(site.getusersitepackages()):
         folders.append(site.getusersitepackages())
@@ -108,70 +112,73 @@ def libraries() -> list[str]:
 
 
 def user_packages() -> dict[str, str]:
-    """The variable that keeps the user's site-packages where they are, though HOME is another."""
+    """The environment variable by which Python finds the user's site-packages in spite of another HOME."""
     return {"PYTHONUSERBASE": site.getuserbase()} if site.ENABLE_USER_SITE else {}
 
 
 def plan(
     argv: Sequence[str], *, home: Path, homes: Path, folder: Path | None, hidden: Sequence[Path], limits: Limits
 ) -> dict[str, Any]:
-    """The guard's instructions: the program to start, its limits and what it may see, in types that marshal supports.
+    """The guard's instructions, in types that marshal supports: the program, its limits, and the files that it may see.
 
-    home: the folder to work in, empty or with what the program is given. homes: the folder with the homes of all
-    estimators. folder: the estimator's. hidden: paths that are empty to the estimator even in a readable folder.
+    `home` is the working folder, which is empty or holds the program's input.
+    `homes` is the folder that holds the homes of all estimators.
+    `folder` is the estimator's folder, if it has one.
+    `hidden` lists paths that appear empty to the program, even inside a readable folder.
     """
-    own = [] if folder is None else [str(folder.absolute())]
+    estimator_folders = [] if folder is None else [str(folder.absolute())]
     return {
         "is_isolated": not is_switched_off() and sys.platform == "linux",
-        "program": found(argv[0], folder),
+        "program": program_path(argv[0], folder),
         "argv": list(argv),
         "file_bytes": limits.disk_mib * MEBIBYTE,
         "disk_bytes": limits.disk_mib * MEBIBYTE + DISK_ALLOWANCE_BYTES,
         "memory_bytes": limits.memory_mib * MEBIBYTE,
         "home": str(home),
         "homes": str(homes),
-        "read": [*libraries(), *opened(), *own],
+        "read": [*libraries(), *opened(), *estimator_folders],
         "hidden": [str(path.resolve()) for path in hidden],
         "graphics": _has_graphics(),
     }
 
 
 def _has_graphics() -> bool:
-    """Whether there is a graphics processor, which estimators may use."""
-    names = os.listdir("/dev") if os.path.isdir("/dev") else []
-    is_nvidia = any(name.startswith(isolation.GRAPHICS_PREFIX) for name in names)
+    """Whether this machine has a graphics processor."""
+    device_names = os.listdir("/dev") if os.path.isdir("/dev") else []
+    is_nvidia = any(name.startswith(isolation.GRAPHICS_PREFIX) for name in device_names)
     return is_nvidia or any(os.path.exists(path) for path in isolation.GRAPHICS)
 
 
-def found(program: str, folder: Path | None) -> str:
-    """The path of a program: the first on PATH that an estimator may read, else the first of all.
+def program_path(program: str, folder: Path | None) -> str:
+    """The path of a program: the first match on PATH that an estimator may read, or else the first match.
 
-    So `python3` is the system's where the shim of a version manager, in the user's home, comes before it.
+    For example, `python3` is the system's interpreter even if PATH lists the shim of a version manager, which is in the
+    user's home, before it.
     """
     if os.sep in program:
         return program
-    places = os.environ.get("PATH", os.defpath).split(os.pathsep)
-    paths = [path for place in places if (path := shutil.which(program, path=place))]
-    readable = [path for path in paths if not _out_of_reach([path], folder)]
-    return next(iter([*readable, *paths]), program)
+    search_folders = os.environ.get("PATH", os.defpath).split(os.pathsep)
+    matches = [path for search_folder in search_folders if (path := shutil.which(program, path=search_folder))]
+    readable = [path for path in matches if not _unreadable([path], folder)]
+    return next(iter([*readable, *matches]), program)
 
 
 def is_out_of_reach(program: str, folder: Path | None) -> bool:
-    """Whether a program is there, but in no folder that an estimator may read."""
-    return bool(_out_of_reach([found(program, folder)], folder))
+    """Whether a program exists, but not in a folder that an estimator may read."""
+    return bool(_unreadable([program_path(program, folder)], folder))
 
 
 def hint_on_modules(folder: Path | None) -> str:
-    """Why a module may not be found: the folders of PYTHONPATH that an estimator may not read; empty where it may."""
-    named = [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path]
-    unreadable = _out_of_reach(named, folder)
+    """A clause about the folders in PYTHONPATH that an estimator may not read; empty if it may read all of them."""
+    module_folders = [path for path in os.environ.get("PYTHONPATH", "").split(os.pathsep) if path]
+    unreadable = _unreadable(module_folders, folder)
     if not unreadable:
         return ""
     return f"; PYTHONPATH has {', '.join(unreadable)}, which an estimator may not read: name it in {READ}"
 
 
-def _out_of_reach(paths: Sequence[str], folder: Path | None) -> list[str]:
-    """The paths that exist, but lie in no folder that an estimator may read."""
+def _unreadable(paths: Sequence[str], folder: Path | None) -> list[str]:
+    """The paths that exist, but not in a folder that an estimator may read."""
     readable = [*isolation.SYSTEM, *libraries(), *opened()]
     if folder is not None:
         readable.append(str(folder))

@@ -1,8 +1,9 @@
-"""A stereo pair of any two lenses: its rectified views, disparities, and points.
+"""Stereo geometry and matching for two cameras with any lenses: rectified views, disparities and points.
 
-view       a virtual pinhole at a camera's centre, rectified: both views have the same rows and the same matrix K
-rays       (N, 3) with z = 1 in the view's axes
-disparity  column in the left view less column in the right one, px; inverse depth rho = disparity / (K[0, 0] baseline)
+view       a virtual pinhole camera at the centre of a camera; the views are rectified and have the same matrix K
+rays       (N, 3) with z = 1 in the frame of a view
+disparity  the column in the left view minus the column in the right view, in px
+rho        the inverse depth, disparity / (K[0, 0] baseline), in 1/m
 """
 
 from dataclasses import dataclass
@@ -21,27 +22,27 @@ from vobench.geometry.se3 import Array
 
 Map = tuple[NDArray[np.float32], NDArray[np.float32]]
 
-# On the plane z = 1 a pixel grows with 1 / cos² of the angle to the axis; at 60° it is four times as tall.
+# On the plane z = 1, the size of a pixel grows with 1 / cos² of its angle to the axis. At 60° it is 4 times as large.
 WIDEST_COSINE = 0.5
 ROW_PX = 1.0  # largest difference in rows between a point's pixels in the two views
 MIN_DISPARITY_PX = 0.5
-OUTSIDE_PX = -1e4  # a pixel that no picture has
+OUTSIDE_PX = -1e4  # a coordinate outside of every picture
 
 # Small pictures show disparities up to half the picture's width.
 SMALL_WIDTH_PX = 180
 SMALL_DISPARITIES = 96
 SGBM_BLOCK_PX = 5
-SGBM_SUBPIXELS = 16.0  # units of the matcher's disparities in a pixel
+SGBM_SUBPIXELS = 16.0  # the matcher returns disparities in 1/16 px
 
-# A point on a depth edge gets the disparity of the foreground (foreground fattening: Scharstein, Szeliski 2002), less
-# so in a smaller window. A point is left out if such a window moves it by more than this, and by more than most.
+# A point near a depth edge gets the disparity of the foreground (foreground fattening: Scharstein, Szeliski 2002). The
+# effect is weaker in a smaller window. A point is omitted if a smaller window moves it by more than both limits.
 SMALL_WINDOW_PX = 5
 FATTENED_PX = 0.2
 FATTENED_RATIO = 2.0
 
 
 def flat_rays(camera: Camera, uv_px: ArrayLike) -> Array:
-    """Rays (N, 3) with z = 1 through pixels (N, 2); NaN beyond WIDEST_COSINE, or where the lens has no ray."""
+    """The rays (N, 3) with z = 1 through pixels (N, 2); NaN beyond WIDEST_COSINE and for pixels without a ray."""
     rays = camera.rays(uv_px)
     z = rays[:, 2:]
     return rays / np.where(z >= WIDEST_COSINE, z, np.nan)
@@ -49,7 +50,7 @@ def flat_rays(camera: Camera, uv_px: ArrayLike) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Eye:
-    """A camera and its view, a pinhole of matrix K with the camera's picture size."""
+    """A camera and its view, which is a pinhole with matrix K and the camera's picture size."""
 
     camera: Camera
     R_view_camera: Array
@@ -57,30 +58,33 @@ class Eye:
 
     @property
     def is_view(self) -> bool:
-        """Whether the camera's picture is the view already."""
+        """Whether the picture of the camera is identical to the view."""
         has_same_lens = isinstance(self.camera, Pinhole) and np.array_equal(self.camera.K, self.K)
         return has_same_lens and np.array_equal(self.R_view_camera, np.eye(3))
 
     def rays(self, uv_px: ArrayLike) -> Array:
-        """Rays (N, 3) in the view's axes with z = 1 through the camera's pixels (N, 2)."""
+        """The rays (N, 3) with z = 1, in the frame of the view, through pixels (N, 2) of the camera."""
         rays = flat_rays(self.camera, uv_px) @ self.R_view_camera.T
         return rays / rays[:, 2:]
 
     def in_view(self, uv_px: ArrayLike) -> Array:
-        """The view's pixels (N, 2) of the camera's pixels."""
+        """The pixels (N, 2) of the view that correspond to pixels (N, 2) of the camera."""
         return (self.rays(uv_px) @ self.K.T)[:, :2]
 
     def project(self, points_m: Array) -> Array:
-        """The camera's pixels (N, 2) of points (N, 3) in the view's axes; NaN where it cannot see them."""
+        """The pixels (N, 2) of the camera that show points (N, 3) in the frame of the view; NaN if invisible."""
         return self.camera.project(points_m @ self.R_view_camera)
 
     def from_view(self, uv_px: Array) -> Array:
-        """The camera's pixels (N, 2) of the view's pixels."""
+        """The pixels (N, 2) of the camera that correspond to pixels (N, 2) of the view."""
         homogeneous = np.c_[uv_px, np.ones(len(uv_px))]
         return self.project(homogeneous @ np.linalg.inv(self.K).T)
 
     def small_map(self) -> Map | None:
-        """Columns and rows in the camera's small picture of the small view's pixels; None if they are the same."""
+        """The columns and rows in the small picture of the camera that correspond to the pixels of the small view.
+
+        None if they are identical.
+        """
         if self.is_view:
             return None
         width, height = small_size(self.camera.width_px, self.camera.height_px)
@@ -88,7 +92,7 @@ class Eye:
         columns, rows = np.meshgrid(np.arange(width), np.arange(height))
         small_pixels = np.stack([columns, rows], -1).reshape(-1, 2)
 
-        # Pixel centres lie at whole numbers, so that a picture begins at -0.5.
+        # Pixel centres are at integers, so a picture begins at -0.5.
         in_camera = self.from_view((small_pixels + 0.5) * ratio - 0.5)
         in_small_camera = (in_camera + 0.5) / ratio - 0.5
         finite = np.nan_to_num(in_small_camera, nan=OUTSIDE_PX).astype(np.float32)
@@ -98,7 +102,7 @@ class Eye:
 
 @dataclass(frozen=True, slots=True)
 class StereoPair:
-    """Both eyes, with the same view matrix K, and the distance between them. Pictures are not rectified."""
+    """Two cameras whose views have the same matrix K, and their baseline. Their pictures are not rectified."""
 
     left: Eye
     right: Eye
@@ -112,11 +116,11 @@ class StereoPair:
 
     @property
     def focal_baseline(self) -> float:
-        """Disparity in px of a point one metre away."""
+        """The disparity in px of a point at a depth of one metre."""
         return float(self.K[0, 0] * self.baseline_m)
 
     def seen(self, points: Points) -> Mask:
-        """Which points (N, 2) of the left picture are in the view."""
+        """Whether the left view can show each point (N, 2) of the left picture."""
         in_view = self.left.in_view(points)
         return np.asarray(np.isfinite(in_view).all(1))
 
@@ -131,9 +135,10 @@ class StereoPair:
         row_px: float = ROW_PX,
         with_edges: bool = True,
     ) -> tuple[Points, Array]:
-        """Pixels (N, 2) in the right picture of points (N, 2) in the left one, and disparities (N,), NaN for no match.
+        """The pixels (N, 2) in the right picture that match points (N, 2) in the left one, and disparities (N,).
 
-        Rows of the view may differ by `row_px`. Without `with_edges`, points on depth edges have no match.
+        A disparity is NaN without a match. The rows of matching points differ by at most `row_px`. Points near depth
+        edges are omitted unless `with_edges` is set.
         """
         left, right = comparable(left, right)
         guess = self._coarse_match(left, right, points)
@@ -142,36 +147,36 @@ class StereoPair:
         good = found & inside(matched, right, margin_px) & np.isfinite(disparity_px)
         if not with_edges and good.any():
             rematched, found_again = lucas_kanade(left, right, points, matched, window_px=SMALL_WINDOW_PX, levels=0)
-            moved_px = np.abs(rematched - matched)[:, 0]  # along rows, or nearly so
+            moved_px = np.abs(rematched - matched)[:, 0]  # (N,), approximately along the row
             limit_px = max(FATTENED_PX, FATTENED_RATIO * float(np.median(moved_px[good])))
             good &= found_again & (moved_px < limit_px)
         return matched, np.where(good, disparity_px, np.nan)
 
     def disparity(self, points: Points, matched: Points, *, row_px: float = ROW_PX) -> Array:
-        """Disparity (N,) in px of left and right pixels (N, 2); NaN if rows differ or the disparity is too small."""
+        """The disparities (N,) in px of left and right pixels (N, 2); NaN if rows differ or it is too small."""
         columns_px, rows_px = (self.left.in_view(points) - self.right.in_view(matched)).T
         with np.errstate(invalid="ignore"):
             good = (np.abs(rows_px) < row_px) & (columns_px > MIN_DISPARITY_PX)
         return np.where(good, columns_px, np.nan)
 
     def points(self, uv_px: ArrayLike, disparity_px: Array) -> Array:
-        """Points (N, 3) in m, in the view's axes, of left pixels (N, 2) with a disparity."""
+        """The points (N, 3) in m, in the frame of the left view, of left pixels (N, 2) with disparities (N,)."""
         with np.errstate(divide="ignore"):
             depth_m = self.focal_baseline / disparity_px
             return self.left.rays(uv_px) * depth_m[:, None]
 
     def T_left(self, T_view: Array) -> Array:
-        """A motion in the view's axes as the same motion in the left camera's."""
+        """The motion of the left camera that corresponds to a motion of the left view."""
         T_view_left = self.T_view_left
         return se3.inverse(T_view_left) @ T_view @ T_view_left
 
     @property
     def T_view_left(self) -> Array:
-        """The left camera's pose in the view's axes: a rotation."""
+        """The pose of the left camera in the frame of the left view, which is a rotation."""
         return se3.transform(self.left.R_view_camera, np.zeros(3))
 
     def _coarse_match(self, left: Image, right: Image, points: Points) -> Points:
-        """Rough pixels (N, 2) of the points in the right picture; their left pixels where nothing is known."""
+        """Approximate pixels (N, 2) of the points in the right picture; their left pixels if there is no estimate."""
         in_view = self.left.in_view(points)
         left_map, right_map = self.small_maps
         small_left = _small(left, left_map)
@@ -182,7 +187,7 @@ class StereoPair:
 
 
 def shifted_left(uv_px: Array, shift_px: Array) -> Array:
-    """Pixels (N, 2) moved left by so many columns (N,)."""
+    """Pixels (N, 2) shifted to the left by a number of columns (N,)."""
     return uv_px - np.stack([shift_px, np.zeros_like(shift_px)], -1)
 
 
@@ -211,11 +216,11 @@ def stereo_pair(rig: Rig, name: str) -> StereoPair:
 
 
 def coarse_disparity(left: Image, right: Image, uv_px: Array, width_px: int) -> Array:
-    """Disparity (N,) in px at pixels (N, 2) of a view `width_px` wide, from small pictures of both views.
+    """The disparities (N,) in px at pixels (N, 2) of a view with width `width_px`, from small pictures of both views.
 
-    It finds disparities far beyond the reach of Lucas-Kanade alone. Source: Hirschmüller (2008).
+    It finds disparities that are too large for Lucas-Kanade alone. Source: Hirschmüller (2008).
     """
-    # The matcher skips columns from which the largest disparity would leave the picture, so the picture is widened.
+    # The matcher omits columns for which the largest disparity would leave the picture, so the picture is padded.
     widen = (0, 0, SMALL_DISPARITIES, 0, cv2.BORDER_REPLICATE)
     wide_left = cv2.copyMakeBorder(left, *widen)
     wide_right = cv2.copyMakeBorder(right, *widen)
@@ -234,7 +239,7 @@ def coarse_disparity(left: Image, right: Image, uv_px: Array, width_px: int) -> 
 
 
 def small_size(width_px: int, height_px: int) -> tuple[int, int]:
-    """Width and height of a small picture."""
+    """The width and height of the small version of a picture."""
     ratio = _shrink_ratio(width_px)
     return width_px // ratio, height_px // ratio
 
@@ -244,7 +249,7 @@ def _shrink_ratio(width_px: int) -> int:
 
 
 def _small(image: Image, small_map: Map | None) -> Image:
-    """The small picture of the view."""
+    """The small version of a picture, resampled to the view."""
     height_px, width_px = image.shape
     small = cv2.resize(image, small_size(width_px, height_px), interpolation=cv2.INTER_AREA)
     if small_map is not None:
@@ -253,9 +258,9 @@ def _small(image: Image, small_map: Map | None) -> Image:
 
 
 def predicted(eye: Eye, points: Points, rho: Array, T_now_last: Array) -> Points:
-    """Pixels (N, 2) of points (N, 2) with inverse depths rho (N,) after a motion of the view.
+    """The predicted pixels (N, 2) of points (N, 2) with inverse depths rho (N,) after a motion of the view.
 
-    A point of unknown depth (NaN) is taken to be as far away as the median; one that would not be seen stays.
+    A point with unknown depth (NaN) gets the median depth. A point that would leave the view keeps its pixel.
     """
     known = np.isfinite(rho)
     typical_rho = np.median(rho[known]) if known.any() else 0.0

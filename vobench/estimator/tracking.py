@@ -1,4 +1,4 @@
-"""Corners of a picture, their tracks by Lucas-Kanade, and local contrast for pictures of unlike brightness."""
+"""Detects corners, tracks them by Lucas-Kanade, and makes pictures of different brightness comparable."""
 
 from itertools import pairwise
 
@@ -11,15 +11,15 @@ from vobench.estimator.protocol import Image
 Mask = NDArray[np.bool_]
 Points = NDArray[np.float32]
 
-# Cells across and down: corners are spread over the picture, not only where the texture is best.
+# The number of cells across and down. Corners are detected in each cell, so that they cover the whole picture.
 GRID_COLUMNS = 6
 GRID_ROWS = 4
-CORNER_QUALITY = 0.01  # of the best corner in the cell
+CORNER_QUALITY = 0.01  # the smallest quality of a corner, relative to the best corner in its cell
 WINDOW_PX = 21
-LEVELS = 3  # of the pyramid, above the picture itself
+LEVELS = 3  # the number of reduced pictures in the pyramid
 LK_STOP = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 30, 0.01)
-ROUND_TRIP_PX = 0.5  # largest distance between a corner and its track followed forward and back
-# A guess this far away that finds fewer than this share of the corners is doubted.
+ROUND_TRIP_PX = 0.5  # the largest distance between a point and the same point tracked forward and backward
+# Tracking is repeated without the guess if the guess is this far away and a smaller share than this of points is found.
 MISLED_PX = 5.0
 MISLED_SHARE = 0.4
 BRIGHTNESS_JUMP = 0.1  # relative change of mean or contrast beyond which grey values are not compared directly
@@ -31,7 +31,7 @@ CONTRAST_GAIN = 40
 
 
 def corners_per_cell(image: Image, per_cell: int, *, distance_px: float, margin_px: int) -> Points:
-    """The best corners (N, 2) of each cell of the grid. Source: Shi and Tomasi (1994)."""
+    """The best corners (N, 2) of all cells of the picture. Source: Shi and Tomasi (1994)."""
     height, width = image.shape
     columns = np.linspace(margin_px, width - margin_px, GRID_COLUMNS + 1).astype(int)
     rows = np.linspace(margin_px, height - margin_px, GRID_ROWS + 1).astype(int)
@@ -51,10 +51,10 @@ def corners_per_cell(image: Image, per_cell: int, *, distance_px: float, margin_
 def follow(
     image: Image, later: Image, points: Points, guess: Points | None = None, *, window_px: int = WINDOW_PX
 ) -> tuple[Points, Mask]:
-    """Tracks of points (N, 2) in a later picture, and which of them (N,) are forward-backward consistent.
+    """The pixels (N, 2) of points in a later picture, and which of them (N,) are forward-backward consistent.
 
-    `guess` (N, 2) is where the search begins, by default at the points. A small window is accurate at edges and on
-    slanted surfaces, a large one in noisy pictures. Source: Lucas and Kanade (1981), pyramids after Bouguet (2000).
+    The search begins at `guess` (N, 2), by default at the points. A small window is more accurate near depth edges and
+    on slanted surfaces, and a large window in noisy pictures. Source: Lucas and Kanade (1981), Bouguet (2000).
     """
     if not len(points):
         return points, np.zeros(0, bool)
@@ -68,7 +68,7 @@ def follow(
 def lucas_kanade(
     image: Image, later: Image, points: Points, guess: Points, *, window_px: int = WINDOW_PX, levels: int = LEVELS
 ) -> tuple[Points, Mask]:
-    """Tracks of points (N, 2) in a later picture, searched from a guess (N, 2), and which of them (N,) were found."""
+    """The pixels (N, 2) of points in a later picture, searched from a guess (N, 2), and which (N,) were found."""
     there, status, _ = cv2.calcOpticalFlowPyrLK(
         image,
         later,
@@ -85,7 +85,10 @@ def lucas_kanade(
 def follow_predicted(
     image: Image, later: Image, points: Points, guess: Points, *, window_px: int = WINDOW_PX
 ) -> tuple[Points, Mask]:
-    """As `follow`, and again without the guess if that misled: a motion that was predicted may have stopped."""
+    """Track points as `follow` does, and repeat it without the guess if most points are lost.
+
+    The guess can be wrong because the predicted motion has stopped.
+    """
     there, found = follow(image, later, points, guess, window_px=window_px)
     if not len(points):
         return there, found
@@ -99,7 +102,7 @@ def follow_predicted(
 
 
 def inside(points: Points, image: Image, margin_px: int) -> Mask:
-    """Which points (N, 2) are at least `margin_px` within the picture."""
+    """Whether each point (N, 2) is inside of the picture, at least `margin_px` from its border."""
     height, width = image.shape
     limit = np.array([width - 1 - margin_px, height - 1 - margin_px])
     is_inside = (points >= margin_px) & (points <= limit)
@@ -108,7 +111,7 @@ def inside(points: Points, image: Image, margin_px: int) -> Mask:
 
 
 def comparable(image: Image, other: Image) -> tuple[Image, Image]:
-    """Two pictures whose grey values can be compared: unchanged, or as local contrast if gain or light differ."""
+    """The two pictures unchanged, or their local contrast if their brightness differs."""
     statistics = np.array(cv2.meanStdDev(image)).ravel()  # mean and standard deviation
     other_statistics = np.array(cv2.meanStdDev(other)).ravel()
     change = np.abs(other_statistics - statistics)
@@ -118,7 +121,7 @@ def comparable(image: Image, other: Image) -> tuple[Image, Image]:
 
 
 def local_contrast(image: Image) -> Image:
-    """The picture less its local mean, over its local standard deviation: invariant to brightness and gain."""
+    """The picture minus its local mean, divided by its local standard deviation. It is invariant to gain and offset."""
     window = (CONTRAST_WINDOW_PX, CONTRAST_WINDOW_PX)
     grey = image.astype(np.float32)
     mean = cv2.blur(grey, window)

@@ -1,4 +1,4 @@
-"""The process that an estimator's class runs in: it imports the estimator's folder and passes frames to it."""
+"""The process in which the class of an estimator runs: it imports the class and passes frames to it."""
 
 import errno
 import importlib
@@ -15,7 +15,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import BinaryIO, cast
 
-from vobench.errors import VobenchError
+from vobench.errors import VobenchError, error_sentence
 from vobench.estimator.check import InvalidOutputError, checked, checked_revision, in_one_line
 from vobench.estimator.message import HEADER, answered, revision, unpickled
 from vobench.estimator.protocol import Estimator
@@ -24,9 +24,9 @@ NAMESPACE = "vobench_estimators"
 
 
 def load(folder: Path, class_path: str, *, name: str) -> Estimator:
-    """A new estimator from `file:Class` in a folder, imported as the package `vobench_estimators.<name>`.
+    """An instance of `file:Class`. The folder of the file is imported as the package `vobench_estimators.<name>`.
 
-    Raises VobenchError, one line, if the plugin cannot be imported, found or constructed.
+    Raises VobenchError if the class cannot be found, imported or constructed.
     """
     folder = folder.resolve()
     module_name, _, class_name = class_path.partition(":")
@@ -47,7 +47,7 @@ def load(folder: Path, class_path: str, *, name: str) -> Estimator:
 
 
 def _module(folder: Path, package: str, module_name: str) -> ModuleType:
-    """The module with the class, freshly imported from this folder and no other of the same name."""
+    """The module that contains the class, imported again from this folder."""
     for name in list(sys.modules):
         if f"{name}.".startswith(f"{package}."):
             del sys.modules[name]
@@ -61,7 +61,7 @@ def _module(folder: Path, package: str, module_name: str) -> ModuleType:
 
 
 def _open_package(package: str, folder: Path) -> None:
-    """Make the folder a package under this name, with or without an `__init__.py`."""
+    """Import the folder as a package with this name. It need not have an `__init__.py`."""
     namespace = sys.modules.setdefault(NAMESPACE, ModuleType(NAMESPACE))
     namespace.__path__ = []
     init = folder / "__init__.py"
@@ -77,7 +77,7 @@ def _open_package(package: str, folder: Path) -> None:
 
 
 def _cause(error: Exception, folder: Path) -> str:
-    """The exception, and the innermost line of the plugin in its traceback."""
+    """The exception as a sentence, with the innermost line of the estimator's code in its traceback."""
     if isinstance(error, SyntaxError):
         return f"SyntaxError: {error.msg}: {error.filename}:{error.lineno}"
     place = str(folder)
@@ -92,8 +92,8 @@ Message = tuple[bytes, bytes]  # tag and content
 
 
 def main(folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
-    """Serve frames until vobench closes the connection."""
-    # Warnings about retired names go to the log.
+    """Answer requests until vobench closes the connection."""
+    # Warnings about retired names are written to the log.
     warnings.filterwarnings("default", message=r"vobench\.", category=DeprecationWarning)
     resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
     requests, answers = _taken_over()
@@ -105,12 +105,15 @@ def main(folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
         return
     except Exception as error:
         traceback.print_exc()
-        content = _in_one_line(error).encode("utf-8", "replace")
+        content = in_one_line(error_sentence(error)).encode("utf-8", "replace")
         answers.write(HEADER.pack(_tag(error), len(content)) + content)
 
 
 def _taken_over() -> tuple[BinaryIO, BinaryIO]:
-    """The connection on standard input and output; from here on these are empty, and the log."""
+    """The connection to vobench, which was on standard input and output.
+
+    From then on, standard input is empty and standard output is the log.
+    """
     requests = os.fdopen(os.dup(0), "rb")
     answers = os.fdopen(os.dup(1), "wb", buffering=0)
     nothing = os.open(os.devnull, os.O_RDONLY)
@@ -121,7 +124,7 @@ def _taken_over() -> tuple[BinaryIO, BinaryIO]:
 
 
 def _answers(requests: BinaryIO, estimator: Estimator) -> Iterator[Message]:
-    """The answers to one request after another. Requests are vobench's own, so they are unpickled."""
+    """The answers to all requests, in order. Requests come from vobench, so they can be unpickled."""
     is_watched = False
     while head := requests.read(HEADER.size):
         tag, length = HEADER.unpack(head)
@@ -148,17 +151,12 @@ def _answers(requests: BinaryIO, estimator: Estimator) -> Iterator[Message]:
 
 def _tag(error: Exception) -> bytes:
     is_disk_full = isinstance(error, OSError) and error.errno == errno.ENOSPC
-    # OpenCV reports a failed allocation as its own error -4.
+    # OpenCV reports a failed allocation as an error with code -4.
     if isinstance(error, MemoryError) or is_disk_full or "Insufficient memory" in str(error):
         return b"NMEM"
     if isinstance(error, InvalidOutputError):
         return b"WRNG"
     return b"FAIL" if isinstance(error, VobenchError) else b"CRSH"
-
-
-def _in_one_line(error: Exception) -> str:
-    text = in_one_line(error)
-    return text if isinstance(error, VobenchError) else f"{type(error).__name__}: {text}"
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Absolute trajectory error, and the errors between poses that all metrics are made of."""
+"""Absolute trajectory error, and the pose errors that all metrics are based on."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from vobench.metric.comparison import HARTLEY, OURS, POSES, STURM_ATE, ZHANG, Co
 from vobench.trajectory.associate import Index
 
 Rows = tuple[Array, ...]
-BLOCK = 1 << 14  # poses per block, few enough for their matrices to fit into the processor's cache
+BLOCK = 1 << 14  # poses per block; the matrices of a block fit into the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,8 +29,8 @@ class PoseErrors:
 def angle_rad(R: Array) -> Array:
     """Angles (...) in radians of rotation matrices (..., 3, 3) that may be slightly non-orthonormal.
 
-    One Newton step towards the nearest rotation removes the rounding error of text files: KITTI's six digits leave R
-    2e-7 from orthonormal, which alone would change an angle by 3e-7 rad. Source: Higham (1986), eq. 3.6.
+    One Newton step towards the nearest rotation removes the rounding errors of text files. KITTI prints six digits,
+    so R is up to 2e-7 from orthonormal, which would change the angle by 3e-7 rad. Source: Higham (1986), eq. 3.6.
     """
     R_transposed = se3.transposed(R)
     correction = 1.5 * np.eye(3) - 0.5 * R_transposed @ R
@@ -38,9 +38,9 @@ def angle_rad(R: Array) -> Array:
 
 
 def matrix_norms(E: Array) -> Rows:
-    """Frobenius norms (N,) of errors (N, 4, 4) minus the identity: of the rotation, and of the whole matrix.
+    """Frobenius norms (N,) of E - I for error poses E (N, 4, 4): of the rotation part, and of the whole matrix.
 
-    They are evo's rot_part and full.
+    evo calls these errors rot_part and full.
     """
     squares = np.square(E - np.eye(4))
     rotation_norm = np.sqrt(squares[:, :3, :3].sum((1, 2)))
@@ -61,8 +61,9 @@ def errors_between(
     first: Index,
     last: Index,
 ) -> PoseErrors:
-    """Errors of the motions from poses `first` to `last` (N,) of trajectories (K, 4, 4), as `motion_errors`.
+    """Errors of the estimated motions between pairs of poses of two trajectories (K, 4, 4).
 
+    `first` and `last` (N,) are the indices of the two poses of each pair.
     Source: Sturm et al. (2012), section V-A: (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j).
     """
     gt = _pose_columns(T_gt)
@@ -79,11 +80,11 @@ def errors_between(
     return PoseErrors(*in_blocks(len(first), errors))
 
 
-# Below, N poses are (3, 4, N): each number of all of them side by side, which is faster than N small matrices.
+# The functions below store N poses as an array (3, 4, N), which is processed faster than N small matrices.
 
 
 def _pose_columns(T: Array) -> Array:
-    """Poses (N, 4, 4) as (3, 4, N)."""
+    """Poses (N, 4, 4) as an array (3, 4, N)."""
     upper_rows = T[:, :3]
     return np.ascontiguousarray(np.moveaxis(upper_rows, 0, -1))
 
@@ -99,7 +100,10 @@ def _relative_poses(first: Array, last: Array) -> Array:
 
 
 def _relative_errors(gt: Array, est: Array) -> Rows:
-    """Lengths and angles (N,) of poses est in the frames of gt, both (3, 4, N), corrected as by `angle_rad`."""
+    """Translation errors (N,) in m and rotation errors (N,) in rad of poses `est` relative to `gt`, both (3, 4, N).
+
+    The rotations are orthonormalised as in `angle_rad`.
+    """
     E = _relative_poses(gt, est)
     R = E[:, :3]
     t = E[:, 3]
@@ -108,8 +112,8 @@ def _relative_errors(gt: Array, est: Array) -> Rows:
     R = np.einsum("ikn,kjn->ijn", R, correction)
 
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R
-    axis_times_sine = np.stack([zy - yz, xz - zx, yx - xy])  # twice the sine of the angle along the axis
-    twice_sine = np.sqrt(np.einsum("in,in->n", axis_times_sine, axis_times_sine))
+    scaled_axis = np.stack([zy - yz, xz - zx, yx - xy])  # (3, N), the axis of rotation times twice the sine
+    twice_sine = np.sqrt(np.einsum("in,in->n", scaled_axis, scaled_axis))
     twice_cosine = xx + yy + zz - 1.0
     length = np.sqrt(np.einsum("in,in->n", t, t))
     angle = np.arctan2(twice_sine, twice_cosine)
@@ -117,31 +121,31 @@ def _relative_errors(gt: Array, est: Array) -> Rows:
 
 
 def in_blocks(n: int, work: Callable[[slice], Rows]) -> Rows:
-    """The arrays (n,) that `work` returns for n samples, computed one block of samples at a time."""
+    """The arrays (n,) that `work` returns for n samples. `work` is called with one block of samples at a time."""
     results = []
-    for begin in range(0, max(n, 1), BLOCK):  # no samples are one empty block, so that the results are arrays
+    for begin in range(0, max(n, 1), BLOCK):  # one empty block if n is 0, so that the results are arrays
         end = min(begin + BLOCK, n)
         results.append(work(slice(begin, end)))
     return tuple(np.concatenate(blocks) for blocks in zip(*results, strict=True))
 
 
 def motions(T_world_frame: Array, first: Index, last: Index) -> Array:
-    """Poses (N, 4, 4) of frames `last` in frames `first`, for index arrays (N,)."""
+    """The motions (N, 4, 4) from poses `first` to poses `last`, given as indices (N,): T_first_last."""
     T_first_world = se3.inverse(T_world_frame[first])
     T_first_last: Array = T_first_world @ T_world_frame[last]
     return T_first_last
 
 
 def distances_between(T: Array, first: Index, last: Index) -> Array:
-    """Distances (N,) in m between poses `first` and `last` (N,) of a trajectory (K, 4, 4)."""
+    """Distances (N,) in m between poses `first` and poses `last`, given as indices (N,), of a trajectory (K, 4, 4)."""
     offset_m = T[last, :3, 3] - T[first, :3, 3]
     return np.asarray(np.linalg.norm(offset_m, axis=1))
 
 
 def absolute_errors(T_gt: Array, T_est: Array) -> PoseErrors:
-    """Distances and angles between matched poses (K, 4, 4), the estimate already aligned.
+    """Errors of the poses of an aligned estimate relative to the matched true poses, both (K, 4, 4).
 
-    Source: Sturm et al. (2012), section V-B; the rotation is the angle of R_est⁻¹ R_gt.
+    The rotation error is the angle of R_est⁻¹ R_gt. Source: Sturm et al. (2012), section V-B.
     """
 
     def errors(block: slice) -> Rows:
@@ -155,12 +159,12 @@ def absolute_errors(T_gt: Array, T_est: Array) -> PoseErrors:
 
 
 def absolute(comparison: Comparison) -> PoseErrors:
-    """`absolute_errors` of a comparison."""
+    """The absolute errors of the matched poses of a comparison."""
     return absolute_errors(comparison.matched.T_gt, comparison.T_aligned)
 
 
 def _matrix_errors(comparison: Comparison) -> Rows:
-    """`matrix_norms` of the errors of matched poses."""
+    """The `matrix_norms` of the error poses T_est⁻¹ T_gt of a comparison."""
     T_gt = comparison.matched.T_gt
     T_est = comparison.T_aligned
 
@@ -172,7 +176,10 @@ def _matrix_errors(comparison: Comparison) -> Rows:
 
 
 def _axis_errors(comparison: Comparison) -> dict[str, Array]:
-    """Signed errors (K,) by axis, in m and degrees, in the truth's world: R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """Signed errors (K,) by axis of the world: position in m, and angles in degrees.
+
+    The angles are defined by R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll).
+    """
     T_gt = comparison.matched.T_gt
     T_est = comparison.T_aligned
     x, y, z = (T_est[:, :3, 3] - T_gt[:, :3, 3]).T
@@ -183,12 +190,12 @@ def _axis_errors(comparison: Comparison) -> dict[str, Array]:
 
 
 def _axis_measure(axis: str) -> Callable[[Comparison], Array]:
-    """A measure of the signed error along or about one axis."""
+    """The function that returns the signed errors (K,) of a comparison along or about one axis."""
     return lambda comparison: comparison.once(_axis_errors)[axis]
 
 
-DRIFT = "where along the path an error was made: one early turn moves everything after it"
-LOST = "frames without a pose: read coverage beside it"
+DRIFT = "where along the path an error arose: one early rotation error displaces all later poses"
+LOST = "frames without a pose: see coverage"
 _pose_metric = partial(MetricDefinition, settings=POSES)
 METRICS = (
     _pose_metric(
@@ -207,7 +214,7 @@ METRICS = (
         "deg",
         "angle of R_est⁻¹ R_gt of each aligned pose",
         STURM_ATE,
-        blind=f"a roll that the alignment had to guess: read alignment.unobservable; {LOST}",
+        blind=f"a rotation that the alignment cannot observe: see alignment.unobservable; {LOST}",
         full=False,
         measure=lambda comparison: np.rad2deg(comparison.once(absolute).rot_rad),
     ),
@@ -226,7 +233,7 @@ METRICS = (
         "1",
         "‖T_est⁻¹ T_gt − I‖_F",
         "evo's full",
-        blind=f"metres and rotations are added: it changes with the unit of length; {LOST}",
+        blind=f"the difference between translation and rotation: their sum depends on the unit of length; {LOST}",
         measure=lambda comparison: comparison.once(_matrix_errors)[1],
     ),
     *(
@@ -248,7 +255,7 @@ METRICS = (
             "deg",
             f"{axis} of R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll), with its sign",
             ZHANG,
-            blind=f"the angles of rotations near 90° of pitch, where roll and yaw are one; {LOST}",
+            blind=f"roll and yaw separately at a pitch near 90°, where their axes coincide; {LOST}",
             measure=_axis_measure(axis),
         )
         for axis in ("roll", "pitch", "yaw")

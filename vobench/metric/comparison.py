@@ -1,4 +1,4 @@
-"""Comparisons, a matched and aligned pair of trajectories, and definitions of metrics that measure them."""
+"""Comparisons, which are matched and aligned pairs of trajectories, and the definitions of metrics."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
@@ -17,15 +17,17 @@ from vobench.trajectory.trajectory import Trajectory, step_lengths_m
 
 Found = TypeVar("Found")
 DEFAULTS = ScoreSettings()
-STILL_M = 1e-4  # a step that TartanAir's script counts as no motion
+STILL_M = 1e-4  # TartanAir's script counts a shorter step as no motion
 
 
 @dataclass(frozen=True, slots=True)
 class Comparison:
-    """A matched and aligned pair of ground truth and estimate, with complete settings.
+    """A matched and aligned pair of ground truth and estimate, with all settings.
 
-    T_aligned (K, 4, 4) are the aligned poses. T_moving (K, 4, 4) are the poses whose motions are compared, which
-    differ only if `scale_rule` gives motions another scale. distances_m (N,) is the path length to each true pose.
+    `T_aligned` (K, 4, 4) are the aligned poses.
+    `T_moving` (K, 4, 4) are the poses whose motions are compared. They differ from `T_aligned` only if `scale_rule`
+    gives motions another scale.
+    `distances_m` (N,) are the path lengths to the true poses.
     `covariance` (N, 6, 6) are the covariances of the estimated poses, if the estimator reports them.
     """
 
@@ -61,7 +63,7 @@ class Comparison:
 class OverLengths:
     """Errors (N,) of segments or parts of the path, each of a nominal length (N,) in m.
 
-    `drift` (N,) are the errors of segments that their mean is computed from, in 1 or rad/m: float32 for the devkit.
+    `drift` (N,) are the errors from which the mean is computed, in 1 or rad/m; they are float32 for KITTI's devkit.
     """
 
     errors: Array
@@ -71,10 +73,10 @@ class OverLengths:
 
 @dataclass(frozen=True, slots=True)
 class MetricDefinition:
-    """One metric: the settings that change it, the errors it does not show, its main statistic, and how to measure it.
+    """A metric: its settings, the errors that it does not show, its main statistic, and its measure.
 
-    A metric with `full` is only measured if all metrics are requested. `measure` gives its errors (N,) in its unit,
-    possibly none. Metrics of recordings rather than poses, such as coverage, have no measure.
+    A metric with `full` is measured only if all metrics are requested. `measure` returns its errors (N,) in its unit.
+    Metrics of recordings instead of poses, such as coverage, have no measure.
     """
 
     id: str
@@ -90,7 +92,7 @@ class MetricDefinition:
 
     @property
     def identity(self) -> str:
-        """The start of the ids of its numbers: family.rest."""
+        """The beginning of the ids of its numbers: family.rest."""
         return self.id.replace("_", ".", 1)
 
     def as_dict(self) -> dict[str, Any]:
@@ -99,7 +101,7 @@ class MetricDefinition:
         return {name: getattr(self, name) for name in names}
 
 
-# The settings that change poses, and so all metrics of poses.
+# The settings that change poses, and therefore all metrics of poses.
 POSES = ("alignment", "align_n", "scale_rule", "project", "association", "max_diff_ns", "offset_ns")
 OURS = "this project"
 STURM_ATE = "Sturm et al. (2012), section V-B"
@@ -175,9 +177,9 @@ def _aligned(matched: Matched, settings: ScoreSettings) -> tuple[Alignment, Arra
 
 
 def ate_scale(T_gt: Array, T_est: Array) -> float:
-    """TartanAir's factor on the estimate (K, 4, 4) before an SE(3) alignment: Σ‖gt‖² / Σ gt·est about the means.
+    """TartanAir's scale of the estimate (K, 4, 4) before an SE(3) alignment: Σ‖gt‖² / Σ gt·est about the means.
 
-    Umeyama's is Σ gt·est / Σ‖est‖², and never larger; 1 if either side is stationary.
+    Umeyama's scale is Σ gt·est / Σ‖est‖², which is never larger. The result is 1 if either side is stationary.
     Source: Wang et al. (2020), the evaluation script.
     """
     gt_m = T_gt[:, :3, 3]
@@ -191,9 +193,9 @@ def ate_scale(T_gt: Array, T_est: Array) -> float:
 
 
 def motion_scale(T_gt: Array, T_est: Array) -> float:
-    """TartanAir's factor on the estimate (K, 4, 4) before relative and segment errors.
+    """TartanAir's scale of the estimate (K, 4, 4) before relative and segment errors are computed.
 
-    It is 1 / mean of the estimate's steps over the truth's, 1 if either side is stationary.
+    It is 1 / mean(step of the estimate / step of the truth), and 1 if either side is stationary.
     Source: Wang et al. (2020), the evaluation script.
     """
     gt_m = step_lengths_m(T_gt[:, :3, 3])
@@ -231,7 +233,7 @@ def _no_overlap(gt: Trajectory, est: Trajectory, settings: ScoreSettings) -> str
 
 
 def _span(trajectory: Trajectory) -> str:
-    """Number of poses and the time that they span, for messages."""
+    """The number of poses and the time that they span, for messages."""
     if not len(trajectory):
         return "no pose"
     first = seconds(int(trajectory.t_ns[0]))

@@ -13,8 +13,8 @@ from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
 FRAME_NS = 30_000_000  # ground truth with shorter steps comes from motion capture, so its poses are not frames
-SLOT_NS = 200_000_000  # for such ground truth; a camera at 10 Hz has an image in every slot despite jitter
-END_NS = 100_000_000  # the last image of a camera at 10 Hz is at most this long before the end
+SLOT_NS = 200_000_000  # the length of a slot for such ground truth; a camera at 10 Hz has an image in every slot
+END_NS = 100_000_000  # the largest time between the last image of a camera at 10 Hz and the end of the recording
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""All metrics, and the identity of a number: the metric and every setting that shaped it."""
+"""All metrics, and the identity of a number: its metric and all settings that influenced it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,9 +18,9 @@ _PAIRS = {False: "consecutive", True: "all"}
 
 @dataclass(frozen=True, slots=True)
 class IdentityPart:
-    """One `key=value` of an identity, written for metrics that one of its settings changes, or for all if it has none.
+    """One `key=value` of an identity. It is written for the metrics that depend on its settings, or for all metrics.
 
-    `write` returns None if the part is left out.
+    `write` returns None if the part is omitted.
     """
 
     key: str
@@ -35,7 +35,7 @@ def identity(
     n: int,
     of: int,
 ) -> str:
-    """The id of a metric's number, such as `ate.trans.rmse[align=se3; ...]`, from n of so many true poses."""
+    """The id of a number, such as `ate.trans.rmse[align=se3; ...]`, with the number of poses that it is based on."""
     items = []
     for part in PARTS:
         is_relevant = not part.settings or set(part.settings) & set(metric.settings)
@@ -47,7 +47,7 @@ def identity(
 
 
 def _number(value: float) -> str:
-    """The shortest text of a number, without a decimal point for a whole one."""
+    """The shortest text of a number. An integer has no decimal point."""
     return repr(float(value)).removesuffix(".0")
 
 
@@ -95,7 +95,7 @@ def _setting_part(
     *,
     always: bool = False,
 ) -> IdentityPart:
-    """The part of one setting, written if its value is not the default, or always."""
+    """The part of one setting. It is written if the value is not the default, or always."""
 
     def written(settings: ScoreSettings) -> str | None:
         value = getattr(settings, setting)

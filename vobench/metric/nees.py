@@ -1,4 +1,4 @@
-"""Consistency: whether errors are as large as the covariances that an estimator reports."""
+"""Consistency: whether the errors of an estimator agree with the covariances that it reports."""
 
 from dataclasses import dataclass
 
@@ -20,7 +20,7 @@ SMALLEST_SINE = 1e-12  # of half the angle: below it the angle is twice the sine
 
 @dataclass(frozen=True, slots=True)
 class Consistency:
-    """Normalised estimation errors squared, each (K,): on average 6, 3 and 3 for correct covariances."""
+    """Normalised estimation errors squared (K,). Their means are 6, 3 and 3 if the covariances are correct."""
 
     pose: Array
     trans: Array
@@ -33,10 +33,10 @@ def consistency(
     covariance: Array,
     alignment: Alignment,
 ) -> Consistency:
-    """eᵀ P⁻¹ e of matched poses (K, 4, 4), the estimate not yet aligned, and its covariances P (K, 6, 6).
+    """The values eᵀ P⁻¹ e of matched poses (K, 4, 4) before alignment, with covariances P (K, 6, 6).
 
-    e is the position error in m and the rotation vector of R_gt R_est⁻¹ in rad, P in this order about the
-    fixed axes of the estimate's world, as in ROS. Raises TrajectoryError for a P that isn't positive definite.
+    e consists of the position error in m and the rotation vector of R_gt R_est⁻¹ in rad. P has the same order, in the
+    axes of the estimate's world, as in ROS. Raises TrajectoryError if a P is not positive definite.
     Source: Bar-Shalom et al. (2001), section 5.4.
     """
     scales = np.diag([alignment.scale, 1.0])  # of positions, of rotations
@@ -88,7 +88,10 @@ def median_interval(samples: float, degrees_of_freedom: int) -> tuple[float, flo
 
 
 def rotation_vector(R: Array) -> Array:
-    """Axis times angle (..., 3) in rad of rotations (..., 3, 3), from the quaternion: exact up to half a turn."""
+    """The rotation vectors (..., 3) in rad of rotations (..., 3, 3), computed from quaternions.
+
+    They are accurate for all angles up to half a turn.
+    """
     q = se3.to_quaternion(R)
     axis_times_sine = q[..., :3]
     sine = np.linalg.norm(axis_times_sine, axis=-1, keepdims=True)
@@ -119,7 +122,7 @@ def _require_positive_definite(covariance: Array) -> None:
 
 
 def _consistency(comparison: Comparison) -> Consistency:
-    """The consistency of a comparison, without samples if the estimator reports no covariances."""
+    """The consistency of a comparison. It has no samples if the estimator reports no covariances."""
     if comparison.covariance is None:
         return Consistency(*np.zeros((3, 0)))
     matched = comparison.matched
@@ -134,7 +137,7 @@ def _definition(
     title: str,
     expected: int,
 ) -> MetricDefinition:
-    """The metric of one part of the pose, whose error has `expected` components."""
+    """The metric of a part of the pose whose error has `expected` components."""
 
     def measure(comparison: Comparison) -> Array:
         return np.asarray(getattr(comparison.once(_consistency), part))

@@ -95,7 +95,7 @@ def trial_loss(lost_aware: float | None, *, survived: bool) -> float:
     """A trial's loss in (0, 1], 1 minus its lost-aware score; at least 1/2 for a failed trial, whatever its score."""
     score = lost_aware if lost_aware is not None else 0.5 * survived
     if not survived and score >= 0.5:
-        score -= 0.5  # it was scored as a survivor, by its poses alone
+        score -= 0.5  # the score of its poses counted it as survived
     return max(1.0 - score, MIN_LOSS)
 
 

@@ -27,12 +27,12 @@ from vobench.metric.settings import RelativeRule, Unit
 from vobench.trajectory.associate import Index, nearest
 from vobench.trajectory.trajectory import Stamps, Trajectory, path_lengths_m, step_lengths_m
 
-TOLERANCE = 0.1  # of delta, by which a pair of all pairs may miss it; evo's
-GAP_STEPS = 1.5  # a step this many times the usual one is a gap
-MAX_PAIRS = 20_000_000  # all pairs by angle grow with the square of the poses; this many need 3 GB
-MAX_POSES = 2000  # up to which every pair is compared: 4 million
-CHUNK = 4_000_000  # relative angles computed at once: 32 MB
-TRACE_MARGIN = 1e-4  # more than matrices with six digits are off
+TOLERANCE = 0.1  # with all pairs, the largest deviation of a pair from delta, relative to delta; as in evo
+GAP_STEPS = 1.5  # a longer step, relative to the usual step, is a gap
+MAX_PAIRS = 20_000_000  # the number of pairs by angle grows with the square of the poses; these need 3 GB
+MAX_POSES = 2000  # the largest number of poses for which all pairs are compared, which are 4 million
+CHUNK = 4_000_000  # the number of relative angles that are computed at once, in 32 MB
+TRACE_MARGIN = 1e-4  # larger than the rounding errors of matrices with six digits
 
 IndexPairs = tuple[Index, Index]
 Mask = NDArray[np.bool_]
@@ -77,7 +77,7 @@ def _pairs_by_frames(n: int, delta: int, *, all_pairs: bool) -> IndexPairs:
 
 
 def _pairs_by_angle(R: Array, delta_rad: float, *, all_pairs: bool) -> IndexPairs:
-    """Pairs of rotations (K, 3, 3) that are an angle apart."""
+    """Pairs of rotations (K, 3, 3) that differ by an angle."""
     if all_pairs:
         return _all_by_angle(R, delta_rad)
     R_steps = se3.transposed(R[:-1]) @ R[1:]
@@ -85,9 +85,9 @@ def _pairs_by_angle(R: Array, delta_rad: float, *, all_pairs: bool) -> IndexPair
 
 
 def every_pair(n: int) -> IndexPairs:
-    """All ordered pairs (first, last) of n poses, each with itself too: what TartanAir draws 10,000 at random of.
+    """All ordered pairs (first, last) of n poses, including pairs of equal poses. TartanAir draws 10,000 of them.
 
-    Of more than MAX_POSES poses, as many pairs as these have are drawn, always the same.
+    For more than MAX_POSES poses, MAX_POSES² pairs are drawn, which are always the same.
     """
     if n <= MAX_POSES:
         poses = np.arange(n)
@@ -103,10 +103,11 @@ def pairs_along(
     tolerance: float,
     gaps: Mask | None = None,
 ) -> IndexPairs:
-    """For every pose the later one whose distance `along` (K,), not decreasing, is nearest to delta further on.
+    """Each pose, paired with the later pose whose distance from it is nearest to delta.
 
-    Pairs that miss it by more than `tolerance` are dropped, unless the partner fell into one of the `gaps`
-    (K-1,), the steps with missing poses: then the pose after the gap is taken. O(K log K).
+    `along` (K,) are distances from the start, which do not decrease. A pair whose distance differs from delta by more
+    than `tolerance` is dropped, unless the later pose would be in one of the `gaps` (K - 1,), which are steps with
+    missing poses. The pose after the gap is used then. O(K log K).
     """
     n = len(along)
     first = np.arange(max(n - 1, 0))
@@ -114,7 +115,7 @@ def pairs_along(
     beyond = np.searchsorted(along, goal, side="left")
     beyond = np.clip(beyond, first + 1, max(n - 1, 0))
 
-    # While the body is stationary poses share a distance; the first of them is the one that arrives there.
+    # While the body is stationary, all poses have the same distance. The first of them is used.
     short = _first_of_equal(along, beyond - 1, first)
     beyond = _first_of_equal(along, beyond, first)
     distance_beyond = along[beyond] - along[first]
@@ -133,13 +134,13 @@ def pairs_along(
 
 
 def _first_of_equal(along: Array, poses: Index, first: Index) -> Index:
-    """The first poses at the distances of others, but later than `first`, all (N,)."""
+    """The first of all poses with the same distance as `poses` that come after `first`, all (N,)."""
     arrivals = np.searchsorted(along, along[poses], side="left")
     return np.asarray(np.maximum(arrivals, first + 1))
 
 
 def _gaps(t_ns: Stamps) -> Mask:
-    """Which steps (K-1,) between matched poses take longer than usual."""
+    """Whether each step (K - 1,) between matched poses is longer than usual."""
     steps_ns = np.diff(t_ns)
     if not len(steps_ns):
         return np.zeros(0, bool)
@@ -147,7 +148,7 @@ def _gaps(t_ns: Stamps) -> Mask:
 
 
 def _chain(steps: NDArray[Any], delta: float) -> IndexPairs:
-    """Pairs end to end, each as soon as its steps sum up to delta; steps are added one by one, as evo does."""
+    """Consecutive pairs, each of which ends when the sum of its steps reaches delta. Steps are added as in evo."""
     ends = [0]
     total = 0.0
     for end, step in enumerate(steps.tolist(), 1):
@@ -160,7 +161,7 @@ def _chain(steps: NDArray[Any], delta: float) -> IndexPairs:
 
 
 def _all_by_angle(R: Array, delta_rad: float) -> IndexPairs:
-    """All pairs of rotations (K, 3, 3) that are delta ± a tenth apart, whatever the rotations between them."""
+    """All pairs of rotations (K, 3, 3) that differ by delta ± a tenth, regardless of the rotations between them."""
     firsts = [NO_POSES]
     lasts = [NO_POSES]
     total = 0
@@ -179,7 +180,7 @@ def _all_by_angle(R: Array, delta_rad: float) -> IndexPairs:
 
 
 def _candidates(R: Array, delta_rad: float) -> Iterator[IndexPairs]:
-    """Pairs with a trace near that of the angle, one chunk after the other."""
+    """The pairs whose trace is close to that of the angle, in chunks."""
     flat = R.reshape(-1, 9)
     largest_rad = min((1 + TOLERANCE) * delta_rad, np.pi)
     smallest_rad = max((1 - TOLERANCE) * delta_rad, 0.0)
@@ -195,13 +196,13 @@ def _candidates(R: Array, delta_rad: float) -> Iterator[IndexPairs]:
         yield first[is_later] + begin, last[is_later] + begin + 1
 
 
-# TUM's: a true pose more than this many of its usual steps away counts as missing.
+# In TUM's script, a true pose counts as missing if it is farther away than this number of usual steps.
 MAX_TRUTH_STEPS = 2.0
-STILL_M = 1e-100  # a true motion below it has no percentage that could be squared
+STILL_M = 1e-100  # the square of a percentage of a smaller true motion would overflow
 
 
 def relative_matrix_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
-    """`matrix_norms` (P,) of the errors of the motions between matched poses (K, 4, 4) from first to last."""
+    """The `matrix_norms` (P,) of the errors of the motions between the poses of pairs of matched poses (K, 4, 4)."""
     first, last = pairs
 
     def norms(block: slice) -> Rows:
@@ -215,7 +216,7 @@ def relative_matrix_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows
 def distance_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
     """| ‖q_j - q_i‖ - ‖p_j - p_i‖ | of matched poses (K, 4, 4), q true and p estimated: in m, and in % of the true one.
 
-    Pairs between which the truth didn't move have no percentage. Source: evo's point_distance and its ratio.
+    A pair without true motion has no percentage. Source: evo's point_distance and its ratio.
     """
     gt_m = distances_between(T_gt, *pairs)
     est_m = distances_between(T_est, *pairs)
@@ -233,13 +234,13 @@ def tum_errors(
     offset_ns: int = 0,
     scale: float = 1.0,
 ) -> PoseErrors:
-    """Errors of the estimate's motions over delta_s seconds, from every pose on; est's positions times scale.
+    """The errors of the estimated motions over `delta_s` seconds from every pose. Positions are multiplied by `scale`.
 
-    Source: Sturm et al. (2012), section V-A, by their script with --fixed_delta.
+    Source: Sturm et al. (2012), section V-A; their script with --fixed_delta.
     """
     t_ns = est.t_ns + np.int64(offset_ns)
     last = nearest(t_ns + round(delta_s * 1e9), t_ns)
-    first = np.flatnonzero(last < len(t_ns) - 1)  # the last pose is nearest to any later instant, so it ends no pair
+    first = np.flatnonzero(last < len(t_ns) - 1)  # the last pose would be the nearest one to all later instants
     last = last[first]
 
     gt_first = nearest(t_ns[first], gt.t_ns)
@@ -260,13 +261,13 @@ def tum_errors(
 OPENVINS_LENGTHS_M = (8.0, 16.0, 24.0, 32.0, 40.0, 48.0)
 OPENVINS_TOLERANCE_M = 0.5
 RPG_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5)
-RPG_TOLERANCE = 0.2  # of the length
-MIN_SAMPLES = 2  # a length with fewer parts is left out
+RPG_TOLERANCE = 0.2  # the tolerance of rpg, relative to the length
+MIN_SAMPLES = 2  # a length with fewer parts is omitted
 
 
 @dataclass(frozen=True, slots=True)
 class RelativeErrors:
-    """Errors of N parts: nominal length, translation in m, angle, its yaw and its tilt in rad, each (N,)."""
+    """The errors of N parts of a path: translation in m, and angle, yaw and tilt in rad, with the nominal lengths."""
 
     length_m: Array
     trans_m: Array
@@ -279,7 +280,7 @@ class RelativeErrors:
 
 
 def relative_lengths(path_m: float, rule: RelativeRule) -> tuple[float, ...]:
-    """The rule's lengths: 8 to 48 m, or 10 to 50 % of the path, truncated to two decimals."""
+    """The lengths of a rule: 8 to 48 m, or 10 to 50 % of the path, truncated to two decimals."""
     if rule == "openvins":
         return OPENVINS_LENGTHS_M
     lengths_m = [float(np.trunc(share * path_m * 100) / 100) for share in RPG_SHARES]
@@ -293,9 +294,9 @@ def part_errors(
     *,
     rule: RelativeRule,
 ) -> RelativeErrors:
-    """Errors of the motions from each pose (K, 4, 4) to the one whose true path is nearest to each length.
+    """The errors of motions from each pose (K, 4, 4) to the pose at the path length nearest to each length.
 
-    Gravity points along z of the world. Source: Zhang and Scaramuzza (2018), section IV.
+    The vertical is the z axis of the world. Source: Zhang and Scaramuzza (2018), section IV.
     """
     along_m = path_lengths_m(T_gt[:, :3, 3])
     firsts = [NO_POSES]
@@ -317,11 +318,11 @@ def part_errors(
 
 
 def _part_tolerance_m(length_m: float, rule: RelativeRule) -> float:
-    """By how much the path of a part may differ from its length."""
+    """The largest difference between the path of a part and its nominal length."""
     if rule == "openvins":
         return OPENVINS_TOLERANCE_M
     limit_m = RPG_TOLERANCE * length_m
-    return float(np.nextafter(limit_m, 0.0))  # rpg's tolerance is strictly less
+    return float(np.nextafter(limit_m, 0.0))  # rpg requires a difference strictly below the limit
 
 
 def _part_errors(
@@ -330,7 +331,7 @@ def _part_errors(
     first: Index,
     last: Index,
 ) -> Rows:
-    """Translation, angle, yaw and tilt (N,) of the errors of motions."""
+    """The translation, angle, yaw and tilt (N,) of the errors of motions."""
     E = se3.inverse(motions(T_gt, first, last)) @ motions(T_est, first, last)
     R_error = E[:, :3, :3]
     R_est = T_est[last, :3, :3]
@@ -346,7 +347,7 @@ def _pairs(comparison: Comparison) -> IndexPairs:
     settings = comparison.settings
     if settings.rpe_rule == "tartanair":
         return every_pair(len(comparison.matched))
-    if settings.rpe_rule == "tum":  # that script pairs other poses, and measures other errors in no other form
+    if settings.rpe_rule == "tum":  # TUM's script uses other pairs, and has only some of the errors
         return NO_POSES, NO_POSES
     is_from_truth = settings.rpe_pairs_from == "gt"
     return select_pairs(
@@ -384,7 +385,7 @@ def _distances(comparison: Comparison) -> Rows:
 
 
 def _parts(comparison: Comparison) -> RelativeErrors:
-    """`part_errors` of a comparison, over the lengths of its rule."""
+    """The `part_errors` of a comparison for the lengths of its rule."""
     matched = comparison.matched
     settings = comparison.settings
     T_est = comparison.T_moving
@@ -398,7 +399,7 @@ def _parts(comparison: Comparison) -> RelativeErrors:
 
 
 def _over_parts(errors: Callable[[RelativeErrors], Array]) -> Callable[[Comparison], OverLengths]:
-    """A measure of one kind of errors of parts."""
+    """The measure of one kind of errors of parts."""
 
     def measure(comparison: Comparison) -> OverLengths:
         parts = comparison.once(_parts)
@@ -449,7 +450,7 @@ METRICS = (
         "1",
         "‖E − I‖_F",
         "evo's full",
-        blind=f"metres and rotations are added: it changes with the unit of length; {GLOBAL}",
+        blind=f"the difference between translation and rotation: their sum depends on the unit of length; {GLOBAL}",
         measure=lambda comparison: comparison.once(_matrices)[1],
     ),
     _motion_metric(
@@ -467,7 +468,7 @@ METRICS = (
         "%",
         "100 | ‖q_j − q_i‖ − ‖p_j − p_i‖ | / ‖q_j − q_i‖, pairs where the truth stood still left out",
         "evo's point_distance_error_ratio",
-        blind="every direction, and drift while the truth stands still",
+        blind="every direction, and drift while the truth is stationary",
         measure=lambda comparison: comparison.once(_distances)[1],
     ),
     _part_metric(

@@ -1,4 +1,4 @@
-"""One estimate scored against one ground truth: associate, align, measure."""
+"""Scores an estimate against a ground truth: associates, aligns and measures."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field, replace
@@ -24,7 +24,7 @@ UNIT_NAMES = {"m": "m", "s": "s", "d": "°", "r": "rad"}
 
 @dataclass(frozen=True, slots=True)
 class Statistics:
-    """Statistics of n errors in the errors' unit; sse is in the unit squared."""
+    """The statistics of n errors in the unit of the errors. `sse` is in the unit squared."""
 
     n: int
     rmse: float
@@ -39,9 +39,9 @@ class Statistics:
 
 
 def statistics(errors: ArrayLike, *, ddof: int = 0) -> Statistics:
-    """Statistics of one or more errors (N,); percentiles interpolate linearly, std has `ddof`, 0 for one error.
+    """The statistics of errors (N,). Percentiles are interpolated linearly. `std` uses `ddof`, or 0 for one error.
 
-    Raises ValueError without errors: nothing measured is not an error of zero.
+    Raises ValueError if there are no errors, because that does not mean that the error is 0.
     """
     e = np.sort(np.asarray(errors, float).ravel())
     if not e.size:
@@ -68,7 +68,7 @@ def statistics(errors: ArrayLike, *, ddof: int = 0) -> Statistics:
 
 @dataclass(frozen=True, slots=True)
 class MetricResult:
-    """One metric's statistics; `id` identifies how it was computed, so that numbers with equal ids are comparable."""
+    """The statistics of a metric. `id` identifies how it was computed; numbers with equal ids are comparable."""
 
     id: str
     name: str
@@ -82,7 +82,7 @@ class MetricResult:
 
 @dataclass(frozen=True, slots=True)
 class LengthMetric:
-    """The statistics of one metric over the segments or parts of one nominal length."""
+    """The statistics of a metric over the segments or parts of one nominal length."""
 
     name: str
     unit: str
@@ -96,7 +96,7 @@ class LengthMetric:
 
 @dataclass(frozen=True, slots=True)
 class Samples:
-    """All errors (N,) of one metric, in its unit; `over` has their lengths if each is of a part of the path."""
+    """All errors (N,) of a metric in its unit. `over` has their nominal lengths, if they are errors of segments."""
 
     of: MetricDefinition
     errors: Array
@@ -104,7 +104,7 @@ class Samples:
 
     @classmethod
     def measured(cls, metric: MetricDefinition, comparison: Comparison) -> "Samples":
-        """The errors of a metric in a comparison; there may be none."""
+        """The errors of a metric in a comparison, which may be empty."""
         if metric.measure is None:
             return cls(metric, np.zeros(0))
         measurement = metric.measure(comparison)
@@ -113,7 +113,7 @@ class Samples:
         return cls(metric, measurement)
 
     def statistics(self, settings: ScoreSettings) -> Statistics:
-        """The statistics of one error or more."""
+        """The statistics of the errors. Raises ValueError if there are none."""
         result = statistics(self.errors, ddof=settings.std_ddof)
         if self.over is None or self.over.drift is None:
             return result
@@ -122,12 +122,12 @@ class Samples:
         return replace(result, mean=float(np.rad2deg(mean)) if is_angle else mean)
 
     def metric(self, settings: ScoreSettings, *, n: int, of: int) -> MetricResult:
-        """The metric of errors of n matched out of so many true poses."""
+        """The metric with the statistics of the errors, from `n` matched poses of `of` true poses."""
         metric_id = identity(self.of, settings, n=n, of=of)
         return MetricResult(metric_id, self.of.id, self.of.unit, self.statistics(settings))
 
     def per_length(self, settings: ScoreSettings) -> Iterator[LengthMetric]:
-        """The metric over each length alone; none for a metric without lengths."""
+        """The metric for each length separately; empty for a metric without lengths."""
         if self.over is None:
             return
         for length_m in np.unique(self.over.length_m):
@@ -149,7 +149,7 @@ class Samples:
 
 
 def _joined(parts: Sequence[Samples]) -> Samples:
-    """The samples of one metric of several sequences one after the other."""
+    """The concatenated samples of one metric of several sequences."""
     definition = parts[0].of
     errors = np.concatenate([part.errors for part in parts])
     overs = [part.over for part in parts if part.over is not None]
@@ -167,7 +167,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Association:
-    """The number of pairs, of all poses on either side, and the largest time difference of a pair."""
+    """The numbers of pairs, of true poses and of estimated poses, and the largest time difference of a pair."""
 
     pairs: int
     gt_poses: int
@@ -177,7 +177,7 @@ class Association:
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """An estimate's metrics, and for plots the error and aligned position of every matched frame.
+    """The metrics of an estimate, and for plots, the error and the aligned position of every matched frame.
 
     gt_frames, gt_t_ns, ate_trans_m and ate_rot_deg are (K,), aligned_positions_m is (K, 3), in truth's frame.
     `settings` are complete; `samples` are the errors of the metrics, in the same order.
@@ -200,14 +200,14 @@ class Score:
 
     @property
     def per_length(self) -> tuple[LengthMetric, ...]:
-        """The metrics that are measured over lengths of path, for each length alone."""
+        """The metrics that are measured over lengths of path, for each length separately."""
         metrics = list[LengthMetric]()
         for samples in self.samples:
             metrics.extend(samples.per_length(self.settings))
         return tuple(metrics)
 
     def metric(self, name: str) -> MetricResult | None:
-        """The metric of that name, None if the trajectories give it no sample."""
+        """The metric with a name; None if it has no samples."""
         return next((metric for metric in self.metrics if metric.name == name), None)
 
     def __repr__(self) -> str:
@@ -226,7 +226,7 @@ class Score:
         return pd.DataFrame(rows).set_index("name")
 
     def as_dict(self) -> dict[str, Any]:
-        """The score as plain JSON values, without the series; the details of coverage are part of failure."""
+        """The score as plain JSON values, without the values of frames. The coverage is part of the failure."""
         coverage_details = asdict(self.coverage)
         ratio = coverage_details.pop("ratio")
         coverage_of = coverage_details.pop("of")
@@ -249,10 +249,10 @@ def score(
     covariance: Array | None = None,
     metrics: Iterable[MetricDefinition] = tuple(DEFINITIONS.values()),
 ) -> Score:
-    """Score an estimate of the motion of one frame against the truth of the same frame.
+    """Score an estimate against the true trajectory of the same frame.
 
-    `covariance` (N, 6, 6) of the estimate's poses adds their consistency (see `nees`). A metric without
-    samples is left out and a warning says why, never a zero. Raises AlignmentError if no poses match in time.
+    With `covariance` (N, 6, 6) of the estimated poses, their consistency is scored too (see `nees`). A metric without
+    samples is omitted, and a warning says why. Raises AlignmentError if no poses match in time.
     """
     comparison = compare(gt, est, settings, covariance=covariance)
     complete_settings = comparison.settings
@@ -285,7 +285,7 @@ def score(
 
 
 def _samples(comparison: Comparison, metrics: Iterable[MetricDefinition]) -> tuple[Samples, ...]:
-    """The samples of the requested metrics that have any, headline metrics first."""
+    """The samples of the requested metrics, headline metrics first. Metrics without samples are omitted."""
     requested = []
     for metric in metrics:
         is_headline = not metric.full
@@ -299,7 +299,7 @@ def _samples(comparison: Comparison, metrics: Iterable[MetricDefinition]) -> tup
 
 @dataclass(frozen=True, slots=True)
 class Pooled:
-    """Several sequences as one: the statistics of all their errors together, and what could not be pooled."""
+    """The pooled metrics of several sequences, and warnings about metrics that could not be pooled."""
 
     metrics: tuple[MetricResult, ...]
     per_length: tuple[LengthMetric, ...]
@@ -307,10 +307,10 @@ class Pooled:
 
 
 def pooled(scores: Sequence[Score]) -> Pooled:
-    """The statistics over all errors of all sequences, so that each counts by its number of errors.
+    """The metrics over all errors of all sequences. Each sequence is weighted by its number of errors.
 
-    For segments this is the mean of KITTI's table. A metric that the sequences measured in different ways, such
-    as over other lengths of path, is left out with a warning.
+    For segments, this is the mean in KITTI's table. A metric that was computed in different ways, for example over
+    different lengths of path, is omitted with a warning.
     """
     n = sum(score.association.pairs for score in scores)
     n_true = sum(score.association.gt_poses for score in scores)
@@ -330,7 +330,7 @@ def pooled(scores: Sequence[Score]) -> Pooled:
 
 
 def _samples_by_metric(scores: Sequence[Score]) -> dict[str, list[Samples]]:
-    """The samples of each metric, in the order in which metrics and scores come first."""
+    """The samples of each metric, in the order of the scores and their metrics."""
     by_metric: dict[str, list[Samples]] = {}
     for score in scores:
         for samples in score.samples:
@@ -381,16 +381,16 @@ def _missing_warnings(comparison: Comparison, metrics: tuple[MetricResult, ...])
             f"path apart; the whole path is {path_m:.3g} m"
         )
     if not path_m:
-        yield "no lost-aware score: the truth stands still, so no error can be measured against its path"
+        yield "no lost-aware score: the truth is stationary, so its path has no length to compare errors with"
 
 
 def _count(number: int, noun: str) -> str:
-    """A number of things, in words."""
+    """A number with a noun, in the plural unless it is 1."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _delta(settings: ScoreSettings) -> str:
-    """The distance between the poses of a pair, in words."""
+    """The distance between the poses of a pair, as text with its unit."""
     if settings.rpe_unit == "f":
         return _count(int(settings.rpe_delta), "frame")
     return f"{settings.rpe_delta:g} {UNIT_NAMES[settings.rpe_unit]}"

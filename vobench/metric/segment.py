@@ -15,12 +15,12 @@ from vobench.trajectory.associate import Index
 
 Float32 = NDArray[np.float32]
 Distances = Float32 | Array
-LEAST_SHARE = 0.1  # of the median true distance; a segment that ends nearer to its start shows no scale
+LEAST_SHARE = 0.1  # segments with a shorter true distance, relative to the median, do not determine the scale
 
 
 @dataclass(frozen=True, slots=True)
 class SegmentErrors:
-    """Errors of N segments: ground-truth frames first and last, nominal length, error per metre, each (N,)."""
+    """The errors per metre of N segments, with their first and last true frames and nominal lengths, each (N,)."""
 
     first: Index
     last: Index
@@ -42,7 +42,7 @@ def segment_errors(
     step_frames: int = 1,
     precision: Precision = "float64",
 ) -> SegmentErrors:
-    """Errors of every segment that begins at a multiple of `step_frames`, in order of their starts.
+    """The errors of all segments that begin at a multiple of `step_frames`, in the order of their starts.
 
     T_gt and T_est (K, 4, 4) are matched poses, `frames` (K,) their ground-truth frames, distances_m (N,)
     the path from the start to every ground-truth frame (of `devkit_distances` for "devkit", which rounds
@@ -86,11 +86,11 @@ def segment_pairs(
     *,
     step_frames: int = 1,
 ) -> tuple[Index, Index, Array]:
-    """Matched poses (first, last) of each segment, each (N,), and the path (N,) in m to divide by.
+    """The first and last matched pose (N,) of each segment, and the path length (N,) in m that divides its error.
 
-    A segment ends at the first frame strictly beyond `length_m`, and `length_m` divides its error:
-    the devkit's rule. If that frame has no estimate, the next one that has ends the segment, and the
-    path travelled divides.
+    As in the devkit, a segment ends at the first frame whose path exceeds `length_m`, and its error is divided by
+    `length_m`. If that frame has no estimated pose, the segment ends at the next frame that has one, and its error is
+    divided by the actual path length.
     """
     first = np.flatnonzero(frames % step_frames == 0)
     # A sum of float32 stays float32, as in the devkit.
@@ -109,7 +109,7 @@ def segment_pairs(
 
 
 def devkit_distances(positions_m: Array) -> Float32:
-    """Path length (N,) to each position (N, 3), summed in float32 one after the other as in the devkit."""
+    """The path length (N,) to each position (N, 3), added sequentially in float32 as in the devkit."""
     steps_m = np.diff(positions_m, axis=0).astype(np.float32)
     x, y, z = steps_m.T
     lengths_m = np.sqrt(x * x + y * y + z * z)
@@ -119,9 +119,9 @@ def devkit_distances(positions_m: Array) -> Float32:
 
 
 def mean_drift(errors: Distances, length_m: Array, *, mean: Mean = "micro") -> float:
-    """The mean of segments' errors (N,), or with "macro" the mean over lengths of their means.
+    """The mean of the errors (N,) of segments. With "macro", the mean over lengths of the mean errors of each length.
 
-    float32 errors, as the devkit's are, are summed one after the other as in the devkit.
+    Errors in float32 are added sequentially, as in the devkit.
     """
     if mean == "macro":
         means = [errors[length_m == length].mean() for length in np.unique(length_m)]
@@ -138,7 +138,7 @@ def _devkit_errors(
     first: Index,
     last: Index,
 ) -> Rows:
-    """Errors as the devkit rounds them: full inverses in float64, then float32, and the angle by its cosine."""
+    """The errors with the rounding of the devkit: inverses in float64, then float32, and angles from their cosine."""
     gt = np.linalg.inv(T_gt[first]) @ T_gt[last]
     est = np.linalg.inv(T_est[first]) @ T_est[last]
     E = np.linalg.inv(est) @ gt
@@ -153,7 +153,7 @@ def _devkit_errors(
 
 
 def segments(comparison: Comparison) -> SegmentErrors:
-    """`segment_errors` of a comparison."""
+    """The `segment_errors` of a comparison."""
     settings = comparison.settings
     distances_m: Distances = comparison.distances_m
     if settings.segment_precision == "devkit":
@@ -170,7 +170,7 @@ def segments(comparison: Comparison) -> SegmentErrors:
 
 
 def _drift(comparison: Comparison, errors: Array, drift: Distances) -> OverLengths:
-    """Errors of segments with the lengths of these."""
+    """The errors of segments with the nominal lengths of the segments."""
     length_m = comparison.once(segments).length_m
     return OverLengths(errors, length_m, drift)
 
@@ -188,7 +188,7 @@ def _rotation_drift(comparison: Comparison) -> OverLengths:
 
 @dataclass(frozen=True, slots=True)
 class ScaleErrors:
-    """Signed errors (N,) of the scale, the ratio minus one, and its drift per metre of path."""
+    """The signed errors (N,) of the scale, which are the ratio minus 1, and the drift of the scale per metre."""
 
     error: Array
     drift_per_m: float
@@ -201,10 +201,10 @@ def scale_errors(
     first: Index,
     last: Index,
 ) -> ScaleErrors:
-    """Ratios of the distances between matched poses (K, 4, 4) `first` and `last` (N,), estimate over truth.
+    """The scale errors from the estimated and true distances between matched poses `first` and `last` (N,).
 
-    along_m (K,) is the true path to each pose. The drift is the slope of the logarithm of the ratio over
-    the path by least squares, 0 for fewer than two segments. Source: Strasdat et al. (2010), section II.
+    `along_m` (K,) is the true path length to each pose. The drift is the least-squares slope of the logarithm of the
+    ratio over the path, 0 for fewer than two segments. Source: Strasdat et al. (2010), section II.
     """
     gt_m = distances_between(T_gt, first, last)
     est_m = distances_between(T_est, first, last)
@@ -228,7 +228,7 @@ def _slope(x: Array, y: Array) -> float:
 
 
 def _scale(comparison: Comparison) -> ScaleErrors:
-    """`scale_errors` of the segments of a comparison."""
+    """The `scale_errors` of the segments of a comparison."""
     matched = comparison.matched
     frames = matched.pairs.gt
     errors = comparison.once(segments)
@@ -243,7 +243,7 @@ def _scale_error(comparison: Comparison) -> Array:
 
 
 def _scale_drift(comparison: Comparison) -> Array:
-    """The drift of the scale as one number (1,), none (0,) without segments."""
+    """The drift of the scale as one number (1,); empty (0,) without segments."""
     scale = comparison.once(_scale)
     n = min(len(scale.error), 1)
     return np.full(n, scale.drift_per_m)

@@ -1,4 +1,4 @@
-"""Settings of a score, and those with which other tools score."""
+"""The settings of scores, and the settings that reproduce the scores of other tools."""
 
 from dataclasses import dataclass, replace
 from math import inf, pi
@@ -11,7 +11,7 @@ from vobench.setting import Positive, require
 from vobench.trajectory.align import AlignmentKind
 from vobench.trajectory.associate import MAX_DIFF_NS, Method
 
-Unit = Literal["f", "m", "s", "d", "r"]  # evo's letters: frames, metres, degrees, radians; and s for seconds
+Unit = Literal["f", "m", "s", "d", "r"]  # frames, metres, seconds, degrees and radians, with the letters of evo
 Side = Literal["gt", "est"]
 PairRule = Literal["spanning", "evo", "tum", "tartanair"]
 Plane = Literal["xy", "xz", "yz"]
@@ -25,20 +25,22 @@ INDOOR_LENGTHS_M = (0.5, 1.0, 1.5, 2.0)
 TARTANAIR_LENGTHS_M = (5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0, 40.0)
 KITTI_LENGTHS_M = (100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0)
 KITTI_STEP_FRAMES = 10
-SHORTEST_KITTI_PATH_M = 300.0  # from which segments are as long as in KITTI
+SHORTEST_KITTI_PATH_M = 300.0  # the shortest path whose segments are as long as in KITTI
 LARGEST_DELTA = {"d": 180.0, "r": pi}  # half a turn
-# Unit, all pairs and side: the only pairs that these tools support.
+# The unit, all pairs and side that these tools support.
 PAIRS_OF_RULE: dict[PairRule, tuple[Unit, bool, Side]] = {"tum": ("s", True, "est"), "tartanair": ("f", True, "gt")}
 
 
 @dataclass(frozen=True, slots=True)
 class ScoreSettings:
-    """The settings of a score; those that affect a metric are part of its identity.
+    """The settings of a score. Those that affect a metric are part of its identity.
 
-    `align_n` fits only the first so many matched poses; `offset_ns` is added to the estimate's stamps;
-    `project` projects poses, after the alignment, to a plane of the truth's world, as evo does;
-    segment lengths and step of None follow from the length of the true path (`settled`); `full`
-    measures all metrics, not only the headline metrics. Raises SettingError for values that cannot be measured.
+    `align_n` is the number of matched poses, from the first one, to which the alignment is fitted.
+    `offset_ns` is added to the stamps of the estimate.
+    `project` projects poses after the alignment to a plane of the truth's world, as in evo.
+    Segment lengths and step, if None, follow from the length of the true path (`settled`).
+    `full` measures all metrics instead of only the headline metrics.
+    Raises SettingError for values that cannot be measured.
     """
 
     alignment: AlignmentKind = "se3"
@@ -87,10 +89,10 @@ class ScoreSettings:
 
 
 def settled(settings: ScoreSettings, path_m: float) -> ScoreSettings:
-    """The settings, completed by the segments for a true path of path_m.
+    """The settings, completed by the segment lengths and step for a true path of length `path_m`.
 
-    KITTI's 100..800 m every tenth frame from 300 m on (its shortest sequence has 394 m), TartanAir's
-    5..40 m from 40 m on, 0.5..2 m for a shorter path.
+    They are 100 to 800 m and every tenth frame, as in KITTI, from 300 m (its shortest sequence has 394 m); 5 to 40 m,
+    as in TartanAir, from 40 m; and 0.5 to 2 m for a shorter path.
     """
     lengths_m = settings.segment_lengths_m or _segment_lengths(path_m)
     usual_step = KITTI_STEP_FRAMES if lengths_m == KITTI_LENGTHS_M else 1
@@ -114,7 +116,7 @@ _TARTANAIR = ScoreSettings(
     segment_step_frames=1,
     segment_mean="macro",
 )
-# The settings that reproduce the numbers of other tools, where they differ from the defaults here.
+# The settings that reproduce the numbers of other tools, as far as they differ from the defaults.
 # Sources: the defaults in the code of each tool; docs/metrics.md has the table.
 LIKE: dict[str, ScoreSettings] = {
     "evo": ScoreSettings(alignment="none", association="evo", rpe_pairs_from="est", rpe_rule="evo"),

@@ -330,7 +330,7 @@ def _only(planned: Plan, patterns: Sequence[str]) -> Plan:
     """The cases and estimators that match; each pattern selects cases, or else scenes, or else estimators."""
     case_names = [case.name for case in planned.cases]
     scene_names = [case.variant.get("scene", "") for case in planned.cases]
-    labels = [entrant.label for entrant in planned.entrants]
+    labels = [entry.label for entry in planned.estimator_entries]
     cases: list[str] = []
     scenes: list[str] = []
     estimators: list[str] = []
@@ -344,10 +344,10 @@ def _only(planned: Plan, patterns: Sequence[str]) -> Plan:
         else:
             known = sorted({*case_names, *labels})
             raise UnknownNameError(unknown_name_sentence("case, scene or estimator", pattern, known))
-    entrants = planned.entrants
+    entries = planned.estimator_entries
     if estimators:
-        entrants = tuple(entrant for entrant in entrants if _matches_any(entrant.label, estimators))
-    return replace(planned.only(cases, scenes), entrants=entrants)
+        entries = tuple(entry for entry in entries if _matches_any(entry.label, estimators))
+    return replace(planned.only(cases, scenes), estimator_entries=entries)
 
 
 def _matches_any(name: str, patterns: Iterable[str]) -> bool:

@@ -119,7 +119,7 @@ class Reflectors:
         for share, rows, weight in parts:
             if weight.sum() > 0:
                 chance[rows] += share * weight / weight.sum()
-        return chance / max(chance.sum(), 1e-30)
+        return np.asarray(chance / max(chance.sum(), 1e-30))
 
     def _emitted(
         self,

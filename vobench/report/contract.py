@@ -18,7 +18,7 @@ from vobench.runner.folder import read_tum
 from vobench.runner.frames import ANSWERS, TIMES, read_table
 from vobench.runner.store import SilentProgress
 from vobench.sequence import Sequence as Recording
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Trial
 from vobench.suite.source import RecordedCase, Source
@@ -53,9 +53,9 @@ def contract(folder: Path) -> Iterator[Clause]:
     manifest = read_manifest(folder)
     for path, foreign in foreign_imports(folder):
         yield Clause("imports", Verdict.ADVICE, f"{path}:{foreign.line}: {foreign.full_name}: {foreign.remedy}")
-    entrant = EstimatorEntry(manifest.name, folder, manifest, manifest.params, manifest.limits)
+    estimator_entry = EstimatorEntry(manifest.name, folder, manifest, manifest.params, manifest.limits)
     with temporary_folder() as place:
-        yield from _Attempt(entrant, place).clauses()
+        yield from _Attempt(estimator_entry, place).clauses()
 
 
 def assert_contract(folder: Path | str) -> None:
@@ -69,14 +69,14 @@ def assert_contract(folder: Path | str) -> None:
 class _Attempt:
     """An estimator that is run on practice recordings in a temporary folder."""
 
-    def __init__(self, entrant: EstimatorEntry, place: Path) -> None:
-        self._entrant = entrant
+    def __init__(self, estimator_entry: EstimatorEntry, place: Path) -> None:
+        self._estimator_entry = estimator_entry
         self._place = place
         self._recordings = {name: practice.write(place / name) for name, practice in PRACTICES.items()}
 
     def clauses(self) -> Iterator[Clause]:
         """Every clause of the contract; the first one alone if the estimator does not finish an ordinary drive."""
-        manifest = self._entrant.manifest
+        manifest = self._estimator_entry.manifest
         drive = self._run("drive")
         yield _finishes("rigid poses in time", drive)
         if not _is_finished(drive):
@@ -88,7 +88,7 @@ class _Attempt:
         yield _finishes("black frames", self._run("black"))
         yield _finishes("missing frames", self._run("missing"))
         yield _is_stationary(self._run("standstill"))
-        yield _is_in_time(drive, limit_ms=MS_PER_S * self._entrant.limits.frame_s)
+        yield _is_in_time(drive, limit_ms=MS_PER_S * self._estimator_entry.limits.frame_s)
 
     def _run(self, name: str, suffix: str = "") -> Path:
         """The folder of the estimate on a recording."""
@@ -96,12 +96,12 @@ class _Attempt:
         folder.mkdir()
         recording = self._recordings[name]
         case = RecordedCase(name=name, variant={}, source=Source(path=str(recording)))
-        estimate(Trial(case, self._entrant, 0), recording, folder, SilentProgress())
+        estimate(Trial(case, self._estimator_entry, 0), recording, folder, SilentProgress())
         return folder
 
     def _is_causal(self, drive: Path) -> Clause:
         """Whether other pictures from FIRST_CHANGED on leave the poses before them unchanged."""
-        manifest = self._entrant.manifest
+        manifest = self._estimator_entry.manifest
         if manifest.command:
             return Clause("causality", Verdict.NOT_TOLD, "it reads all frames at once: nothing to compare")
         if not (manifest.causal and manifest.deterministic):
@@ -113,16 +113,21 @@ class _Attempt:
 
     def _leaves_frames_and_restarts(self, class_path: str, *, log: Path) -> Iterator[Clause]:
         """What only a class can be asked: that it does not write to its frames, and that start() resets it."""
-        entrant = self._entrant
+        estimator_entry = self._estimator_entry
         sequence = Recording.open(self._recordings["drive"])
-        frames = list(frames_of(sequence, entrant.manifest.needs))
+        frames = list(frames_of(sequence, estimator_entry.manifest.needs))
         tracks = []
         try:
             with EstimatorProcess.of_class(
-                entrant.folder, class_path, name=entrant.manifest.name, log=log, limits=entrant.limits, is_watched=True
+                estimator_entry.folder,
+                class_path,
+                name=estimator_entry.manifest.name,
+                log=log,
+                limits=estimator_entry.limits,
+                is_watched=True,
             ) as process:
                 for _ in range(2):
-                    process.start(sequence.rig, entrant.params, 0)
+                    process.start(sequence.rig, estimator_entry.params, 0)
                     answers = [process.process(frame).result for frame in frames]
                     tracks.append([_pose(answer.T_odom_frame) for answer in answers])
         except EstimatorFailure as failure:
@@ -131,7 +136,7 @@ class _Attempt:
         yield Clause("frames unchanged", Verdict.KEPT, "no picture and no reading was written to")
         is_same = tracks[0] == tracks[1]
         seen = f"a second start() gives {'the same' if is_same else 'other'} poses"
-        yield Clause("restart", _kept_if(is_same or not entrant.manifest.deterministic), seen)
+        yield Clause("restart", _kept_if(is_same or not estimator_entry.manifest.deterministic), seen)
 
 
 def _kept_if(holds: bool) -> Verdict:

@@ -1,4 +1,4 @@
-"""The ground truth of pixels in a Rerun recording: one entity per camera and channel."""
+"""Logs per-pixel ground truth to a Rerun recording, as one entity per camera and channel."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ SET = (255, 255, 255, 160)
 
 @dataclass(frozen=True, slots=True)
 class TruthView:
-    """The recorded channels, the names of ids, and a function that iterates over the frames from the first one."""
+    """The recorded channels, the names of ids, and a function that returns an iterator over all frames."""
 
     channels: tuple[str, ...]
     names: TruthNames
@@ -27,7 +27,7 @@ class TruthView:
 
 
 def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
-    """Log all channels of both cameras, with one frame in memory at a time."""
+    """Log all channels of both cameras. Only one frame is in memory at a time."""
     for side in ("left", "right"):
         for channel in view.channels:
             classes = _classes(channel, view.names)
@@ -43,7 +43,10 @@ def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
 
 
 def _columns(channel: str, values: NDArray[np.generic]) -> Any:
-    """One frame of a channel: a depth image, classes for ids, counts and masks, or colours for directions."""
+    """The columns of one frame of a channel.
+
+    Depth is logged as a depth image; ids, counts and masks as classes; and directions as colours.
+    """
     if channel == "depth":
         depth_format = _format(values, rr.ChannelDatatype.F32)
         return rr.DepthImage.columns(buffer=[_bytes(values)], format=[depth_format], meter=[1.0])
@@ -70,7 +73,7 @@ def _bytes(values: NDArray[np.generic]) -> NDArray[np.uint8]:
 
 
 def _classes(channel: str, names: TruthNames) -> list[rr.AnnotationInfo]:
-    """The name and the colour of each id, count or value of a mask; empty for other channels."""
+    """The name and the colour of each class of a channel; empty for a channel without classes."""
     if channel == "instance":
         return _named_ids(channel, names.instance)
     if channel == "material":
@@ -83,8 +86,8 @@ def _classes(channel: str, names: TruthNames) -> list[rr.AnnotationInfo]:
 
 
 def _named_ids(channel: str, names: tuple[str, ...]) -> list[rr.AnnotationInfo]:
-    """The name of each id, and the colour that pictures of the channel show it in."""
+    """The name of each id, and its colour in pictures of the channel."""
     ids = np.arange(len(names), dtype=np.uint16)
-    one_row = ids[None]  # (1, N), a picture with a pixel for each id
+    one_row = ids[None]  # (1, N), a picture with one pixel for each id
     colors = picture(channel, one_row)[0].tolist()
     return [rr.AnnotationInfo(index, names[index], tuple(color)) for index, color in enumerate(colors)]

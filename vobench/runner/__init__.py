@@ -1,1 +1,1 @@
-"""Plan, stages, the store of finished results, and the folder of a run."""
+"""Runs plans: the stages, the store of finished results, and the folder of a run."""

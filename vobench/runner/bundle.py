@@ -1,4 +1,4 @@
-"""A run as one zip file that others can score again, and several runs as one."""
+"""Packs a run into one zip file that others can score again, and merges several runs."""
 
 import errno
 import json
@@ -45,23 +45,23 @@ from vobench.temporary import temporary_folder
 OF_RUN = (SUITE, ENVIRONMENT, ESTIMATORS)
 OF_CASE = (CASE, GROUND_TRUTH)
 OF_TRIAL = (SCORE, ESTIMATE, REVISED, COVARIANCE, FRAMES, TIMES, LOG)
-SEQUENCES = "sequence_hashes.json"  # of the recordings, which are too large for a bundle
-MOST_BYTES = 8 << 30  # unpacked
-# What a suite's names look like; a label of several runs' has the name of its run behind it.
+SEQUENCES = "sequence_hashes.json"  # the hashes of the recordings, which are too large for a bundle
+MOST_BYTES = 8 << 30  # the largest size after unpacking
+# The form of names in a suite. In merged runs, a label can be followed by the name of its run.
 LABEL = re.compile(r"[a-z0-9][a-z0-9_.]*( of [A-Za-z0-9_.-]+)?")
 CASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 REPEAT = re.compile(r"[0-9]{1,9}")
 NO_PLAIN = re.compile(r"[^A-Za-z0-9_.-]|^[^A-Za-z0-9]")
 NAME_LETTERS = 60
 FOLLOW_NOTHING = os.O_RDONLY | os.O_NOFOLLOW
-SAME_POSE = 1e-9  # metres, and elements of a rotation: below it two poses are one
-EPOCH = (1980, 1, 1, 0, 0, 0)  # no date, so that equal runs make equal bundles
+SAME_POSE = 1e-9  # the largest difference of equal poses, in m and elements of a rotation
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the date of all files, so that equal runs give equal bundles
 
 
 def bundle(folder: RunFolder, out: Path) -> int:
-    """Write suite, versions, truth, estimates, scores and the hashes of all into a zip file; how many files.
+    """Write the suite, versions, truth, estimates, scores and all hashes to a zip file, and return the number of files.
 
-    Raises InputError where the folder is none of a run.
+    Raises InputError if the folder is not a run.
     """
     root = folder.path.resolve()
     files = dict[str, bytes]()
@@ -80,7 +80,7 @@ def bundle(folder: RunFolder, out: Path) -> int:
 
 
 def _bundled_names(folder: RunFolder) -> Iterator[str]:
-    """The names of the files that a bundle of a run may hold, those of the run first, then cases, then trials."""
+    """The names of the files that a bundle of a run may contain: those of the run, of cases, and of trials."""
     yield from OF_RUN
     trials = [file.parent for file in folder.score_files()]
     cases = sorted({trial.parents[2] for trial in trials})
@@ -91,21 +91,21 @@ def _bundled_names(folder: RunFolder) -> Iterator[str]:
 
 
 def _sequence_hashes(folder: RunFolder) -> dict[str, str]:
-    """The hashes of the recordings that a run links to."""
+    """The hashes of the sequences to which a run links."""
     hashes = read_hashes(folder)
     return {name: value for name, value in hashes.items() if SEQUENCE in PurePosixPath(name).parts}
 
 
 def require_zip(out: Path) -> None:
-    """Raise InputError unless the name of a bundle's file ends in .zip."""
+    """Raise InputError unless the name of a bundle ends in .zip."""
     if out.suffix.lower() != ".zip":
         raise InputError(f"a bundle's name should end in .zip, got {out.name!r}")
 
 
 def _content(root: Path, name: str) -> bytes | None:
-    """The bytes of a file below a folder, None if there is no such file; no link on its path is followed.
+    """The content of a file below a folder, None if it does not exist. No link on its path is followed.
 
-    Raises InputError if something on its path is a link, or the file is none.
+    Raises InputError if a part of its path is a link, or if it is not a file.
     """
     *folders, last = PurePosixPath(name).parts
     opened = [os.open(root, os.O_RDONLY | os.O_DIRECTORY)]
@@ -130,10 +130,10 @@ def _content(root: Path, name: str) -> bytes | None:
 
 @contextmanager
 def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
-    """The run of a folder or a bundle, which is unpacked for so long.
+    """The run in a folder or a bundle. A bundle is unpacked for the duration of the block.
 
-    `tell` is given a sentence if control characters had to be removed from what was unpacked. Raises InputError if the
-    path is neither, or its names are none that a suite could have.
+    `tell` is called with a sentence if control characters had to be removed from the unpacked files. Raises InputError
+    if the path is neither, or if the names in it are not valid in a suite.
     """
     if not path.is_file():
         folder = open_run(path)
@@ -146,7 +146,7 @@ def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
                 folder = RunFolder(temporary / _suite(file) / (_plain_name(path.stem) or "bundle"))
                 names = _unpack(file, folder.path, path)
         except (BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
-            raise InputError(f"neither a run's folder nor a bundle of one ({error}): {path}") from None
+            raise InputError(f"neither the folder of a run nor a bundle ({error}): {path}") from None
         hashes = read_hashes(folder)
         for name, held in hashes.items():
             there = folder.path / name
@@ -154,7 +154,7 @@ def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
                 raise InputError(f"{name} is not the file that was bundled: {path}")
         unnamed = sorted(set(names) - hashes.keys() - {HASHES, TIMES_HASHES, SEQUENCES})
         if unnamed:
-            raise InputError(f"holds a file that its hashes do not name ({printable(unnamed[0])}): {path}")
+            raise InputError(f"contains a file that its hashes do not name ({printable(unnamed[0])}): {path}")
         _require_names(folder)
         for name in hashes:
             if _clean(folder.path / name):
@@ -163,7 +163,7 @@ def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
 
 
 def _require_names(folder: RunFolder) -> None:
-    """Raise InputError if a case or an estimator has a name that no suite could give it."""
+    """Raise InputError if the name of a case or an estimator is not valid in a suite."""
     for file in folder.score_files():
         case = file.parents[3].name
         estimator = file.parents[1].name
@@ -179,7 +179,10 @@ def _require_names(folder: RunFolder) -> None:
 
 
 def _clean(path: Path) -> bool:
-    """Remove control characters, such as ESC and those that turn text around, from a table or an object in JSON."""
+    """Remove control characters, such as ESC and those that reverse text, from a table or JSON file.
+
+    Returns whether there were any.
+    """
     if path.suffix not in (".json", ".csv"):
         return False
     text = path.read_text(encoding="utf-8", errors="replace")
@@ -191,12 +194,12 @@ def _clean(path: Path) -> bool:
 
 
 def _clean_table(text: str) -> str:
-    """A table with a space for each control character, except ends of lines and tabs."""
+    """A table in which control characters, except line ends and tabs, are replaced by spaces."""
     return "".join(letter if letter.isprintable() or letter in "\r\n\t" else " " for letter in text)
 
 
 def _clean_json(text: str, name: str) -> str:
-    """JSON with printable texts; the same text if they are printable already. Raises InputError."""
+    """JSON in which all texts are made printable; the same text if they are already. Raises InputError."""
     try:
         value = json.loads(text)
         cleaned = _printable(value)
@@ -206,7 +209,7 @@ def _clean_json(text: str, name: str) -> str:
 
 
 def _printable(value: Any) -> Any:
-    """The same JSON value with printable texts."""
+    """The JSON value with all texts made printable."""
     if isinstance(value, str):
         return printable(value)
     if isinstance(value, list):
@@ -217,12 +220,12 @@ def _printable(value: Any) -> Any:
 
 
 def _plain_name(name: str) -> str:
-    """A name without what neither a table of numbers nor a terminal should be given."""
+    """A name without characters that are unsafe in a table or on a terminal."""
     return NO_PLAIN.sub("_", name)
 
 
 def _suite(file: ZipFile) -> str:
-    """The suite's name, as a folder may have it."""
+    """The name of the suite, as a valid name of a folder."""
     try:
         name = str(json.loads(file.read(SUITE))["name"])
     except (KeyError, ValueError, TypeError):
@@ -231,7 +234,7 @@ def _suite(file: ZipFile) -> str:
 
 
 def _unpack(file: ZipFile, to: Path, path: Path) -> list[str]:
-    """Unpack all files, and return their names. Raises InputError if one is twice, or would lie outside."""
+    """Unpack all files, and return their names. Raises InputError for a duplicate, or a path outside of the folder."""
     entries = file.infolist()
     total = sum(entry.file_size for entry in entries)
     if total > MOST_BYTES:
@@ -239,7 +242,7 @@ def _unpack(file: ZipFile, to: Path, path: Path) -> list[str]:
     seen = set[str]()
     for entry in entries:
         if _is_outside(entry):
-            raise InputError(f"holds a file that would lie outside of it ({entry.filename!r}): {path}")
+            raise InputError(f"contains a file whose path is outside of it ({entry.filename!r}): {path}")
         name = str(PurePosixPath(entry.filename))
         if name in seen:
             raise InputError(f"holds a file twice ({entry.filename!r}): {path}")
@@ -250,7 +253,7 @@ def _unpack(file: ZipFile, to: Path, path: Path) -> list[str]:
 
 
 def _is_outside(entry: ZipInfo) -> bool:
-    """Whether an entry is a link, or its path leads out of the folder that it is unpacked to."""
+    """Whether an entry is a link, or its path leads out of the folder to which it is unpacked."""
     parts = PurePosixPath(entry.filename).parts
     is_link = stat.S_ISLNK(entry.external_attr >> 16)
     return is_link or ".." in parts or entry.filename.startswith("/")
@@ -259,7 +262,7 @@ def _is_outside(entry: ZipInfo) -> bool:
 def scored_again(
     folder: RunFolder, wrong_truths: Mapping[str, str] = MappingProxyType({})
 ) -> Iterator[tuple[TrialScore, bool]]:
-    """Each trial with its score computed again from estimate and truth, and whether the run states the same.
+    """Each trial with its score computed again from estimate and truth, and whether the stored score is the same.
 
     `wrong_truths` are those of `rescored`.
     """
@@ -269,10 +272,10 @@ def scored_again(
 
 @contextmanager
 def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFolder]:
-    """Several runs as one, for so long.
+    """Several runs merged into one, for the duration of the block.
 
-    The same estimator's trials are repeats of one another; another one of the same label gets its run's name behind it.
-    Raises InputError where two runs have another case of the same name.
+    Trials of the same estimator become repeats. The label of a different estimator with the same label is followed by
+    the name of its run. Raises InputError if two runs have different cases with the same name.
     """
     if len(folders) == 1:
         yield folders[0]
@@ -314,7 +317,7 @@ def _stated(folder: RunFolder) -> list[dict[str, Any]]:
 
 
 def _is_same_path(one: Path, other: Path) -> bool:
-    """Whether two files hold one true path; processors of other makes round its last digits differently."""
+    """Whether two files contain the same true path, except for rounding, which depends on the processor."""
     if one.read_bytes() == other.read_bytes():
         return True
     first = read_tum(one)
@@ -329,9 +332,9 @@ def _link_case(folder: RunFolder, made: RunFolder, case: str, name: str) -> None
     target = made.case(case)
     truths = [place / GROUND_TRUTH for place in (source, target)]
     if all(truth.is_file() for truth in truths) and not _is_same_path(*truths):
-        raise InputError(f"case {case!r} is another one in {name}: its true path differs, so nothing compares")
+        raise InputError(f"case {case!r} is another one in {name}: its true path differs, so runs cannot be compared")
     target.mkdir(parents=True, exist_ok=True)
-    # A run that could not make the case has no true path of it; then another run's is linked.
+    # A run that could not create the case has no true path of it. The path of another run is linked then.
     for path in (source / each for each in (*OF_CASE, SEQUENCE)):
         if path.exists() and not (target / path.name).exists():
             (target / path.name).symlink_to(path.resolve())

@@ -1,4 +1,4 @@
-"""The covariances that an estimator states of its poses: as a file, and compared with its errors."""
+"""Reads and writes the covariances that an estimator reports, and compares them with its errors."""
 
 from collections.abc import Iterable
 from pathlib import Path
@@ -26,7 +26,7 @@ DEGREES_OF_FREEDOM = 6
 
 
 def format_covariances(rows: Iterable[tuple[int, Array]]) -> str:
-    """Stamps in ns and covariances (6, 6) as text that gives the same numbers back."""
+    """Stamps in ns and covariances (6, 6) as text, without loss of digits."""
     lines = [HEAD]
     for t_ns, covariance in rows:
         entries = " ".join(map(repr, covariance[UPPER].tolist()))
@@ -35,7 +35,7 @@ def format_covariances(rows: Iterable[tuple[int, Array]]) -> str:
 
 
 def read_covariances(path: Path, t_ns: Stamps) -> Array:
-    """The covariances (N, 6, 6) of poses stamped t_ns (N,), NaN for a pose without one. Raises InputError."""
+    """The covariances (N, 6, 6) of poses with stamps t_ns (N,), NaN for a pose without one. Raises InputError."""
     try:
         rows = content(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
@@ -55,7 +55,7 @@ def read_covariances(path: Path, t_ns: Stamps) -> Array:
 
 
 class CovarianceConsistency(BaseModel):
-    """Errors against stated covariances: NEES of poses, and the ratio of errors to stated deviations.
+    """The consistency of errors with reported covariances, from the NEES of poses.
 
     `scale_gap` is the square root of the median NEES over that of its distribution, χ² with six degrees of freedom:
     1 for consistent covariances, and within `gap_low` and `gap_high` for 95 % of consistent estimators whose errors are
@@ -89,7 +89,7 @@ class CovarianceConsistency(BaseModel):
 
     @property
     def sentence(self) -> str:
-        """The verdict and what it rests on."""
+        """The verdict, and the numbers on which it is based."""
         verdict = "claims what it holds"
         if self.scale_gap > self.gap_high:
             verdict = "claims too much"
@@ -105,10 +105,10 @@ class CovarianceConsistency(BaseModel):
 def trial_consistency(
     estimate: Path, gt: Trajectory, est: Trajectory, *, start_ns: int, scale: float
 ) -> CovarianceConsistency | None:
-    """The consistency of a trial's covariances with its errors; None if it stated none.
+    """The consistency of a trial's covariances with its errors; None if it reported no covariances.
 
-    The covariances are of poses in odom, the left camera at the first frame's stamp, so nothing is fitted but the
-    scale. If the truth at that stamp is unknown, the first frame with truth and pose is the reference instead.
+    The covariances are those of poses in odom, which is the left camera at the first frame, so only the scale is
+    fitted. If the truth of that frame is unknown, the first frame with truth and pose is the reference instead.
     """
     if not (estimate / COVARIANCE).is_file():
         return None

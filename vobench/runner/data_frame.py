@@ -1,4 +1,4 @@
-"""Results as pandas tables."""
+"""Converts results to pandas tables."""
 
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -10,7 +10,7 @@ if TYPE_CHECKING:
 
 
 def data_frame(rows: Iterable[Mapping[str, Any]]) -> "DataFrame":
-    """Return a table with one row per mapping; its keys are the columns, in the order of the first row."""
+    """A table with one row per mapping. Its columns are the keys, in the order of the first row."""
     import pandas as pd
 
     return pd.DataFrame(list(rows))

@@ -1,4 +1,4 @@
-"""Drives of a suite's trajectories, without rendering: the motion of the body, its wheels and its motors."""
+"""Drives the trajectories of a suite without rendering: the motion of the body, its wheels and its motors."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from vobench.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
-# Columns of a drive's CSV file that `identify_drives` reads again.
+# The columns of a drive's CSV file that `identify_drives` reads.
 RIM_COLUMNS = ("left_rim_rad", "right_rim_rad")
 REFERENCE_COLUMNS = ("u_ref_mps", "omega_ref_radps")
 
@@ -37,9 +37,9 @@ VOLTAGE_COLUMNS = ("left_V", "right_V")
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryDrive:
-    """One trajectory of a suite, driven.
+    """The drive along one trajectory of a suite.
 
-    `body` is the true motion at the stamps of the N frames. `refusals` are sentences on why `vobench run` would refuse
+    `body` is the true motion at the stamps of the N frames. `refusals` are the reasons why `vobench run` would refuse
     cases on this trajectory, for example because a camera leaves the room. `case` is the first of these cases.
     """
 
@@ -51,19 +51,19 @@ class TrajectoryDrive:
 
     @property
     def kind(self) -> str:
-        """The kind of trajectory and, of a wheeled body, its mover: for example "waypoints, pioneer"."""
+        """The kind of trajectory and, for a wheeled body, its mover: for example "waypoints, pioneer"."""
         spec = self.case.trajectory
         return f"{spec.kind}, {spec.mover}" if isinstance(spec, Wheeled) else spec.kind
 
     @property
     def frames(self) -> slice:
-        """Which frames of the whole drive the case's frames are."""
+        """The frames of the case in the whole drive."""
         first = self.motion.first
         return slice(first, first + len(self.motion.t_ns))
 
     @property
     def reached_s(self) -> Array | None:
-        """Times (K,) in s at which the legs to the K targets ended; None without targets."""
+        """The times (K,) in s at which the K targets were reached; None without targets."""
         drive = self.motion.drive
         if drive is None or not isinstance(self.case.trajectory, Waypoints):
             return None
@@ -71,7 +71,7 @@ class TrajectoryDrive:
 
     @property
     def rim_rad(self) -> Array | None:
-        """Angles (N, 2) in rad of the left and right rim at the frames; None for a body without wheels."""
+        """The angles (N, 2) in rad of the left and right rim at the frames; None for a body without wheels."""
         rims = self.motion.rims
         if rims is None:
             return None
@@ -80,13 +80,13 @@ class TrajectoryDrive:
 
     @property
     def references(self) -> Array | None:
-        """Reference speed in m/s and yaw rate in rad/s (N, 2) of the controller; None for a body without one."""
+        """The reference speeds in m/s and yaw rates in rad/s (N, 2) of the controller; None without a controller."""
         drive = self.motion.drive
         return None if drive is None else drive.references[self.frames]
 
     @property
     def voltages_V(self) -> Array | None:
-        """Voltages (N, 2) of the left and right motor; None where the suite gives no motor constants."""
+        """The voltages (N, 2) of the left and right motor; None if the suite contains no motor constants."""
         drive = self.motion.drive
         spec = self.case.trajectory
         if drive is None or not isinstance(spec, Wheeled) or spec.motors is None:
@@ -130,8 +130,8 @@ class TrajectoryDrive:
     def csv(self) -> str:
         """The true motion at the frames as the text of a CSV file, one row per frame.
 
-        Poses are in the world; velocities and accelerations are in the axes of the body. Angles of the rims, references
-        of the controller and voltages of the motors follow where the body has these.
+        Poses are in the world. Velocities and accelerations are in the axes of the body. The rim angles, references and
+        motor voltages follow if the body has them.
         """
         positions_m = self.body.T_world_body[:, :3, 3]
         quaternions_xyzw = se3.to_quaternion(self.body.T_world_body[:, :3, :3])
@@ -160,13 +160,13 @@ class TrajectoryDrive:
 
 @dataclass(frozen=True, slots=True)
 class SuiteDrive:
-    """The driven trajectories of a suite, in the suite's order."""
+    """The drives along the trajectories of a suite, in the order of the suite."""
 
     drives: tuple[TrajectoryDrive, ...]
 
     @property
     def refusals(self) -> tuple[str, ...]:
-        """The refusals of all drives, each sentence once."""
+        """The refusals of all drives, without duplicates."""
         sentences = [sentence for drive in self.drives for sentence in drive.refusals]
         return tuple(dict.fromkeys(sentences))
 
@@ -180,7 +180,7 @@ class SuiteDrive:
 
 
 def chosen_trajectories(plan: Plan, *, trajectory: str | None = None) -> tuple[str, ...]:
-    """The names of the plan's trajectories, or only the one asked for.
+    """The names of the plan's trajectories, or only the requested one.
 
     Raises InputError for a suite without trajectories, and UnknownNameError for a name that is not in the suite.
     """
@@ -206,7 +206,7 @@ def drive_plan(plan: Plan, *, trajectory: str | None = None) -> SuiteDrive:
 
 
 def drive_trajectory(plan: Plan, name: str) -> TrajectoryDrive:
-    """Drive one trajectory of a plan. Raises SuiteError where the body cannot follow it."""
+    """Drive one trajectory of a plan. Raises SuiteError if the body cannot follow it."""
     cases = [case for case in plan.simulated if case.variant["trajectory"] == name]
     mistakes = plan.mistakes()
     with mistakes.at("trajectories", name):
@@ -219,13 +219,13 @@ def drive_trajectory(plan: Plan, name: str) -> TrajectoryDrive:
 
 
 def _step_lengths_m(body: Kinematics) -> Array:
-    """Distances (N - 1,) between the positions of successive frames."""
+    """The distances (N - 1,) between the positions of successive frames."""
     steps_m = np.diff(body.T_world_body[:, :3, 3], axis=0)
     return np.asarray(np.linalg.norm(steps_m, axis=1))
 
 
 def _step_angles_rad(body: Kinematics) -> Array:
-    """Angles (N - 1,) between the orientations of successive frames; (1,) zero for a single frame."""
+    """The angles (N - 1,) between the orientations of successive frames; one 0 for a single frame."""
     R_world_body = body.T_world_body[:, :3, :3]
     if len(R_world_body) == 1:
         return np.zeros(1)

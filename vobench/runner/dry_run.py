@@ -1,4 +1,4 @@
-"""A dry run: what a run would make, why each result is not in the store, and about how long that takes."""
+"""A dry run: the tasks that a run would perform, why each result is not in the store, and the estimated time."""
 
 import json
 from collections import Counter
@@ -14,14 +14,14 @@ from vobench.runner.estimate import read_outcome
 from vobench.runner.store import INPUTS, Store
 from vobench.runner.task import KINDS, Task, has_failed, missing
 
-COMPARED = 300  # of each kind, the results used last
-MOST_CHANGES = 3  # between a task's inputs and a result's that its reason compares them with
+COMPARED = 300  # the number of results of each kind, those used last, to which a task is compared
+MOST_CHANGES = 3  # a result with more changed inputs is not similar to a task
 VALUE_LETTERS = 24
 
 
 @dataclass(frozen=True, slots=True)
 class ToDo:
-    """One stage: how many tasks it has, how many are to be done and why, and seconds by what others took, if known."""
+    """The tasks of one stage: how many must be performed and why, and the estimated seconds, if known."""
 
     stage: str
     tasks: int
@@ -30,12 +30,12 @@ class ToDo:
 
     @property
     def to_do(self) -> int:
-        """How many tasks are to be done."""
+        """The number of tasks that must be performed."""
         return sum(self.reasons.values())
 
 
 def to_do(tasks: Sequence[Task], root: Path) -> list[ToDo]:
-    """What is to be done, stage by stage in order."""
+    """The tasks that must be performed, by stage and in order."""
     wanted = {task.key: task for task in missing(tasks, root)}
     store = Store(root)
     stages = []
@@ -48,7 +48,7 @@ def to_do(tasks: Sequence[Task], root: Path) -> list[ToDo]:
 
 
 def _reason(task: Task, wanted: Mapping[str, Task], root: Path) -> str:
-    """Why a task is to be done."""
+    """The reason why a task must be performed."""
     for key in task.needs:
         if key in wanted:
             return f"its {wanted[key].stage} is to be made"
@@ -64,11 +64,12 @@ def _reason(task: Task, wanted: Mapping[str, Task], root: Path) -> str:
 
 
 def _changes(inputs: dict[str, str], kind: Path) -> str:
-    """The differences from the most similar of the results used last; "new" if none is similar."""
+    """The differences between inputs and those of the most similar recent result; "new" if none is similar."""
     fewest: set[str] | None = None
     nearest: dict[str, str] = {}
     for other in _stored(kind):
-        names = {name for name in inputs.keys() | other.keys() if inputs.get(name) != other.get(name)}
+        all_names = inputs.keys() | other.keys()
+        names = {name for name in all_names if inputs.get(name) != other.get(name)}
         limit = MOST_CHANGES + 1 if fewest is None else len(fewest)
         if len(names) < limit:
             fewest = names
@@ -95,7 +96,7 @@ def _shortened(text: str | None) -> str:
 
 @cache
 def _stored(kind: Path) -> list[dict[str, str]]:
-    """The inputs of a kind's results, of those used last."""
+    """The inputs of the recent results of a kind."""
     stored = []
     with suppress(OSError):
         paths = sorted(kind.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)

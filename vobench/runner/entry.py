@@ -1,4 +1,4 @@
-"""An entry of the store: a folder of files, and the manifest of their sizes and hashes when they were written."""
+"""Entries of the store: folders of files, with a manifest of the sizes and hashes of the files."""
 
 import hashlib
 import json
@@ -17,26 +17,26 @@ from vobench.errors import InputError
 
 MANIFEST = "manifest.json"
 CHUNK = 1 << 20
-# Hashes that a process keeps: where nothing can be written, a file is hashed once in a run and not at every look.
+# The number of hashes that a process caches. If the store is read-only, each file is hashed only once in a run.
 KEPT_HASHES = 1 << 14
 
 
 @dataclass(frozen=True, slots=True)
 class File:
-    """What a file was when it was written."""
+    """The size and hash of a file when it was written."""
 
     bytes: int
     sha256: str
 
 
-# By a file's path in its entry: size, time of its last change in ns, and inode. Of an equal state are equal bytes.
+# For each path in an entry: the size, the time of the last change in ns, and the inode. Equal states mean equal bytes.
 States = Mapping[str, tuple[int, int, int]]
 FILES = TypeAdapter(dict[str, File])
 STATES = TypeAdapter(dict[str, tuple[int, int, int]])
 
 
 def file_hash(path: Path) -> str:
-    """SHA-256 of a file's bytes."""
+    """The SHA-256 hash of a file."""
     state = hashlib.sha256()
     with path.open("rb") as file:
         while chunk := file.read(CHUNK):
@@ -51,7 +51,7 @@ def _hash_of(path: Path, _: tuple[int, int, int]) -> str:
 
 
 def seal(folder: Path) -> States:
-    """Bring all files of a finished folder to the disk and write its manifest; the states of what was hashed."""
+    """Flush all files of a finished folder to the disk, write its manifest, and return the states of the files."""
     names = sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
     for name in names:
         _sync(folder / name)
@@ -81,7 +81,7 @@ def _states(folder: Path, names: Iterable[str]) -> States:
 
 
 def _files_of(folder: Path) -> dict[str, File]:
-    """The files of an entry, by its manifest. Raises OSError or ValueError if that is not as it was written."""
+    """The files of an entry according to its manifest. Raises OSError or ValueError if the manifest is damaged."""
     text = (folder / MANIFEST).read_bytes()
     files = FILES.validate_json(text, strict=True)
     if _text(files) != text:
@@ -90,9 +90,9 @@ def _files_of(folder: Path) -> dict[str, File]:
 
 
 def fault(folder: Path, checked: Path | None = None) -> str:
-    """What is wrong with an entry; empty if its files are those of its manifest.
+    """What is wrong with an entry; empty if its files agree with its manifest.
 
-    Sizes are always compared. Hashes are compared unless the file `checked` has these states of the files.
+    Sizes are always compared. Hashes are compared unless the file `checked` contains the states of the files.
     """
     try:
         files = _files_of(folder)
@@ -136,7 +136,7 @@ def _remembered(checked: Path) -> States | None:
 
 
 def remember(checked: Path, states: States) -> None:
-    """Keep in the file `checked` that files of these states were hashed and are sound; where it can be written."""
+    """Record in the file `checked`, if it can be written, that files with these states agree with the manifest."""
     with suppress(OSError):
         checked.parent.mkdir(parents=True, exist_ok=True)
         part = checked.with_suffix(f".{os.getpid()}")
@@ -145,7 +145,7 @@ def remember(checked: Path, states: States) -> None:
 
 
 def copy_files(folder: Path, names: Iterable[str], target: Path) -> None:
-    """Copy some files of an entry. Raises InputError where a copy is not what the manifest says."""
+    """Copy some files of an entry. Raises InputError if a copy does not agree with the manifest."""
     files = dict[str, File]()
     with suppress(OSError, ValueError):
         files = _files_of(folder)
@@ -153,4 +153,4 @@ def copy_files(folder: Path, names: Iterable[str], target: Path) -> None:
         if name in files:
             copyfile(folder / name, target / name)
         if name not in files or file_hash(target / name) != files[name].sha256:
-            raise InputError(f"not what was written; run the suite again to make it anew: {folder / name}")
+            raise InputError(f"differs from what was written; run the suite again to recreate it: {folder / name}")

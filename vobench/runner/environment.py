@@ -1,4 +1,4 @@
-"""Where figures come from: processor, driver, versions and commit, of what made a result and of a whole run."""
+"""The environment in which results are computed: processor, driver, versions and commit."""
 
 import os
 import platform
@@ -20,17 +20,17 @@ from vobench.portable import is_portable
 from vobench.runner.folder import ENVIRONMENT, RunFolder, run_date
 from vobench.runner.key import PACKAGE, library_versions
 
-MADE_ON = "made_on.json"  # beside each result in the store, in a file of its own: no recording holds it
+MADE_ON = "made_on.json"  # a separate file beside each result in the store
 UNKNOWN = "unknown"
-# Libraries whose release can change a score; others only draw or write reports.
+# The libraries whose version can change a score. Other libraries only draw or write reports.
 SCORING = ("numpy", "scipy", "opencv-python-headless", "PyOpenGL", "embreex")
 LIBRARIES = (*SCORING, "pyrender2", "mcap", "rosbags", "pandas", "rerun-sdk")
-# What of vobench's clone a result depends on.
+# The parts of vobench's repository on which a result depends.
 SOURCES = ("vobench", "scenes", "estimators", "suites")
 GIT_S = 10.0
 
 
-# The levels of the x86-64 psABI, by flags as Linux names them, the highest first.
+# The levels of the x86-64 psABI, by the names of their flags in Linux, the highest first.
 V2 = {"cx16", "lahf_lm", "popcnt", "pni", "sse4_1", "sse4_2", "ssse3"}
 V3 = V2 | {"abm", "avx", "avx2", "bmi1", "bmi2", "f16c", "fma", "movbe", "xsave"}
 V4 = V3 | {"avx512bw", "avx512cd", "avx512dq", "avx512f", "avx512vl"}
@@ -40,7 +40,7 @@ ARM_LEVELS = (("SVE2", "sve2"), ("SVE", "sve"), ("NEON", "asimd"))
 
 @dataclass(frozen=True, slots=True, order=True)
 class Processor:
-    """A processor's model as the system names it, and the instruction set that libraries choose their code by."""
+    """The model of a processor, and its instruction set, by which libraries select their code."""
 
     model: str = UNKNOWN
     simd: str = UNKNOWN
@@ -51,7 +51,7 @@ class Processor:
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """What made a result, and everything that it was made from; usually one processor and one driver."""
+    """The processors and drivers that computed a result and its inputs; usually one of each."""
 
     processors: tuple[Processor, ...] = ()
     drawn_by: tuple[str, ...] = ()
@@ -59,11 +59,12 @@ class Origin:
 
 @dataclass(frozen=True, slots=True)
 class Environment:
-    """Where the figures of a run come from; the fields of `environment.json`, empty where a run does not state them.
+    """The environment of a run. The fields are those of `environment.json`, and are empty if they are unknown.
 
-    `processors` and `drawn_by` are of all results of the run, also those that the cache held. `cores` are those that
-    the run may use, of `cores_total`. `commit` is of vobench's clone, with `+changes` where files differ from it.
-    `date` stands in no file: it is read off the name of the run's folder.
+    `processors` and `drawn_by` are those of all results of the run, including cached ones.
+    `cores` is the number of cores that the run may use, of `cores_total`.
+    `commit` is that of vobench's repository, followed by `+changes` if files differ from it.
+    `date` is not in the file, but is taken from the name of the run's folder.
     """
 
     vobench: str = ""
@@ -92,16 +93,16 @@ class Environment:
 
     @property
     def driver(self) -> str:
-        """All drivers that drew."""
+        """All graphics drivers that rendered pictures."""
         return " and ".join(self.drawn_by)
 
     @property
     def release(self) -> str:
-        """The version of vobench, and the commit where it runs from a clone."""
+        """The version of vobench, and the commit if it runs from a repository."""
         return f"vobench {self.vobench}{f' ({self.commit})' if self.commit else ''}"
 
     def line(self) -> str:
-        """All of it in one line, without the libraries that do not change scores."""
+        """The environment in one line, without libraries that do not change scores."""
         parts = list[str]()
         if self.processors:
             parts.append(" and ".join(map(str, self.processors)))
@@ -124,7 +125,7 @@ class Environment:
         return [f"{name} {self.libraries[name]}" for name in SCORING if name in self.libraries]
 
     def facts(self) -> dict[str, str]:
-        """The same as columns of a table."""
+        """The environment as columns of a table."""
         return {
             "processor": self.processor,
             "simd": self.simd,
@@ -144,7 +145,7 @@ ORIGINS = TypeAdapter(Origin)
 
 
 def differences(old: Environment, new: Environment) -> list[str]:
-    """The differences of two environments that can change scores, as `name old value → new value`."""
+    """The differences between two environments that can change scores, as `name old value → new value`."""
     old_facts = _comparable_facts(old)
     new_facts = _comparable_facts(new)
     changes = []
@@ -156,7 +157,7 @@ def differences(old: Environment, new: Environment) -> list[str]:
 
 
 def _comparable_facts(environment: Environment) -> dict[str, str]:
-    """The facts that can change scores, by name; empty if the run does not state them."""
+    """The facts that can change scores, by name; empty if they are unknown."""
     libraries = {name: environment.libraries.get(name, "") for name in SCORING}
     return {
         "processor": " and ".join(map(str, environment.processors)),
@@ -169,7 +170,7 @@ def _comparable_facts(environment: Environment) -> dict[str, str]:
 
 @cache
 def processor() -> Processor:
-    """This machine's processor, read off /proc/cpuinfo where there is one."""
+    """The processor of this machine, from /proc/cpuinfo if that exists."""
     text = ""
     with suppress(OSError):
         text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
@@ -177,7 +178,7 @@ def processor() -> Processor:
 
 
 def parse_cpuinfo(text: str, machine: str, *, fallback: str = "") -> Processor:
-    """The processor that a text of Linux's /proc/cpuinfo describes; `fallback` is its model if the text names none."""
+    """The processor that the text of /proc/cpuinfo describes. `fallback` is its model if the text has none."""
     stated = dict[str, str]()
     for line in text.splitlines():
         name, colon, value = line.partition(":")
@@ -188,7 +189,7 @@ def parse_cpuinfo(text: str, machine: str, *, fallback: str = "") -> Processor:
 
 
 def _model(stated: Mapping[str, str]) -> str:
-    """The model's name; numbers tell apart the models that clouds give one name, and those of Arm, which have none."""
+    """The name of the model, with numbers that distinguish models of the same name, and Arm models without a name."""
     numbers = [f"{name} {stated[key]}" for name, key in (("family", "cpu family"), ("model", "model")) if key in stated]
     if "model name" in stated:
         return ", ".join([stated["model name"], *numbers])
@@ -198,7 +199,7 @@ def _model(stated: Mapping[str, str]) -> str:
 
 
 def _simd(flags: set[str], machine: str) -> str:
-    """The highest level of instructions that these flags name."""
+    """The highest instruction set level that the flags contain."""
     if not flags:
         return UNKNOWN
     if machine in ("aarch64", "arm64"):
@@ -210,7 +211,7 @@ def _simd(flags: set[str], machine: str) -> str:
 
 @cache
 def commit() -> str:
-    """The commit of the clone that vobench runs from, with `+changes` where its files differ; empty elsewhere."""
+    """The commit of the repository from which vobench runs, with `+changes` if files differ; empty if there is none."""
     clone = PACKAGE.parent
     if not (clone / ".git").exists():
         return ""
@@ -220,7 +221,7 @@ def commit() -> str:
 
 
 def _git(clone: Path, *words: str) -> str:
-    """What git says of a clone; empty where there is no git, or it refuses."""
+    """The output of git in a repository; empty if git is missing or fails."""
     with suppress(OSError, subprocess.SubprocessError):
         done = subprocess.run(
             ["git", "-C", str(clone), *words], capture_output=True, text=True, timeout=GIT_S, check=True
@@ -230,7 +231,7 @@ def _git(clone: Path, *words: str) -> str:
 
 
 def drawn_by(engine: str) -> str:
-    """What draws the pictures of an engine here: the OpenGL driver, or Mitsuba."""
+    """The software that renders the pictures of an engine on this machine: the OpenGL driver, or Mitsuba."""
     if engine == "path":
         return f"Mitsuba {library_versions('mitsuba')['mitsuba']}"
     from vobench.rendering.raster import driver_facts
@@ -242,14 +243,17 @@ def drawn_by(engine: str) -> str:
 
 
 def origin_here(needs: Iterable[Path], *, engine: str = "") -> Origin:
-    """The origin of a result that is made here of other results; `engine` is named if it draws pictures."""
+    """The origin of a result that this machine computes from other results.
+
+    `engine` is given if it renders pictures.
+    """
     before = [read_origin(folder) for folder in needs]
     own = Origin((processor(),), (drawn_by(engine),) if engine else ())
     return joined([*before, own])
 
 
 def joined(origins: Iterable[Origin]) -> Origin:
-    """The origin of what several results are part of, each processor and driver once, in order of their names."""
+    """The joint origin of several results: all processors and drivers without duplicates, sorted by name."""
     processors = set[Processor]()
     drivers = set[str]()
     for origin in origins:
@@ -259,14 +263,14 @@ def joined(origins: Iterable[Origin]) -> Origin:
 
 
 def read_origin(folder: Path) -> Origin:
-    """The origin of a result in the store; empty where an older vobench made it."""
+    """The origin of a result in the store; empty if an older version of vobench computed it."""
     with suppress(OSError, ValidationError):
         return ORIGINS.validate_json((folder / MADE_ON).read_bytes())
     return Origin()
 
 
 def environment(origin: Origin, *, timed: str, sandboxed: bool) -> dict[str, Any]:
-    """The content of a run's `environment.json`: equal on one machine for equal inputs, so without date and times."""
+    """The content of a run's `environment.json`, without date and times, so that equal runs have equal files."""
     stated = asdict(
         Environment(
             vobench=__version__,
@@ -288,7 +292,7 @@ def environment(origin: Origin, *, timed: str, sandboxed: bool) -> dict[str, Any
 
 
 def read_environment(folder: RunFolder) -> Environment | None:
-    """The environment that a run states, with its date; None where it states none."""
+    """The environment of a run, with its date; None if the run does not contain it."""
     try:
         stated = ENVIRONMENTS.validate_json((folder.path / ENVIRONMENT).read_bytes())
     except (OSError, ValidationError):
@@ -298,7 +302,7 @@ def read_environment(folder: RunFolder) -> Environment | None:
 
 
 def merged_environment(environments: Sequence[Environment]) -> dict[str, Any]:
-    """The environment of several runs together: all processors and drivers, and versions, joined if they differ."""
+    """The joint environment of several runs: all processors, drivers and versions."""
     origin = joined(Origin(each.processors, each.drawn_by) for each in environments)
     are_portable = bool(environments) and all(each.portable for each in environments)
 
@@ -329,5 +333,5 @@ def _merged_libraries(environments: Sequence[Environment]) -> dict[str, str]:
 
 
 def _joined(texts: Iterable[str]) -> str:
-    """The texts that are not empty, each once."""
+    """The texts that are not empty, without duplicates, joined."""
     return " and ".join(dict.fromkeys(filter(None, texts)))

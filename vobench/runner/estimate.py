@@ -1,4 +1,4 @@
-"""Sequence to estimate: an estimator gets frame after frame; its poses, statuses and tracks are written to files."""
+"""Runs an estimator on a sequence, frame by frame, and writes its poses, statuses and tracks to files."""
 
 import csv
 import io
@@ -47,13 +47,13 @@ POINTS = "points/"
 OUTCOME = "outcome.json"
 LOG = "log.txt"
 FINISHED = "finished"
-DROPPED = "dropped"  # status of a frame that came while the estimator was busy with another
+DROPPED = "dropped"  # the status of a frame that arrived while the estimator was busy
 EARLIEST_NS = np.iinfo(np.int64).min
-ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # fixed, so that equal tracks are equal bytes
+ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # constant, so that equal tracks give equal files
 
 
 class EstimatorOutcome(BaseModel):
-    """How an estimator's process ended: FINISHED, or the kind of its failure and the reason; and what it could see.
+    """The outcome of an estimate: FINISHED, or the kind of failure and the reason; and what the estimator could see.
 
     `sandbox` is None if no process was started.
     """
@@ -66,12 +66,15 @@ class EstimatorOutcome(BaseModel):
 
 
 def read_outcome(folder: Path) -> EstimatorOutcome:
-    """How the estimate ended."""
+    """The outcome of the estimate in a folder."""
     return EstimatorOutcome(**json.loads((folder / OUTCOME).read_text(encoding="utf-8")))
 
 
 def read_tracks(folder: Path, *, of: str = "") -> Iterator[tuple[int, NDArray[np.float32]]]:
-    """Frame index and its table (N, 5): u, v before, u, v now, inlier; or `of` POINTS (N, 3), in odom, in m."""
+    """The index and the table of each frame: tracks (N, 5) as last u, last v, u, v and inlier, by default.
+
+    With `of` POINTS, the tables are points (N, 3) in odom, in m.
+    """
     is_in_folder = bool(of)
     with zipfile.ZipFile(folder / TRACKS) as archive:
         for name in archive.namelist():
@@ -83,12 +86,12 @@ def read_tracks(folder: Path, *, of: str = "") -> Iterator[tuple[int, NDArray[np
 Readings = TypeVar("Readings", EncoderReadings, ImuReadings)
 
 
-# A running estimator of any kind; its methods start, process and finish raise EstimatorFailure.
+# A running estimator of any kind. Its methods start, process and finish raise EstimatorFailure.
 Running = EstimatorProcess | CommandProgram | NoisyTruth
 
 
 def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress") -> None:
-    """Run a trial's estimator on a sequence; the folder is complete afterwards, also if the estimator fails."""
+    """Run the estimator of a trial on a sequence. The folder is complete afterwards, even if the estimator fails."""
     sequence = Sequence.open(recording)
     kind = FINISHED
     reason = ""
@@ -96,14 +99,14 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
     (folder / LOG).touch()
     with _keeper(folder) as keeper:
         try:
-            keeper.T_frame_left = _T_frame_left(sequence.rig, trial.entrant.manifest)
-            _check_needs(trial.entrant.manifest.needs, sequence)
+            keeper.T_frame_left = _T_frame_left(sequence.rig, trial.estimator_entry.manifest)
+            _check_needs(trial.estimator_entry.manifest.needs, sequence)
             running = _running(trial, recording, folder / LOG)
             _feed(trial, sequence, keeper, progress, running)
         except EstimatorFailure as failure:
             kind = failure.kind
             reason = failure.reason
-        except SequenceError as error:  # a layout that cannot hold this recording
+        except SequenceError as error:  # the layout cannot represent this recording
             kind = "refused"
             reason = str(error)
     sandbox = None
@@ -114,16 +117,16 @@ def estimate(trial: "Trial", recording: Path, folder: Path, progress: "Progress"
 
 
 def _running(trial: "Trial", recording: Path, log: Path) -> Running:
-    """The trial's estimator, run as its manifest states."""
-    entrant = trial.entrant
-    manifest = entrant.manifest
-    limits = entrant.limits
+    """The estimator of a trial, which is run as its manifest specifies."""
+    estimator_entry = trial.estimator_entry
+    manifest = estimator_entry.manifest
+    limits = estimator_entry.limits
     hidden = _hidden(trial, recording)
     if manifest.oracle:
         return NoisyTruth(read_tum(recording / GROUND_TRUTH))
     if manifest.class_path:
         return EstimatorProcess.of_class(
-            entrant.folder,
+            estimator_entry.folder,
             manifest.class_path,
             name=manifest.name,
             log=log,
@@ -134,17 +137,17 @@ def _running(trial: "Trial", recording: Path, log: Path) -> Running:
     if manifest.stream:
         return EstimatorProcess.of_stream(
             manifest.stream,
-            entrant.folder,
+            estimator_entry.folder,
             log=log,
             limits=limits,
             rate_hz=rate_hz(t_ns),
             hidden=hidden,
         )
-    if entrant.mode == "real_time":
+    if estimator_entry.mode == "real_time":
         raise EstimatorFailure("refused", "it takes the whole recording at once, so it cannot go at the camera's pace")
     return CommandProgram(
         manifest.command,
-        entrant.folder,
+        estimator_entry.folder,
         log=log,
         limits=limits,
         out=manifest.out,
@@ -155,9 +158,9 @@ def _running(trial: "Trial", recording: Path, log: Path) -> Running:
 
 
 def _hidden(trial: "Trial", recording: Path) -> list[Path]:
-    """The folders that are hidden even inside of a folder that the estimator may read.
+    """The folders that are hidden from an estimator, even inside of folders that it may read.
 
-    These are the store with the sequence, the recording that it was read from, and earlier runs.
+    They are the store with the sequence, the original recording, and earlier runs.
     """
     hidden = [recording.resolve().parents[1], Path("runs").absolute()]
     source = getattr(trial.case, "source", None)
@@ -167,7 +170,7 @@ def _hidden(trial: "Trial", recording: Path) -> list[Path]:
 
 
 def _write_blind(recording: Path, manifest: Manifest, folder: Path) -> None:
-    """Write a recording in the manifest's layout: the sensors it needs and Kalibr's calibration, without the truth."""
+    """Write a recording in the layout of a manifest, with the required sensors and Kalibr files, but without truth."""
     from vobench.dataset.export import write_calibration
     from vobench.dataset.layout import writable
     from vobench.dataset.source import ExportSource
@@ -182,7 +185,7 @@ def _write_blind(recording: Path, manifest: Manifest, folder: Path) -> None:
 
 
 def _views(manifest: Manifest, rig: Rig) -> "Views":
-    """The pictures of a recording as they are in a program's files."""
+    """The views in which a program gets the pictures of a recording."""
     from vobench.dataset.layout import writable
 
     layout = writable()[manifest.dataset]
@@ -193,7 +196,7 @@ def _views(manifest: Manifest, rig: Rig) -> "Views":
 
 
 def _T_frame_left(rig: Rig, manifest: Manifest) -> Array:
-    """The left camera in the frame of the estimator's poses; a program's pictures may be rectified ones."""
+    """The pose of the left camera in the frame of the estimator's poses. A program may get rectified pictures."""
     if manifest.pose_of == "left_camera":
         if not manifest.command:
             return np.eye(4)
@@ -205,7 +208,7 @@ def _T_frame_left(rig: Rig, manifest: Manifest) -> Array:
 
 
 def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
-    """Raise EstimatorFailure for an estimator that needs a sensor which this recording lacks."""
+    """Raise EstimatorFailure if the recording lacks a sensor that the estimator needs."""
     rig = sequence.rig
     lacks = {}
     if not rig.right:
@@ -220,12 +223,12 @@ def _check_needs(needs: tuple[str, ...], sequence: Sequence) -> None:
 
 
 def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Progress", estimator: Running) -> None:
-    """Start the estimator, send it frame after frame, and write its answers. Raises EstimatorFailure."""
-    entrant = trial.entrant
+    """Start the estimator, send it all frames, and write its answers. Raises EstimatorFailure."""
+    estimator_entry = trial.estimator_entry
     with estimator as running:
-        running.start(sequence.rig, entrant.params, trial.repeat)
-        pace = _Pace(keeper, is_real_time=entrant.mode == "real_time")
-        frames = frames_of(sequence, entrant.manifest.needs, pace)
+        running.start(sequence.rig, estimator_entry.params, trial.repeat)
+        pace = _Pace(keeper, is_real_time=estimator_entry.mode == "real_time")
+        frames = frames_of(sequence, estimator_entry.manifest.needs, pace)
         for frame in progress.track(frames, trial.name, total=len(sequence)):
             answer = running.process(frame)
             keeper.keep(frame, answer)
@@ -235,9 +238,9 @@ def _feed(trial: "Trial", sequence: Sequence, keeper: "_Keeper", progress: "Prog
 
 @dataclass(slots=True)
 class _Pace:
-    """The camera's pace, on a clock of its stamps and of the time that answers took; nothing sleeps.
+    """Decides which frames are dropped in real time, on a virtual clock of stamps and answer times.
 
-    An estimator is free again at `free_ns`. In real time, a frame that comes earlier is dropped.
+    The estimator is busy until `free_ns`. In real time, earlier frames are dropped.
     """
 
     keeper: "_Keeper"
@@ -245,7 +248,7 @@ class _Pace:
     free_ns: int = EARLIEST_NS
 
     def drops(self, index: int, t_ns: int) -> bool:
-        """Whether this frame is dropped, which is then noted in the table of frames."""
+        """Whether a frame is dropped. A dropped frame is written to the table of frames."""
         is_dropped = self.is_real_time and t_ns < self.free_ns
         if is_dropped:
             self.keeper.answers.writerow({"frame": index, "status": DROPPED})
@@ -253,7 +256,7 @@ class _Pace:
 
 
 def frames_of(sequence: Sequence, needs: tuple[str, ...], pace: _Pace | None = None) -> Iterator[Frame]:
-    """The frames of a sequence with the sensors that an estimator needs, without those that its pace drops."""
+    """The frames of a sequence with the sensors that an estimator needs, without those that `pace` drops."""
     encoders = EncoderReadings(*sequence.encoders()) if "encoders" in needs else None
     imu = sequence.imu() if "imu" in needs else None
     convert = rgb if "colour" in needs else grey
@@ -276,7 +279,7 @@ def frames_of(sequence: Sequence, needs: tuple[str, ...], pace: _Pace | None = N
 
 
 def _recorded_frames(sequence: Sequence, needs: tuple[str, ...]) -> Iterator[StereoFrame | EncodedFrame]:
-    """The recorded frames; pictures are decoded only if an estimator needs them."""
+    """The recorded frames. Pictures are decoded only if the estimator needs them."""
     if "stereo" in needs:
         return sequence.frames(right=True)
     if "mono" in needs:
@@ -285,7 +288,7 @@ def _recorded_frames(sequence: Sequence, needs: tuple[str, ...]) -> Iterator[Ste
 
 
 def _between(readings: Readings | None, last_ns: int, now_ns: int) -> Readings | None:
-    """The readings after one frame, up to and including the next."""
+    """The readings after a frame, up to and including the next frame."""
     if readings is None:
         return None
     first, end = np.searchsorted(readings.t_ns, [last_ns, now_ns], side="right")
@@ -295,7 +298,7 @@ def _between(readings: Readings | None, last_ns: int, now_ns: int) -> Readings |
 
 @dataclass(slots=True)
 class _Keeper:
-    """Writes an estimator's answers as they come, so that memory does not grow with the length of the sequence."""
+    """Writes each answer of an estimator immediately, so that memory does not grow with the length of the sequence."""
 
     answers: "csv.DictWriter[str]"
     times: "csv.DictWriter[str]"
@@ -338,9 +341,9 @@ class _Keeper:
         self.times.writerow({"frame": index, **costs})
 
     def _covariance_of_left(self, R_odom_frame: Array, covariance: Array) -> Array:
-        """The covariance (6, 6) of the left camera's pose, from that of the frame that it is mounted on.
+        """The covariance (6, 6) of the left camera's pose, from that of the frame on which it is mounted.
 
-        A rotation of the frame by δ about odom's axes moves the camera by δ × r, with r its position in the frame.
+        A rotation of the frame by δ about the axes of odom moves the camera by δ × r, where r is its position.
         """
         x, y, z = R_odom_frame @ self.T_frame_left[:3, 3]
         lever = np.eye(6)
@@ -352,7 +355,7 @@ class _Keeper:
         return np.asarray(jacobian @ covariance @ jacobian.T)
 
     def write(self, folder: Path) -> None:
-        """Write the files of poses: the left camera's, in its frame at the start."""
+        """Write the files with the poses of the left camera, in its frame at the start."""
         (folder / ESTIMATE).write_text(self._tum(self.poses), encoding="utf-8")
         if self.covariances:
             rows = [(self.stamps[index], covariance) for index, covariance in self.covariances.items()]
@@ -373,7 +376,7 @@ class _Keeper:
 
 @contextmanager
 def _keeper(folder: Path) -> Iterator[_Keeper]:
-    """A keeper while an estimator runs; its files of poses are written at the end."""
+    """A keeper for the duration of the block. The files of poses are written at its end."""
     with (
         new_table(folder / ANSWERS, ANSWER_COLUMNS) as answers,
         new_table(folder / TIMES, TIME_COLUMNS) as times,
@@ -385,14 +388,14 @@ def _keeper(folder: Path) -> Iterator[_Keeper]:
 
 
 def _member(index: int, of: str = "") -> zipfile.ZipInfo:
-    """The entry of a frame's table in the archive."""
+    """The archive entry of the table of a frame."""
     info = zipfile.ZipInfo(f"{of}{index:08d}.npy", date_time=ZIP_DATE)
     info.compress_type = zipfile.ZIP_DEFLATED
     return info
 
 
 def _npy(table: Array) -> bytes:
-    """Numbers as .npy in float32."""
+    """A table as the bytes of a .npy file in float32."""
     buffer = io.BytesIO()
     np.save(buffer, table.astype(np.float32))
     return buffer.getvalue()

@@ -1,7 +1,7 @@
-"""Executors of a run's tasks: this process, processes of this machine, or the workers of a Dask cluster.
+"""Executes the tasks of a run in this process, in processes of this machine, or on the workers of a Dask cluster.
 
-Every executor takes one task at a time and answers with a future of `Done`, which never raises; `perform_all` decides
-what runs when. If a task fails, the tasks that need it fail, and no other.
+An executor takes one task at a time and returns a future of `TaskOutcome`, which never raises. `perform_all` decides
+the order. If a task fails, only the tasks that need it fail as well.
 """
 
 import errno
@@ -32,19 +32,19 @@ from vobench.runner.store import STATE, Progress, SilentProgress, Store, Tell
 from vobench.runner.task import ENTRIES, NO_LIMIT, Stage, Task, perform
 
 FailureKind = Literal["crashed", "out_of_memory", "refused"]
-# Lacks that every other task would meet, too.
+# Missing resources that would make all other tasks fail, too.
 Shortage = Literal["disk", "library"]
 LOOK_S = 0.2
-GRACE_S = 0.7  # for a process that is asked to stop, before it is killed
-STOP_S = 0.4  # for its main thread, before another one tidies up and ends it
+GRACE_S = 0.7  # the time for a process to stop, before it is killed
+STOP_S = 0.4  # the time for its main thread to stop, before another thread cleans up and ends the process
 CONNECT_S = 10.0
-STACK_BYTES = 1 << 20  # of a stack that is kept, at most
+STACK_BYTES = 1 << 20  # the largest size of a stack that is stored
 END_LOOK_S = 0.01
-# Exit codes of a process that a library's fault ended, as happens once in hundreds of sequences.
+# The exit codes of a process that a fault in a library ended, which happens once in hundreds of sequences.
 FAULTS = (-signal.SIGABRT, -signal.SIGSEGV, -signal.SIGBUS)
-# Stages that are performed again after a fault: their result is the same each time.
+# The stages that are repeated after a fault, because their result is deterministic.
 REPEATABLE = ("bake", "sequence")
-# The result of a stage, as a sentence names it.
+# The result of a stage as a noun.
 PRODUCTS: dict[Stage, str] = {
     "bake": "scene's light",
     "sequence": "sequence",
@@ -52,7 +52,7 @@ PRODUCTS: dict[Stage, str] = {
     "estimate": "estimate",
     "score": "score",
 }
-# The function of worker processes, and what they import, once for all of them.
+# The function of worker processes, and the modules that are imported once for all of them.
 ENTRY = "vobench.runner.executor:work"
 PRELOADED = [
     "vobench.runner.executor",
@@ -68,10 +68,10 @@ PRELOADED = [
 
 @dataclass(frozen=True, slots=True)
 class TaskOutcome:
-    """How a task ended: the kind of its failure and the reason, or none.
+    """The outcome of a task: empty, or the kind of failure and the reason.
 
-    `lacks` names what ends the whole run, since every other task would lack it, too.
-    `stack` is what a process wrote when a fault of a library ended it.
+    `lacks` names a missing resource that ends the whole run, because all other tasks would lack it, too.
+    `stack` is the stack that a process wrote when a fault in a library ended it.
     """
 
     failure: FailureKind | None = None
@@ -83,9 +83,9 @@ class TaskOutcome:
 
 @dataclass(frozen=True, slots=True)
 class TaskEvent:
-    """An event of one task: `what` happens, on which slot of the executor, after how many seconds, and why.
+    """An event of one task: what happened, in which slot of the executor, after how many seconds, and why.
 
-    A message that the user should read, such as for whom the task waits, is in `told`, and comes at once.
+    `told` is a message for the user, for example that the task waits for another process.
     """
 
     what: Literal["started", "told", "done", "failed"]
@@ -102,17 +102,17 @@ class Executor(Protocol):
     slots: int
 
     def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[TaskOutcome]":
-        """Begin a task; `threads` is how many it may use, NO_LIMIT for as many as there are.
+        """Begin a task. `threads` is the number of threads that it may use; NO_LIMIT does not limit them.
 
-        `tell` is called with messages for the user while the task is under way, from any thread.
+        `tell` is called with messages for the user while the task runs, from any thread.
         """
 
     def close(self) -> None:
-        """End whatever still runs."""
+        """End all tasks that still run."""
 
 
 class Serial:
-    """One task after another in this process."""
+    """Performs tasks sequentially in this process."""
 
     slots = 1
 
@@ -120,18 +120,18 @@ class Serial:
         self._progress = progress
 
     def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[TaskOutcome]":
-        """Perform it now."""
+        """Perform the task immediately."""
         del slot, threads
         future: Future[TaskOutcome] = Future()
         future.set_result(performed(task, store, NO_LIMIT, self._progress or SilentProgress(tell)))
         return future
 
     def close(self) -> None:
-        """Nothing runs."""
+        """Nothing to do, because no task runs."""
 
 
 def performed(task: Task, store: Path, threads: int, progress: Progress) -> TaskOutcome:
-    """Perform a task; whatever it raises becomes its result, except a request to stop."""
+    """Perform a task, and return its outcome. An exception becomes the outcome, except a request to stop."""
     began_s = time.monotonic()
     try:
         perform(task, store, threads, progress=progress)
@@ -142,7 +142,7 @@ def performed(task: Task, store: Path, threads: int, progress: Progress) -> Task
         done = TaskOutcome("refused", _line(error))
     except MemoryError:
         done = TaskOutcome("out_of_memory", "there was not enough memory")
-    except Exception as error:  # of one task; the others go on
+    except Exception as error:  # the other tasks continue
         done = _unexpected(error, store)
     return replace(done, wall_s=time.monotonic() - began_s)
 
@@ -161,11 +161,11 @@ def _line(error: Exception) -> str:
 
 
 class LocalProcesses:
-    """Processes forked from a server that has imported what tasks import and nothing else, one for each task.
+    """Performs each task in a process, which is forked from a server that has imported the modules of tasks.
 
-    Only sequences of one light, one after the other in a slot, share a process, which has their scene loaded.
-    Unless `pins_cores` is False, each slot has its own cores, as many as a task gets threads: libraries that draw,
-    trace, filter and multiply use as many threads as they have cores.
+    Only sequences with the same light that follow each other in a slot share a process, which has their scene loaded.
+    Unless `pins_cores` is False, each slot has separate cores, as many as a task gets threads, because libraries use
+    as many threads as there are cores.
     """
 
     def __init__(self, slots: int, *, server: ForkServer | None = None, pins_cores: bool = True) -> None:
@@ -178,7 +178,7 @@ class LocalProcesses:
         self._stores: set[Path] = set()
 
     def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[TaskOutcome]":
-        """Give the task to a process; a thread waits for its messages and its end."""
+        """Give the task to a process. A thread waits for its messages and its end."""
         future: Future[TaskOutcome] = Future()
         self._stores.add(store)
         has_all = threads == NO_LIMIT or not self._pins_cores
@@ -190,7 +190,7 @@ class LocalProcesses:
             worker = first
             done = worker.ask(task, store, limit, tell)
             if worker.had_fault and task.stage in REPEATABLE:
-                tell(f"{task.key}: {done.reason}, by a fault in a library; it is made once more")
+                tell(f"{task.key}: {done.reason}, because of a fault in a library; it is repeated once")
                 self._running.discard(worker.process)
                 worker.leave()
                 worker = self._worker(slot, task, cores)
@@ -205,7 +205,7 @@ class LocalProcesses:
         def await_end() -> None:
             try:
                 future.set_result(outcome())
-            except BaseException as error:  # else whoever waits for the future would wait for ever
+            except BaseException as error:  # otherwise the future would never be resolved
                 first.leave()
                 future.set_exception(error)
 
@@ -213,7 +213,7 @@ class LocalProcesses:
         return future
 
     def _worker(self, slot: int, task: Task, cores: list[int]) -> "_Worker":
-        """The idle process of a slot if it has the task's input loaded on these cores, else a new one."""
+        """The idle process of a slot if it has the task's input loaded and runs on these cores, or a new process."""
         idle = self._idle.pop(slot, None)
         if idle and idle.suits(task, cores):
             self._running.add(idle.process)
@@ -228,7 +228,7 @@ class LocalProcesses:
         return worker
 
     def close(self) -> None:
-        """End the idle processes; ask those that run to stop, kill them after a grace period, and tidy up."""
+        """End idle processes, ask running ones to stop, and kill those that still run after GRACE_S."""
         while self._idle:
             _, idle = self._idle.popitem()
             idle.leave()
@@ -239,7 +239,7 @@ class LocalProcesses:
                 Store(store).sweep()
 
     def _signal_all(self, number: int) -> bool:
-        """Signal the processes that run, and wait for their ends, GRACE_S at most; whether there were any."""
+        """Signal the running processes, and wait at most GRACE_S for them. Returns whether there were any."""
         running = [process for process in list(self._running) if process.is_alive and not process.abandon()]
         for process in running:
             process.kill(number)
@@ -251,9 +251,9 @@ class LocalProcesses:
 
 @dataclass(frozen=True, slots=True)
 class _Worker:
-    """A process that performs tasks, on these cores, until its connection is closed.
+    """A process that performs tasks on certain cores until its connection is closed.
 
-    `main_input` is the key of the light or sequence that it has loaded; `trace` is the file to which it writes its
+    `main_input` is the key of the light or sequence that it has loaded. `trace` is the file to which it writes its
     stack when a fault ends it.
     """
 
@@ -264,7 +264,7 @@ class _Worker:
 
     @property
     def had_fault(self) -> bool:
-        """Whether a fault of a library has ended the process."""
+        """Whether a fault in a library has ended the process."""
         return self.process.exit_code in FAULTS
 
     def suits(self, task: Task, cores: list[int]) -> bool:
@@ -273,13 +273,13 @@ class _Worker:
         return has_input and self.process.is_alive
 
     def begin(self) -> None:
-        """Send the process its folder, environment and cores; it may not have started yet."""
-        with suppress(OSError):  # it is dead, which `ask` reports
+        """Send the process its folder, environment and cores. It may not have started yet."""
+        with suppress(OSError):  # the process is dead, which `ask` reports
             self.process.connection.send((os.getcwd(), dict(os.environ), self.cores))
             send_handle(self.process.connection, self.trace.fileno(), None)
 
     def ask(self, task: Task, store: Path, threads: int, tell: Tell) -> TaskOutcome:
-        """The process's report of how a task ended, or how the process died; its messages go to `tell` at once."""
+        """The outcome of a task that the process performs, or of the death of the process. Messages go to `tell`."""
         began_s = time.monotonic()
         try:
             self.process.connection.send((task, store, threads))
@@ -293,7 +293,7 @@ class _Worker:
             return self._with_stack(done, task, store) if self.had_fault else done
 
     def _with_stack(self, done: TaskOutcome, task: Task, store: Path) -> TaskOutcome:
-        """The same failure with the stack that the process wrote when a fault ended it, which is kept in the store."""
+        """The failure with the stack that the process wrote when a fault ended it. The stack is stored."""
         self.trace.seek(0)
         stack = self.trace.read(STACK_BYTES).decode("utf-8", "replace")
         if not stack:
@@ -312,7 +312,7 @@ class _Worker:
 
 
 def _share(cores: Sequence[int], slot: int, threads: int) -> list[int]:
-    """The cores of a slot, one for each of its threads, all of them at most."""
+    """The cores of a slot: one for each of its threads, or all cores if there are fewer."""
     count = min(threads, len(cores))
     first = slot * threads
     return [cores[(first + n) % len(cores)] for n in range(count)]
@@ -328,11 +328,11 @@ def _death(exit_code: int | None, wall_s: float) -> TaskOutcome:
 
 
 def work(connection: Connection, vobench_fd: int) -> None:
-    """Perform tasks in a forked process until vobench needs no more, or is gone.
+    """Perform tasks in a forked process until vobench needs no more of them, or ends.
 
-    `vobench_fd` becomes readable when vobench ends; -1 on systems without such descriptors.
+    `vobench_fd` becomes readable when vobench ends. It is -1 on systems without such descriptors.
     """
-    os.setsid()  # the terminal's Ctrl-C is vobench's
+    os.setsid()  # Ctrl-C in the terminal is handled by vobench
     signals_fd, wakes_fd = os.pipe()
     os.set_blocking(wakes_fd, False)
     signal.set_wakeup_fd(wakes_fd)
@@ -342,7 +342,7 @@ def work(connection: Connection, vobench_fd: int) -> None:
     threading.Thread(target=watching, name="watch vobench", daemon=True).start()
     try:
         folder, environment, cores = connection.recv()
-        # Writes the stack of every thread, and since Python 3.14 that of the libraries, if a fault ends this process.
+        # If a fault ends this process, the stack of every thread is written; since Python 3.14 also that of libraries.
         faulthandler.enable(recv_handle(connection))
         os.environ.clear()
         os.environ.update(environment)
@@ -353,20 +353,20 @@ def work(connection: Connection, vobench_fd: int) -> None:
             task, store, threads = connection.recv()
             connection.send(performed(task, store, threads, SilentProgress(connection.send)))
     except (EOFError, OSError):
-        return  # nobody asks or listens any more
+        return  # vobench has closed the connection
     except stop.Stopped:
         os._exit(128 + stop.requested())
 
 
 def _leave() -> None:
-    """Tidy up and end this process, whatever its main thread does."""
+    """Clean up and end this process, regardless of what its main thread does."""
     stop.clean_up_all()
     number = stop.requested()
     os._exit(128 + number if number else 1)
 
 
 class Dask:
-    """The workers of a Dask scheduler, which share the store's folder and have the same code."""
+    """Performs tasks on the workers of a Dask scheduler, which share the folder of the store and have the same code."""
 
     def __init__(self, address: str) -> None:
         try:
@@ -383,14 +383,14 @@ class Dask:
             self.close()
             raise
         self.slots = len(self._workers)
-        # Every worker that performs tasks of this client holds the lease, which ends with the client.
+        # Every worker that performs tasks of this client holds the lease, which expires with the client.
         self._lease = f"vobench-lease-{uuid4().hex}"
         self._held = self._client.submit(str, self._lease, key=self._lease, pure=False)
         self._tells: dict[str, Tell] = {}
         self._client.subscribe_topic(self._lease, self._hear)
 
     def _checked_workers(self, address: str) -> list[str]:
-        """The addresses of the workers. Raises InputError if there are none, or if one has other versions."""
+        """The addresses of the workers. Raises InputError if there are none, or if one has different versions."""
         expected = versions()
         try:
             versions_of = self._client.run(versions)
@@ -405,7 +405,7 @@ class Dask:
         return list(versions_of)
 
     def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[TaskOutcome]":
-        """Send the task to the worker of that slot, or to another if that one is gone."""
+        """Send the task to the worker of the slot, or to another one if that has left."""
         future: Future[TaskOutcome] = Future()
         worker = self._workers[slot]
         self._tells[task.key] = tell
@@ -423,12 +423,12 @@ class Dask:
         return future
 
     def _hear(self, event: tuple[float, tuple[str, str]]) -> None:
-        """Pass on a message of a task under way."""
+        """Pass on a message of a running task."""
         _, (key, sentence) = event
         self._tells[key](sentence)
 
     def close(self) -> None:
-        """Leave the scheduler; what was sent to it is taken back."""
+        """Cancel all tasks and disconnect from the scheduler."""
         self._client.close()
 
 
@@ -437,7 +437,7 @@ _leases_lock = threading.Lock()
 
 
 def _performed_for(lease: str, task: Task, store: Path, threads: int) -> TaskOutcome:
-    """Perform a task on a Dask worker, in a process that ends as soon as the client that holds the lease is gone."""
+    """Perform a task on a Dask worker, in a process that ends when the client that holds the lease ends."""
     from distributed import get_worker
 
     worker = get_worker()
@@ -456,7 +456,7 @@ def _performed_for(lease: str, task: Task, store: Path, threads: int) -> TaskOut
 
 
 def _leave_with(lease: str, worker: Any, server: ForkServer) -> None:
-    """End what runs for a client on this Dask worker once the client is gone."""
+    """End the tasks of a client on this Dask worker when the client ends."""
     while lease in worker.data:
         time.sleep(LOOK_S)
     _processes_for.pop(lease).close()
@@ -464,7 +464,7 @@ def _leave_with(lease: str, worker: Any, server: ForkServer) -> None:
 
 
 def versions() -> dict[str, str]:
-    """What two machines must have in common for their results to be of one run."""
+    """The versions that must be equal on all machines that work on the same run."""
     import platform
 
     entries = sorted({entry for modules in ENTRIES.values() for entry in modules})
@@ -474,10 +474,10 @@ def versions() -> dict[str, str]:
 
 @dataclass(slots=True)
 class _Queue:
-    """The tasks that have not begun: those that are ready, by their main input, and those that wait for others.
+    """The tasks that have not begun: those that are ready, by main input, and those that wait for others.
 
-    `ready` is of tasks that may run beside others, `ready_timed` of estimates, whose time is measured. `missing` counts
-    the tasks that each waiting task needs; `dependents` are the tasks that wait for each.
+    `ready` contains tasks that may run concurrently, and `ready_timed` estimates, whose time is measured.
+    `missing` is the number of tasks for which each waiting task waits, and `dependents` the tasks that wait for a task.
     """
 
     ready: dict[str, deque[Task]] = field(default_factory=dict)
@@ -504,7 +504,7 @@ class _Queue:
         by_input.setdefault(_main_input(task), deque()).append(task)
 
     def take(self, last: str, *, timed: bool) -> Task | None:
-        """The first ready task with the main input that a slot had last, else any; a timed one only if `timed`."""
+        """The first ready task with the last main input of a slot, or otherwise any. It is timed only if `timed`."""
         choices = [self.ready, self.ready_timed] if timed else [self.ready]
         for by_input in choices:
             if by_input:
@@ -521,7 +521,7 @@ class _Queue:
         return sum(map(len, tasks))
 
     def release(self, key: str) -> None:
-        """Make the tasks ready that waited for this one alone."""
+        """Make the tasks ready that waited only for this one."""
         for task in self.dependents.pop(key, ()):
             self.missing[task.key] -= 1
             if not self.missing[task.key]:
@@ -540,7 +540,7 @@ def _is_timed(task: Task) -> bool:
 
 
 def _main_input(task: Task) -> str:
-    """The key of the light or sequence that a task reads; a slot that has it loaded should get the next such task."""
+    """The key of the light or sequence that a task reads. A slot that has it loaded should get the task."""
     return task.needs[0] if task.needs else task.key
 
 
@@ -552,9 +552,9 @@ def perform_all(
     shares_time: bool = False,
     heard: Callable[[TaskEvent], object] = lambda _: None,
 ) -> dict[str, TaskOutcome]:
-    """Perform tasks, each after those that it needs; the failures by key, with those of the tasks that needed them.
+    """Perform tasks, each after those that it needs, and return all failures by key.
 
-    An estimator is timed: unless `shares_time`, nothing else runs beside it. `heard` is called with each event.
+    An estimator is timed, so no other task runs beside it unless `shares_time`. `heard` is called with events.
     Raises InputError if the disk is full, MissingDependencyError if a library is missing, and Stopped.
     """
     schedule = _Schedule(_Queue.of(tasks), store, executor, shares_time=shares_time, heard=heard)
@@ -569,7 +569,7 @@ def perform_all(
 
 
 class _Schedule:
-    """The tasks of a run over the slots of an executor, and the failures so far by key."""
+    """Distributes the tasks of a run over the slots of an executor, and collects failures by key."""
 
     def __init__(
         self,
@@ -597,7 +597,7 @@ class _Schedule:
         return not self._running and not len(self._queue)
 
     def begin_tasks(self) -> None:
-        """Begin the tasks that may begin now, one in each free slot."""
+        """Begin tasks that are ready, one in each free slot."""
         busy = {slot for _, slot in self._running.values()}
         for slot in range(self._executor.slots):
             if slot in busy:
@@ -625,7 +625,7 @@ class _Schedule:
         self._running[future] = (task, slot)
 
     def _threads(self, task: Task) -> int:
-        """The threads of a task that begins: all if nothing can run beside it, else its slot's share of the cores."""
+        """The number of threads of a task: all if no other task can run at the same time, or the share of its slot."""
         runs_apart = _is_timed(task) and not self._shares_time
         is_alone = not self._running and (runs_apart or not len(self._queue))
         if is_alone or self._executor.slots == 1:
@@ -633,7 +633,7 @@ class _Schedule:
         return max(self._cores // self._executor.slots, 1)
 
     def await_ends(self) -> None:
-        """Wait a little for ends of tasks; pass on their messages and what follows from the ends."""
+        """Wait briefly for tasks to end, and process their messages and outcomes."""
         ended = wait(self._running, timeout=LOOK_S, return_when=FIRST_COMPLETED).done
         while not self._messages.empty():
             self._heard(self._messages.get())

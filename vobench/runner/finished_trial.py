@@ -1,4 +1,4 @@
-"""A trial of a finished run, read back so that variants of its case can be run with the same estimator."""
+"""Reads a trial of a finished run, and runs the same estimator on variants of its case."""
 
 import json
 from collections.abc import Mapping
@@ -25,25 +25,25 @@ from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.store import SILENT, Progress
 from vobench.suite import catalog
 from vobench.suite.case import Case
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Plan
 from vobench.suite.suite_spec import Suite
 from vobench.suite.yaml_file import checked
 from vobench.suite.yaml_source import Mistakes, YamlFile
 
-# RUN/cases/CASE/estimates/ESTIMATOR/REPEAT: how far above the folder of a trial its run is.
+# The number of levels from the folder of a trial, RUN/cases/CASE/estimates/ESTIMATOR/REPEAT, to that of its run.
 LEVELS_TO_RUN = 5
 
 
 @dataclass(frozen=True, slots=True)
 class FinishedTrial:
-    """A trial of a run with all that is needed to run it again: its case, its entrant and the suite of the run."""
+    """A trial of a run, with everything needed to repeat it: its case, its estimator and the suite of the run."""
 
     folder: RunFolder
     score: TrialScore
     case: Case
-    entrant: EstimatorEntry
+    estimator_entry: EstimatorEntry
     suite: Suite
 
     @property
@@ -53,24 +53,24 @@ class FinishedTrial:
 
 
 def read_finished_trial(path: Path, *, estimator: Path | None = None, progress: Progress = SILENT) -> FinishedTrial:
-    """Read the trial at RUN/CASE/ESTIMATOR, at RUN/CASE/ESTIMATOR/REPEAT, or at its own folder in the run.
+    """Read the trial RUN/CASE/ESTIMATOR or RUN/CASE/ESTIMATOR/REPEAT, or the trial in a folder of the run.
 
-    `estimator` is the folder of the estimator, for one that is not found by its name. `progress` is told when the
+    `estimator` is the folder of the estimator, if it cannot be found by its name. `progress` gets a note if the
     estimator has changed since the run.
 
-    Raises InputError and UnknownNameError where there is no such trial, where the case is a recording, which cannot be
-    simulated in variants, and where another version of vobench wrote the run.
+    Raises InputError and UnknownNameError if there is no such trial, if the case is a recording, which cannot be
+    changed, or if another version of vobench wrote the run.
     """
     folder, score = _find(path)
     if score.status == NO_SEQUENCE:
         raise InputError(f"'{score.case}' has no sequence, as it could not be made: {score.reason}")
     case = read_simulated_case(folder, score.case)
-    entrant = _read_entrant(folder, score.estimator, estimator, progress)
-    return FinishedTrial(folder, score, case, entrant, _read_suite(folder))
+    estimator_entry = _read_estimator_entry(folder, score.estimator, estimator, progress)
+    return FinishedTrial(folder, score, case, estimator_entry, _read_suite(folder))
 
 
 def _find(path: Path) -> tuple[RunFolder, TrialScore]:
-    """The run and the score of the trial that a path names."""
+    """The run and the score of the trial at a path."""
     if (path / SCORE).is_file() and len(path.parts) > LEVELS_TO_RUN:
         return RunFolder(path.parents[LEVELS_TO_RUN - 1]), read_score(path / SCORE)
 
@@ -94,7 +94,7 @@ def _find(path: Path) -> tuple[RunFolder, TrialScore]:
 
 
 def _require_in_run(kind: str, name: str, known: set[str], folder: RunFolder) -> None:
-    """Raise UnknownNameError, which names the run, unless it has a case or an estimator of this name."""
+    """Raise UnknownNameError with the run unless the name of a case or an estimator is known in it."""
     try:
         require_known(kind, name, sorted(known))
     except UnknownNameError as error:
@@ -102,11 +102,11 @@ def _require_in_run(kind: str, name: str, known: set[str], folder: RunFolder) ->
 
 
 def read_simulated_case(folder: RunFolder, name: str) -> Case:
-    """Read a simulated case of a run. Raises InputError for a recording, or where another version wrote the file."""
+    """Read a simulated case of a run. Raises InputError for a recording, or if another version wrote the file."""
     path = folder.case(name) / CASE
     content = json.loads(path.read_bytes())
     if "source" in content:
-        raise InputError(f"'{name}' is a recording: nothing in it can be changed and made again: {path}")
+        raise InputError(f"'{name}' is a recording, so it cannot be simulated with changes: {path}")
     try:
         return checked(Case, content)
     except ValidationError as error:
@@ -122,8 +122,8 @@ def _read_suite(folder: RunFolder) -> Suite:
         raise InputError(f"of another vobench, whose suites this one cannot read: {path}") from None
 
 
-def _read_entrant(folder: RunFolder, label: str, path: Path | None, progress: Progress) -> EstimatorEntry:
-    """The estimator with the parameters, limits and mode of the run. Raises UnknownNameError where it is not found."""
+def _read_estimator_entry(folder: RunFolder, label: str, path: Path | None, progress: Progress) -> EstimatorEntry:
+    """The estimator with the parameters, limits and mode of the run. Raises UnknownNameError if it is not found."""
     listed = json.loads((folder.path / ESTIMATORS).read_bytes())
     facts = next(entry for entry in listed if entry["label"] == label)
     place = path or catalog.find("estimator", facts["name"]).path
@@ -135,14 +135,14 @@ def _read_entrant(folder: RunFolder, label: str, path: Path | None, progress: Pr
 
 
 def run_variants(trial: FinishedTrial, cases: Mapping[str, Case], *, name: str, run_plan: PlanRunner) -> RunFolder:
-    """Run the estimator of a trial once on each of these cases, which get the names that they are mapped from.
+    """Run the estimator of a trial once on each of the given cases, which are renamed to their keys.
 
-    `name` is the name of the suite of this run. Raises SuiteError where one of the cases cannot be simulated.
+    `name` is the name of the suite of the new run. Raises SuiteError if one of the cases cannot be simulated.
     """
     named = tuple(replace(case, name=key) for key, case in cases.items())
     suite = replace(trial.suite, name=name, repeats=1)
     source = YamlFile(trial.folder.path / SUITE, {})
-    plan = Plan(suite, named, (), (trial.entrant,), (), source)
+    plan = Plan(suite, named, (), (trial.estimator_entry,), (), source)
 
     mistakes = Mistakes(source)
     with mistakes.at():

@@ -1,4 +1,4 @@
-"""The folder of a run, which people read, and the hashes of its files."""
+"""Reads and writes the folder of a run and the hashes of its files."""
 
 import json
 import os
@@ -24,15 +24,15 @@ from vobench.trajectory.trajectory import Trajectory
 CASE = "case.json"
 SCORE = "score.json"
 SEQUENCE = "sequence"
-STAMP = "%Y%m%dT%H%M%S"  # of the name of a run's folder
+STAMP = "%Y%m%dT%H%M%S"  # the date in the name of a run's folder
 ESTIMATES = "estimates"
 PAGE = "leaderboard.html"
 ENVIRONMENT = "environment.json"
 SUITE = "suite.json"
 ESTIMATORS = "estimators.json"
 
-# Best first. Those from `lost` to `not_applicable` are failures, and no failure ranks before a survivor. The last one
-# is not a failure of an estimator: its case is excluded for all of them.
+# The best status comes first. Those from `lost` to `not_applicable` are failures, which rank after all others. The last
+# one is not a failure of an estimator, because its case is excluded for all estimators.
 TrialStatus = Literal[
     "ok",
     "partial",
@@ -51,11 +51,11 @@ SURVIVED = ("ok", "partial")
 FINISHED_TRIAL = (*SURVIVED, "lost", "diverged")  # the estimator answered to the end, well or not
 NOT_APPLICABLE = "not_applicable"  # the recording lacks a sensor that the estimator needs
 NO_SEQUENCE: Final = "no_sequence"  # the case could not be simulated or imported
-MOST_NAMED = 3  # cases that a sentence names; the others are counted
+MOST_NAMED = 3  # the largest number of cases that a sentence names; the others are counted
 
 
 class _Metric(BaseModel):
-    """One metric of a score, as far as everybody reads it."""
+    """The fields of a metric in JSON that are always read."""
 
     model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
 
@@ -63,7 +63,7 @@ class _Metric(BaseModel):
 
 
 class _ScoreShape(BaseModel):
-    """What every score in JSON has."""
+    """The fields that every score in JSON has."""
 
     model_config = ConfigDict(frozen=True, extra="allow", allow_inf_nan=False)
 
@@ -73,7 +73,7 @@ class _ScoreShape(BaseModel):
 
 
 class TrialScore(BaseModel):
-    """One estimator on one case: its status and, where there is any estimate, its score.
+    """The status of an estimator on a case and, if there is an estimate, its score.
 
     `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
     `claims` are the manifest's, such as Sim(3), and `sensors` those that it needs; `consistency` is of the covariances
@@ -109,29 +109,29 @@ class TrialScore(BaseModel):
         return score
 
     def value(self, metric: str, statistic: str) -> float | None:
-        """One statistic of one metric, None where the trial has no such score."""
+        """A statistic of a metric; None if the trial does not have it."""
         return value_of(self.score, metric, statistic)
 
 
 @dataclass(frozen=True, slots=True)
 class UnavailableCases:
-    """Cases that could not be simulated or imported for one cause, which names the remedy where there is one."""
+    """Cases that could not be simulated or imported for the same cause. The cause may include a remedy."""
 
     cause: str
     cases: tuple[str, ...]
 
     @property
     def names(self) -> str:
-        """The first of the cases, and how many others there are."""
+        """The names of the first cases, and the number of the others."""
         named = ", ".join(self.cases[:MOST_NAMED])
         others = len(self.cases) - MOST_NAMED
         return f"{named} and {others} more" if others > 0 else named
 
 
 def unavailable_cases(scores: Iterable[TrialScore]) -> tuple[UnavailableCases, ...]:
-    """The cases without a sequence, grouped by cause, in order of their first case.
+    """The cases without a sequence, grouped by cause, in the order of their first case.
 
-    A case that another of several merged runs has made is none of them.
+    If several runs are merged, a case that one of them has simulated is not included.
     """
     causes = dict[str, str]()
     made = set[str]()
@@ -147,12 +147,12 @@ def unavailable_cases(scores: Iterable[TrialScore]) -> tuple[UnavailableCases, .
 
 
 def with_sequence(scores: Iterable[TrialScore]) -> list[TrialScore]:
-    """The trials whose case could be simulated or imported: those that say something about an estimator."""
+    """The trials whose case could be simulated or imported. Other trials say nothing about an estimator."""
     return [score for score in scores if score.status != NO_SEQUENCE]
 
 
 def total_failure(scores: Iterable[TrialScore]) -> str:
-    """One sentence if no estimator finished any trial: how many trials failed how, and the first; else empty."""
+    """A sentence about the numbers of failures and the first one if no trial finished; empty otherwise."""
     trials = with_sequence(scores)
     if not trials or any(trial.status in FINISHED_TRIAL for trial in trials):
         return ""
@@ -163,7 +163,7 @@ def total_failure(scores: Iterable[TrialScore]) -> str:
 
 
 def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> float | None:
-    """One statistic of one metric of a score as JSON has it; None without such a metric."""
+    """A statistic of a metric of a score in JSON; None if there is no such metric."""
     metrics = score["metrics"] if score else []
     for entry in metrics:
         if entry["name"] == metric:
@@ -172,13 +172,13 @@ def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> fl
 
 
 ONLY_THEIR_OWN = "Estimators saw only their own files."
-ORACLE = "oracle"  # the claim of the harness's own estimators, which are no programs
+ORACLE = "oracle"  # the claim of estimators that are part of vobench and use the ground truth
 
 
 def visible_to(trials: Iterable[TrialScore]) -> str:
-    """What the estimators of trials could see, in sentences for every form of a board.
+    """Sentences about what the estimators of trials could see, for every form of the leaderboard.
 
-    Estimators that saw more than their own files are named, and those of older runs, of which nothing is recorded.
+    They name estimators that saw more than their own files, and those of older runs, for which nothing is recorded.
     """
     estimators = dict[str, set[str]]()
     for trial in trials:
@@ -190,7 +190,7 @@ def visible_to(trials: Iterable[TrialScore]) -> str:
 
 
 def seen_by(trial: TrialScore) -> str:
-    """What a trial's estimator saw beyond its own files; empty if nothing."""
+    """What the estimator of a trial saw besides its own files; empty if nothing."""
     sandbox = trial.sandbox
     if sandbox is not None:
         is_strict = sandbox.level == "full" and not sandbox.read
@@ -213,7 +213,7 @@ class RunFolder:
     def unmade(self) -> tuple[UnavailableCases, ...]:
         """The cases that could not be simulated or imported, by cause; empty if the run is complete.
 
-        Raises InputError where the folder or a score is none of ours.
+        Raises InputError for an invalid folder or score.
         """
         return unavailable_cases(self.scores())
 
@@ -222,7 +222,7 @@ class RunFolder:
         return self.case(case) / ESTIMATES / estimator / str(repeat)
 
     def score_files(self) -> list[Path]:
-        """Where every trial's score lies, in order of folders. Raises InputError where the folder is none of ours."""
+        """The paths of the scores of all trials, in the order of folders. Raises InputError if it is not a run."""
         cases = self.path / "cases"
         files = sorted(cases.glob(f"*/{ESTIMATES}/*/*/{SCORE}"))
         if files:
@@ -231,26 +231,26 @@ class RunFolder:
             raise InputError(f"no such folder: {self.path}")
         if any(cases.glob(f"*/*/*/{SCORE}")):
             raise InputError(
-                f"a run of an older vobench, whose estimates do not lie in cases/*/{ESTIMATES}; "
+                f"a run of an older vobench, whose estimates are not in cases/*/{ESTIMATES}; "
                 f"run the suite again: {self.path}"
             )
         raise InputError(f"not the folder of a run (no cases/*/{ESTIMATES}/*/*/{SCORE} in it): {self.path}")
 
     def scores(self) -> list[TrialScore]:
-        """Every trial's score, in order of folders. Raises InputError where the folder or a score is none of ours."""
+        """The scores of all trials, in the order of folders. Raises InputError for an invalid folder or score."""
         scores = []
         for file in self.score_files():
             score = read_score(file)
             folder = self.estimate(score.case, score.estimator, score.repeat)
             if folder / SCORE != file:
                 trial = f"{score.estimator!r} on {score.case!r}, {score.repeat}"
-                raise InputError(f"should be the score of the folder it lies in, but is of {trial}: {file}")
+                raise InputError(f"should be the score of its folder, but is that of {trial}: {file}")
             scores.append(score)
         return scores
 
 
 def read_score(path: Path) -> TrialScore:
-    """One trial's score. Raises InputError where the file is none."""
+    """The score of a trial. Raises InputError if the file is not a score."""
     try:
         return TrialScore.model_validate_json(path.read_bytes())
     except ValidationError as error:
@@ -262,12 +262,12 @@ def read_score(path: Path) -> TrialScore:
 
 
 def open_run(path: Path) -> RunFolder:
-    """The run at a path; a suite's folder stands for its latest run."""
+    """The run at a path. The folder of a suite stands for its latest run."""
     return RunFolder((path / "latest") if (path / "latest").exists() else path)
 
 
 def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]) -> RunFolder:
-    """A new run's folder, which gets its name when `fill` is through with it without an error."""
+    """Create the folder of a run. It gets its final name when `fill` has returned without an error."""
     parent = root / suite
     sweep(parent)
     with unfinished(parent) as folder:
@@ -275,12 +275,12 @@ def make_run(root: Path, suite: str, key: str, fill: Callable[[RunFolder], None]
         final = _published(folder, parent / f"{datetime.now(UTC):{STAMP}}_{key[:8]}")
         fresh = parent / f".latest-{os.getpid()}"
         fresh.symlink_to(final.name)
-        fresh.replace(parent / "latest")  # in one step
+        fresh.replace(parent / "latest")  # atomic
     return RunFolder(final)
 
 
 def _published(folder: Path, name: Path) -> Path:
-    """The folder under its final name, with a number behind it where two runs ended in one second."""
+    """The folder with its final name, followed by a number if two runs ended in the same second."""
     for number in count(1):
         final = name if number == 1 else name.with_name(f"{name.name}.{number}")
         try:
@@ -292,7 +292,7 @@ def _published(folder: Path, name: Path) -> Path:
 
 
 def run_date(folder: RunFolder) -> str:
-    """The day a run ended in UTC, as in 2026-11-24, read off its folder's name; empty for a folder of another name."""
+    """The date in UTC on which a run ended, as in 2026-11-24, from the name of its folder; empty for another name."""
     stamp = folder.path.resolve().name.partition("_")[0]
     try:
         ended = datetime.strptime(stamp, STAMP).replace(tzinfo=UTC)
@@ -302,9 +302,9 @@ def run_date(folder: RunFolder) -> str:
 
 
 def read_tum(path: Path) -> Trajectory:
-    """The trajectory in a TUM file of a run; empty where an estimator gave no pose at all.
+    """The trajectory in a TUM file of a run; empty if an estimator gave no pose.
 
-    Raises TrajectoryError where the file is none.
+    Raises TrajectoryError if the file is not a trajectory.
     """
     try:
         text = path.read_text(encoding="utf-8")
@@ -313,13 +313,13 @@ def read_tum(path: Path) -> Trajectory:
     return parse_tum(text, name=str(path))
 
 
-# Of runs of equal inputs the first are equal; the second are of the files of times, and of the page that shows them.
+# The first file is equal for runs with equal inputs. The second has the hashes of durations and of the page with them.
 HASHES = "hashes.json"
 TIMES_HASHES = "times_hashes.json"
 
 
 def write_hashes(folder: RunFolder) -> None:
-    """Hash all files in a run's folder, and the sequences that it links to; files of times apart."""
+    """Hash all files in the folder of a run and the sequences to which it links, and files of durations separately."""
     hashes: dict[str, str] = {}
     times_hashes: dict[str, str] = {}
     for name in _names(folder.path):
@@ -331,7 +331,7 @@ def write_hashes(folder: RunFolder) -> None:
 
 
 def read_hashes(folder: RunFolder) -> dict[str, str]:
-    """The hash of each file by its path in the folder. Raises InputError where none were kept."""
+    """The hash of each file by its path in the folder. Raises InputError if the run has no hashes."""
     return {**_hashes_in(folder.path / HASHES), **_hashes_in(folder.path / TIMES_HASHES)}
 
 
@@ -353,7 +353,7 @@ def _hashes_in(path: Path) -> dict[str, str]:
 
 
 def _names(root: Path) -> Iterator[str]:
-    """Paths of all files below a run's folder; a sequence is a link to a folder in the cache."""
+    """The paths of all files below the folder of a run. A sequence is a link to a folder in the cache."""
     files = {path for path in root.rglob("*") if path.is_file()}
     for link in root.glob(f"cases/*/{SEQUENCE}"):
         files.update(link.glob("*.mcap"))

@@ -1,13 +1,13 @@
-"""A process that has imported what workers need and forks them; neither it nor any worker outlives vobench.
+"""A server process that imports the modules of workers once and forks workers. None of them outlives vobench.
 
-Three things end a worker, each where the others cannot:
+There are three ways in which a worker ends, so that at least one always works:
 
-- a thread of the worker sees that vobench is gone, tidies up and leaves;
-- the server kills workers that have not left after a grace period, and what they have left behind;
-- the kernel kills every worker when the server dies.
+- A thread of the worker notices that vobench has ended, cleans up and ends the worker.
+- The server kills workers that still run after a grace period, and the processes that they have started.
+- The kernel kills all workers when the server dies.
 
-multiprocessing's own fork server is not used: each of its children holds open the pipe whose end should end the
-server, so killing vobench ends neither, and its socket stays in the temporary folder.
+The fork server of multiprocessing is not used. Each of its children holds open the pipe whose closing should end the
+server, so the server and its workers survive if vobench is killed, and its socket stays in the temporary folder.
 """
 
 import atexit
@@ -31,16 +31,16 @@ from typing import NoReturn
 
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 PR_SET_CHILD_SUBREAPER = 36
-FAREWELL_S = 0.8  # for workers to leave by themselves once vobench is gone
-ORPHAN_S = 0.3  # for what a dead worker has left behind to end by itself
-LOOK_S = 0.02  # how often the server looks while it waits for ends
-END_S = 2.0  # for the server to end when it is asked to
+FAREWELL_S = 0.8  # the time for workers to end by themselves after vobench has ended
+ORPHAN_S = 0.3  # the time for the orphans of a dead worker to end by themselves
+LOOK_S = 0.02  # the period at which the server checks whether processes have ended
+END_S = 2.0  # the time for the server to end on request
 NUMBER = struct.Struct("q")  # a process id or an exit code on a pipe
 START = b"w"  # on the control socket: fork a worker
 
 
 class WorkerProcess:
-    """A forked worker as vobench sees it: the connection to it, and how it ended."""
+    """A forked worker: the connection to it, and its exit code."""
 
     def __init__(self, connection: Connection, status_fd: int) -> None:
         self.connection = connection
@@ -51,26 +51,26 @@ class WorkerProcess:
 
     @property
     def exit_code(self) -> int | None:
-        """The exit code, or minus the signal's number; None while the worker runs or has yet to start."""
+        """The exit code, or minus the number of a signal; None while the worker runs or has not started."""
         return self.join(timeout_s=0)
 
     @property
     def is_alive(self) -> bool:
-        """Whether the worker runs or has yet to start."""
+        """Whether the worker runs or has not started yet."""
         return self.exit_code is None
 
     def pid(self, timeout_s: float | None = None) -> int | None:
-        """The process id, waited for if need be; None if the worker did not start in time, or at all."""
+        """The process id, for which the call waits if necessary; None if the worker does not start in time."""
         self._read(until=lambda: self._pid is not None, timeout_s=timeout_s)
         return self._pid
 
     def join(self, timeout_s: float | None = None) -> int | None:
-        """Wait for the end of the worker; its exit code, None if it has not ended in time."""
+        """Wait for the end of the worker, and return its exit code; None if it has not ended in time."""
         self._read(until=lambda: self._exit_code is not None, timeout_s=timeout_s)
         return self._exit_code
 
     def abandon(self) -> bool:
-        """Whether the worker has yet to start; if so it will end as soon as it does."""
+        """Return whether the worker has not started yet. In this case, it will end as soon as it starts."""
         if self.pid(timeout_s=0) is not None or not self.is_alive:
             return False
         with suppress(OSError), socket.socket(fileno=os.dup(self.connection.fileno())) as line:
@@ -78,7 +78,7 @@ class WorkerProcess:
         return True
 
     def kill(self, number: int) -> None:
-        """Send a signal to the worker, unless it has ended or has yet to start."""
+        """Send a signal to the worker if it runs."""
         pid = self.pid(timeout_s=0)
         if pid is not None and self.is_alive:
             with suppress(ProcessLookupError):
@@ -94,7 +94,7 @@ class WorkerProcess:
             self._status_fd = -1
 
     def _read(self, *, until: Callable[[], bool], timeout_s: float | None) -> None:
-        """Read what the server reports of the worker: its id, then its exit code."""
+        """Read the reports of the server on the worker: its id, then its exit code."""
         ends_s = None if timeout_s is None else time.monotonic() + timeout_s
         while not until() and self._exit_code is None:
             left_s = None if ends_s is None else max(ends_s - time.monotonic(), 0)
@@ -105,7 +105,7 @@ class WorkerProcess:
                     return
                 report = os.read(self._status_fd, NUMBER.size)
                 if len(report) < NUMBER.size:
-                    self._exit_code = -signal.SIGKILL  # the server died, and the worker with it
+                    self._exit_code = -signal.SIGKILL  # the server died, which killed the worker
                 elif self._pid is None:
                     (self._pid,) = NUMBER.unpack(report)
                 else:
@@ -128,7 +128,7 @@ class ForkServer:
         self._process: subprocess.Popen[bytes] | None = None
 
     def start_worker(self) -> WorkerProcess:
-        """Ask for a new worker; it starts once the server has imported everything."""
+        """Request a new worker. It starts when the server has imported all modules."""
         ours, theirs = Pipe()
         reads_fd, writes_fd = os.pipe()
         try:
@@ -148,7 +148,7 @@ class ForkServer:
         if self._control is not None:
             try:
                 socket.send_fds(self._control, [request], fds)
-            except OSError:  # the server was killed
+            except OSError:  # the server has been killed
                 self._close()
             else:
                 return
@@ -168,7 +168,7 @@ class ForkServer:
                 [sys.executable, "-c", code],
                 stdin=subprocess.DEVNULL,
                 pass_fds=[theirs.fileno()],
-                start_new_session=True,  # the terminal's Ctrl-C is vobench's
+                start_new_session=True,  # Ctrl-C in the terminal is handled by vobench
             )
         return ours
 
@@ -189,7 +189,7 @@ _shared: dict[tuple[str, ...], ForkServer] = {}
 
 
 def shared_server(entry: str, preloaded: Sequence[str]) -> ForkServer:
-    """The server of this process for these workers; it ends with the process."""
+    """The server of this process for workers with an entry function. It ends with the process."""
     key = (entry, *preloaded)
     if key not in _shared:
         _shared[key] = ForkServer(entry, preloaded)
@@ -200,13 +200,13 @@ def shared_server(entry: str, preloaded: Sequence[str]) -> ForkServer:
 def watch(
     connection: Connection, vobench_fd: int, signals_fd: int, *, grace_s: float, leave: Callable[[], None]
 ) -> None:
-    """Call `leave` in a worker once nobody needs it: vobench is gone, or has closed the connection to it.
+    """Call `leave` in a worker when vobench ends or closes the connection to it.
 
-    A byte from `signals_fd` is a request to stop that reached the worker; `leave` is called if the worker still runs
-    after `grace_s` seconds.
+    A byte from `signals_fd` means that the worker received a request to stop. `leave` is called if the worker still
+    runs after `grace_s` seconds.
     """
     poll = select.poll()
-    poll.register(connection.fileno(), 0)  # events that are always reported: the other end is closed
+    poll.register(connection.fileno(), 0)  # 0 selects only the events that are always reported, such as a hang-up
     poll.register(signals_fd, select.POLLIN)
     if vobench_fd >= 0:
         poll.register(vobench_fd, select.POLLIN)
@@ -218,21 +218,21 @@ def watch(
 
 
 def serve(control_fd: int, *, vobench_pid: int, entry: str, preloaded: list[str]) -> NoReturn:
-    """Be the server: import, then fork workers as they are asked for, until vobench ends or closes the socket."""
-    # Nobody looks at the control socket during imports, so the kernel watches vobench.
+    """Run the server: import the modules, then fork workers on request until vobench ends or closes the socket."""
+    # The control socket is not read during imports, so the kernel ends the server if vobench ends.
     _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     _require_parent(vobench_pid)
     for name in preloaded:
-        with suppress(Exception):  # the worker that needs it reports why
+        with suppress(Exception):  # the worker that needs the module reports the error
             import_module(name)
     module, _, function = entry.partition(":")
     work = getattr(import_module(module), function)
-    # From here on the server watches by itself: the kernel would leave workers no time to tidy up, and would end the
-    # server with the thread of vobench that started it.
+    # From here on, the server itself detects the end of vobench. The kernel would leave workers no time to clean up,
+    # and would end the server with the thread of vobench that started it.
     vobench_fd = _pidfd(vobench_pid)
     _prctl(PR_SET_PDEATHSIG, 0)
     _require_parent(vobench_pid)
-    _prctl(PR_SET_CHILD_SUBREAPER, 1)  # orphans of workers become children of the server
+    _prctl(PR_SET_CHILD_SUBREAPER, 1)  # orphaned processes of workers become children of the server
     with socket.socket(fileno=control_fd) as control:
         control.set_inheritable(False)
         server = _Server(control, vobench_fd, work)
@@ -242,14 +242,14 @@ def serve(control_fd: int, *, vobench_pid: int, entry: str, preloaded: list[str]
 
 
 class _Server:
-    """The state of the server: its workers, by id, with the descriptor on which the end of each is reported."""
+    """The server: its workers by id, with the descriptors on which their ends are reported."""
 
     def __init__(self, control: socket.socket, vobench_fd: int, work: Callable[[Connection, int], None]) -> None:
         self._control = control
         self._vobench_fd = vobench_fd
         self._work = work
         self._workers: dict[int, int] = {}
-        self._orphans_end_s: float | None = None  # when orphans are killed
+        self._orphans_end_s: float | None = None  # the time at which orphans are killed
         self._woken_fd, self._wakes_fd = os.pipe()
         os.set_blocking(self._woken_fd, False)
         os.set_blocking(self._wakes_fd, False)
@@ -257,7 +257,7 @@ class _Server:
         signal.set_wakeup_fd(self._wakes_fd)
 
     def run(self) -> None:
-        """Fork and bury workers until vobench is gone."""
+        """Fork workers and reap ended ones until vobench ends."""
         poll = select.poll()
         for fd in (self._control.fileno(), self._woken_fd, self._vobench_fd):
             if fd >= 0:
@@ -274,7 +274,7 @@ class _Server:
                 return
 
     def end(self) -> None:
-        """Wait for the workers to leave, then kill whoever is left."""
+        """Wait for the workers to end, then kill the remaining ones."""
         ends_s = time.monotonic() + FAREWELL_S
         while self._workers and time.monotonic() < ends_s:
             time.sleep(LOOK_S)
@@ -289,7 +289,7 @@ class _Server:
             children = _children(os.getpid())
 
     def _answer(self) -> bool:
-        """Answer one request; False once nobody is there to ask."""
+        """Answer one request. Returns False if vobench has closed the socket."""
         try:
             request, fds, _, _ = socket.recv_fds(self._control, 1, 2)
         except OSError:
@@ -299,7 +299,7 @@ class _Server:
         connection_fd, status_fd = fds
         try:
             pid = os.fork()
-        except OSError:  # no memory, or too many processes: the closed descriptors report it
+        except OSError:  # there is too little memory or too many processes, which the closed descriptors report
             pid = -1
         if pid == 0:
             self._become_worker(connection_fd, status_fd)
@@ -333,7 +333,7 @@ class _Server:
             os._exit(exit_code)
 
     def _bury(self) -> None:
-        """Report the workers that have ended."""
+        """Reap and report the workers that have ended."""
         with suppress(ChildProcessError):
             while True:
                 pid, status = os.waitpid(-1, os.WNOHANG)
@@ -346,18 +346,18 @@ class _Server:
                     self._orphans_end_s = time.monotonic() + ORPHAN_S
 
     def _end_orphans(self) -> None:
-        """Kill what dead workers have started and left behind, a while after the death of a worker."""
+        """Kill the orphaned processes of dead workers, some time after the death of a worker."""
         if self._orphans_end_s is None or time.monotonic() < self._orphans_end_s:
             return
         orphans = [pid for pid in _children(os.getpid()) if pid not in self._workers]
         for pid in orphans:
             _kill(pid)
-        if not orphans:  # else their own children are now ours
+        if not orphans:  # otherwise their children have become children of the server
             self._orphans_end_s = None
 
 
 def _report(fd: int, number: int) -> None:
-    with suppress(OSError):  # vobench is gone
+    with suppress(OSError):  # vobench has ended
         os.write(fd, NUMBER.pack(number))
 
 
@@ -367,13 +367,13 @@ def _kill(pid: int) -> None:
 
 
 def _require_parent(pid: int) -> None:
-    """End this process if it has another parent: its own is gone."""
+    """End this process if it has another parent, because its original parent has ended."""
     if os.getppid() != pid:
         os._exit(1)
 
 
 def _pidfd(pid: int) -> int:
-    """A descriptor that becomes readable when a process ends; -1 on systems without."""
+    """A descriptor that becomes readable when a process ends; -1 on systems without such descriptors."""
     try:
         return os.pidfd_open(pid)
     except (AttributeError, OSError):
@@ -381,12 +381,12 @@ def _pidfd(pid: int) -> int:
 
 
 def _prctl(option: int, value: int) -> None:
-    with suppress(OSError, AttributeError):  # on Linux only
+    with suppress(OSError, AttributeError):  # prctl exists only on Linux
         ctypes.CDLL(None).prctl(option, value, 0, 0, 0)
 
 
 def _children(parent: int) -> list[int]:
-    """The ids of the children of a process; none on systems without /proc."""
+    """The ids of the children of a process; empty on systems without /proc."""
     children = []
     for name in os.listdir("/proc") if sys.platform == "linux" else []:
         if not name.isdigit():

@@ -1,4 +1,4 @@
-"""The table of a trial's frames: the estimator's answer to each, the error of its pose, and its exposure."""
+"""The table of the frames of a trial: the answer of the estimator, the error of its pose, and the exposure."""
 
 import csv
 from collections.abc import Iterable, Iterator, Mapping
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 FRAMES = "frames.csv"
 TIMES = "times.csv"
-# The tables in the store that these are joined from: one of a sequence, one of an estimate.
+# The tables in the store that are joined: one of the sequence, and one of the estimate.
 EXPOSURES = "exposures.csv"
 ANSWERS = "answers.csv"
 GROUND_TRUTH = "ground_truth.tum"
@@ -30,12 +30,14 @@ ERROR_COLUMNS = ("position_error_m", "rotation_error_deg")
 
 @dataclass(frozen=True, slots=True)
 class FrameRow:
-    """One frame of a trial; unknown values are None.
+    """One frame of a trial. Unknown values are None.
 
-    `status` is empty if the estimator never answered. The errors are against the truth after the score's alignment;
-    `tracks` and `inliers` count the tracked points; `stats` is a JSON object of the estimator's other numbers.
-    `wall_ms` and `cpu_ms` are the cost of the answer, `memory_mib` the largest memory of the estimator's processes
-    so far.
+    `status` is empty if the estimator did not answer.
+    Errors are relative to the truth after the alignment of the score.
+    `tracks` and `inliers` are numbers of tracked points.
+    `stats` is a JSON object with other numbers of the estimator.
+    `wall_ms` and `cpu_ms` are the cost of the answer.
+    `memory_mib` is the peak memory of the estimator so far.
     """
 
     frame: int
@@ -59,7 +61,7 @@ COLUMNS = tuple(name for name in FRAME_FIELDS if name not in COST_COLUMNS)
 
 
 def write_frames(sequence: Path, estimate: Path, scored: "Score | None", folder: Path) -> None:
-    """Join a sequence's exposures, the answers of an estimator and the errors of their score in one table."""
+    """Join the exposures of a sequence, the answers of an estimator and the errors of its poses to one table."""
     answers = {row["frame"]: row for row in read_table(estimate / ANSWERS)}
     errors = _errors(scored) if scored else {}
     with new_table(folder / FRAMES, COLUMNS) as table:
@@ -70,7 +72,7 @@ def write_frames(sequence: Path, estimate: Path, scored: "Score | None", folder:
 
 
 def _errors(scored: "Score") -> Mapping[str, Mapping[str, float]]:
-    """The errors of each pose by the stamp of its frame."""
+    """The errors of each pose, by the stamp of its frame."""
     stamps = map(str, scored.gt_t_ns.tolist())
     errors = zip(scored.ate_trans_m.tolist(), scored.ate_rot_deg.tolist(), strict=True)
     rows = (dict(zip(ERROR_COLUMNS, pair, strict=True)) for pair in errors)
@@ -78,9 +80,9 @@ def _errors(scored: "Score") -> Mapping[str, Mapping[str, float]]:
 
 
 def read_frames(folder: Path) -> list[FrameRow]:
-    """One row for each frame of a trial's sequence, joined with the times in the file beside it.
+    """The rows of all frames of a trial, joined with the times in the file beside them.
 
-    Raises InputError if a run has no such tables.
+    Raises InputError if the run has no such tables.
     """
     if not (folder / TIMES).is_file():
         raise InputError(f"a run of an older vobench, without a table of times; run the suite again: {folder}")
@@ -98,7 +100,7 @@ def read_frames(folder: Path) -> list[FrameRow]:
 
 
 def _known_cells(row: Mapping[str, str]) -> dict[str, str | None]:
-    """The cells of a row; an empty one is an empty text or, if it should be a number, None."""
+    """The cells of a row by column. An empty cell of a number is None."""
     cells: dict[str, str | None] = {}
     for column in fields(FrameRow):
         empty = "" if column.type is str else None
@@ -113,7 +115,7 @@ def _adapter() -> TypeAdapter[list[FrameRow]]:
 
 @contextmanager
 def new_table(path: Path, columns: Iterable[str]) -> Iterator["csv.DictWriter[str]"]:
-    """A CSV file to write rows to, each a cell by its column; a cell that is not given is empty."""
+    """A writer of a CSV file, for rows that map columns to cells. Missing cells are empty."""
     with path.open("w", newline="", encoding="utf-8") as file:
         table = csv.DictWriter(file, tuple(columns), lineterminator="\n")
         table.writeheader()
@@ -121,6 +123,6 @@ def new_table(path: Path, columns: Iterable[str]) -> Iterator["csv.DictWriter[st
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
-    """The rows of a CSV file, each its cells by their columns."""
+    """The rows of a CSV file, which map columns to cells."""
     with path.open(newline="", encoding="utf-8") as file:
         return list(csv.DictReader(file))

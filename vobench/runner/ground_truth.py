@@ -1,4 +1,4 @@
-"""The ground truth that trials are scored against, and the exposures of the frames, as files beside a sequence."""
+"""Writes the ground truth for scoring, and the exposures of the frames, as files beside a sequence."""
 
 from pathlib import Path
 
@@ -16,15 +16,15 @@ from vobench.suite.suite_spec import EXACT, TruthNoise, Window
 from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
-NOISE_STREAM = 9_173  # sets the noise of the truth apart from other streams of a seed
-LONGEST_GAP_NS = 200_000_000  # the truth is not interpolated between poses further apart
+NOISE_STREAM = 9_173  # separates the noise of the truth from the other random streams of a seed
+LONGEST_GAP_NS = 200_000_000  # the truth is not interpolated over longer gaps
 
 
 def left_truth(folder: Path) -> Trajectory:
-    """The left camera's true poses at all pictures that have one; the truth is interpolated if its stamps differ.
+    """The true poses of the left camera at the stamps of pictures. The truth is interpolated if its stamps differ.
 
-    Pictures before, after or in a gap of the truth are left out, and so not scored.
-    Raises SequenceError if no picture is left.
+    Pictures before, after or in a gap of the truth are omitted, so they are not scored.
+    Raises SequenceError if no picture remains.
     """
     sequence = Sequence.open(folder)
     truth = read_truth(folder)
@@ -40,14 +40,14 @@ def left_truth(folder: Path) -> Trajectory:
 
 
 def scored_truth(exact: str, case: Case | RecordedCase) -> str:
-    """The truth, as TUM text, that estimates on a case are scored against: the exact one with the case's noise."""
+    """The truth for scoring estimates on a case, as TUM text: the exact truth with the noise of the case."""
     if isinstance(case, RecordedCase):
         return exact
     return noisy(exact, case.truth_noise, seed=case.seed, frames=case.frames)
 
 
 def noisy(exact: str, noise: TruthNoise, *, seed: int, frames: Window | None) -> str:
-    """A truth, as TUM text, with noise on each pose; a window of frames has the noise that it has in the whole case."""
+    """The truth as TUM text, with noise added to each pose. A window of frames has the noise of the whole case."""
     if noise == EXACT:
         return exact
     truth = parse_tum(exact, name=GROUND_TRUTH)
@@ -61,7 +61,7 @@ def noisy(exact: str, noise: TruthNoise, *, seed: int, frames: Window | None) ->
 
 
 def is_known(truth_ns: Stamps, stamps: Stamps) -> NDArray[np.bool_]:
-    """Which stamps (M,) lie on a true pose, or between two that are at most LONGEST_GAP_NS apart."""
+    """Whether the truth is known at each stamp (M,): at a pose, or between poses at most LONGEST_GAP_NS apart."""
     after = np.searchsorted(truth_ns, stamps, side="left")
     before = np.searchsorted(truth_ns, stamps, side="right") - 1
     last = len(truth_ns) - 1
@@ -72,7 +72,7 @@ def is_known(truth_ns: Stamps, stamps: Stamps) -> NDArray[np.bool_]:
 
 
 def write_ground_truth(folder: Path) -> None:
-    """Write the files beside a sequence that its trials read: the true path, and the exposure of each frame."""
+    """Write the files beside a sequence that trials read: the true path, and the exposure of each frame."""
     (folder / GROUND_TRUTH).write_text(format_tum(left_truth(folder)), encoding="utf-8")
     sequence = Sequence.open(folder)
     stamps, exposures = sequence.exposures()

@@ -1,4 +1,4 @@
-"""Theta of the Pioneer from recorded drives: of a run, a sequence, or a CSV file of `vobench drive`."""
+"""Identifies theta of the Pioneer from recorded drives: of a run, a sequence, or a CSV file of `vobench drive`."""
 
 import csv
 from collections.abc import Mapping
@@ -25,16 +25,17 @@ from vobench.trajectory.trajectory import Stamps
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
-# A recorded pose and that of the same drive computed again differ by rounding only.
-SAME_POSE = 1e-6  # m, and of elements of the rotation
+# The poses of a recorded drive and of the repeated drive differ only by rounding errors.
+SAME_POSE = 1e-6  # the largest difference of equal poses, in m and elements of the rotation
 
 
 @dataclass(frozen=True, slots=True)
 class WheelLog:
-    """What theta is identified from: what the wheels turned, and what the controller asked for.
+    """The data from which theta is identified: the rim angles of the wheels, and the references of the controller.
 
-    Rim angles (M, 2) in rad at rim_t_ns (M,), left then right; references (N, 2) in m/s and rad/s, each of which holds
-    from its stamp in t_ns (N,) on. `theta` is what the drive was simulated with, where that is known.
+    `rim_rad` (M, 2) are the angles of the left and right rim in rad at `rim_t_ns` (M,).
+    `references` (N, 2) are in m/s and rad/s. Each one is valid from its stamp in `t_ns` (N,).
+    `theta` is the theta of the simulation, None if it is unknown.
     """
 
     name: str
@@ -46,7 +47,7 @@ class WheelLog:
     theta: Theta | None = None
 
     def fit(self) -> Fit:
-        """Identify theta. Raises MotionError where the drive does not determine it."""
+        """Identify theta. Raises MotionError if the drive does not determine it."""
         left_m = self.rim_rad[:, 0] * self.wheels.radius_m
         right_m = self.rim_rad[:, 1] * self.wheels.radius_m
         distance_m = (left_m + right_m) / 2
@@ -57,7 +58,7 @@ class WheelLog:
 
 @dataclass(frozen=True, slots=True)
 class IdentifiedDrive:
-    """The fitted theta of one drive, and the theta that it was simulated with, where that is known."""
+    """The fitted theta of one drive, and the theta of the simulation, None if it is unknown."""
 
     name: str
     fit: Fit
@@ -71,7 +72,7 @@ class IdentifiedDrive:
 
 @dataclass(frozen=True, slots=True)
 class Identification:
-    """The identified drives, and by name the reason why nothing could be identified from others."""
+    """The identified drives, and the reasons why theta could not be identified from the others, by name."""
 
     drives: tuple[IdentifiedDrive, ...]
     failures: Mapping[str, str]
@@ -93,8 +94,8 @@ class Identification:
 def identify_drives(path: Path, *, radius_m: float | None = None, track_m: float | None = None) -> Identification:
     """Identify theta from every drive of a run, from one sequence, or from a CSV file of `vobench drive`.
 
-    `radius_m` and `track_m` are those of the wheels behind a CSV file, by default the Pioneer's; a sequence states its
-    own. Raises InputError and MotionError where there is no drive from which theta can be identified.
+    `radius_m` and `track_m` are those of the wheels of a CSV file, by default those of the Pioneer. A sequence contains
+    them. Raises InputError and MotionError if there is no drive from which theta can be identified.
     """
     if path.is_file():
         wheels = WheelGeometry(radius_m or PIONEER_WHEELS.radius_m, track_m or PIONEER_WHEELS.track_m, 1)
@@ -106,7 +107,7 @@ def identify_drives(path: Path, *, radius_m: float | None = None, track_m: float
 
 
 def _identify_sequences(sequences: Mapping[str, Path]) -> Identification:
-    """Identify theta from each sequence that allows it. Raises InputError where none does."""
+    """Identify theta from each sequence that allows it. Raises InputError if none does."""
     drives = []
     failures = {}
     for name, folder in sequences.items():
@@ -121,7 +122,7 @@ def _identify_sequences(sequences: Mapping[str, Path]) -> Identification:
 
 
 def _sequences(path: Path) -> dict[str, Path]:
-    """The folders of sequences by name: of every case of a run, or the one sequence at the path."""
+    """The folders of sequences by name: those of all cases of a run, or the single sequence at the path."""
     if (path / "truth.mcap").exists():
         return {path.name: path}
     run = open_run(path)
@@ -130,16 +131,16 @@ def _sequences(path: Path) -> dict[str, Path]:
 
 
 def read_sequence_log(name: str, folder: Path) -> WheelLog:
-    """Read the encoders of a sequence; its references come from driving its case again.
+    """Read the encoders of a sequence. The references are computed by driving its case again.
 
-    Raises InputError where the body is not a Pioneer under control, or where this version of vobench drives the case
-    differently from how it was recorded.
+    Raises InputError if the body is not a Pioneer with a controller, or if this version of vobench drives the case
+    differently.
     """
     drive = recorded_drive(folder)
     _require_same_drive(drive, folder)
     sequence = Sequence.open(folder)
     wheels = sequence.rig.wheels
-    assert wheels is not None  # a controller drove them
+    assert wheels is not None  # a body with a controller has wheels
     t_ns, ticks = sequence.encoders()
     rad_per_tick = 2 * np.pi / wheels.ticks_per_revolution
     rim_rad = (ticks * rad_per_tick).astype(np.float64)
@@ -147,12 +148,12 @@ def read_sequence_log(name: str, folder: Path) -> WheelLog:
 
 
 def _require_same_drive(drive: Drive, folder: Path) -> None:
-    """Raise InputError unless the recorded poses are those of the drive; some of its frames may be missing."""
+    """Raise InputError unless the recorded poses are those of the drive. Frames may be missing."""
     truth = read_truth(folder)
     T_world_body = drive.motion.at(truth.t_ns).T_world_body
     has_same_stamps = bool(np.isin(truth.t_ns, drive.t_ns).all())
     if not has_same_stamps or not np.allclose(T_world_body, truth.T_world_frame, atol=SAME_POSE):
-        raise InputError(f"this version of vobench drives the case otherwise than it was recorded: {folder}")
+        raise InputError(f"this version of vobench drives the case differently from the recording: {folder}")
 
 
 def read_csv_log(path: Path, wheels: WheelGeometry) -> WheelLog:
@@ -175,7 +176,7 @@ def read_csv_log(path: Path, wheels: WheelGeometry) -> WheelLog:
         raise InputError(f"the columns {listed} should hold a number in each row: {path}") from None
     is_rising = bool((np.diff(values[:, 0]) > 0).all())
     if not np.isfinite(values).all() or not is_rising:
-        raise InputError(f"numbers should be finite and t_ns should rise: {path}")
+        raise InputError(f"numbers should be finite and t_ns should increase: {path}")
 
     t_ns = values[:, 0].astype(np.int64)
     rim_rad = values[:, 1:3]

@@ -1,4 +1,4 @@
-"""Recordings made elsewhere, read before anything is run, and kept in the store as sequences."""
+"""Reads the recordings of a plan before it is run, and imports them to the store as sequences."""
 
 import hashlib
 from pathlib import Path
@@ -17,9 +17,9 @@ LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "mcap", "rosbags")
 
 
 def read_all(plan: Plan) -> dict[str, Recording]:
-    """The recording of each recorded case by its name: said before hours of work.
+    """The recording of each recorded case by name. They are read first, so that errors are found before the run.
 
-    Raises SuiteError, with the places in the suite's file, where some cannot be read or have no ground truth.
+    Raises SuiteError, with the places in the suite, if recordings cannot be read or have no ground truth.
     """
     recordings = dict[str, Recording]()
     wrong = plan.mistakes()
@@ -34,7 +34,7 @@ def read_all(plan: Plan) -> dict[str, Recording]:
 
 
 def _why_not_scored(recording: Recording) -> str:
-    """Why a recording cannot be scored, with its reader's note on the truth; empty if it can."""
+    """The reason why a recording cannot be scored, with the note on its truth; empty if it can be scored."""
     if recording.truth is None:
         notes = [note.rstrip(".") for note in recording.notes if "truth" in note and note != NO_TRUTH]
         return f"no ground truth ({notes[-1]})" if notes else "no ground truth"
@@ -43,7 +43,7 @@ def _why_not_scored(recording: Recording) -> str:
 
 
 def read_case(case: RecordedCase) -> Recording:
-    """The recording of a case. Raises VobenchError, naming the file, for whatever is wrong with it."""
+    """The recording of a case. Raises VobenchError with the file if it cannot be read."""
     from vobench.dataset.layout import read
 
     source = case.source
@@ -58,14 +58,14 @@ def read_case(case: RecordedCase) -> Recording:
 
 
 def import_recording(recording: Recording, folder: Path) -> None:
-    """Write a recording as a sequence, and with which versions. Raises VobenchError where a picture is wrong."""
+    """Write a recording as a sequence, with the versions of libraries. Raises VobenchError for an invalid picture."""
     from vobench.dataset.sequence import convert
 
     convert(recording, folder, provenance=versions(*LIBRARIES))
 
 
 def content(case: RecordedCase, recording: Recording) -> dict[str, Any]:
-    """The recording that is imported: its files by size and time of change, since reading gigabytes is slow."""
+    """The identity of a recording: the size and modification time of its files, because hashing them would be slow."""
     source = case.source
     listing = []
     for file in (source.path, source.calibration, source.imu):
@@ -79,7 +79,7 @@ def content(case: RecordedCase, recording: Recording) -> dict[str, Any]:
 
 
 def _truth_hash(recording: Recording) -> str:
-    """A hash of the ground truth, which may lie outside of the folder, as KITTI's does."""
+    """A hash of the ground truth, which can be outside of the folder, as in KITTI."""
     truth = recording.truth
     if not truth:
         return ""
@@ -88,7 +88,7 @@ def _truth_hash(recording: Recording) -> str:
 
 
 def _listing(path: Path) -> list[str]:
-    """A line for each file: its path, size and time of change."""
+    """One line per file: its path, size and modification time."""
     files = [path]
     if path.is_dir():
         files = sorted(file for file in path.rglob("*") if file.is_file())

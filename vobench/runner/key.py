@@ -1,4 +1,4 @@
-"""Keys of results: hashes of all that a result depends on, from its inputs to the code that makes it."""
+"""Computes the keys of results: hashes of everything that a result depends on, from its inputs to the code."""
 
 import ast
 import hashlib
@@ -23,32 +23,32 @@ from vobench import __version__
 
 PACKAGE = Path(__file__).resolve().parents[1]
 PLUGIN = "vobench.plugin"
-# The digest of a module depends on the Python that compiles it and on this file.
+# The digest of a module depends on the version of Python and on this file.
 READER = hashlib.sha256(sys.version.encode() + Path(__file__).read_bytes()).digest()
 NOT_DATA = {".py", ".pyc"}
-# Imports that only a type checker sees: no result depends on them.
+# Imports for type checkers only, on which no result depends.
 TYPES_ONLY = re.compile(rb"^if TYPE_CHECKING:\n(?:(?: .*)?\n)+", re.MULTILINE)
 
 
 def cache_folder() -> Path:
-    """$VOBENCH_CACHE, or vobench/ in the user's cache folder."""
+    """The folder of the cache: $VOBENCH_CACHE, or vobench/ in the user's cache folder."""
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return Path(os.environ.get("VOBENCH_CACHE") or home / "vobench")
 
 
 def canonical(inputs: Mapping[str, Any]) -> str:
-    """JSON with sorted keys: the same text for the same content."""
+    """The inputs as JSON with sorted keys, so that equal content gives equal text."""
     return json.dumps(inputs, sort_keys=True, indent=1, ensure_ascii=False, allow_nan=False)
 
 
 def digest(inputs: Mapping[str, Any]) -> str:
-    """128 bits of SHA-256 over the same JSON on one line, which is written faster, in hex."""
+    """The first 128 bits of the SHA-256 hash, in hex, of the inputs as JSON on one line, which is faster to write."""
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=False, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def folder_digest(folder: Path) -> str:
-    """A hash over names and contents of all files below a folder, compiled Python left out."""
+    """A hash of the names and contents of all files below a folder, except compiled Python."""
     state = hashlib.sha256()
     for path in sorted(_files(folder)):
         state.update(f"{path.relative_to(folder)}\0".encode())
@@ -63,28 +63,28 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def versions(*libraries: str) -> dict[str, str]:
-    """What something is made with: the versions of vobench, Python and these distributions."""
+    """The versions of vobench, Python and the given distributions."""
     return {"vobench": __version__, **library_versions(*libraries)}
 
 
 @cache
 def library_versions(*names: str) -> dict[str, str]:
-    """Versions of Python and of the installed distributions whose release can change a result's bytes."""
+    """The versions of Python and of installed distributions that can change the bytes of a result."""
     return {"python": platform.python_version(), **{name: _version(name) for name in names}}
 
 
 def _version(name: str) -> str:
     try:
         return version(name)
-    except PackageNotFoundError:  # whoever needs it says so, and how to install it
+    except PackageNotFoundError:  # the code that needs the package reports that it is missing
         return "not installed"
 
 
 @cache
 def code_digest(*entries: str, package: Path = PACKAGE) -> str:
-    """A hash of the import closure of these modules: their code without docstrings and comments, and its data files.
+    """A hash of modules and everything they import: their code without docstrings and comments, and their data files.
 
-    A room among them stands for all of its modules.
+    A package in `entries` stands for all of its modules.
     """
     known = _modules(package)
     rooms = tuple(f"{entry}." for entry in entries)
@@ -103,15 +103,15 @@ def code_digest(*entries: str, package: Path = PACKAGE) -> str:
 
 
 def imported_by(folder: Path, *, package: Path = PACKAGE) -> list[str]:
-    """The modules of vobench that the Python files of a folder, such as an estimator's, import themselves.
+    """The modules of vobench that the Python files of a folder, for example of an estimator, import directly.
 
-    A name imported from `vobench.plugin`, or from where an earlier release had it, stands for the module it lives in.
-    Tests (`test_*.py`) do not run with the rest, so what they import does not count.
+    A name from `vobench.plugin`, or a retired name, stands for the module that defines it. Tests (`test_*.py`) are not
+    part of the estimator, so they are ignored.
     """
     names = set[str]()
     for path in _files(folder):
         if path.suffix == ".py" and not path.name.startswith("test_"):
-            with suppress(SyntaxError, ValueError):  # whoever runs it says what is wrong with it
+            with suppress(SyntaxError, ValueError):  # an error is reported when the file is run
                 names.update(_module(path.read_bytes()).imports)
     homes = _homes(package)
     names.update([homes[name] for name in names if name in homes])
@@ -120,7 +120,7 @@ def imported_by(folder: Path, *, package: Path = PACKAGE) -> list[str]:
 
 @cache
 def _homes(package: Path) -> dict[str, str]:
-    """The module of each name that `vobench.plugin` offers and of each retired name: `vobench.plugin.se3`, say."""
+    """The module that defines each name of `vobench.plugin` and each retired name, such as `vobench.plugin.se3`."""
     homes = {f"{PLUGIN}.{name}": home.partition(":")[0] for name, home in offered_names(package).items()}
     for module, moved in _table(package / "retired.py", "MOVED").items():
         for name, new_place in moved.items():
@@ -130,12 +130,12 @@ def _homes(package: Path) -> dict[str, str]:
 
 @cache
 def offered_names(package: Path = PACKAGE) -> dict[str, str]:
-    """`HOMES` of `vobench.plugin`, read without importing it: where each name that plugins may import lives."""
+    """The module of each name that plugins may import: `HOMES` of `vobench.plugin`, read without importing it."""
     return _table(package / "plugin.py", "HOMES")
 
 
 def _table(path: Path, name: str) -> dict[str, Any]:
-    """The literal dictionary that a file assigns to a name; the file is not imported."""
+    """The literal dictionary that a file assigns to a name. The file is not imported."""
     if not path.is_file():
         return {}
     for statement in ast.parse(path.read_bytes()).body:
@@ -150,7 +150,7 @@ def _table(path: Path, name: str) -> dict[str, Any]:
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """A module's code as a hash, and all names that may be of modules of vobench it imports, at once or later."""
+    """The hash of a module's code, and all names in it that can be modules of vobench."""
 
     digest: str
     imports: frozenset[str]
@@ -160,9 +160,9 @@ MODULE = TypeAdapter(Module)
 
 
 def closure(entries: Iterable[str], *, package: Path = PACKAGE) -> dict[str, Module]:
-    """All modules that these import, themselves included, by name.
+    """All modules that the given modules import, directly or indirectly, including themselves, by name.
 
-    The package's own file and `vobench.plugin` are none of them: they look names up when these are asked for.
+    `vobench` itself and `vobench.plugin` are excluded, because they import names only on request.
     """
     known = _modules(package)
     modules = dict[str, Module]()
@@ -191,7 +191,7 @@ def _modules(package: Path) -> dict[str, Path]:
 
 @cache
 def _module(source: bytes) -> Module:
-    """The digest and imports of a source, compiled once for all processes; the file that holds them may be missing."""
+    """The digest and imports of a source. The result is cached in a file for all processes."""
     known = cache_folder() / "modules" / hashlib.sha256(READER + source).hexdigest()
     with suppress(OSError, ValueError):
         return MODULE.validate_json(known.read_bytes(), strict=True)
@@ -205,23 +205,23 @@ def _module(source: bytes) -> Module:
 
 
 def _compiled(source: bytes) -> Module:
-    # optimize=2 leaves docstrings out; asserts go too, which change no result.
+    # optimize=2 omits docstrings, and asserts, which do not change results.
     seen_at_runtime = TYPES_ONLY.sub(b"", source)
     bare = _bare(compile(seen_at_runtime, "", "exec", optimize=2, dont_inherit=True))
-    # The second form of marshal has no references, which depend on what else the process holds.
+    # Version 2 of marshal has no references, which would depend on other objects in the process.
     digest = hashlib.sha256(marshal.dumps(bare, 2)).hexdigest()
     imports = {*_imports(bare), *_plugin_names(ast.parse(source))}
     return Module(digest, frozenset(imports))
 
 
 def _bare(code: CodeType) -> CodeType:
-    """The code without its place in the file."""
+    """The code without its file name and line numbers."""
     consts = tuple(_bare(const) if isinstance(const, CodeType) else const for const in code.co_consts)
     return code.replace(co_consts=consts, co_filename="", co_firstlineno=0, co_linetable=b"")
 
 
 def _imports(code: CodeType) -> Iterator[str]:
-    """The dotted names in code, which are modules, and each name that may be imported from one of them."""
+    """The dotted names in code, which are modules, and each name that can be imported from one of them."""
     for name in code.co_names:
         if (name == "vobench" or name.startswith("vobench.")) and name != PLUGIN:
             yield name
@@ -232,9 +232,9 @@ def _imports(code: CodeType) -> Iterator[str]:
 
 
 def _plugin_names(tree: ast.Module) -> set[str]:
-    """The names that a file takes from `vobench.plugin`, each as `vobench.plugin.name`.
+    """The names that a file imports from `vobench.plugin`, each as `vobench.plugin.name`.
 
-    If the module itself is imported, or all of its names by a star, every name in the file may be one of them.
+    If the file imports the module itself, or all names with a star, every name in the file can be one of them.
     """
     imported = set[str]()
     for node in ast.walk(tree):
@@ -246,13 +246,13 @@ def _plugin_names(tree: ast.Module) -> set[str]:
 
 
 def _imported_names(node: ast.Import | ast.ImportFrom) -> set[str]:
-    """The full names that an import statement imports, as in `vobench.plugin.se3`."""
+    """The full names that an import statement imports, such as `vobench.plugin.se3`."""
     module = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
     return {f"{module}{alias.name}" for alias in node.names}
 
 
 def _all_names(tree: ast.Module) -> set[str]:
-    """Every name and attribute in a file, as if each were one of `vobench.plugin`."""
+    """All names and attributes in a file, as if each were a name of `vobench.plugin`."""
     names = set[str]()
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute):

@@ -1,4 +1,4 @@
-"""Run a plan on this machine, or on the workers of a Dask scheduler, from a command line or from Python."""
+"""Runs a plan on this machine or on the workers of a Dask scheduler, for the command line and for Python."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -28,11 +28,11 @@ MOST_JOBS = 8
 
 
 def default_jobs() -> int:
-    """The number in $VOBENCH_JOBS, else one task a core that this process may use, and no more than 8."""
+    """The number of tasks at once: $VOBENCH_JOBS, or the number of cores of this process, at most 8."""
     stated = os.environ.get("VOBENCH_JOBS", "")
     if stated:
         if not stated.isdecimal() or int(stated) < 1:
-            raise InputError(f"VOBENCH_JOBS should be a number of tasks from 1 on, got {stated!r}")
+            raise InputError(f"VOBENCH_JOBS should be a number of tasks, 1 or more, got {stated!r}")
         return int(stated)
     return min(len(os.sched_getaffinity(0)), MOST_JOBS)
 
@@ -51,15 +51,17 @@ def run_plan(
     is_fresh: bool = False,
     require_all: bool = False,
 ) -> "RunFolder":
-    """Perform all tasks of a plan that the cache does not hold, and gather the run's folder below `out`.
+    """Perform all tasks of a plan that are not cached, and write the folder of the run below `out`.
 
-    `recordings` are those of its recorded cases, read here where they are not given; `finish` writes the reports;
-    `jobs` is the number of tasks at once, `default_jobs()` without it; `scheduler` is the address of a Dask scheduler
-    whose workers perform the tasks instead; `task_progress` shows the progress within a task where `jobs` is 1.
+    `recordings` are those of its recorded cases. They are read if they are not given.
+    `finish` writes the reports.
+    `jobs` is the number of tasks at once, by default `default_jobs()`.
+    `scheduler` is the address of a Dask scheduler whose workers perform the tasks instead.
+    `task_progress` shows the progress within a task if `jobs` is 1.
 
-    Raises SuiteError where the plan is not valid, InputError where `out` cannot be written, NoSequenceError where no
-    case could be simulated or imported, or with `require_all` where any could not, MissingDependencyError where this
-    machine lacks a library, and Stopped.
+    Raises SuiteError if the plan is not valid, InputError if `out` cannot be written, NoSequenceError if no case could
+    be simulated or imported, or with `require_all` if any could not, MissingDependencyError if this machine lacks a
+    library, and Stopped.
     """
     from vobench.runner.run import run_suite
 
@@ -99,9 +101,9 @@ def plan_runner(
     finish: "Finish | None" = None,
     task_progress: Progress = SILENT,
 ) -> PlanRunner:
-    """What runs a plan in a new folder below `out` and shows it on a display of its own.
+    """A function that runs a plan in a new folder below `out` and shows its progress on a new display.
 
-    `finish` writes reports into the folder of each run; without it there are none.
+    `finish` writes reports to the folder of each run. Without it, there are no reports.
     """
 
     def run(planned: Plan, /) -> "RunFolder":
@@ -123,9 +125,9 @@ def _no_reports(folder: "RunFolder", scores: "list[TrialScore]") -> None:
 
 
 def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | None = None) -> Path:
-    """Perform those of these tasks that the cache does not hold; the folder of the last one's result.
+    """Perform the tasks that are not cached, and return the folder of the last task's result.
 
-    Raises InputError with the cause where one of them fails, and Stopped.
+    Raises InputError with the cause if one of them fails, and Stopped.
     """
     store = cache_folder().resolve()
     kept = Store(store)
@@ -143,7 +145,7 @@ def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | N
 
 
 def make_executor(jobs: int | None, scheduler: str | None, task_progress: Progress) -> Executor:
-    """The executor that was asked for: Dask's workers, this process for one job, else processes of this machine."""
+    """The requested executor: the workers of Dask, this process for one job, or processes of this machine."""
     if scheduler:
         return Dask(scheduler)
     count = jobs or default_jobs()
@@ -153,7 +155,7 @@ def make_executor(jobs: int | None, scheduler: str | None, task_progress: Progre
 
 
 def typical_seconds(store: Path) -> dict[str, float]:
-    """The median of the seconds that recent tasks of each stage took, for the stages that have been performed."""
+    """The median duration in s of recent tasks of each stage, for stages with recent tasks."""
     noted = Store(store)
     typical: dict[str, float] = {}
     for stage in KINDS:

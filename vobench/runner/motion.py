@@ -1,4 +1,4 @@
-"""The motion of a case's body and its wheels, and the checks that a case can be simulated."""
+"""Computes the motion of a case's body and wheels, and checks whether a case can be simulated."""
 
 import hashlib
 import json
@@ -39,7 +39,7 @@ from vobench.trajectory.trajectory import Stamps
 
 
 def generator(seed: int, stream: str) -> np.random.Generator:
-    """The random stream of a name; its draws depend on no other stream, and on nothing else in a case."""
+    """The random stream with a name. It does not depend on other streams or on the case."""
     digest = hashlib.sha256(stream.encode()).digest()
     stream_number = int.from_bytes(digest[:8], "big")
     return np.random.default_rng([seed, stream_number])
@@ -47,12 +47,12 @@ def generator(seed: int, stream: str) -> np.random.Generator:
 
 ENCODERS_PER_FRAME = 4
 MOST_FRAMES = 200_000  # nearly two hours at 30 Hz
-UP_M = 1e3  # length of the ray that finds the ceiling above
+UP_M = 1e3  # the length of the ray that finds the ceiling
 
 
 @dataclass(frozen=True, slots=True)
 class Rims:
-    """What the encoders measure: angles (M, 2) in rad of the left and right rim at t_ns (M,)."""
+    """The angles (M, 2) in rad of the left and right rim at t_ns (M,), which the encoders measure."""
 
     t_ns: Stamps
     rim_rad: Array
@@ -60,10 +60,11 @@ class Rims:
 
 @dataclass(frozen=True, slots=True)
 class BodyMotion:
-    """A body's motion and the stamps t_ns (N,) of its pictures; `rims` if it has wheels, `drive` if it is controlled.
+    """The motion of a body, and the stamps t_ns (N,) of its pictures.
 
-    All true poses, twists and accelerations come from `motion`, at these stamps or any other. `first` is the index of
-    the first picture that is taken among those of the whole motion.
+    All true poses, twists and accelerations come from `motion`, which can be evaluated at any time.
+    `rims` are those of a body with wheels, and `drive` is that of a body with a controller.
+    `first` is the index of the first picture among the pictures of the whole motion.
     """
 
     motion: Motion
@@ -73,12 +74,12 @@ class BodyMotion:
     first: int = 0
 
     def at_frames(self) -> Kinematics:
-        """Poses and velocities of the body at the stamps of its pictures."""
+        """The poses and velocities of the body at the stamps of its pictures."""
         return self.motion.at(self.t_ns)
 
 
 def body_motion(case: Case) -> BodyMotion:
-    """The motion of the case's body, which is the same for every scene, rig and camera. Raises MotionError."""
+    """The motion of the body of a case, which does not depend on scene, rig and camera. Raises MotionError."""
     whole = _whole_motion(case)
     if case.frames is None:
         return whole
@@ -101,7 +102,7 @@ def _whole_motion(case: Case) -> BodyMotion:
         return BodyMotion(drive.motion, drive.t_ns, rims, drive)
     motion: Motion
     if isinstance(spec, Replay):
-        assert case.replayed is not None  # read with the suite
+        assert case.replayed is not None  # it is read with the suite
         recorded = parse_tum(case.replayed, name=spec.file)
         motion = spec.motion(recorded)
     elif isinstance(spec, Handheld):
@@ -112,9 +113,9 @@ def _whole_motion(case: Case) -> BodyMotion:
 
 
 def recorded_drive(folder: Path) -> Drive:
-    """The drive that a sequence was recorded on, driven again from its case.
+    """The drive of a recorded sequence, which is repeated from its case.
 
-    Raises SequenceError where it has no case, InputError where its body is no Pioneer under control.
+    Raises SequenceError if it has no case, and InputError if its body is not a Pioneer with a controller.
     """
     from vobench.sequence import read_case
 
@@ -129,7 +130,7 @@ def recorded_drive(folder: Path) -> Drive:
 
 
 def _driven(spec: Waypoints | Planar, seed: int) -> Drive:
-    """The drive through its targets or along its path, with the disturbances and slip of the seed."""
+    """The drive to the targets or along the path, with the disturbances and the slip of the seed."""
     rngs = {stream: generator(seed, f"slip.{stream}") for stream in DISTURBANCE_STREAMS}
     if isinstance(spec, Waypoints):
         return spec.drive(rngs)
@@ -137,23 +138,23 @@ def _driven(spec: Waypoints | Planar, seed: int) -> Drive:
 
 
 def stamps(motion: Motion, rate_hz: float, *, per_frame: int = 1) -> Stamps:
-    """Stamps from a motion's start to its end, `per_frame` to a frame, every `per_frame`-th exactly a frame's.
+    """Stamps from the start to the end of a motion. There are `per_frame` per frame; the first is that of the frame.
 
-    Raises MotionError where there would be more than MOST_FRAMES.
+    Raises MotionError if there would be more than MOST_FRAMES frames.
     """
     lasts_s = (motion.end_ns - motion.start_ns) / NS_PER_S
     frames = int(lasts_s * rate_hz + 1e-6)
     if frames > MOST_FRAMES:
-        raise MotionError(f"{lasts_s:.4g} s at {rate_hz:g} Hz are {frames} frames, and {MOST_FRAMES} are the most")
+        raise MotionError(f"{lasts_s:.4g} s at {rate_hz:g} Hz are {frames} frames; at most {MOST_FRAMES} are possible")
     index = np.arange(frames * per_frame + 1)
     since_start_ns = np.rint(index * NS_PER_S / per_frame / rate_hz)
     return since_start_ns.astype(np.int64) + motion.start_ns
 
 
 def _along(spec: Planar, rngs: Generators) -> Drive:
-    """The Pioneer on a path: its point h follows that of an ideal robot.
+    """The drive of the Pioneer along a path. Its point h follows that of an ideal robot.
 
-    If no point ahead of the axle can lead it, it gets the speeds that would take it along the path undisturbed.
+    If no point ahead of the axle can lead it, it gets the speeds that would move it along the path undisturbed.
     """
     ideal = spec.way()
     robot = options(spec, rngs)
@@ -168,7 +169,7 @@ def _along(spec: Planar, rngs: Generators) -> Drive:
 
 
 def _path_of_h(ideal: Motion, t_ns: Stamps, controller: ControllerSettings) -> tuple[Array, Array]:
-    """Positions and velocities (N, 2) in the world of the point h of a body with exactly this motion."""
+    """The positions and velocities (N, 2) in the world of the point h of a body with an ideal motion."""
     T_body_h = se3.transform(np.eye(3), [controller.a_m, 0.0, 0.0])
     h = ideal.at(t_ns).of_mounted(T_body_h)
     R_world_h = h.T_world_body[:, :3, :3]
@@ -177,7 +178,7 @@ def _path_of_h(ideal: Motion, t_ns: Stamps, controller: ControllerSettings) -> t
 
 
 def _fed_forward(motion: Motion, t_ns: Stamps, theta: Theta) -> Array:
-    """References (N, 2) with which the robot of (18) has this motion at t_ns, the middles of its frames."""
+    """The references (N, 2) for which the robot of eq. (18) has this motion at t_ns, the middles of its frames."""
     ideal = motion.at(t_ns)
     u = ideal.velocity_mps[:, 0]
     omega = ideal.angular_velocity_radps[:, 2]
@@ -187,7 +188,7 @@ def _fed_forward(motion: Motion, t_ns: Stamps, theta: Theta) -> Array:
 
 
 def _rolling(spec: Planar) -> BodyMotion:
-    """A body whose wheels move exactly as commanded; a car moves as its steering allows."""
+    """The motion of a body whose wheels move exactly as commanded. A car moves as its steering allows."""
     path = spec.way()
     encoder_t_ns = stamps(path, spec.rate_hz, per_frame=ENCODERS_PER_FRAME)
     motion: Motion = path
@@ -198,7 +199,7 @@ def _rolling(spec: Planar) -> BodyMotion:
 
 
 def cut(planned: Plan, frames: int) -> Plan:
-    """The plan with at most so many frames of each simulated case; recordings stay whole.
+    """The plan with at most `frames` frames of each simulated case. Recordings are not cut.
 
     Raises SuiteError if a body cannot follow its trajectory.
     """
@@ -213,7 +214,7 @@ def cut(planned: Plan, frames: int) -> Plan:
 
 
 def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotion]:
-    """The motion of each trajectory of a plan, by its name, before anything is rendered.
+    """The motion of each trajectory of a plan, by name. Nothing is rendered.
 
     Raises SuiteError with all mistakes: a target cannot be reached and, if cases `are_checked`, a trajectory ends
     within a frame, a camera leaves the room, its pictures take longer than a frame, or an IMU would feel the noise of
@@ -232,12 +233,12 @@ def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotio
 
 
 def check_cases(cases: Sequence[Case], motion: BodyMotion, mistakes: Mistakes) -> None:
-    """Collect the mistakes for which these cases of one trajectory, of this motion, cannot be simulated."""
+    """Collect the mistakes because of which cases with this trajectory cannot be simulated."""
     with mistakes.at(*_place_in_suite(cases[0], "trajectory")):
         if len(motion.t_ns) < 2:
             raise MotionError(
-                f"the way ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows no "
-                "motion; go further, more slowly or with a higher rate_hz"
+                f"the trajectory ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows "
+                "no motion; go further, more slowly or with a higher rate_hz"
             )
     for case, *_ in _by(cases, "scene", "rig").values():
         with mistakes.at(*_place_in_suite(case, "trajectory")):
@@ -253,14 +254,14 @@ AXIS_KEYS = {"trajectory": "trajectories", "camera": "cameras"}
 
 
 def _place_in_suite(case: Case, axis: str) -> tuple[str, str]:
-    """The key and name under which a suite has the variant of a case on this axis."""
+    """The key and the name of the variant of a case on an axis, as they are in the suite."""
     if case.scenario:
         return "scenarios", case.scenario
     return AXIS_KEYS[axis], case.variant[axis]
 
 
 def _by(cases: Sequence[Case], *axes: str) -> dict[str, list[Case]]:
-    """The cases of each combination of variants on these axes."""
+    """The cases of each combination of variants on some axes."""
     groups = dict[str, list[Case]]()
     for case in cases:
         combination = " ".join(case.variant[axis] for axis in axes)
@@ -303,7 +304,7 @@ def _check_fits_frame(case: Case) -> None:
 
 
 def _check_clear(case: Case, motion: BodyMotion) -> None:
-    """Raise MotionError if a camera leaves the room, starts inside a thing or moves through one."""
+    """Raise MotionError if a camera leaves the room, starts inside of a thing or moves through one."""
     rig = case.build_rig()
     scene = case.build_scene()
     T_world_body = motion.at_frames().T_world_body
@@ -313,7 +314,7 @@ def _check_clear(case: Case, motion: BodyMotion) -> None:
 
 
 def _check_path(case: Case, scene: Scene, motion: BodyMotion, positions_m: Array) -> None:
-    """Raise MotionError if a camera at these positions (N, 3) leaves the room or meets a thing."""
+    """Raise MotionError if a camera at positions (N, 3) leaves the room or collides with a thing."""
     room = case.scene.room
     if room:
         is_outside = ~room.holds(positions_m / case.scene.scale)
@@ -331,7 +332,7 @@ def _check_path(case: Case, scene: Scene, motion: BodyMotion, positions_m: Array
 def _check_things(
     case: Case, motion: BodyMotion, positions_m: Array, things: tuple[Thing, ...], relative_m: Array
 ) -> None:
-    """Raise MotionError if a path, relative_m (N, 3) in the things' frame, goes through one of them."""
+    """Raise MotionError if a path, `relative_m` (N, 3) in the frame of the things, goes through one of them."""
     if not things:
         return
     met_faces = _met_faces(things, relative_m)
@@ -344,9 +345,10 @@ def _check_things(
 
 
 def _met_faces(things: tuple[Thing, ...], positions_m: Array) -> NDArray[np.int32]:
-    """The face (N,) that each step to a position (N, 3) goes through, -1 for none.
+    """The face (N,) through which each step to a position (N, 3) goes; -1 for none.
 
-    The entry of the first position is the back of the face straight above it, which only a start inside a thing sees.
+    For the first position, it is the face straight above if its back is visible, which means that the position is
+    inside of a thing.
     """
     faces, caster = _faces_and_caster(things)
     upwards_m = [[0.0, 0.0, UP_M]]
@@ -362,14 +364,14 @@ def _met_faces(things: tuple[Thing, ...], positions_m: Array) -> NDArray[np.int3
 
 @lru_cache(maxsize=8)
 def _faces_and_caster(things: tuple[Thing, ...]) -> tuple[Triangles, RayCaster]:
-    """The faces of things in one frame, and rays against them; cached, since many cases share a scene."""
+    """The faces of things and their ray caster. They are cached, because many cases share a scene."""
     no_index = [-1] * len(things)
     faces = table(things, no_index, no_index)
     return faces, RayCaster(faces, np.arange(len(faces)))
 
 
 def _refuse(case: Case, motion: BodyMotion, positions_m: Array, is_wrong: NDArray[np.bool_], what: str) -> None:
-    """Raise MotionError for the first instant at which a camera is where it cannot be."""
+    """Raise MotionError for the first instant at which a camera is at an impossible position."""
     if is_wrong.any():
         first = int(np.argmax(is_wrong))
         position = ", ".join(f"{x:.2f}" for x in positions_m[first])

@@ -1,4 +1,4 @@
-"""How an analysis has a plan run, whoever runs it: a terminal, a notebook, a test."""
+"""The interface by which an analysis runs a plan, for example on a terminal, in a notebook or in a test."""
 
 from typing import Protocol
 
@@ -7,10 +7,10 @@ from vobench.suite.plan import Plan
 
 
 class PlanRunner(Protocol):
-    """Runs every trial of a plan: makes its sequences, runs its estimators and scores them.
+    """Runs all trials of a plan: creates the sequences, runs the estimators and scores them.
 
-    Where runs are stored, how many tasks run at once, which reports are written and how progress is shown is up to
-    the implementation. It reads the recordings of `plan.recorded` itself (`import_recording.read_all`).
+    The implementation decides where runs are stored, how many tasks run at once, which reports are written, and how
+    progress is shown. It reads the recordings of `plan.recorded` itself (`import_recording.read_all`).
     """
 
     def __call__(self, plan: Plan, /) -> RunFolder:

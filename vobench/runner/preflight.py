@@ -1,4 +1,4 @@
-"""What is known of a plan before anything is made: what is wrong with it, its cases, and the work that is left."""
+"""Checks a plan before it is run: its mistakes, its cases, and the remaining work."""
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
@@ -31,7 +31,7 @@ class Preflight:
 
 @dataclass(frozen=True, slots=True)
 class CaseSummary:
-    """A case before it is made. `notes` is None for a simulated case, and lists the assumptions of an import."""
+    """A case before it is created. `notes` are the assumptions of an import, and None for a simulated case."""
 
     case: str
     frames: int
@@ -41,7 +41,7 @@ class CaseSummary:
     notes: tuple[str, ...] | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The fields that apply, as JSON has them."""
+        """The fields that apply, as plain JSON values."""
         content = asdict(self)
         notes = content.pop("notes")
         return content if notes is None else {**content, "notes": list(notes)}
@@ -68,29 +68,31 @@ class PlanSummary:
         """Each estimator with its version, the sensors that it needs, and its folder."""
         return [
             {
-                "estimator": entrant.label,
-                "version": entrant.manifest.version,
-                "needs": list(entrant.manifest.needs),
-                "path": str(entrant.folder),
+                "estimator": estimator_entry.label,
+                "version": estimator_entry.manifest.version,
+                "needs": list(estimator_entry.manifest.needs),
+                "path": str(estimator_entry.folder),
             }
-            for entrant in self.plan.entrants
+            for estimator_entry in self.plan.estimator_entries
         ]
 
     def found(self) -> list[dict[str, str]]:
-        """The scenes and estimators that the suite's names stand for."""
+        """The scenes and estimators to which the names in the suite refer."""
         return [
             {"kind": entry.kind, "name": entry.name, "origin": entry.origin, "path": str(entry.path)}
             for entry in self.plan.found
         ]
 
     def tasks(self) -> list[dict[str, Any]]:
-        """Stage by stage: how many tasks there are, how many are to do and why, and an estimate of the seconds."""
-        return [
-            {**asdict(stage), IN_CACHE: stage.tasks - stage.to_do, "to do": stage.to_do} for stage in self.stages or ()
-        ]
+        """For each stage: the number of tasks, how many must be performed and why, and the estimated seconds."""
+        rows = []
+        for stage in self.stages or ():
+            in_cache = stage.tasks - stage.to_do
+            rows.append({**asdict(stage), IN_CACHE: in_cache, "to do": stage.to_do})
+        return rows
 
     def as_dict(self) -> dict[str, Any]:
-        """All of it, as JSON has it."""
+        """The summary as plain JSON values."""
         content = {
             "suite": self.plan.suite.name,
             "cases": [case.as_dict() for case in self.cases],
@@ -105,10 +107,9 @@ class PlanSummary:
 
 
 def preflight(planned: Plan, *, only_missing: bool = False) -> Preflight:
-    """Compute the motion of every simulated case, and read what every recorded case needs.
+    """Compute the motion of all simulated cases, and read the recordings of all recorded cases.
 
-    With `only_missing`, cases whose sequence is in the cache are taken to be valid. Raises SuiteError, which lists
-    all that is wrong.
+    With `only_missing`, cases whose sequence is cached are not checked. Raises SuiteError with all mistakes.
     """
     wrong = planned.mistakes()
     motions: dict[str, BodyMotion] = {}
@@ -128,9 +129,9 @@ def preflight(planned: Plan, *, only_missing: bool = False) -> Preflight:
 
 
 def summarize(planned: Plan, *, with_stages: bool = False) -> PlanSummary:
-    """Validate a plan and say what it comes to; with_stages also counts the work that is left.
+    """Validate a plan, and summarise it. With `with_stages`, the remaining work is counted, too.
 
-    Raises SuiteError, which lists all that is wrong.
+    Raises SuiteError with all mistakes.
     """
     checked = preflight(planned)
     cases = tuple(_case_summary(case, checked) for case in planned.cases)
@@ -145,7 +146,7 @@ def summarize(planned: Plan, *, with_stages: bool = False) -> PlanSummary:
 
 
 def is_in_cache(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> bool:
-    """Whether the sequence of a case has been made."""
+    """Whether the sequence of a case is cached."""
     return is_done(sequence_tasks(case, recordings)[-1], cache_folder())
 
 

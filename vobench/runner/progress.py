@@ -1,4 +1,4 @@
-"""What a person is shown of a run while it goes on: the tasks by stage, the share that is done, the time left."""
+"""The progress of a run: the tasks by stage, the finished share, and the remaining time."""
 
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
@@ -11,37 +11,37 @@ if TYPE_CHECKING:
     from vobench.runner.task import Task
 
 
-LEAST_CONCURRENCY = 0.1  # tasks at once, so that one slow start does not promise hours
+LEAST_CONCURRENCY = 0.1  # the smallest number of tasks at once, so that a slow start does not predict hours
 
 
 class RunDisplay(Protocol):
-    """Shows a run to whoever started it; entered before the first task and left after the last."""
+    """Shows a run to the user. It is entered before the first task and exited after the last one."""
 
     def __enter__(self) -> Self:
-        """Start to show it."""
+        """Start to show the run."""
 
     def __exit__(self, *exception: object) -> None:
-        """Stop to show it."""
+        """Stop to show the run."""
 
     def begin(self, tasks: "Sequence[Task]", seconds: Mapping[str, float]) -> None:
-        """Take the tasks that are to be performed, and the typical seconds of a task of each stage, where known."""
+        """Get the tasks that will be performed, and the typical seconds of a task of each stage, if known."""
 
     def hear(self, event: "TaskEvent") -> None:
-        """Take the news of one task."""
+        """Handle an event of a task."""
 
     def say(self, sentence: str) -> None:
-        """Show a sentence of its own."""
+        """Show a sentence."""
 
 
 class RunProgress:
-    """How far a run has come, from the events of its tasks.
+    """The progress of a run, from the events of its tasks.
 
-    The seconds that a task takes are the mean over finished tasks of its stage in this run, else the typical seconds
-    of earlier runs. Without either for some stage that is still to do, the time left is not known.
+    The duration of a task is the mean over finished tasks of its stage in this run, or the typical duration in earlier
+    runs. If neither is known for a remaining stage, the remaining time is unknown.
     """
 
     def __init__(self, tasks: "Sequence[Task]" = (), typical_s: Mapping[str, float] = MappingProxyType({})) -> None:
-        """No task is done yet. `typical_s` are the seconds of a task of each stage in earlier runs, where known."""
+        """Begin without finished tasks. `typical_s` has the durations of tasks of each stage in earlier runs."""
         self._stages = {task.key: task.stage for task in tasks}
         self._dependents: dict[str, list[str]] = defaultdict(list)
         for task in tasks:
@@ -52,7 +52,7 @@ class RunProgress:
         self._taken_s: dict[str, list[float]] = defaultdict(list)
 
     def count(self, event: "TaskEvent") -> None:
-        """Take the news of one task. A failed task takes those that need it with it."""
+        """Handle an event of a task. If a task fails, the tasks that need it end, too."""
         task = event.task
         if event.what == "done":
             self._ended.add(task.key)
@@ -68,17 +68,17 @@ class RunProgress:
 
     @property
     def finished(self) -> int:
-        """The number of tasks that have ended, well or not."""
+        """The number of tasks that have ended, successfully or not."""
         return len(self._ended)
 
     @property
     def planned(self) -> int:
-        """The number of tasks in all."""
+        """The total number of tasks."""
         return len(self._stages)
 
     @property
     def share(self) -> float:
-        """The share of the work that is done, from 0 to 1: by seconds where they are known, else by tasks."""
+        """The share of the work that is done, from 0 to 1, by time if durations are known, and otherwise by tasks."""
         all_s = self._work_s(self._stages)
         done_s = self._work_s(self._ended)
         if all_s and done_s is not None:
@@ -86,12 +86,12 @@ class RunProgress:
         return self.finished / self.planned if self.planned else 1.0
 
     def left_s(self, elapsed_s: float) -> float | None:
-        """The seconds left, `elapsed_s` after the start; None where too little is done to tell."""
+        """The remaining seconds, `elapsed_s` after the start; None if they are unknown."""
         work_left_s = self._work_s(self._stages.keys() - self._ended)
         if work_left_s is None:
             return None
         done_s = sum(sum(taken) for taken in self._taken_s.values())
-        # How many tasks have run at once, on the average.
+        # The mean number of tasks that have run at once.
         concurrency = done_s / elapsed_s if elapsed_s > 0 and done_s > 0 else 1.0
         return work_left_s / max(concurrency, LEAST_CONCURRENCY)
 
@@ -105,7 +105,7 @@ class RunProgress:
         return " · ".join(parts)
 
     def _work_s(self, keys: Iterable[str]) -> float | None:
-        """The seconds that these tasks take, one after the other; None where that is not known."""
+        """The total duration of tasks in s; None if it is unknown."""
         total_s = 0.0
         for stage, count in Counter(self._stages.get(key, "") for key in keys).items():
             each_s = self._task_s(stage)
@@ -120,7 +120,7 @@ class RunProgress:
 
 
 def spell_time(seconds: float) -> str:
-    """Seconds as minutes and seconds, or hours where there are some: ``0:40``, ``1:05:00``."""
+    """Seconds as minutes and seconds, with hours if necessary: ``0:40``, ``1:05:00``."""
     whole = round(seconds)
     minutes, rest = divmod(whole, 60)
     hours, minutes = divmod(minutes, 60)

@@ -1,4 +1,4 @@
-"""Scores recomputed from estimates and ground truths, for results that come from somebody else."""
+"""Recomputes scores from estimates and ground truths, for results of other people."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -27,13 +27,13 @@ from vobench.suite.yaml_file import checked
 from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Trajectory
 
-# Another machine's arithmetic may differ in the last digits.
+# The last digits can differ between machines.
 RELATIVE = 1e-6
 ABSOLUTE = 1e-9
 SAME_TRUTH_M = 1e-6
-# Statuses that follow from the estimate; the cause of a crash is in no trajectory.
+# The statuses that follow from the estimate. The cause of a crash does not.
 OF_ESTIMATE = (*SURVIVED, "lost", "diverged")
-# Settings of a case that its path does not depend on.
+# The settings of a case on which its path does not depend.
 NOT_OF_PATH = ("name", "variant", "scene", "lighting")
 VALUE_LETTERS = 60
 
@@ -42,8 +42,8 @@ VALUE_LETTERS = 60
 class Rescored:
     """A trial with its recomputed score.
 
-    `differs` names the first value that the run states differently, empty if all agree. `claimed` is the reason why
-    the score cannot be recomputed; `score` is then what the run states, and should not be ranked.
+    `differs` names the first value that differs from the stored one; empty if all agree. `claimed` is the reason why
+    the score cannot be recomputed. `score` is the stored score then, and should not be ranked.
     """
 
     score: TrialScore
@@ -53,7 +53,7 @@ class Rescored:
 
 @dataclass(frozen=True, slots=True)
 class RescoredRun:
-    """The trials of a run that may be ranked, rescored, those that only claim a score, and notes on differences."""
+    """The rescored trials of a run, the trials whose score cannot be recomputed, and notes on differences."""
 
     scores: list[TrialScore]
     claimed: list[Rescored]
@@ -61,7 +61,7 @@ class RescoredRun:
 
 
 def check(folder: RunFolder, wrong_truths: Mapping[str, str] = MappingProxyType({})) -> RescoredRun:
-    """Score a run again, as `rescored` does. Raises InputError if the folder is not a run, or nothing can be scored."""
+    """Score a run again with `rescored`. Raises InputError if the folder is not a run, or if nothing can be scored."""
     trials = list(rescored(folder, wrong_truths))
     claimed = [trial for trial in trials if trial.claimed]
     ranked = [trial.score for trial in trials if not trial.claimed]
@@ -83,8 +83,8 @@ def _named(score: TrialScore) -> str:
 def rescored(folder: RunFolder, wrong_truths: Mapping[str, str] = MappingProxyType({})) -> Iterator[Rescored]:
     """Score every trial of a run again.
 
-    `wrong_truths` has the reason, by the names of cases, why their ground truth cannot be trusted. A failure that does
-    not follow from the estimate stays one. Raises InputError if the folder is not a run.
+    `wrong_truths` maps the names of cases to the reason why their ground truth cannot be trusted. A failure that does
+    not follow from the estimate is kept. Raises InputError if the folder is not a run.
     """
     for stated in folder.scores():
         stop.check()
@@ -141,7 +141,7 @@ def _why_not_scored(stated: TrialScore, truth: Path, estimate: Path) -> str:
 
 
 def _as_json(scored: Score | None) -> dict[str, Any] | None:
-    """A score as it is read from JSON."""
+    """A score as plain JSON values."""
     if scored is None:
         return None
     content: dict[str, Any] = json.loads(json.dumps(scored.as_dict()))
@@ -151,7 +151,7 @@ def _as_json(scored: Score | None) -> dict[str, Any] | None:
 def _status(
     stated: TrialScore, est: Trajectory, gt: Trajectory, scored: Score | None, rows: list[dict[str, str]]
 ) -> tuple[str, str]:
-    """The status of the trial and its reason, recomputed if they follow from the estimate."""
+    """The status and the reason of a trial, which are recomputed if they follow from the estimate."""
     if stated.status not in OF_ESTIMATE:
         return stated.status, stated.reason
     dropped = [int(row["t_ns"]) for row in rows if row.get("status") == DROPPED]
@@ -163,7 +163,7 @@ def _status(
 def _consistency(
     trial: Path, gt: Trajectory, est: Trajectory, scored: Score | None, rows: list[dict[str, str]]
 ) -> CovarianceConsistency | None:
-    """The consistency of the covariances; the start is that of the frames, which a bundle has."""
+    """The consistency of the covariances. The start is taken from the table of frames, which a bundle contains."""
     if not (trial / COVARIANCE).is_file():
         return None
     stamps = [int(row["t_ns"]) for row in rows]
@@ -172,7 +172,7 @@ def _consistency(
 
 
 def _frame_difference(rows: list[dict[str, str]], scored: Score | None) -> str:
-    """The first error in the table of frames that is not that of the estimate; empty if there is none."""
+    """The first error in the table of frames that differs from that of the estimate; empty if there is none."""
     if scored is None:
         return ""
     errors_m = dict(zip(scored.gt_t_ns.tolist(), scored.ate_trans_m.tolist(), strict=True))
@@ -187,7 +187,7 @@ def _frame_difference(rows: list[dict[str, str]], scored: Score | None) -> str:
 
 
 def _difference(stated: Any, computed: Any, place: str = "") -> str:
-    """The first place at which two JSON values differ by more than rounding; empty if there is none."""
+    """The first place at which two JSON values differ by more than rounding errors; empty if there is none."""
     for name, stated_part, computed_part in _parts(stated, computed):
         difference = _difference(stated_part, computed_part, f"{place} {name}".strip())
         if difference:
@@ -198,14 +198,14 @@ def _difference(stated: Any, computed: Any, place: str = "") -> str:
 
 
 def _are_containers(stated: Any, computed: Any) -> bool:
-    """Whether both are objects, or both are lists of one length: then their parts are compared."""
+    """Whether two values are both objects, or both lists of the same length, so that their parts are compared."""
     if isinstance(stated, dict) and isinstance(computed, dict):
         return True
     return isinstance(stated, list) and isinstance(computed, list) and len(stated) == len(computed)
 
 
 def _parts(stated: Any, computed: Any) -> Iterator[tuple[Any, Any, Any]]:
-    """Name and values of the parts of two containers; an entry of a list that has a name is called by it."""
+    """The names and values of the parts of two containers. List entries with a name are identified by it."""
     if not _are_containers(stated, computed):
         return
     if isinstance(stated, dict):
@@ -228,7 +228,7 @@ def _is_number(value: Any) -> bool:
 
 
 def brief_value(value: Any) -> str:
-    """A JSON value in a few characters."""
+    """A JSON value as a short text."""
     if isinstance(value, dict | list):
         return f"{len(value)} entries"
     if isinstance(value, float):
@@ -237,10 +237,10 @@ def brief_value(value: Any) -> str:
 
 
 def wrong_truths(folder: RunFolder) -> dict[str, str]:
-    """The reason, by name, for each simulated case of a run whose ground truth is not the path of its settings.
+    """The simulated cases of a run whose ground truth does not follow from their settings, and the reasons, by name.
 
-    Nothing is drawn, and nothing of a scene is executed. The truth of recordings cannot be checked, nor that of cases
-    that another version of vobench wrote.
+    Nothing is rendered, and no code of a scene is executed. The truth of recordings, and of cases that another version
+    of vobench wrote, cannot be checked.
     """
     wrong = {}
     paths: dict[str, Trajectory] = {}
@@ -260,7 +260,7 @@ def wrong_truths(folder: RunFolder) -> dict[str, str]:
             if key not in paths:
                 paths[key] = _true_path(case)
         except (VobenchError, OSError, ValueError, LookupError, AssertionError):
-            continue  # such as a camera file of another machine
+            continue  # for example, a camera file is on another machine
         if not _is_same(stated, paths[key]):
             wrong[place.name] = f"its {GROUND_TRUTH} is not the path that its {CASE} gives"
     return wrong
@@ -282,7 +282,7 @@ def _settings_of_path(path: Path) -> dict[str, Any]:
 
 
 def _true_path(case: Case) -> Trajectory:
-    """The left camera's true path that a case is scored against."""
+    """The true path of the left camera against which a case is scored."""
     motion = body_motion(case)
     frames = frames_of(case, motion)
     T_world_body = motion.at_frames().T_world_body[frames.index]

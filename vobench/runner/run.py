@@ -1,4 +1,4 @@
-"""A run of a suite: its tasks are performed, and the files for people are gathered in one folder."""
+"""Runs a suite: performs its tasks, and writes the results to one folder."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
@@ -39,7 +39,7 @@ from vobench.runner.store import Store, Tell, write_json
 from vobench.runner.task import Task, missing, plan
 from vobench.sequence import read_import_notes
 from vobench.suite.case import Case
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.plan import Plan
 from vobench.suite.source import RecordedCase
 from vobench.suite.yaml_file import plain
@@ -51,7 +51,7 @@ Finish = Callable[[RunFolder, list[TrialScore]], None]
 OF_ESTIMATE = (ESTIMATE, TRACKS, LOG, TIMES)
 OF_SCORE = (SCORE, FRAMES)
 OPTIONAL = (COVARIANCE, REVISED)
-# Remedies if a sequence could not be made; the sentence of a refusal has its own.
+# The remedies for sequences that could not be created. A refusal contains its own remedy.
 REMEDIES: dict[str, str] = {
     "crashed": " (`vobench doctor` checks what this machine lacks)",
     "out_of_memory": " (run fewer tasks at once, as with --jobs 1)",
@@ -76,17 +76,19 @@ def run_suite(
     heard: Callable[[TaskEvent], object] = lambda _: None,
     tell: Tell = lambda _: None,
 ) -> RunFolder:
-    """Run every case, estimator and repeat; results that the store holds are reused.
+    """Run all cases, estimators and repeats. Results in the store are reused.
 
-    `finish` adds reports to the folder before it gets its final name under `root`. A trial that fails has a row that
-    says why. A case that could not be simulated or imported is in the folder's `unmade()`; its trials have the status
-    `no_sequence` and count for no estimator. `is_fresh` ignores what the store holds. `begin` is given the
-    tasks that are to be performed. `executor`, `shares_time` (which the suite may ask for itself) and `heard` are
-    those of `perform_all`; `tell` is called with sentences about the store, such as that a result was damaged, and
-    about folders that the user names for the sandbox, but that it does not open.
+    `finish` adds reports to the folder before it gets its final name below `root`.
+    `is_fresh` ignores results in the store.
+    `begin` is called with the tasks that will be performed.
+    `executor`, `shares_time` (which the suite can also set) and `heard` are those of `perform_all`.
+    `tell` is called with sentences about the store, for example about a damaged result, and about folders that the
+    sandbox does not open.
+    A trial that fails has a row with the reason. A case that could not be simulated or imported is in `unmade()` of the
+    folder. Its trials have the status `no_sequence`, and count for no estimator.
 
-    Raises NoSequenceError, and makes no folder, if no case could be simulated or imported; with `require_all`, if any
-    could not. Raises MissingDependencyError if a library is missing and InputError if the disk is full.
+    Raises NoSequenceError, and creates no folder, if no case could be simulated or imported; with `require_all`, if any
+    could not. Raises MissingDependencyError if a library is missing, and InputError if the disk is full.
     """
     require_held()
     if unopened := note_on_unopened():
@@ -117,7 +119,7 @@ def run_suite(
 
 
 class _Gathering:
-    """The results of a run in the store, and how they are gathered in its folder."""
+    """Copies the results of a run from the store to its folder."""
 
     def __init__(self, suite: Plan, store: Path, scores: Sequence[Task], failures: Mapping[str, TaskOutcome]) -> None:
         self._store = store
@@ -125,7 +127,7 @@ class _Gathering:
         self._failures = failures
         self._cases = {case.name: case for case in suite.cases}
         self._unmade = _unmade(scores, failures)
-        estimators = [_entrant_facts(entrant) for entrant in suite.entrants]
+        estimators = [_estimator_facts(entry) for entry in suite.estimator_entries]
         self.identity = {"suite": plain(suite.suite), "estimators": estimators}
 
     def require_sequences(self, *, require_all: bool) -> None:
@@ -134,7 +136,7 @@ class _Gathering:
         _require_sequences(self._unmade, cases, require_all=require_all)
 
     def write(self, folder: RunFolder, *, timed: str) -> list[TrialScore]:
-        """Write the files of the run, its cases and its trials; the score of each trial."""
+        """Write the files of the run, its cases and its trials, and return the scores of the trials."""
         origin = joined(read_origin(self._store / task.key) for task in self._scores)
         write_json(folder.path / SUITE, self.identity["suite"])
         write_json(folder.path / ESTIMATORS, self.identity["estimators"])
@@ -142,7 +144,7 @@ class _Gathering:
         return [_gather(task, self._cases, self._store, folder, self._failure(task)) for task in self._scores]
 
     def _failure(self, task: Task) -> "_Failure | None":
-        """Why a trial has no score; None if it has one."""
+        """The failure of a trial without a score; None if it has one."""
         unmade = self._unmade.get(task.inputs["case"])
         if unmade:
             return unmade
@@ -154,7 +156,7 @@ class _Gathering:
 
 @dataclass(frozen=True, slots=True)
 class _Failure:
-    """The status and the reason of a trial without a score, and the stack of a process that a fault ended."""
+    """The status and the reason of a trial without a score, and the stack of a process that ended by a fault."""
 
     status: TrialStatus
     reason: str
@@ -162,7 +164,7 @@ class _Failure:
 
 
 def _unmade(scores: Iterable[Task], failures: Mapping[str, TaskOutcome]) -> dict[str, _Failure]:
-    """The failure of each case whose sequence could not be made, by the case's name."""
+    """The failures of cases without a sequence, by name."""
     unmade = dict[str, _Failure]()
     for task in scores:
         sequence, _ = task.needs
@@ -192,7 +194,7 @@ def _require_sequences(unmade: Mapping[str, _Failure], cases: Collection[str], *
 def _gather(
     task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, folder: RunFolder, failure: _Failure | None
 ) -> TrialScore:
-    """Copy a trial's files from the store, and before its case's first trial those of the case."""
+    """Copy the files of a trial from the store, and before the first trial of a case, those of the case."""
     stop.check()
     sequence, estimate = (store / key for key in task.needs)
     case = task.inputs["case"]
@@ -243,7 +245,7 @@ def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> Non
     is_made = sequence.is_dir()
     settings = plain(case)
     if is_made and isinstance(case, RecordedCase):
-        settings["import"] = read_import_notes(sequence)  # all that the import assumed, converted or dropped
+        settings["import"] = read_import_notes(sequence)  # what the import assumed, converted or dropped
     write_json(target / CASE, settings)
     if not is_made:
         return
@@ -253,14 +255,14 @@ def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> Non
     (target / SEQUENCE).symlink_to(sequence.resolve())
 
 
-def _entrant_facts(entrant: EstimatorEntry) -> dict[str, Any]:
-    manifest = entrant.manifest
+def _estimator_facts(estimator_entry: EstimatorEntry) -> dict[str, Any]:
+    manifest = estimator_entry.manifest
     return {
-        "label": entrant.label,
+        "label": estimator_entry.label,
         "name": manifest.name,
         "version": manifest.version,
-        "params": entrant.params,
-        "limits": asdict(entrant.limits),
-        "mode": entrant.mode,
-        "code": folder_digest(entrant.folder),
+        "params": estimator_entry.params,
+        "limits": asdict(estimator_entry.limits),
+        "mode": estimator_entry.mode,
+        "code": folder_digest(estimator_entry.folder),
     }

@@ -1,4 +1,4 @@
-"""One picture of a scene from a camera anywhere in it, and the ground truth of its pixels."""
+"""Renders one picture of a scene from any camera pose, with per-pixel ground truth."""
 
 from collections.abc import Mapping
 from contextlib import closing
@@ -31,20 +31,20 @@ from vobench.suite.suite_spec import Rendering
 from vobench.suite.white import white_of
 from vobench.trajectory.nanoseconds import NS_PER_S
 
-LATEST_S = 1e9  # stamps are 64 bits of nanoseconds
-# Flow and occlusion are of one picture and the next.
+LATEST_S = 1e9  # stamps are nanoseconds in 64 bits
+# Flow and occlusion need the next picture.
 STILL_CHANNELS = tuple(name for name in CHANNELS if name not in {"flow", "occlusion"})
 
 
 @dataclass(frozen=True, slots=True)
 class ScenePicture:
-    """A picture (H, W, 3) uint8 of red, green and blue, and each channel of its ground truth by name."""
+    """An RGB picture (H, W, 3) uint8, and the channels of its ground truth by name."""
 
     rgb: Grey
     truth: Mapping[str, NDArray[Any]]
 
     def save(self, path: Path) -> list[Path]:
-        """Write the picture as PNG, and beside it a picture of each channel and all their values in one .npz.
+        """Write the picture as PNG, a picture of each channel beside it, and the values of all channels as one .npz.
 
         Returns the files that were written.
         """
@@ -76,26 +76,26 @@ def render_scene(
     with_truth: bool = False,
     progress: Progress = SILENT,
 ) -> ScenePicture:
-    """Draw one picture of a scene; its light is computed unless it is in the cache.
+    """Render one picture of a scene. Its light is computed unless it is cached.
 
     Args:
         scene: the scene's name, or the path of its file or model.
         camera: the rig preset whose left lens is used.
-        at_m: where the camera stands, in the world.
-        yaw_deg: where it looks: 0 along x, 90 along y.
-        pitch_deg: how far below the horizon it looks.
-        time_s: when; lights and things may move.
+        at_m: the position of the camera in the world.
+        yaw_deg: the direction in which it looks: 0 is along x, 90 along y.
+        pitch_deg: the angle by which it looks below the horizon.
+        time_s: the time of the picture, because lights and things can change.
         sensor: the chip behind the lens.
         gain: multiplies the exposure.
         engine: raster, path (Mitsuba's path tracer) or pyrender (stock pyrender).
-        samples: light paths per pixel, for the engine path alone.
-        with_truth: whether depth, ids and the other channels of one picture are computed, too.
-        progress: shows how the light is computed.
+        samples: light paths per pixel, only for the engine path.
+        with_truth: whether depth, ids and other channels of the picture are computed, too.
+        progress: shows the computation of the light.
 
     Raises:
         UnknownNameError: no scene, camera or sensor has that name.
-        InputError: a setting is wrong, or the camera stands outside the room.
-        MissingDependencyError: this machine cannot draw.
+        InputError: a setting is wrong, or the camera is outside of the room.
+        MissingDependencyError: this machine cannot render.
     """
     rendering = _rendering(engine, samples)
     require_known("camera", camera, PRESETS)
@@ -125,7 +125,7 @@ def render_scene(
 
 
 def _rendering(engine: str, samples: int | None) -> Rendering:
-    """The engine. Raises InputError for one that is not known, and for samples that it does not take."""
+    """The settings of an engine. Raises InputError for an unknown engine, or for samples that it does not use."""
     try:
         return Rendering(engine=engine, samples=samples)
     except SettingError as error:
@@ -134,9 +134,9 @@ def _rendering(engine: str, samples: int | None) -> Rendering:
 
 
 def _pose(at_m: Triple, yaw_deg: float, pitch_deg: float, time_s: float) -> tuple[Array, int]:
-    """The camera's pose T_world_camera (4, 4) and instant in ns.
+    """The pose T_world_camera (4, 4) and the time in ns of the camera.
 
-    Raises InputError where one is not finite, or where a stamp cannot hold the time.
+    Raises InputError if a value is not finite, or if the time is too large for a stamp.
     """
     for option, value in (("--yaw", yaw_deg), ("--pitch", pitch_deg), ("--time", time_s)):
         if not np.isfinite(value):
@@ -149,7 +149,7 @@ def _pose(at_m: Triple, yaw_deg: float, pitch_deg: float, time_s: float) -> tupl
 
 
 def _exposed(radiance: Radiance, camera: CameraSettings) -> Grey:
-    """Red, green and blue (H, W, 3) uint8, each on a chip of its own behind a prism."""
+    """The RGB picture (H, W, 3) uint8 of a camera with a separate chip for each colour."""
     pattern_rng, shot_rng, read_rng = np.random.default_rng(0).spawn(3)
     noise = NoiseStreams(shot_rng, read_rng)
     shape = (radiance.shape[0], radiance.shape[1])

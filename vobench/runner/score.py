@@ -1,4 +1,4 @@
-"""Estimate to score: one trial's numbers and its status."""
+"""Scores the estimate of a trial, and determines the status of the trial."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -23,25 +23,25 @@ from vobench.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     from vobench.suite.plan import Trial
 
-# The truth that a trial is scored against has one pose for each frame.
+# The truth against which a trial is scored has one pose for each frame.
 SETTINGS = ScoreSettings(coverage_of="frames")
 NO_SCALE = "Sim(3)"
 NO_POSE_RIGHT = 0.5  # the lost-aware score of an estimate that survives with every pose wrong
 # Metrics of an estimate without a scale: those of every score, and how its scale drifts.
 OF_NO_SCALE = tuple(metric for metric in DEFINITIONS.values() if not metric.full or metric.id == "scale_drift")
 NO_SCALE_SETTINGS = replace(SETTINGS, alignment="sim3", full=True)
-# Jitter of trackers at rest. Extents, not path lengths: jitter adds up along a path.
+# The jitter of trackers at rest. These are limits of extents, because path lengths add up the jitter.
 STILL_M = 2e-3
 STILL_RAD = np.deg2rad(0.2)
 LEAST_DIVERGED_M = 1e-3
 
 
 def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) -> None:
-    """Score a trial's estimate against its sequence's ground truth; write the score and the table of frames."""
+    """Score the estimate of a trial against the truth of its sequence, and write the score and the table of frames."""
     exact = (sequence / GROUND_TRUTH).read_text(encoding="utf-8")
-    # The truth is read from the text that the run holds, so that anybody gets the same score from it.
+    # The truth is read from the text in the run, so that everybody can reproduce the score.
     gt = parse_tum(scored_truth(exact, trial.case), name=GROUND_TRUTH)
-    claims = trial.entrant.claims
+    claims = trial.estimator_entry.claims
     est = read_tum(estimate / ESTIMATE)
     scored = score_estimate(est, gt, claims)
     stamps = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
@@ -53,7 +53,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
     score = TrialScore(
         case=trial.case.name,
         variant=trial.case.variant,
-        estimator=trial.entrant.label,
+        estimator=trial.estimator_entry.label,
         repeat=trial.repeat,
         status=status,
         reason=reason,
@@ -63,7 +63,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         score=scored.as_dict() if scored else None,
         drift_m=drift_m(est, gt, scored),
         claims=claims,
-        sensors=trial.entrant.manifest.needs,
+        sensors=trial.estimator_entry.manifest.needs,
         consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale_of(scored)),
         revised=_revised_score(estimate, gt, claims),
         sandbox=outcome.sandbox,
@@ -73,7 +73,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
 
 
 def _revised_score(estimate: Path, gt: Trajectory, claims: Sequence[str]) -> dict[str, Any] | None:
-    """The score of the poses that an estimator revised at the end; None if it has none."""
+    """The score of the poses that an estimator revised at the end; None if there are none."""
     revised = score_revised(estimate, gt, claims)
     return revised.as_dict() if revised else None
 
@@ -92,14 +92,14 @@ def scale_of(scored: Score | None) -> float:
 
 
 def drift_m(est: Trajectory, gt: Trajectory, scored: Score | None) -> float | None:
-    """The largest distance of a scored estimate from its start if the truth stands still; else None."""
+    """The largest distance of a scored estimate from its start if the truth is stationary; None otherwise."""
     if scored is None or not stands_still(gt):
         return None
     return extent_m(est)
 
 
 def stands_still(gt: Trajectory) -> bool:
-    """Whether the truth stays within 2 mm and 0.2° of its first pose, so that a relative error means nothing."""
+    """Whether the truth stays within 2 mm and 0.2° of its first pose, so that relative errors are meaningless."""
     R_world_frame = gt.T_world_frame[:, :3, :3]
     R_first_world = se3.inverse(gt.T_world_frame[:1])[:, :3, :3]
     turned_rad = se3.rotation_angle(R_first_world @ R_world_frame)
@@ -115,7 +115,7 @@ def extent_m(trajectory: Trajectory) -> float:
 def score_estimate(est: Trajectory, gt: Trajectory, claims: Sequence[str]) -> Score | None:
     """The score of an estimate; None if it has no pose at a frame whose truth is known.
 
-    An estimate that claims no scale, Sim(3), is aligned with a scale, and the drift of its scale is measured.
+    An estimate with the claim Sim(3), which has no scale, is aligned with a scale, and the drift of it is measured.
     """
     if not np.isin(est.t_ns, gt.t_ns).any():
         return None
@@ -125,7 +125,7 @@ def score_estimate(est: Trajectory, gt: Trajectory, claims: Sequence[str]) -> Sc
 
 
 def status_of(outcome: EstimatorOutcome, scored: Score | None, gt: Trajectory) -> tuple[TrialStatus, str]:
-    """The status of a trial and its reason, the worst first; a process that failed counts before its answers."""
+    """The status of a trial and its reason. The worst status that applies is used, first of all a failed process."""
     if outcome.kind != FINISHED:
         return outcome.kind, outcome.reason  # type: ignore[return-value]  # EstimatorFailure's kinds are statuses
     if scored is None:
@@ -160,7 +160,7 @@ def _divergence(scored: Score, gt: Trajectory) -> str:
 def status_of_handed(
     est: Trajectory, gt: Trajectory, claims: Sequence[str], dropped: Sequence[int]
 ) -> tuple[TrialStatus, str]:
-    """The status of a trial in real time and its reason, by the frames whose stamps were not dropped."""
+    """The status of a trial in real time and its reason, from the frames that were not dropped."""
     is_sent = ~np.isin(gt.t_ns, dropped)
     sent = Trajectory(gt.t_ns[is_sent], gt.T_world_frame[is_sent])
     scored = score_estimate(est, sent, claims)

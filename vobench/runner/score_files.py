@@ -1,4 +1,4 @@
-"""Scores of trajectory files: of one pair of ground truth and estimate, or of several and all of them together."""
+"""Scores trajectory files: one pair of ground truth and estimate, or several pairs separately and pooled."""
 
 import shlex
 from collections.abc import Iterator, Sequence
@@ -31,7 +31,7 @@ ALL_TOGETHER = "pooled"  # what the rows of all sequences together are called
 
 @dataclass(frozen=True, slots=True)
 class FilePair:
-    """Ground truth and estimate of one sequence and, where the estimate states its covariances, their file."""
+    """The ground truth, the estimate and, if they are reported, the covariances of one sequence, as files."""
 
     gt: TrajectorySource
     est: TrajectorySource
@@ -42,8 +42,8 @@ class FilePair:
 class ScoredPair:
     """The score of one pair of files.
 
-    `consistency` compares errors with the stated covariances. `by_frame` says how poses were paired where neither file
-    has stamps. `notes` say what was done to read the files.
+    `consistency` compares errors with the reported covariances. `by_frame` says how poses were paired if neither file
+    has stamps. `notes` say how the files were read.
     """
 
     pair: FilePair
@@ -66,7 +66,7 @@ class ScoredPair:
 
 @dataclass(frozen=True, slots=True)
 class ScoredFiles:
-    """The scores of some pairs of files and, of several pairs, the score of all errors together."""
+    """The scores of pairs of files and, for several pairs, the pooled score of all errors."""
 
     pairs: tuple[ScoredPair, ...]
     pool: Pooled | None = None
@@ -96,7 +96,7 @@ class ScoredFiles:
         return data_frame({"sequence": sequence, **metric.as_dict()} for sequence, metric in self._metrics())
 
     def _metrics(self) -> Iterator[tuple[str, MetricResult]]:
-        """Every metric, with the estimate that it is of."""
+        """All metrics, with the names of their estimates."""
         for scored in self.pairs:
             for metric in scored.score.metrics:
                 yield str(scored.pair.est.path), metric
@@ -105,7 +105,7 @@ class ScoredFiles:
                 yield ALL_TOGETHER, metric
 
     def require_finite(self) -> None:
-        """Raise AlignmentError where a statistic is infinite or not a number."""
+        """Raise AlignmentError if a statistic is infinite or not a number."""
         for _, metric in self._metrics():
             for name, value in asdict(metric.statistics).items():
                 if not isfinite(value):
@@ -115,7 +115,7 @@ class ScoredFiles:
 def score_files(
     pairs: Sequence[FilePair], *, settings: ScoreSettings = DEFAULTS, times: Sequence[Path] = ()
 ) -> ScoredFiles:
-    """Score estimates against ground truth; of several pairs, also all of their errors together.
+    """Score estimates against ground truth. For several pairs, all errors are also pooled.
 
     With `settings.full`, installed metrics are measured too. `times` are files of stamps for files without (KITTI).
 

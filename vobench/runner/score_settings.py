@@ -1,4 +1,4 @@
-"""The settings of a score: those of a tool, or our own, with some of them changed."""
+"""The settings of a score: the defaults or those of another tool, with changes."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -9,7 +9,7 @@ from vobench.metric.settings import LIKE, PAIRS_OF_RULE, Plane, ScoreSettings, S
 from vobench.trajectory.align import AlignmentKind
 from vobench.trajectory.associate import Method
 
-# Settings that are one of a few names: what these are names of, and the names.
+# The settings whose value is one of several names: a noun for the value, and the names.
 NAMED = {
     "alignment": ("alignment", get_args(AlignmentKind)),
     "association": ("association", get_args(Method)),
@@ -20,13 +20,12 @@ NAMED = {
 
 
 def settings_like(preset: str | None = None, **changes: Any) -> ScoreSettings:
-    """Return the settings of a preset of `LIKE`, or our own without one, with changes; a change of None is none.
+    """The settings of a preset of `LIKE`, or the defaults without a preset, with changes. A change of None is ignored.
 
-    Some tools choose the pairs of RPE by a rule of theirs (`rpe_rule`). With changes that this rule does not know, the
-    pairs are chosen by our own rule instead.
+    Some tools choose the pairs of RPE by a special rule (`rpe_rule`). If the changes include settings that the rule
+    does not have, the default rule is used instead.
 
-    Raises UnknownNameError for a name that a preset or setting does not have, and SettingError for values that measure
-    nothing.
+    Raises UnknownNameError for an unknown preset or value, and SettingError for values that cannot be measured.
     """
     if preset is not None:
         require_known("preset", preset, LIKE)
@@ -42,7 +41,7 @@ def settings_like(preset: str | None = None, **changes: Any) -> ScoreSettings:
 
 
 def _keeps_rule(base: ScoreSettings, changes: Mapping[str, Any]) -> bool:
-    """Whether the changes leave the pairs that the rule of a tool chooses as they are."""
+    """Whether the rule of a tool still applies with the changes."""
     unit, all_pairs, side = PAIRS_OF_RULE[base.rpe_rule]
     known = {"rpe_unit": unit, "rpe_all_pairs": all_pairs, "rpe_pairs_from": side}
     for name, value in known.items():

@@ -1,4 +1,4 @@
-"""Readings of a body's wheels and IMU, and the ground truth of its cameras' pixels."""
+"""Simulates the readings of a body's wheels and IMU, and the per-pixel ground truth of its cameras."""
 
 from dataclasses import replace
 
@@ -54,7 +54,7 @@ class SensorFeed:
 
 
 def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
-    """Stamps (M,) and counts (M, 2) of both encoders, 0 at the first picture; none for a body without wheels."""
+    """The stamps (M,) and counts (M, 2) of both encoders, 0 at the first picture; empty for a body without wheels."""
     spec = case.trajectory
     if travel.rims is None or not isinstance(spec, Wheeled):
         return EMPTY, EMPTY.reshape(0, 2)

@@ -48,13 +48,13 @@ def content(case: "Case") -> dict[str, Any]:
     return {**settings, "scene": scene}
 
 
-# What draws and writes is imported where it is used: whoever asks whether a sequence is there needs none of it.
+# The modules that render and write are imported when they are used, because looking up a sequence needs none of them.
 
 
 def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
     """Compute the light of a scene, under whatever levels, and what cameras see of it, into a folder.
 
-    Raises MissingDependencyError where this machine cannot draw, before any light is computed.
+    Raises MissingDependencyError if this machine cannot render, before any light is computed.
     """
     from vobench.rendering.bake import BakeSettings, bake, save_baked
     from vobench.rendering.raster import require_drawing
@@ -72,12 +72,12 @@ def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
 def open_renderer(
     scene: "Scene", rendering: "Rendering", light: Path | None, *, white_cd_m2: float | None = None
 ) -> "Renderer":
-    """The renderer of a scene, which the caller closes.
+    """The renderer of a scene. The caller must close it.
 
-    light: the folder with the scene's light, for the engine that draws with it; white_cd_m2: the luminance that is
-    white, for the one that draws 8 bits.
+    `light` is the folder with the light of the scene, for the engine raster. `white_cd_m2` is the luminance of white,
+    for the engine pyrender, which renders 8 bits.
 
-    Raises MissingDependencyError where this machine cannot draw.
+    Raises MissingDependencyError if this machine cannot render.
     """
     if rendering.engine == "path":
         from vobench.rendering.path import SAMPLES, PathRenderer
@@ -98,7 +98,7 @@ def open_renderer(
 
 
 def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progress") -> None:
-    """Record a case's sequence in a folder, drawn by its engine, with the light of its scene where that needs it."""
+    """Render the sequence of a case, and write it to a folder. `light` is the light of its scene, if it is needed."""
     from vobench.runner.sensors import PixelTruth, SensorFeed
     from vobench.runner.stereo_camera import StereoCamera, World
     from vobench.suite.white import white_of
@@ -120,7 +120,7 @@ def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progr
 
 
 def frames_of(case: "Case", travel: BodyMotion) -> "Schedule":
-    """The frames of a case's motion, and when their pictures are taken."""
+    """The schedule of a case: its frames, and the times of their pictures."""
     from vobench.sensor.timing import STREAMS, schedule
 
     rngs = {stream: generator(case.seed, f"camera.{stream}") for stream in STREAMS}
@@ -128,7 +128,7 @@ def frames_of(case: "Case", travel: BodyMotion) -> "Schedule":
 
 
 def _pairs(camera: "StereoCamera", frames: "Schedule") -> "Iterator[ExposedPair]":
-    """The pictures of each frame; one that repeats has those before."""
+    """The pictures of each frame. A repeated frame has the pictures of the frame before it."""
     pair = None
     for left_ns, right_ns, is_repeated in zip(frames.left_ns, frames.right_ns, frames.repeats, strict=True):
         if pair is None or not is_repeated:
@@ -163,7 +163,7 @@ def _write(
     truth: "PixelTruth | None",
 ) -> None:
     body = travel.at_frames()
-    # The stamps of each side's pictures; flow leads from one to the next, and from the last nowhere.
+    # The stamps of the pictures of each side. Flow is that from one picture to the next; the last one has none.
     taken_ns = {
         "left": [*frames.left_ns.tolist(), None],
         "right": [*frames.right_ns.tolist(), None],

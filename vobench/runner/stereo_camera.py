@@ -1,4 +1,4 @@
-"""The simulated stereo cameras: light through the lens onto the chip, exposed by a shutter while the body moves."""
+"""Simulates the stereo cameras: the light through the lens onto the chip, and the shutter while the body moves."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -25,14 +25,14 @@ from vobench.suite.case import Case
 from vobench.trajectory.kinematics import Motion
 from vobench.trajectory.trajectory import Stamps
 
-FAR_M = 1e3  # distance of what a ray sees that meets nothing: the sky
-# Pixels of a picture at which displacements are measured, across and down.
+FAR_M = 1e3  # the distance of the sky, which a ray sees if it hits nothing
+# The numbers of pixels across and down at which displacements are measured.
 GRID_COLUMNS = 9
 GRID_ROWS = 7
 
 
 class Displacement:
-    """Measures one scene's displacements, at a grid of pixels."""
+    """Measures the displacements in the picture of a scene at a grid of pixels."""
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
@@ -63,7 +63,7 @@ class Displacement:
 
 
 def _faces_seen(scene: Scene, t_ns: int) -> tuple[RayCaster, NDArray[np.int32]]:
-    """Rays against the faces of a scene at an instant, except panes; and the mover of each face, -1 for none."""
+    """A ray caster for the faces of a scene at an instant, without panes, and the mover of each face, -1 for none."""
     faces = triangles(scene, t_ns=t_ns)
     materials = [scene.materials.get(thing.material) for thing in faces.things]
     is_pane = np.array([material is not None and material.kind == "pane" for material in materials], bool)
@@ -73,7 +73,7 @@ def _faces_seen(scene: Scene, t_ns: int) -> tuple[RayCaster, NDArray[np.int32]]:
 
 @lru_cache(maxsize=8)
 def _grid_rays(camera: Camera) -> Array:
-    """Rays (K, 3) through pixels spread over the whole picture, borders included, where the lens has rays."""
+    """The rays (K, 3) through pixels that are spread over the whole picture, including its borders."""
     columns = np.linspace(0, camera.width_px - 1, GRID_COLUMNS)
     rows = np.linspace(0, camera.height_px - 1, GRID_ROWS)
     u, v = np.meshgrid(columns, rows)
@@ -81,16 +81,16 @@ def _grid_rays(camera: Camera) -> Array:
     return rays[np.isfinite(rays).all(1)]
 
 
-# Largest displacement between two sub-frames, and between the first and last row of a strip.
+# The largest displacement between two sub-frames, and between the first and the last row of a strip.
 SUB_FRAME_PX = 1.0
 STRIP_PX = 0.25
 MOST_SUB_FRAMES = 32
-ROWS_UNDER_CHANGING_LIGHT = 4  # of a strip, so that it sees one phase of lamps that change in time
+ROWS_UNDER_CHANGING_LIGHT = 4  # the rows of a strip, so that it shows a single phase of lamps that change
 
 
 @dataclass(frozen=True, slots=True)
 class ExposedPair:
-    """A stereo pair, (H, W) or (H, W, 3) uint8 each, and the exposure that both had."""
+    """A stereo pair, each picture (H, W) or (H, W, 3) uint8, and the exposure of both."""
 
     left: Grey
     right: Grey
@@ -108,7 +108,7 @@ class World:
 
 
 class StereoCamera:
-    """Both cameras of a case on the true rig; the exposure loop watches the left picture and sets both."""
+    """The cameras of a case on the true rig. The auto-exposure measures the left picture, and controls both cameras."""
 
     def __init__(self, case: Case, world: World) -> None:
         displacement = Displacement(world.scene)
@@ -120,14 +120,14 @@ class StereoCamera:
         self._state = initial_exposures(loop, first) if loop else (first,)
 
     def skip(self, pictures: int) -> None:
-        """Leave out the first pictures: the noise of others is as it would be, auto-exposure starts anew."""
+        """Skip the first pictures. The noise of the others does not change, but the auto-exposure starts again."""
         for camera in (self._left, self._right):
             camera.skip(pictures)
 
     def shoot(self, t_ns: int, right_ns: int | None = None) -> ExposedPair:
-        """The pictures with t_ns at the middle of their exposure, the right one with right_ns if that is given.
+        """The pictures whose mid-exposure time is t_ns, or right_ns for the right picture if that is given.
 
-        Call it in order of time.
+        Calls must be in order of time.
         """
         exposure = self._state[0]
         left = self._left.picture(t_ns, exposure)
@@ -139,7 +139,7 @@ class StereoCamera:
 
 
 class SimulatedCamera:
-    """One camera: its poses, its shutter, its lens, and its chip with noise of its own."""
+    """One camera: its poses, its shutter, its lens, and its chip with a separate noise stream."""
 
     def __init__(self, case: Case, side: Side, world: World, displacement: Displacement) -> None:
         def stream(name: str) -> np.random.Generator:
@@ -159,7 +159,7 @@ class SimulatedCamera:
         self._pattern = fixed_pattern(shape, case.camera.chip, stream("pattern"))
 
     def skip(self, pictures: int) -> None:
-        """Take the draws of so many pictures' noise."""
+        """Draw and discard the noise of a number of pictures."""
         chip = self._settings.chip
         shape = (self._camera.height_px, self._camera.width_px)
         for _ in range(pictures):
@@ -169,7 +169,7 @@ class SimulatedCamera:
                 self._noise.read.standard_normal(shape)
 
     def picture(self, t_ns: int, exposure: Exposure) -> Grey:
-        """The values (H, W), or (H, W, 3) in colour, of a picture stamped t_ns."""
+        """The grey values (H, W), or colours (H, W, 3), of a picture with stamp t_ns."""
         return self.exposed(self.light(t_ns, exposure), exposure)
 
     def light(self, t_ns: int, exposure: Exposure) -> Radiance:
@@ -180,12 +180,12 @@ class SimulatedCamera:
         return light
 
     def exposed(self, light: Radiance, exposure: Exposure) -> Grey:
-        """The values of a picture of that light."""
+        """The values of a picture that is exposed to light."""
         at_chip: Radiance = apply_lens(light, self._lens)
         return expose(at_chip, self._settings, self._noise, pattern=self._pattern, exposure=exposure)
 
     def views(self, t_ns: int, exposure: Exposure) -> list[View]:
-        """How the rows are exposed, in strips and sub-frames as fine as the motion asks for."""
+        """The views of strips of rows and sub-frames, which are as fine as the motion requires."""
         exposed_strips = strips(
             self._camera.height_px,
             self._settings.readout_s,
@@ -228,14 +228,14 @@ class SimulatedCamera:
         )
 
     def _poses(self, t_ns: Stamps) -> Array:
-        """T_world_camera (K, 4, 4) at instants (K,)."""
+        """The poses T_world_camera (K, 4, 4) at instants (K,)."""
         T_world_body = self._world.motion.at(t_ns).T_world_body
         T_world_camera: Array = T_world_body @ self._T_body_camera
         return T_world_camera
 
 
 def exposed_by(case: Case, world: World, stamps: Sequence[int]) -> Callable[[CameraSettings], list[Grey]]:
-    """A function that takes a case's left pictures at instants with any camera; the light is drawn once."""
+    """A function that takes the left pictures of a case with any camera settings. The light is rendered only once."""
     displacement = Displacement(world.scene)
     plain = CameraSettings()
     first = SimulatedCamera(replace(case, camera=plain), "left", world, displacement)

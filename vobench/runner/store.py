@@ -1,6 +1,7 @@
-"""The store of finished results, addressed by a hash of all that they depend on; locks, unfinished folders, progress.
+"""The store of finished results, whose keys are hashes of everything that they depend on.
 
-<root>/<kind>/<hash>/ holds a result and its manifest; <root>/state/ what is known of them and who works here.
+The folder <root>/<kind>/<hash>/ contains a result and its manifest. <root>/state/ contains locks, recorded checks and
+durations.
 """
 
 import fcntl
@@ -27,17 +28,17 @@ PREFIX = ".unfinished-"
 BAD = ".bad-"
 STATE = "state"
 INPUTS = "inputs.json"
-TIMED = 50  # results of a stage whose seconds are kept, about
-# How often a lock is asked for that another holds: soon at first, and then so that Ctrl-C is answered in time.
+TIMED = 50  # the approximate number of results of a stage whose durations are recorded
+# The first and the largest pause between attempts to take a lock. Ctrl-C is handled between attempts.
 FIRST_LOOK_S = 1e-3
 LOOK_S = 0.2
-PATIENCE_S = 0.5  # before the user is told who is waited for
+PATIENCE_S = 0.5  # the time after which the user is told that a process waits
 
 Tell = Callable[[str], object]
 
 
 def why_unwritable(folder: Path) -> str:
-    """Why files cannot be made in a folder, which is made where it is missing; empty where they can."""
+    """The reason why files cannot be created in a folder; empty if they can. A missing folder is created."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -47,7 +48,7 @@ def why_unwritable(folder: Path) -> str:
 
 @contextmanager
 def unfinished(parent: Path) -> Iterator[Path]:
-    """An empty folder to fill and rename; one that keeps its name is gone after the block."""
+    """An empty folder to fill and rename. If it is not renamed, it is removed after the block."""
     parent.mkdir(parents=True, exist_ok=True)
     folder, lock = _locked_folder(parent)
     try:
@@ -58,7 +59,7 @@ def unfinished(parent: Path) -> Iterator[Path]:
 
 
 def _locked_folder(parent: Path) -> tuple[Path, int]:
-    """A new folder, and the descriptor whose lock ends with this process, however that ends."""
+    """A new folder, and a descriptor that holds its lock until this process ends in any way."""
     while True:
         folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
         lock = lock_new_folder(folder)
@@ -68,16 +69,16 @@ def _locked_folder(parent: Path) -> tuple[Path, int]:
 
 
 def sweep(parent: Path) -> None:
-    """Remove what killed processes left unfinished in a folder: a living one holds a lock."""
+    """Remove the unfinished folders of killed processes. Those of running processes are locked."""
     for folder in parent.glob(f"{PREFIX}*"):
         remove_if_abandoned(folder)
 
 
 @contextmanager
 def locked(path: Path, tell: Tell = lambda _: None) -> Iterator[None]:
-    """A block that one process at a time enters; the file `path` says which. Raises Stopped while it waits.
+    """Let only one process at a time enter the block. Its id is in the file `path`. Raises Stopped while it waits.
 
-    The lock ends with the process, however that ends.
+    The lock is released when the process ends in any way.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     lock = _awaited(path, tell)
@@ -89,7 +90,7 @@ def locked(path: Path, tell: Tell = lambda _: None) -> Iterator[None]:
 
 
 def _awaited(path: Path, tell: Tell) -> int:
-    """The descriptor that holds the lock of this path, once nobody else does."""
+    """Wait for the lock of a path, and return the descriptor that holds it."""
     began = time.monotonic()
     look_s = FIRST_LOOK_S
     while (lock := _taken(path)) is None:
@@ -103,26 +104,26 @@ def _awaited(path: Path, tell: Tell) -> int:
 
 
 def _taken(path: Path) -> int | None:
-    """The descriptor of a file that is locked from now on, None where another holds it."""
+    """Lock a file, and return the descriptor that holds the lock; None if another process holds it."""
     lock = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError:
         os.close(lock)
         return None
-    except OSError:  # a file system without locks: both make it, and the first to finish is taken
+    except OSError:  # on a file system without locks, several processes compute a result, and the first one is used
         return lock
     with suppress(FileNotFoundError):
         if os.path.samestat(os.fstat(lock), path.stat()):
             os.truncate(lock, 0)
             os.write(lock, f"process {os.getpid()} on {socket.gethostname()}".encode())
             return lock
-    os.close(lock)  # whoever held it is through, and took the file away
+    os.close(lock)  # the previous holder has removed the file
     return None
 
 
 def _unlink_if_free(path: Path) -> None:
-    """Remove the file of a lock that nobody holds."""
+    """Remove the file of a lock unless a process holds it."""
     with suppress(OSError):
         lock = os.open(path, os.O_RDWR)
         try:
@@ -141,7 +142,7 @@ def _holder(path: Path) -> str:
 
 @dataclass(frozen=True, slots=True)
 class StoreEntry:
-    """Something in the store: when it was made and last used, in seconds since 1970; `is_damaged` was set aside."""
+    """A folder in the store, with the times of its creation and last use in seconds since 1970."""
 
     kind: str
     path: Path
@@ -151,12 +152,12 @@ class StoreEntry:
 
     @property
     def key(self) -> str:
-        """What tasks name it by."""
+        """The key of the result, as tasks refer to it."""
         return f"{self.kind}/{self.path.name}"
 
     @property
     def is_damaged(self) -> bool:
-        """Whether it was set aside."""
+        """Whether the result is damaged, and has been renamed."""
         return self.path.name.startswith(BAD)
 
 
@@ -176,7 +177,7 @@ GB = 1e9
 
 
 def limit_bytes() -> float:
-    """How large the user wants the store to be, by $VOBENCH_CACHE_GB; infinite where nothing is said."""
+    """The size limit of the store from $VOBENCH_CACHE_GB; infinite if it is not set."""
     said = os.environ.get(LIMIT) or "inf"
     with suppress(ValueError):
         if (limit := float(said)) > 0:
@@ -185,21 +186,21 @@ def limit_bytes() -> float:
 
 
 class Store:
-    """Finished folders under a root; what is not finished is never seen under its final name."""
+    """Finished folders below a root. A folder gets its final name only when it is complete."""
 
     def __init__(self, root: Path) -> None:
         self.root = root
 
     def path(self, kind: str, inputs: Mapping[str, Any]) -> Path:
-        """Where the result of these inputs lies, or will lie."""
+        """The path of the result of some inputs, whether it exists or not."""
         return self.root / kind / digest(inputs)
 
     def fault(self, key: str, *, anew: bool = False) -> str:
-        """What is wrong with a result, `<kind>/<hash>`, empty where nothing is; `anew` hashes all of it."""
+        """What is wrong with the result of a key `<kind>/<hash>`; empty if nothing. `anew` hashes all files again."""
         return fault(self.root / key, None if anew else self._checked(key))
 
     def has(self, key: str) -> bool:
-        """Whether a result is there and sound; it counts as used."""
+        """Whether an undamaged result exists. It counts as used."""
         folder = self.root / key
         if not folder.is_dir() or self.fault(key):
             return False
@@ -208,12 +209,14 @@ class Store:
         return True
 
     def need(self, key: str) -> Path:
-        """The folder of a result that should be there. Raises InputError where it is not, or is damaged."""
+        """The folder of a required result. Raises InputError if it is missing or damaged."""
         if self.has(key):
             return self.root / key
         is_there = (self.root / key).is_dir()
         wrong = f"is damaged ({self.fault(key)})" if is_there else "is gone"
-        raise InputError(f"a result {wrong} that this is made of; the same command makes it anew: {self.root / key}")
+        raise InputError(
+            f"a result that this depends on {wrong}; run the same command again to recreate it: {self.root / key}"
+        )
 
     def get(
         self,
@@ -224,10 +227,10 @@ class Store:
         keeps: Callable[[Path], bool] = lambda _: True,
         tell: Tell = lambda _: None,
     ) -> Path:
-        """The folder made from these inputs; `build` fills an empty one where there is none that is sound.
+        """The folder of the result of some inputs. If there is no undamaged result, `build` fills an empty folder.
 
-        What is there and not of those that `keeps` is made anew, unless another process did so while we waited for
-        it. Raises InputError where nothing can be written.
+        A result for which `keeps` is false is computed again, unless another process does so while this one waits.
+        Raises InputError if the store cannot be written.
         """
         stop.check()
         final = self.path(kind, inputs)
@@ -253,14 +256,14 @@ class Store:
     def _publish(self, folder: Path, final: Path, states: States) -> None:
         try:
             folder.rename(final)
-        except OSError:  # where no locks are kept another process may be faster; both hold the same
+        except OSError:  # without locks, another process may have been faster; both results are equal
             if not final.is_dir():
                 raise
             return
         remember(self._checked(f"{final.parent.name}/{final.name}"), states)
 
     def note_seconds(self, stage: str, seconds: float) -> None:
-        """Keep how long a result took."""
+        """Record the duration of a task."""
         path = self.root / STATE / "seconds" / stage
         with suppress(OSError):
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -268,7 +271,7 @@ class Store:
                 file.write(f"{seconds:.3f}\n")
 
     def seconds(self, stage: str) -> list[float]:
-        """How long the last results of a stage took; empty where none was made."""
+        """The durations of the last results of a stage, in s; empty if there are none."""
         with suppress(OSError, ValueError):
             path = self.root / STATE / "seconds" / stage
             lines = path.read_text(encoding="ascii").split()
@@ -276,13 +279,13 @@ class Store:
         return []
 
     def forget(self, keys: Iterable[str]) -> None:
-        """Remove results, so that they are made anew; what another process makes meanwhile stays."""
+        """Remove results, so that they are computed again. Results that another process is computing are kept."""
         for key in keys:
             if (self.root / key).is_dir():
                 self._removed(_entry(self.root / key))
 
     def set_aside_damaged(self, keys: Iterable[str], tell: Tell) -> None:
-        """Give results that are not as they were written another name, and say why."""
+        """Rename damaged results, and tell the user why."""
         for key in keys:
             if (self.root / key).is_dir() and self.fault(key):
                 with locked(self._lock(key), tell):
@@ -294,19 +297,18 @@ class Store:
             aside = folder.with_name(f"{BAD}{folder.name}")
             shutil.rmtree(aside, ignore_errors=True)
             folder.rename(aside)
-            tell(f"a damaged result is made anew, for {wrong}: {folder}")
+            tell(f"a damaged result is computed again, because {wrong}: {folder}")
 
     def require_writable(self) -> None:
-        """Raise InputError where nothing can be made here."""
+        """Raise InputError if the store cannot be written."""
         if cause := why_unwritable(self.root):
             raise InputError(f"VOBENCH_CACHE should be a folder that can be written ({cause}): {self.root}")
 
     @contextmanager
     def in_use(self, tell: Tell) -> Iterator[None]:
-        """A block, such as a run, from whose beginning on nothing that is used may be removed.
+        """A block, such as a run, during which results that it uses are not removed.
 
-        In the end the user is told where the store is larger than he wants it to be. Raises InputError where he does
-        not say so as a number.
+        At the end, the user is told if the store exceeds its size limit. Raises InputError for an invalid limit.
         """
         limit = limit_bytes()
         runs = self.root / STATE / "runs"
@@ -326,7 +328,7 @@ class Store:
             )
 
     def sweep(self) -> None:
-        """Remove what killed processes left behind: unfinished folders and locks."""
+        """Remove the unfinished folders and the locks of killed processes."""
         for kind in self._kinds():
             sweep(kind)
         for name in ("runs", "locks"):
@@ -334,10 +336,10 @@ class Store:
                 _unlink_if_free(path)
 
     def entries(self) -> Iterator[StoreEntry]:
-        """All that lies in the store, what was set aside as damaged included."""
+        """All results in the store, including damaged ones."""
         for kind in self._kinds():
             for path in sorted(kind.iterdir()):
-                with suppress(OSError):  # another process may remove it meanwhile
+                with suppress(OSError):  # another process may have removed it
                     if not path.name.startswith(PREFIX):
                         yield _entry(path)
 
@@ -346,9 +348,9 @@ class Store:
         return sorted(path for path in folders if path.name != STATE)
 
     def collect(self, *, keep_bytes: float = math.inf, older_s: float = math.inf) -> list[StoreEntry]:
-        """Remove what is unfinished or damaged, what was last used so long ago, and then the least recently used.
+        """Remove unfinished and damaged results, results that have not been used for `older_s`, and then the oldest.
 
-        What a process makes, or a run uses, stays. Returns what is removed.
+        Results that a process is computing, or that a run uses, are kept. Returns the removed entries.
         """
         self.require_writable()
         self.sweep()
@@ -361,7 +363,7 @@ class Store:
         for entry in entries:
             stop.check()
             is_old = now_s - entry.used_s > older_s
-            is_unused = entry.used_s < first_run_s  # by the runs that are under way
+            is_unused = entry.used_s < first_run_s  # by the current runs
             is_dispensable = is_unused and (is_old or held > keep_bytes)
             if (entry.is_damaged or is_dispensable) and self._removed(entry):
                 held -= entry.bytes
@@ -369,7 +371,7 @@ class Store:
         return removed
 
     def _removed(self, entry: StoreEntry) -> bool:
-        """Whether an entry could be removed: nobody holds its lock."""
+        """Remove an entry unless a process holds its lock. Returns whether it was removed."""
         self._lock(entry.key).parent.mkdir(parents=True, exist_ok=True)
         lock = _taken(self._lock(entry.key))
         if lock is None:
@@ -390,7 +392,7 @@ class Store:
 
 
 def _made(folder: Path) -> tuple[int, int] | None:
-    """What tells a result from the one that it was before it was made anew."""
+    """The identity of a folder, which changes when a result is computed again."""
     with suppress(OSError):
         stat = (folder / MANIFEST).stat()
         return stat.st_ino, stat.st_mtime_ns
@@ -398,7 +400,7 @@ def _made(folder: Path) -> tuple[int, int] | None:
 
 
 def discard(path: Path) -> None:
-    """Take a file or a folder away in one step, and remove what it held."""
+    """Rename a file or a folder in one step, and remove it with its content."""
     gone = path.with_name(f"{PREFIX}{path.name}-old")
     shutil.rmtree(gone, ignore_errors=True)
     path.rename(gone)
@@ -409,7 +411,7 @@ def discard(path: Path) -> None:
 
 
 def write_json(path: Path, content: Any) -> None:
-    """JSON that people can read."""
+    """Write content as indented JSON."""
     path.write_text(json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n", encoding="utf-8")
 
 
@@ -417,36 +419,36 @@ Item = TypeVar("Item")
 
 
 class Progress(Protocol):
-    """Receives news of the work, for a bar on a terminal or for nobody."""
+    """Receives the progress of work, for example to show a bar on a terminal."""
 
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
-        """The same items; `total` of them are expected."""
+        """Iterate over items, of which `total` are expected, and report the progress."""
 
     def step(self, what: str) -> AbstractContextManager[Callable[[float], object]]:
-        """Work of unknown length, which may tell what share of it is done."""
+        """A context around work of unknown length. Its value is a function that reports the finished share."""
 
     def say(self, sentence: str) -> None:
-        """One sentence that stays."""
+        """Show a sentence that is not overwritten by later progress."""
 
 
 class SilentProgress:
-    """Progress that nobody hears of but for sentences that stay, if somebody is to be told."""
+    """Progress that is not shown. Only sentences are passed on, if there is a function for them."""
 
     def __init__(self, tell: Tell = lambda _: None) -> None:
         self._tell = tell
 
     def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
-        """The same items."""
+        """Iterate over items."""
         del what, total
         return iter(items)
 
     def step(self, what: str) -> AbstractContextManager[Callable[[float], object]]:
-        """No context around the work."""
+        """A context that does nothing."""
         del what
         return nullcontext(lambda _: None)
 
     def say(self, sentence: str) -> None:
-        """Told to whoever asked for it."""
+        """Pass the sentence to the function that was given."""
         self._tell(sentence)
 
 

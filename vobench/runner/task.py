@@ -1,4 +1,4 @@
-"""The stages from suite to scores as tasks: what each makes, of what, after which others, and how it is performed."""
+"""The stages from a suite to scores as tasks: the inputs, the dependencies and the code of each."""
 
 import os
 import time
@@ -15,7 +15,7 @@ from vobench.runner.key import code_digest, digest, folder_digest, imported_by, 
 from vobench.runner.simulate import content, libraries
 from vobench.runner.store import Progress, SilentProgress, Store, write_json
 from vobench.suite.case import Case
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.plan import Plan, Trial
 from vobench.suite.scene_file import scene_content
 from vobench.suite.scene_spec import SceneFile
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
 
 Stage = Literal["bake", "sequence", "import", "estimate", "score"]
-# Where the results of each stage lie in the store.
+# The folder of the store with the results of each stage.
 KINDS: dict[Stage, str] = {
     "bake": "bakes",
     "sequence": "sequences",
@@ -34,7 +34,7 @@ KINDS: dict[Stage, str] = {
     "estimate": "estimates",
     "score": "scores",
 }
-# The modules that a stage enters, of which its key hashes all that they import; a room stands for all of its modules.
+# The entry modules of each stage. Its key hashes all code that they import. A package stands for all of its modules.
 ENTRIES: dict[Stage, tuple[str, ...]] = {
     "bake": ("vobench.rendering.bake", "vobench.suite.scene_build", "vobench.suite.white"),
     "sequence": ("vobench.runner.simulate", "vobench.runner.ground_truth"),
@@ -42,7 +42,7 @@ ENTRIES: dict[Stage, tuple[str, ...]] = {
     "estimate": ("vobench.runner.estimate", "vobench.estimator.worker"),
     "score": ("vobench.runner.score",),
 }
-# What of a scene's file its light does not depend on; levels weigh the light of each lamp later.
+# The settings of a scene on which its light does not depend. Levels are applied to the light of each lamp later.
 UNLIT: dict[str, Any] = {
     "summary": True,
     "white_cd_m2": True,
@@ -57,10 +57,11 @@ NO_LIMIT = 0
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """One unit of work, whose result is a folder in the store.
+    """A unit of work whose result is a folder in the store.
 
-    `inputs` is all that the result's bytes depend on, as JSON; `subject` is what it is made of, for whoever makes it;
-    `needs` are the keys of the tasks whose results it takes, in the order that its stage asks for.
+    `inputs` is everything on which the bytes of the result depend, as plain JSON values.
+    `subject` is the object that the stage processes, such as a case or a trial.
+    `needs` are the keys of the tasks whose results it uses, in the order that its stage expects.
     """
 
     stage: Stage
@@ -70,19 +71,19 @@ class Task:
 
     @property
     def name(self) -> str:
-        """What people call it."""
+        """The name of the task for users."""
         return self.subject.name
 
     @property
     def key(self) -> str:
-        """Where its result lies in the store, by which others name it."""
+        """The key of the task, which is the path of its result in the store."""
         return f"{KINDS[self.stage]}/{digest(self.inputs)}"
 
 
 def plan(suite: Plan, recordings: "Mapping[str, Recording]") -> list[Task]:
-    """All tasks of a suite, each once and after those that it needs; `recordings` are its recorded cases' by name.
+    """All tasks of a suite without duplicates, each after those that it needs.
 
-    Nothing is made and nothing of a case is read; of code, the hashes.
+    `recordings` maps recorded cases by name to their recordings. Nothing is simulated, and only code is hashed.
     """
     tasks = dict[str, Task]()
 
@@ -92,16 +93,19 @@ def plan(suite: Plan, recordings: "Mapping[str, Recording]") -> list[Task]:
             tasks.setdefault(key, task)
         return keys[-1]
 
-    code = {entrant.label: estimator_code(entrant) for entrant in suite.entrants}
+    code = {estimator_entry.label: estimator_code(estimator_entry) for estimator_entry in suite.estimator_entries}
     for case in suite.cases:
         sequence = add(*sequence_tasks(case, recordings))
         for trial in suite.trials(case):
-            add(score_task(trial, sequence, add(estimate_task(trial, sequence, code[trial.entrant.label]))))
+            add(score_task(trial, sequence, add(estimate_task(trial, sequence, code[trial.estimator_entry.label]))))
     return list(tasks.values())
 
 
 def sequence_tasks(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> list[Task]:
-    """What makes a case's sequence, the sequence last: its scene's light is computed before, where it is drawn with."""
+    """The tasks that create the sequence of a case.
+
+    If its engine needs the light of the scene, that task comes first.
+    """
     if isinstance(case, RecordedCase):
         return [_import_task(case, recordings[case.name])]
     needs_light = case.rendering.needs_bake or case.scene.white_cd_m2 is None
@@ -113,7 +117,7 @@ def sequence_tasks(case: Case | RecordedCase, recordings: "Mapping[str, Recordin
 
 
 def bake_task(spec: SceneFile) -> Task:
-    """What computes a scene's light, under whatever levels."""
+    """The task that computes the light of a scene, which does not depend on the levels of lights."""
     scene = scene_content(spec, exclude=UNLIT)
     libraries = library_versions("numpy", "scipy", "embreex", "xatlas", "pillow", "trimesh", "opencv-python-headless")
     inputs = {"scene": scene, **_made_by("bake"), "libraries": libraries}
@@ -128,21 +132,21 @@ def _import_task(case: RecordedCase, recording: "Recording") -> Task:
     return Task("import", case, inputs, ())
 
 
-def estimator_code(entrant: EstimatorEntry) -> dict[str, str]:
-    """Hashes of an estimator's folder, and of all code of vobench that runs it or that it imports."""
-    code = code_digest(*ENTRIES["estimate"], *imported_by(entrant.folder))
-    return {"estimator": folder_digest(entrant.folder), "code": code}
+def estimator_code(estimator_entry: EstimatorEntry) -> dict[str, str]:
+    """The hashes of an estimator's folder, and of all code of vobench that runs it or that it imports."""
+    code = code_digest(*ENTRIES["estimate"], *imported_by(estimator_entry.folder))
+    return {"estimator": folder_digest(estimator_entry.folder), "code": code}
 
 
 def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
-    """What lets an estimator run on the sequence of that key; `code` is its `estimator_code`."""
-    entrant = trial.entrant
+    """The task that runs an estimator on the sequence with a key. `code` is its `estimator_code`."""
+    estimator_entry = trial.estimator_entry
     needs = (sequence,)
     inputs = {
-        "params": entrant.params,
+        "params": estimator_entry.params,
         "repeat": trial.repeat,
-        "limits": asdict(entrant.limits),
-        "mode": entrant.mode,
+        "limits": asdict(estimator_entry.limits),
+        "mode": estimator_entry.mode,
         "needs": needs,
         **code,
         **_portable(),
@@ -152,13 +156,13 @@ def estimate_task(trial: Trial, sequence: str, code: Mapping[str, str]) -> Task:
 
 
 def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
-    """What scores the estimate of that key against the truth of its sequence."""
+    """The task that scores the estimate with a key against the truth of its sequence."""
     inputs = {
         "case": trial.case.name,
         "variant": trial.case.variant,
-        "estimator": trial.entrant.label,
-        "claims": trial.entrant.claims,
-        "sensors": trial.entrant.manifest.needs,
+        "estimator": trial.estimator_entry.label,
+        "claims": trial.estimator_entry.claims,
+        "sensors": trial.estimator_entry.manifest.needs,
         **_noise(trial.case),
         "repeat": trial.repeat,
         **_made_by("score", (sequence, estimate)),
@@ -168,7 +172,7 @@ def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
 
 
 def _noise(case: Case | RecordedCase) -> dict[str, Any]:
-    """What the truth of a case that is scored depends on, beside the exact one."""
+    """The settings on which the scored truth of a case depends, besides the exact truth."""
     if isinstance(case, RecordedCase) or case.truth_noise == EXACT:
         return {}
     first_frame = case.frames[0] if case.frames else None
@@ -180,12 +184,12 @@ def _made_by(stage: Stage, needs: tuple[str, ...] = ()) -> dict[str, Any]:
 
 
 def _portable() -> dict[str, bool]:
-    """Portable results share no entry with others, whose keys stay as they are."""
+    """An input that distinguishes the keys of portable results. The keys of other results do not contain it."""
     return {"portable": True} if is_portable() else {}
 
 
 def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
-    """The tasks to perform, in order: not those whose result is stored, nor light that no sequence to make needs."""
+    """The tasks to perform, in order. Tasks with a stored result, and light that no sequence needs, are omitted."""
     needed = set[str]()
     to_make = list[Task]()
     for task in reversed(list(tasks)):
@@ -197,13 +201,13 @@ def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
 
 
 def is_done(task: Task, root: Path) -> bool:
-    """Whether the store holds the task's result; a failure does not count, since its cause may be gone."""
+    """Whether the store contains the result of a task. A failure does not count, because its cause may be gone."""
     is_stored = Store(root).has(task.key)
     return is_stored and not has_failed(task, root / task.key)
 
 
 def has_failed(task: Task, folder: Path) -> bool:
-    """Whether a folder holds the result of a trial whose estimator failed."""
+    """Whether a folder contains the result of a trial whose estimator failed."""
     from vobench.runner.estimate import FINISHED, read_outcome
 
     return task.stage in ("estimate", "score") and read_outcome(folder).kind != FINISHED
@@ -216,10 +220,10 @@ def perform(
     *,
     progress: Progress = SilentProgress(),  # noqa: B008 - no state
 ) -> Path:
-    """Make a task's result in the store at `root`, out of those that it needs, and say where it lies.
+    """Compute the result of a task in the store at `root`, and return its folder.
 
-    `threads` is how many may draw and filter pictures, NO_LIMIT for as many as there are. It may be called in a
-    process of its own.
+    `threads` limits the threads for rendering and filtering; NO_LIMIT does not limit them. The function may be called
+    in a separate process.
     """
     stop.check()
     if threads != NO_LIMIT:
@@ -246,11 +250,11 @@ def perform(
 def _limit(threads: int) -> None:
     import cv2
 
-    os.environ["LP_NUM_THREADS"] = str(threads)  # Mesa reads it when it first draws
+    os.environ["LP_NUM_THREADS"] = str(threads)  # Mesa reads it when it renders for the first time
     cv2.setNumThreads(threads)
 
 
-# Each stage imports what it takes: a process that performs none of them loads none.
+# Each stage imports its modules when it is performed, so that other processes do not load them.
 
 
 def _bake(spec: SceneFile, _: list[Path], folder: Path, progress: Progress) -> None:

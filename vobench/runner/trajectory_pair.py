@@ -1,4 +1,4 @@
-"""A ground truth and an estimate, read from files of any format onto one clock."""
+"""Reads a ground truth and an estimate from files of any format, with stamps on the same clock."""
 
 import re
 from collections.abc import Iterable, Sequence
@@ -25,7 +25,7 @@ UNITS: tuple[StampUnit, ...] = get_args(StampUnit)
 ORDERS: tuple[QuaternionOrder, ...] = get_args(QuaternionOrder)
 TRUTH = "truth.mcap"
 SENSORS = "sensors.mcap"
-HEAD_BYTES = 4096  # enough to tell text from a recording
+HEAD_BYTES = 4096  # enough to distinguish text from a recording
 SAYS_TRUTH = re.compile(r"(?<![a-z])(gt|ground[ _-]?truth|truth|reference)(?![a-z])", re.IGNORECASE)
 BY_ROW = "neither file has stamps: poses are paired by row, and a second is a row; --times names a file with stamps"
 BY_FRAME = (
@@ -38,7 +38,7 @@ SAY_WHICH = (
 
 @dataclass(frozen=True, slots=True)
 class TrajectorySource:
-    """A file, a topic in it, and `words` that state its unit, order or axes: ns, wxyz, axes:z,-x,-y."""
+    """A file, a topic in it, and `words` that specify its unit, order or axes, such as ns, wxyz or axes:z,-x,-y."""
 
     path: Path
     topic: str | None = None
@@ -47,7 +47,7 @@ class TrajectorySource:
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryPair:
-    """Ground truth and estimate, notes on how the files were read, and how they are paired if neither has stamps."""
+    """The ground truth, the estimate, notes on how they were read, and their pairing if neither file has stamps."""
 
     gt: TrajectoryReading
     est: TrajectoryReading
@@ -61,14 +61,14 @@ class _Read:
     path: Path
     moves: tuple[PoseConvention, ...]
     says_truth: bool
-    unit: StampUnit | None = None  # as stated by the user, which overrides the file
+    unit: StampUnit | None = None  # as specified by the user; it overrides the file
     order: QuaternionOrder | None = None
 
 
 def read_pair(
     gt: TrajectorySource, est: TrajectorySource, *, times: Sequence[Path] = (), any_unit: bool = False
 ) -> TrajectoryPair:
-    """Read both; files without stamps get them from `times`, or are paired by frame if both have none.
+    """Read both files. Files without stamps get them from `times`, or are paired by frame if both have none.
 
     `any_unit` tries finer units if stamps are too large for seconds. Raises InputError.
     """
@@ -89,7 +89,7 @@ def read_pair(
 
 
 def _pairing(unstamped: Sequence[_Read]) -> str | None:
-    """How files without stamps are paired; None if there are none."""
+    """The pairing of files without stamps; None if there are none."""
     if not unstamped:
         return None
     has_frames = any(read.parsed.frames is not None for read in unstamped)
@@ -125,7 +125,7 @@ def _notes(read: _Read) -> list[str]:
 
 
 def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: bool = False) -> TrajectoryReading:
-    """Read one alone; a file without stamps needs `times`. Raises InputError."""
+    """Read a single file. A file without stamps needs `times`. Raises InputError."""
     read = _read(source, any_unit=any_unit)
     if times:
         read = _stamp(read, times)
@@ -151,7 +151,7 @@ def _reading(read: _Read) -> TrajectoryReading:
 
 
 def _stamp(read: _Read, times: Sequence[Path]) -> _Read:
-    """The poses with their stamps, from the one file of times that fits them."""
+    """The poses with stamps from the only file of times that fits them."""
     clocks = {path: parse_times(_text(path), name=str(path)) for path in times}
     parsed = read.parsed
     if parsed.t_ns is not None:
@@ -174,7 +174,7 @@ def _stamp(read: _Read, times: Sequence[Path]) -> _Read:
 
 
 def _numbered(read: _Read) -> _Read:
-    """The poses with a second for each frame in place of missing stamps."""
+    """The poses with stamps that increase by one second per frame instead of the missing ones."""
     parsed = read.parsed
     if parsed.t_ns is not None:
         return read
@@ -267,7 +267,7 @@ def _text(path: Path) -> str:
 
 
 def _recorded(path: Path, topic: str | None) -> Trajectory:
-    """A sequence's true path of the left camera, or the poses of a topic."""
+    """The true path of the left camera of a sequence, or the poses of a topic."""
     folder = path if path.is_dir() else path.parent
     is_sequence = (folder / TRUTH).is_file() and (folder / SENSORS).is_file()
     names_sequence = is_sequence and path in (folder, folder / TRUTH)

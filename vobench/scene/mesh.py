@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 Faces = NDArray[np.int64]
 Index = NDArray[np.int32]
-# The size of the cells in which vertices are merged, in all of vobench. float32 resolves 1e-6 m at 10 m.
+# The size of the cells in which vertices are merged, everywhere in vobench. float32 resolves 1e-6 m at 10 m.
 WELD_M = 1e-5
 
 

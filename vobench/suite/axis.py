@@ -1,4 +1,4 @@
-"""The axes of a suite that YAML describes with settings of their own: rigs and cameras."""
+"""The settings of rigs and cameras, which are axes of a suite."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -35,10 +35,11 @@ Calibration = Annotated[CalibrationError, ShortForm(_as_level, {"type": "string"
 
 @settings()
 class RigSettings:
-    """A stereo pair on the body: its lenses and mounting, its calibration error, and an IMU.
+    """A stereo pair on a body: its lenses and mounting, its calibration error, and an IMU.
 
-    The lenses are a preset's, or `own` ones, or those of a file: KITTI's `calib`, with images of `size_px`, or Kalibr's
-    `camchain`. Without `baseline_m` the baseline is the preset's. `picture_scale` 0.5 halves width and height.
+    The lenses are those of the preset, unless they are given by `own` or by a file: `calib` is a file of KITTI, for
+    images of `size_px`, and `camchain` a file of Kalibr. Without `baseline_m`, the baseline is that of the preset.
+    `picture_scale` multiplies the width and the height of images.
     """
 
     lens: Annotated[str, OneOf("lens", PRESETS)] = "paper_blender"
@@ -62,7 +63,7 @@ class RigSettings:
             raise SettingError("requires calib, and there is none", "size_px")
 
     def read(self, folder: Path) -> "RigSettings":
-        """The rig with the lenses of its file; relative paths start at `folder`. Raises InputError."""
+        """The rig with the lenses from its file. Relative paths start at `folder`. Raises InputError."""
         if not (self.calib or self.camchain):
             return self
         from vobench.dataset import kalibr, kitti
@@ -74,7 +75,7 @@ class RigSettings:
         return replace(self, own=custom_stereo_pair(pair), calib=None, size_px=None, camchain=None)
 
     def build(self) -> Rig:
-        """The sensors on the body with their nominal calibration. Raises InputError if `read` was not called."""
+        """The sensors with their nominal calibration. Raises InputError if the lenses have not been read."""
         unread_file = self.calib or self.camchain
         if unread_file:
             raise InputError(f"the lenses are in a file that was not read: {unread_file}")

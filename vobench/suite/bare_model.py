@@ -13,7 +13,7 @@ from vobench.scene.mesh import areas_m2, corners
 from vobench.scene.scene import Scene
 from vobench.suite.scene_spec import ModelSpec, SceneFile
 
-# A larger model is taken to be in centimetres.
+# A larger model is probably in centimetres.
 LARGEST_M = 300.0
 CENTIMETRE = 0.01
 

@@ -1,4 +1,4 @@
-"""Writes a case as a suite of its own: a folder that `vobench run` accepts wherever it is copied to."""
+"""Writes a single case as a suite, in a folder that can be copied and given to `vobench run`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,21 +10,23 @@ from ruamel.yaml import YAML
 
 from vobench.motion.replay import Replay
 from vobench.suite.case import AXES, Case
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.yaml_file import plain
 from vobench.suite.yaml_source import without_nothing
 
 SUITE_FILE = "suite.yaml"
 POSES_FILE = "poses.tum"
-UNNAMED = "it"  # the variant on an axis where the case has no name
-REPLAY_SOURCE_KEYS = ("file", "times", "recorded_hz", "axes")  # of a replayed trajectory
+UNNAMED = "it"  # the name of a variant for which the case has no name
+REPLAY_SOURCE_KEYS = ("file", "times", "recorded_hz", "axes")  # the keys that say how a replayed trajectory is read
 LINE_WIDTH = 120
 
 
-def write_case(case: Case, entrants: Sequence[EstimatorEntry], folder: Path, *, name: str, summary: str = "") -> Path:
-    """Write the suite of one case with its scene, models and recorded poses; return the path of the suite's file.
+def write_case(
+    case: Case, estimator_entries: Sequence[EstimatorEntry], folder: Path, *, name: str, summary: str = ""
+) -> Path:
+    """Write the suite of one case with its scene, models and recorded poses, and return the path of the suite file.
 
-    Estimators are written by name, so that a folder of that name can be put beside the suite.
+    Estimators are written by name. They are found in a folder of that name beside the suite, or in the catalog.
     """
     folder.mkdir(parents=True, exist_ok=True)
     variant = {axis: case.variant.get(axis, UNNAMED) for axis in AXES}
@@ -45,13 +47,13 @@ def write_case(case: Case, entrants: Sequence[EstimatorEntry], folder: Path, *, 
     }
     if case.frames:
         suite["frames"] = list(case.frames)
-    suite["estimators"] = [_estimator(entrant) for entrant in entrants]
+    suite["estimators"] = [_estimator(estimator_entry) for estimator_entry in estimator_entries]
     _write_yaml(folder / SUITE_FILE, suite)
     return folder / SUITE_FILE
 
 
 def _write_scene_files(case: Case, folder: Path) -> Any:
-    """Copy the files of the case's scene to a folder; return the scene's YAML, which names the copies."""
+    """Copy the files of the case's scene to a folder, and return the content of the scene file with their new paths."""
     scene = without_nothing(plain(case.scene))
     parts = (*scene.get("meshes", ()), *scene.get("movers", ()), scene)
     for part in parts:
@@ -64,7 +66,7 @@ def _write_scene_files(case: Case, folder: Path) -> Any:
 
 
 def _write_trajectory_file(case: Case, folder: Path) -> Any:
-    """Write the replayed poses, if any, in body axes and with stamps; return the trajectory's YAML."""
+    """Write the replayed poses, if any, in body axes with stamps, and return the settings of the trajectory."""
     spec = case.trajectory
     if isinstance(spec, Replay) and case.replayed is not None:
         (folder / POSES_FILE).write_text(case.replayed, encoding="utf-8")
@@ -75,13 +77,19 @@ def _write_trajectory_file(case: Case, folder: Path) -> Any:
     return without_nothing(trajectory)
 
 
-def _estimator(entrant: EstimatorEntry) -> Any:
-    """The entry of an entrant in a suite, with those limits that are not its manifest's."""
+def _estimator(estimator_entry: EstimatorEntry) -> Any:
+    """An estimator as an entry of a suite, with the limits that differ from those of its manifest."""
+    manifest = estimator_entry.manifest
     limits = dict[str, Any]()
-    for key, value in plain(entrant.limits).items():
-        if value != getattr(entrant.manifest.limits, key):
+    for key, value in plain(estimator_entry.limits).items():
+        if value != getattr(manifest.limits, key):
             limits[key] = value
-    entry = {"name": entrant.manifest.name, "label": entrant.label, "params": entrant.params, "limits": limits}
+    entry = {
+        "name": manifest.name,
+        "label": estimator_entry.label,
+        "params": estimator_entry.params,
+        "limits": limits,
+    }
     return without_nothing(entry)
 
 

@@ -1,13 +1,14 @@
-"""Finds scenes, suites, scenarios and estimators by name, in one search order; the first match wins.
+"""Finds scenes, suites, scenarios and estimators by name. The first match in the search order is used.
 
-1. Beside the suite that names them: in <kind>s/, then in the suite's own folder
+1. Beside the suite that names them: in <kind>s/, then in the folder of the suite
 2. ./<kind>s/
 3. <folder>/<kind>s/ for each folder of $VOBENCH_PATH
 4. Installed entry points (groups vobench.scenes, vobench.suites, vobench.estimators)
-5. Those included with vobench
+5. Entries included with vobench
 
-A suite is <name>.yaml, an estimator a folder <name>/ with an estimator.yaml. A scene is <name>.yaml, a folder <name>/
-with a scene.yaml, or a model <name>.glb. A scenario is <name>.yaml in suites/scenarios/.
+A suite is a file <name>.yaml. An estimator is a folder <name>/ that contains estimator.yaml. A scene is a file
+<name>.yaml, a folder <name>/ that contains scene.yaml, or a model <name>.glb. A scenario is a file <name>.yaml in
+suites/scenarios/.
 """
 
 import os
@@ -24,7 +25,7 @@ from vobench.errors import UnknownNameError, unknown_name_sentence
 from vobench.suite.file_kind import Kind, display_path, kind_in
 
 KINDS: tuple[Kind, ...] = ("suite", "scenario", "scene", "estimator")
-# Paths below a folder of the kind; {} is the name.
+# The possible paths of an entry in a folder of its kind; {} is the name.
 FORMS: dict[Kind, tuple[str, ...]] = {
     "suite": ("{}.yaml",),
     "scenario": ("{}.yaml",),
@@ -39,13 +40,13 @@ WHAT_IT_IS: dict[Kind, str] = {
 }
 NOT_NAMES = ("", ".", "..")
 BESIDE_SUITE = "beside the suite"
-# Keys of suites and scenarios, at the start of a line, that scenes do not have.
+# A line that begins with a key of suites or scenarios which scenes do not have.
 OTHER_KEY = re.compile(rb"^(estimators|severity|include)\s*:", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
 class CatalogEntry:
-    """A named scene, suite, scenario or estimator, its path, and the step of the search order that found it.
+    """A scene, suite, scenario or estimator: its name, its path, and the step of the search order that found it.
 
     `path` is the file of a scene, suite or scenario, and the folder of an estimator.
     """
@@ -64,7 +65,10 @@ def builtin_root() -> Path:
 
 
 def entries(kind: Kind) -> list[CatalogEntry]:
-    """All entries of a kind, sorted by name. If a name occurs twice, the one that wins comes first."""
+    """All entries of a kind, sorted by name.
+
+    If several entries have the same name, the one that is used comes first.
+    """
     by_path: dict[Path, CatalogEntry] = {}
     for entry in _search(kind):
         by_path.setdefault(entry.path, entry)
@@ -72,10 +76,10 @@ def entries(kind: Kind) -> list[CatalogEntry]:
 
 
 def find(kind: Kind, name: str, *, suite: Path | None = None) -> CatalogEntry:
-    """The entry with a name, or at a path: a name with a slash or a suffix is a path.
+    """The entry with the given name or path. A name that contains a slash or a suffix is a path.
 
-    `suite` is the file that names it; names and relative paths are looked up beside it first. Raises UnknownNameError
-    with the nearest name and all known ones.
+    `suite` is the file that refers to the entry. Names and relative paths are looked up beside it first.
+    Raises UnknownNameError with the nearest known name and all known names.
     """
     path = Path(name)
     has_suffix = path.suffix in {".yaml", ".yml", *MODEL_SUFFIXES}
@@ -89,12 +93,12 @@ def find(kind: Kind, name: str, *, suite: Path | None = None) -> CatalogEntry:
 
 
 def examples() -> list[CatalogEntry]:
-    """The example suites included with vobench, which `vobench new suite` copies; `find` does not find them."""
+    """The example suites that `vobench new suite` can copy. `find` does not find them."""
     return [*_in_folder("suite", builtin_root() / "examples", "example", None)]
 
 
 def _about_folder(kind: Kind, folder: Path) -> str:
-    """The sentence about a folder that was given as a name or a file."""
+    """A sentence about a folder that was given where a name or a file is expected."""
     holds_scene = kind == "scene" and (folder / "scene.yaml").is_file()
     holds_estimator = kind == "estimator" and (folder / "estimator.yaml").is_file()
     if holds_scene or holds_estimator:
@@ -106,7 +110,7 @@ def _about_folder(kind: Kind, folder: Path) -> str:
 
 
 def _is_of_kind(kind: Kind, path: Path) -> bool:
-    """Whether a path is of a kind, judged by its keys."""
+    """Whether the keys of a file are those of a kind."""
     if path.is_dir() or path.suffix.lower() in MODEL_SUFFIXES:
         return True
     return kind_in(path) == kind
@@ -126,7 +130,7 @@ def _entry_at(kind: Kind, path: Path, suite: Path | None) -> CatalogEntry:
 
 
 def _entry_path(kind: Kind, written: Path, suite: Path | None) -> Path:
-    """The path of an entry as `Entry` holds it: relative paths may start at the suite's folder."""
+    """The path of an entry as it is stored in CatalogEntry. A relative path may start at the folder of the suite."""
     path = written
     if suite and not path.exists() and (suite.parent / path).exists():
         path = suite.parent / path
@@ -142,7 +146,7 @@ def _known_names(kind: Kind, suite: Path | None) -> list[str]:
 
 
 def _search(kind: Kind, suite: Path | None = None, *, name: str | None = None) -> Iterator[CatalogEntry]:
-    """Every entry of a kind, or those of one name, in the search order."""
+    """All entries of a kind, or those with one name, in the search order."""
     kind_folder = "suites/scenarios" if kind == "scenario" else f"{kind}s"
     if suite:
         yield from _beside(kind, suite.parent, name)
@@ -157,7 +161,7 @@ def _search(kind: Kind, suite: Path | None = None, *, name: str | None = None) -
 
 
 def _beside(kind: Kind, folder: Path, name: str | None) -> Iterator[CatalogEntry]:
-    """The entries in the folder of a suite. A suite or a scenario may have the name of its scene."""
+    """The entries in the folder of a suite. A suite or scenario there may have the same name as a scene."""
     yield from _in_folder(kind, folder / f"{kind}s", BESIDE_SUITE, name)
     if kind == "scenario":
         return
@@ -171,7 +175,7 @@ def _is_suite_or_scenario(path: Path) -> bool:
 
 
 def _installed(kind: Kind) -> Iterator[CatalogEntry]:
-    """The entries that installed distributions offer: the package that an entry point names holds the files."""
+    """The entries of installed distributions. Their files are in the package that the entry point refers to."""
     for point in entry_points(group=f"vobench.{kind}s"):
         spec = find_spec(point.value)
         package_folders = (spec.submodule_search_locations or []) if spec else []
@@ -182,7 +186,7 @@ def _installed(kind: Kind) -> Iterator[CatalogEntry]:
 
 
 def _installed_file(kind: Kind, folder: Path, name: str) -> Path:
-    """The file of an installed entry; the first possible one if none exists."""
+    """The file of an installed entry; the first possible path if none exists."""
     candidates = [folder / form.format(name) for form in FORMS[kind]]
     candidates.append(folder / "scene.yaml")
     for candidate in candidates:
@@ -192,7 +196,7 @@ def _installed_file(kind: Kind, folder: Path, name: str) -> Path:
 
 
 def _in_folder(kind: Kind, folder: Path, origin: str, name: str | None) -> Iterator[CatalogEntry]:
-    """The entries of a kind in a folder, or those of one name."""
+    """The entries of a kind in a folder, or those with one name."""
     if name in NOT_NAMES:
         return
     pattern = "*" if name is None else escape(name)

@@ -10,7 +10,7 @@ from vobench.rendering.array_types import Indices
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import areas_m2
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import BODY_M, FloorMap, at_height, downward_directions, floor_map
+from vobench.suite.free_space import BODY_M, FloorMap, at_height, downward_directions, floor_map
 from vobench.suite.scene_spec import PanelLamp, SkySpec, SunSpec
 from vobench.suite.viewpoint import is_place
 

@@ -1,4 +1,4 @@
-"""Looks up the scenes, scenarios and estimators that a suite names, and records what was found."""
+"""Looks up the scenes, scenarios and estimators that a suite names, and records them."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,7 +10,7 @@ from vobench.suite.file_kind import Kind
 
 @dataclass(frozen=True, slots=True)
 class Lookup:
-    """Finds entries of the catalog by name for one suite; `entries` lists all that it found."""
+    """Finds entries of the catalog by name for one suite. `entries` lists the entries that were found."""
 
     suite_file: Path
     entries: list[CatalogEntry] = field(default_factory=list)
@@ -22,7 +22,7 @@ class Lookup:
         return entry
 
     def find_for(self, scenario_file: Path, scene: str) -> CatalogEntry:
-        """The scene that a scenario names, recorded only once. Raises UnknownNameError."""
+        """The scene that a scenario names. It is recorded only once. Raises UnknownNameError."""
         entry = catalog.find("scene", scene, suite=scenario_file)
         if entry not in self.entries:
             self.entries.append(entry)

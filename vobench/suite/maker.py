@@ -1,8 +1,8 @@
 """Runs the maker of a scene: a Python file whose `make(seed)` returns things, materials and, optionally, lights.
 
-A maker may be code from a stranger. It therefore runs in the same sandbox as estimators, where it can read the files in
-its folder but no other file of the user. It returns its scene as data. The makers that vobench includes are trusted and
-run in the process of vobench.
+A maker can be untrusted code. It therefore runs in the same sandbox as estimators, where it can read the files in its
+folder but no other files of the user, and returns the scene as data. The makers that are included in vobench are
+trusted, and run in this process.
 """
 
 import os
@@ -12,7 +12,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from vobench import trust
-from vobench.errors import SuiteError
+from vobench.errors import SuiteError, error_sentence
 from vobench.estimator import isolation
 from vobench.estimator.check import in_one_line
 from vobench.estimator.home import Home
@@ -20,7 +20,7 @@ from vobench.estimator.manifest import Limits
 from vobench.estimator.program import EstimatorFailure, Program, sandbox_here
 from vobench.suite.catalog import builtin_root
 from vobench.suite.maker_message import MakerScene, decode
-from vobench.suite.maker_worker import ERROR, SCENE, call, sentence
+from vobench.suite.maker_worker import ERROR, SCENE, call
 
 LIMITS = Limits(trial_s=600.0, threads=max(os.cpu_count() or 1, 1))
 WORKER = (sys.executable, "-P", "-m", "vobench.suite.maker_worker")
@@ -30,10 +30,9 @@ NO_SCENE = "ended without handing back a scene"
 
 
 def made_by(maker: Path, *, seed: int, scene: str) -> MakerScene:
-    """The scene that a maker creates from a seed; `scene` is the scene's name.
+    """The scene that a maker creates from a seed. `scene` is the name of the scene.
 
-    Raises SuiteError, one line that names the maker, if the maker fails, or if this machine has no sandbox and the user
-    does not trust the maker.
+    Raises SuiteError if the maker fails, or if this machine has no sandbox and the user does not trust the maker.
     """
     if maker.resolve().is_relative_to(builtin_root().resolve()):
         return _in_this_process(maker, seed)
@@ -45,16 +44,16 @@ def _in_this_process(maker: Path, seed: int) -> MakerScene:
     try:
         return call(str(maker), seed)
     except Exception as error:
-        raise SuiteError(f"{maker}: {sentence(error)}") from error
+        raise SuiteError(f"{maker}: {error_sentence(error)}") from error
 
 
 def _is_contained() -> bool:
-    """Whether the sandbox of this machine hides the user's files from a program."""
+    """Whether the sandbox on this machine hides the user's files."""
     return isolation.FILES not in sandbox_here().sees
 
 
 def _sources(maker: Path) -> Iterator[bytes]:
-    """The name and content of the maker, then of every other Python file in its folder and below."""
+    """The name and content of the maker, followed by those of all other Python files in its folder and subfolders."""
     others = [path for path in maker.parent.rglob("*.py") if path != maker and path.is_file()]
     for path in [maker, *sorted(others)]:
         yield str(path.relative_to(maker.parent)).encode()
@@ -91,7 +90,10 @@ def _worker_output(maker: Path, seed: int) -> bytes:
 
 
 def _reason(failure: EstimatorFailure) -> str:
-    """Why a maker returned no scene; the reasons of estimators speak of trials and of their output file {out}."""
+    """The reason why a maker returned no scene.
+
+    A failure's reason is worded for estimators: it can mention a trial, or the output file as {out}.
+    """
     if failure.kind == "timeout":
         return f"took more than {LIMITS.trial_s:g} s"
     if failure.kind != "invalid_output":

@@ -1,9 +1,9 @@
-"""What the maker of a scene hands back, as bytes: things, materials and lights, without anything that runs.
+"""Encodes the scene of a maker as bytes that contain only data: things, materials and lights.
 
-A maker runs in a process of its own. Whatever that process writes is data from a stranger: it names one of the classes
-of `CLASSES`, and each field is checked against the class's own types before an object is made of it.
+A maker runs in a separate process, whose output is not trusted. Each object in it must be of one of `CLASSES`, and the
+types of its fields are checked before it is constructed.
 
-The bytes are the length of a JSON header, the header, and the arrays that the header names by offset.
+The bytes consist of the length of a JSON header, the header, and the arrays, to which the header refers by offset.
 """
 
 import json
@@ -45,13 +45,13 @@ CLASSES: dict[str, type] = {each.__name__: each for each in (MeshArrays, Thing, 
 DTYPES = ("float64", "float32", "int64", "int32", "uint8", "bool")
 OBJECT = "object"
 ARRAY = "array"
-LENGTH = struct.Struct("<Q")  # of the header
-ALIGNMENT = 16  # of the beginning of an array
+LENGTH = struct.Struct("<Q")  # the length of the header
+ALIGNMENT = 16  # arrays begin at multiples of this
 
 
 @dataclass(frozen=True, slots=True)
 class MakerScene:
-    """What `make(seed)` returned."""
+    """The things, materials and lights that a maker returns."""
 
     things: tuple[Thing, ...]
     materials: Mapping[str, Material]
@@ -59,7 +59,7 @@ class MakerScene:
 
 
 def checked(returned: Any) -> MakerScene:
-    """What `make(seed)` returned: things, their materials by name and, if it likes, lights. Raises SuiteError."""
+    """The scene that `make(seed)` returned: things, materials by name and, optionally, lights. Raises SuiteError."""
     if not isinstance(returned, Sequence) or len(returned) not in (2, 3):
         raise SuiteError("make() should return things, materials by name and, optionally, lights")
     returned_things, materials, *rest = returned
@@ -78,7 +78,7 @@ def checked(returned: Any) -> MakerScene:
 
 
 def _all_of(noun: str, objects: Any, classes: tuple[type, ...]) -> tuple[Any, ...]:
-    """The objects, which may come from a generator. Raises SuiteError where one is of another class."""
+    """The objects, which may come from a generator, as a tuple. Raises SuiteError if one is of another class."""
     try:
         listed = tuple(objects)
     except TypeError:
@@ -91,7 +91,7 @@ def _all_of(noun: str, objects: Any, classes: tuple[type, ...]) -> tuple[Any, ..
 
 
 def _require_drawable(thing: Thing, material: Material) -> None:
-    """Raise SuiteError where a thing's mesh cannot be drawn."""
+    """Raise SuiteError if the mesh of a thing cannot be drawn."""
     if not is_mesh(thing.mesh):
         kind = type(thing.mesh).__name__
         raise SuiteError(f"make() returns '{thing.name}' with a mesh of type {kind}; it should be a trimesh.Trimesh")
@@ -105,7 +105,7 @@ def _require_drawable(thing: Thing, material: Material) -> None:
 
 
 def _require_sound(mesh: MeshArrays) -> None:
-    """Raise SuiteError where a mesh's arrays do not fit together, or where a number is not finite."""
+    """Raise SuiteError if the arrays of a mesh do not fit together, or if a number is not finite."""
     vertices = len(mesh.vertices_m)
     shapes: dict[str, tuple[NDArray[Any], tuple[int, int]]] = {
         "vertices": (mesh.vertices_m, (vertices, 3)),
@@ -118,7 +118,11 @@ def _require_sound(mesh: MeshArrays) -> None:
             raise SuiteError(f"{name} have shape {array.shape}, where {shape} is right")
         if not np.isfinite(array).all():
             raise SuiteError(f"{name} have a number that is not finite")
-    if len(mesh.faces) and not 0 <= mesh.faces.min() <= mesh.faces.max() < vertices:
+    if not len(mesh.faces):
+        return
+    first_vertex = mesh.faces.min()
+    last_vertex = mesh.faces.max()
+    if first_vertex < 0 or last_vertex >= vertices:
         raise SuiteError("faces name a vertex that is not there")
 
 
@@ -126,17 +130,17 @@ def _require_sound(mesh: MeshArrays) -> None:
 
 
 class _Writer:
-    """Objects in the order in which they can be made again; one that is used twice stands there once."""
+    """Lists objects in an order in which they can be constructed. An object that is used twice is listed once."""
 
     def __init__(self) -> None:
         self.objects: list[dict[str, Any]] = []
         self.arrays: list[bytes] = []
         self._offset = 0
         self._places: dict[int, int] = {}
-        self._alive: list[Any] = []  # so that no id is given to another object meanwhile
+        self._alive: list[Any] = []  # keeps the objects, so that their ids are not used again
 
     def value(self, value: Any) -> Any:
-        """The JSON form of a field's value."""
+        """The value of a field in JSON form."""
         if isinstance(value, np.ndarray):
             return {ARRAY: self._array(value)}
         if isinstance(value, np.generic):
@@ -148,7 +152,7 @@ class _Writer:
         return {OBJECT: self.place(value)}
 
     def place(self, thing: Any) -> int:
-        """The place of an object in the list; it is added if it is new."""
+        """The index of an object in the list. A new object is added."""
         if id(thing) in self._places:
             return self._places[id(thing)]
         kind: type = type(thing)
@@ -157,7 +161,7 @@ class _Writer:
             entry = self._fields(arrays(thing))
         elif CLASSES.get(kind.__name__) is kind and is_dataclass(thing):
             entry = self._fields(thing)
-        elif callable(getattr(thing, "pixels", None)):  # a texture of the maker's own: its picture is what counts
+        elif callable(getattr(thing, "pixels", None)):  # a texture of a class of the maker is sent as its picture
             kind = Picture
             entry = {"values": self.value(np.asarray(thing.pixels())), "tile_m": self.value(thing.tile_m)}
         else:
@@ -172,7 +176,7 @@ class _Writer:
         return {field.name: self.value(getattr(thing, field.name)) for field in fields(thing)}
 
     def _array(self, array: Any) -> dict[str, Any]:
-        """Dtype, shape and offset of an array, which is added to the arrays."""
+        """Add an array, and return its dtype, shape and offset."""
         name = array.dtype.name
         if name not in DTYPES:
             raise SuiteError(f"make() returns an array of {name}, which is none of {', '.join(DTYPES)}")
@@ -185,7 +189,7 @@ class _Writer:
 
 
 def encode(scene: MakerScene) -> bytes:
-    """The bytes of a maker's scene. Raises SuiteError where it has a class that is not in `CLASSES`."""
+    """The scene of a maker as bytes. Raises SuiteError if it contains an object of a class not in `CLASSES`."""
     writer = _Writer()
     header = {
         "things": [writer.place(thing) for thing in scene.things],
@@ -202,7 +206,7 @@ def encode(scene: MakerScene) -> bytes:
 
 
 def decode(content: bytes) -> MakerScene:
-    """A maker's scene from bytes that a stranger may have written. Raises SuiteError."""
+    """The scene of a maker from bytes that are not trusted. Raises SuiteError if they are not valid."""
     try:
         (length,) = LENGTH.unpack_from(content)
         first = LENGTH.size + length
@@ -226,7 +230,7 @@ def decode(content: bytes) -> MakerScene:
 
 
 def _object(entry: Any, earlier: Sequence[Any], arrays: memoryview) -> Any:
-    """The object of an entry, whose own objects are among the earlier ones."""
+    """The object that an entry describes. Objects in its fields must be among the earlier ones."""
     name = entry["class"]
     values = {key: _value(value, earlier, arrays) for key, value in entry["fields"].items()}
     fields_read = _reader(name).model_validate(values)
@@ -240,7 +244,7 @@ def _object(entry: Any, earlier: Sequence[Any], arrays: memoryview) -> Any:
 
 
 def _require_class(value: Any, *, classes: tuple[type, ...]) -> Any:
-    """The value, if it is of one of these classes. Raises ValueError."""
+    """Return the value if it is of one of the classes. Raises ValueError otherwise."""
     if not isinstance(value, classes):
         names = " or ".join(each.__name__ for each in classes)
         raise ValueError(f"it should be of class {names}, not {type(value).__name__}")
@@ -248,19 +252,19 @@ def _require_class(value: Any, *, classes: tuple[type, ...]) -> Any:
 
 
 def _instance_of(*classes: type) -> Any:
-    """The type of a field that holds an object, which was checked when it was made."""
+    """The type of a field that holds an object. The object itself was checked when it was constructed."""
     return Annotated[Any, AfterValidator(partial(_require_class, classes=classes))]
 
 
 def _require_mesh(value: Any) -> Any:
-    """The value, if it is a mesh. Raises ValueError."""
+    """Return the value if it is a mesh. Raises ValueError otherwise."""
     if not is_mesh(value):
         raise ValueError(f"it should be a mesh, not {type(value).__name__}")
     return value
 
 
 class _Mesh:
-    """Stands for trimesh.Trimesh, which this module does not import, in annotations."""
+    """Replaces trimesh.Trimesh in annotations, because this module does not import trimesh."""
 
 
 _OF_FIELDS: dict[Any, Any] = {
@@ -273,12 +277,14 @@ _OF_FIELDS: dict[Any, Any] = {
 
 @cache
 def _reader(name: str) -> type[BaseModel]:
-    """Checks the fields of a class of `CLASSES`; an array by its class alone."""
+    """The pydantic model that checks the fields of a class of `CLASSES`. Of arrays, only the class is checked."""
     known = CLASSES[name]
     hints = get_type_hints(known, localns={"Trimesh": _Mesh}, include_extras=True)
-    types = {field.name: _OF_FIELDS.get(hints[field.name], hints[field.name]) for field in fields(known)}
+    required: dict[str, Any] = {}
+    for field in fields(known):
+        hint = hints[field.name]
+        required[field.name] = (_OF_FIELDS.get(hint, hint), ...)
     config = ConfigDict(arbitrary_types_allowed=True, extra="forbid")
-    required: dict[str, Any] = {key: (kind, ...) for key, kind in types.items()}
     return create_model(name, __config__=config, **required)
 
 
@@ -293,7 +299,7 @@ def _value(value: Any, earlier: Sequence[Any], arrays: memoryview) -> Any:
 
 
 def _array(entry: Any, arrays: memoryview) -> Any:
-    """An array as the header describes it; it cannot be written to."""
+    """The read-only array that an entry of the header describes."""
     name = entry["dtype"]
     shape = [int(length) for length in entry["shape"]]
     offset = int(entry["offset"])
@@ -303,9 +309,11 @@ def _array(entry: Any, arrays: memoryview) -> Any:
 
 
 def _require_picture(texture: Picture) -> None:
+    """Raise SuiteError unless a picture is grey, or has three or four channels of 8 bits."""
     shape = texture.values.shape
+    has_bytes = texture.values.dtype == np.uint8
     is_grey = len(shape) == 2
-    is_colour = len(shape) == 3 and shape[2] in (3, 4) and texture.values.dtype == np.uint8
+    is_colour = has_bytes and len(shape) == 3 and shape[2] in (3, 4)
     if not (is_grey or is_colour) or 0 in shape:
         kind = texture.values.dtype.name
         raise SuiteError(

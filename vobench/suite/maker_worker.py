@@ -1,6 +1,6 @@
 """The process that runs the maker of a scene: `python -m vobench.suite.maker_worker MAKER SEED`.
 
-It writes what `make(seed)` returned to the file `scene.bin` of its working folder, or one line to `error.txt`.
+It writes the returned scene to the file `scene.bin` in the working folder, or an error to `error.txt` in one line.
 """
 
 import sys
@@ -8,7 +8,7 @@ from pathlib import Path
 from runpy import run_path
 from typing import Any
 
-from vobench.errors import SuiteError, VobenchError
+from vobench.errors import SuiteError, error_sentence
 from vobench.suite.maker_message import MakerScene, checked, encode
 
 SCENE = "scene.bin"
@@ -16,26 +16,20 @@ ERROR = "error.txt"
 
 
 def call(maker: str, seed: int) -> MakerScene:
-    """What `make(seed)` of a maker's file returns, checked. Raises SuiteError, and whatever the maker raises."""
-    # Never from bytecode: that of a file edited twice within a second would be the first one's.
+    """The scene that `make(seed)` of a maker returns. Raises SuiteError if it is not valid, and the maker's errors."""
+    # run_path compiles the source. Cached bytecode could be outdated if the file is edited twice within a second.
     make: Any = run_path(maker).get("make")
     if make is None:
         raise SuiteError("has no function make(seed)")
     return checked(make(seed))
 
 
-def sentence(error: Exception) -> str:
-    """An exception in one line."""
-    text = " ".join(str(error).split())
-    return text if isinstance(error, VobenchError) else f"{type(error).__name__}: {text}"
-
-
 def main(maker: str, seed: int) -> None:
-    """Run the maker and leave its scene, or why there is none, in the working folder."""
+    """Run the maker, and write its scene or its error to a file in the working folder."""
     try:
         Path(SCENE).write_bytes(encode(call(maker, seed)))
     except Exception as error:  # the user's code may raise anything
-        Path(ERROR).write_text(sentence(error), encoding="utf-8")
+        Path(ERROR).write_text(error_sentence(error), encoding="utf-8")
 
 
 if __name__ == "__main__":

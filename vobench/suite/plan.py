@@ -8,7 +8,7 @@ from typing import Any
 from vobench.errors import UnknownNameError, unknown_name_sentence
 from vobench.suite.case import Case
 from vobench.suite.catalog import CatalogEntry
-from vobench.suite.entrant import EstimatorEntry
+from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite_spec import Suite
 from vobench.suite.yaml_source import Mistakes, YamlFile
@@ -16,29 +16,30 @@ from vobench.suite.yaml_source import Mistakes, YamlFile
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One run of one entrant on one case; `repeat` counts from 0."""
+    """One run of one estimator on one case. `repeat` counts from 0."""
 
     case: Case | RecordedCase
-    entrant: EstimatorEntry
+    estimator_entry: EstimatorEntry
     repeat: int
 
     @property
     def name(self) -> str:
-        """The trial's name in progress messages."""
-        return f"{self.entrant.label} on {self.case.name}"
+        """The name of the trial in progress messages."""
+        return f"{self.estimator_entry.label} on {self.case.name}"
 
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The cases × entrants × repeats of a suite.
+    """The cases, the estimators and the number of repeats of a suite. Every combination is a trial.
 
-    `found` lists the scenes and estimators that the suite's names refer to; `source` is the suite's file.
+    `found` lists the scenes, scenarios and estimators that the names in the suite refer to.
+    `source` is the file of the suite.
     """
 
     suite: Suite
     simulated: tuple[Case, ...]
     recorded: tuple[RecordedCase, ...]
-    entrants: tuple[EstimatorEntry, ...]
+    estimator_entries: tuple[EstimatorEntry, ...]
     found: tuple[CatalogEntry, ...]
     source: YamlFile
 
@@ -49,12 +50,14 @@ class Plan:
 
     def trials(self, case: Case | RecordedCase) -> list[Trial]:
         """Every trial on one case."""
-        return [Trial(case, entrant, repeat) for entrant in self.entrants for repeat in range(self.suite.repeats)]
+        repeats = range(self.suite.repeats)
+        return [Trial(case, entry, repeat) for entry in self.estimator_entries for repeat in repeats]
 
     def only(self, cases: Collection[str], scenes: Collection[str]) -> "Plan":
-        """The plan restricted to cases whose names match any of `cases`, and whose scenes match any of `scenes`.
+        """The plan with only the cases whose name matches one of `cases`, and whose scene matches one of `scenes`.
 
-        Both are globs; an empty collection selects everything. Raises UnknownNameError for a pattern without a match.
+        Both are collections of globs. An empty collection selects everything. Raises UnknownNameError for a glob
+        without a match.
         """
         _require_matches("case", cases, (case.name for case in self.cases))
         _require_matches("scene", scenes, (_scene_name(case) for case in self.cases))
@@ -67,11 +70,11 @@ class Plan:
         return replace(self, simulated=simulated, recorded=recorded)
 
     def limited(self, **limits: Any) -> "Plan":
-        """The plan with these values in every entrant's Limits."""
-        entrants = list[EstimatorEntry]()
-        for entrant in self.entrants:
-            entrants.append(replace(entrant, limits=replace(entrant.limits, **limits)))
-        return replace(self, entrants=tuple(entrants))
+        """The plan with the given limits for every estimator."""
+        entries = list[EstimatorEntry]()
+        for entry in self.estimator_entries:
+            entries.append(replace(entry, limits=replace(entry.limits, **limits)))
+        return replace(self, estimator_entries=tuple(entries))
 
     def mistakes(self) -> Mistakes:
         """An empty list of mistakes in the suite's file."""
@@ -83,12 +86,12 @@ def _scene_name(case: Case | RecordedCase) -> str:
 
 
 def _matches_any(name: str, patterns: Collection[str]) -> bool:
-    """Whether a name matches one of the patterns; without patterns every name does."""
+    """Whether a name matches one of the patterns. Without patterns, every name matches."""
     return not patterns or any(fnmatch.fnmatch(name, pattern) for pattern in patterns)
 
 
 def _require_matches(kind: str, patterns: Iterable[str], names: Iterable[str]) -> None:
-    """Raise UnknownNameError for a pattern that no name matches."""
+    """Raise UnknownNameError for a pattern that matches no name."""
     known_names = sorted(set(names))
     for pattern in patterns:
         if not fnmatch.filter(known_names, pattern):

@@ -1,4 +1,4 @@
-"""Creates suites and scenes: from a commented template that works as it is, or as a copy."""
+"""Creates suites and scenes, from a commented template or as a copy."""
 
 import re
 import shutil
@@ -14,7 +14,7 @@ NAME_LINE = re.compile(r"^name\s*:\s*[^\s#]+", re.MULTILINE)
 
 
 def require_name(name: str) -> None:
-    """Raise InputError for a name that a new file cannot have."""
+    """Raise InputError unless a name is valid for a new suite or scene."""
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError(
             f"a name should consist of lower-case letters, digits and _, and begin with a letter (got {name!r})"
@@ -28,7 +28,7 @@ def require_free(path: Path) -> None:
 
 
 def new_suite(name: str, *, out: Path = Path("suites"), source: str | None = None) -> Path:
-    """Write a suite to out/<name>.yaml; return its path.
+    """Write a suite to out/<name>.yaml, and return its path.
 
     `source` is the name or path of the suite or example to copy; without it, a commented template is used.
 
@@ -47,7 +47,7 @@ def new_suite(name: str, *, out: Path = Path("suites"), source: str | None = Non
 
 
 def new_scene(name: str, *, out: Path = Path("scenes"), source: str | None = None) -> Path:
-    """Write a scene; return the path of its YAML file.
+    """Write a scene, and return the path of its YAML file.
 
     `source` is the name or path of the scene to copy; without it, a commented template is used. The copy is
     out/<name>.yaml, or out/<name>/scene.yaml with all files beside it if the original has a folder of its own.
@@ -91,7 +91,7 @@ def _suite_or_example(name: str) -> CatalogEntry:
 
 
 def _renamed(original: Path, name: str) -> str:
-    """The text of a file with another name, which also replaces the name in its comments."""
+    """The text of a file in which the name is replaced, also in comments."""
     text = original.read_text(encoding="utf-8")
     if original.parent == TEMPLATES:
         return text.replace("NAME", name)

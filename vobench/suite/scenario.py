@@ -1,4 +1,4 @@
-"""A scenario: one difficulty for odometry at severities from 0 to 5, with everything else the same."""
+"""Scenarios: a difficulty for odometry at severities from 0 to 5, with everything else unchanged."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,9 +21,9 @@ NO_CAMERA = CameraSettings()
 
 @settings()
 class Setup:
-    """The setup that a case is simulated with: one variant of each axis.
+    """The setup of a simulated case: one variant of each axis.
 
-    `scene_changes` replaces values of the scene's file; the keys of nested values are joined by dots.
+    `scene_changes` replaces values of the scene file. The keys of nested values are joined by dots.
     """
 
     scene: str
@@ -36,9 +36,9 @@ class Setup:
 
 @settings()
 class ScenarioFile:
-    """A scenario's YAML: a base setup, and for each severity the keys that change.
+    """The content of a scenario file: a base setup, and for each severity, the keys that change.
 
-    Omitted keys are read from the file that it includes: another scenario, or a file with only a `base`.
+    Omitted keys are taken from the included file, which is another scenario or a file with only a `base`.
     """
 
     include: str | None = None
@@ -50,7 +50,7 @@ class ScenarioFile:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A scenario that was read: its name, its file, and the setup of each severity."""
+    """A scenario: its name, its file, and the setup of each severity."""
 
     name: str
     path: Path
@@ -61,7 +61,7 @@ class Scenario:
         return self.setups[severity]
 
     def variant(self, severity: int, scene: str) -> dict[str, str]:
-        """The name of the variant on each axis: the scenario's name, with the severity if that changes the axis."""
+        """The names of the variants: the scenario's name, followed by the severity on axes that it changes."""
         setup_names = {axis: self._name_on(axis, severity, self.name) for axis in SETUP_AXES}
         scene_name = scene
         if self.setups[severity].scene_changes:

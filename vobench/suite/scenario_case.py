@@ -21,9 +21,9 @@ from vobench.suite.yaml_source import Mistakes
 
 @dataclass(frozen=True, slots=True)
 class ScenarioCases:
-    """Reads the cases of a suite's scenarios, and gathers mistakes.
+    """Reads the cases of the scenarios of a suite, and collects mistakes.
 
-    `scenes` holds scenes with a scenario's changes, so that scenarios that share one read it once.
+    `scenes` caches the scenes with a scenario's changes, because scenarios can share them.
     """
 
     suite: Suite
@@ -32,7 +32,7 @@ class ScenarioCases:
     scenes: dict[str, SceneFile] = field(default_factory=dict)
 
     def all(self) -> list[Case]:
-        """Every case, in the order of the suite."""
+        """All cases, in the order of the suite."""
         cases = list[Case]()
         for name, severities in (self.suite.scenarios or {}).items():
             with self.mistakes.at("scenarios", name):
@@ -76,7 +76,7 @@ class ScenarioCases:
             )
 
     def _calibration_levels(self, severity: int) -> list[Level | None]:
-        """The calibration levels that run at a severity; [None] if the suite sets no calibrations."""
+        """The calibration levels for a severity; [None] if the suite has no calibrations."""
         calibrations = self.suite.calibrations
         if not calibrations:
             return [None]

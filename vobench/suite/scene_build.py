@@ -1,4 +1,4 @@
-"""Builds the scene that a scene's YAML describes: shapes, furniture, models, what its maker makes, and lights."""
+"""Builds the scene that a scene file describes: its room, boxes, furniture, models, lights and movers."""
 
 import json
 from collections import Counter, OrderedDict
@@ -17,7 +17,7 @@ from vobench.asset.outdoors import walker
 from vobench.asset.panorama import Surroundings
 from vobench.asset.room import FINISHES, OUTWARD, Instance, Opening, Piece, shell, things
 from vobench.asset.shape import at, block, card
-from vobench.errors import SuiteError, VobenchError
+from vobench.errors import SuiteError, VobenchError, error_sentence
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.scene import scene as scripted
@@ -33,36 +33,36 @@ from vobench.suite.scene_spec import ModelSpec, MoverSpec, PanoramaSpec, SceneFi
 
 
 def build(spec: SceneFile, lighting: Lighting) -> Scene:
-    """The scene under a lighting. Raises SuiteError where the lighting names a light that is not there."""
-    made = _made(spec)
-    return replace(made, lights=with_lighting(made.lights, lighting))
+    """The scene under a lighting. Raises SuiteError if the lighting names a light that the scene does not have."""
+    scene = _cached_scene(spec)
+    return replace(scene, lights=with_lighting(scene.lights, lighting))
 
 
-KEPT_SCENES = 16
-KEPT_PIECES = 512
+CACHED_SCENES = 16
+CACHED_PIECES = 512
 _scenes: OrderedDict[str, Scene] = OrderedDict()
 _pieces: OrderedDict[str, Instance] = OrderedDict()
-Made = TypeVar("Made")
+Built = TypeVar("Built")
 
 
-def _kept(last: OrderedDict[str, Made], most: int, key: str, make: Callable[[], Made]) -> Made:
-    """What was made of that key, or is now; the `most` that were asked for last are kept."""
-    if key not in last:
-        last[key] = make()
-    last.move_to_end(key)
-    while len(last) > most:
-        last.popitem(last=False)
-    return last[key]
+def _cached(cache: OrderedDict[str, Built], size: int, key: str, make: Callable[[], Built]) -> Built:
+    """The entry of a cache for a key, made if it is missing. The cache keeps the `size` entries used last."""
+    if key not in cache:
+        cache[key] = make()
+    cache.move_to_end(key)
+    while len(cache) > size:
+        cache.popitem(last=False)
+    return cache[key]
 
 
-def _made(spec: SceneFile) -> Scene:
-    """The scene in its own light; some take seconds to make."""
-    return _kept(_scenes, KEPT_SCENES, json.dumps(scene_content(spec)), lambda: _make(spec))
+def _cached_scene(spec: SceneFile) -> Scene:
+    """The scene in the light of its file, from the cache because some scenes take seconds to build."""
+    return _cached(_scenes, CACHED_SCENES, json.dumps(scene_content(spec)), lambda: _scene(spec))
 
 
 @dataclass(frozen=True, slots=True)
 class Contents:
-    """Some of what a scene holds: things, their materials by name, lights and movers."""
+    """A part of a scene: things, materials by name, lights and movers."""
 
     things: tuple[Thing, ...] = ()
     materials: Mapping[str, Material] = field(default_factory=dict)
@@ -70,25 +70,41 @@ class Contents:
     movers: tuple[scripted.Mover, ...] = ()
 
 
-def _make(spec: SceneFile) -> Scene:
-    parts = [_built(spec), *_from_maker(spec), *map(_model, spec.meshes), Contents(lights=tuple(listed_lights(spec)))]
+def _scene(spec: SceneFile) -> Scene:
+    """The scene in the light of its file. Things with an emissive material become lights."""
+    parts = [_room_and_furniture(spec), *_from_maker(spec), *map(_model, spec.meshes)]
+    parts.append(Contents(lights=tuple(listed_lights(spec))))
     parts += [_mover(mover, spec) for mover in spec.movers]
-    materials = {name: material for part in parts for name, material in part.materials.items()}
-    found = [thing for part in parts for thing in part.things]
-    glowing = {name for name, material in materials.items() if emitted_cd_m2(material).max() > 0}
-    own = [light for part in parts for light in part.lights]
-    made = Scene(
+    whole = _joined(parts)
+
+    emissive = {name for name, material in whole.materials.items() if emitted_cd_m2(material).max() > 0}
+    luminous_things = [thing for thing in whole.things if thing.material in emissive]
+    scene = Scene(
         spec.name,
-        tuple(thing for thing in found if thing.material not in glowing),
-        materials,
-        (*own, *_glow([thing for thing in found if thing.material in glowing], materials)),
-        tuple(mover for part in parts for mover in part.movers),
+        tuple(thing for thing in whole.things if thing.material not in emissive),
+        dict(whole.materials),
+        (*whole.lights, *_area_lights(luminous_things, whole.materials)),
+        whole.movers,
     )
-    return made if spec.scale == 1 else scripted.sized(made, spec.scale)
+    return scene if spec.scale == 1 else scripted.sized(scene, spec.scale)
+
+
+def _joined(parts: Sequence[Contents]) -> Contents:
+    """The contents of all parts, in their order."""
+    things: list[Thing] = []
+    materials: dict[str, Material] = {}
+    lights: list[Light] = []
+    movers: list[scripted.Mover] = []
+    for part in parts:
+        things += part.things
+        materials.update(part.materials)
+        lights += part.lights
+        movers += part.movers
+    return Contents(tuple(things), materials, tuple(lights), tuple(movers))
 
 
 def _material(name: str, spec: SceneFile) -> Material:
-    """What the scene calls so, or a finish that every scene has."""
+    """The material that the scene file defines under a name, or the finish with that name."""
     return spec.materials[name].build() if name in spec.materials else _finish(name)
 
 
@@ -97,94 +113,102 @@ def _finish(name: str) -> Material:
     return FINISHES[name]()
 
 
-def _built(spec: SceneFile) -> Contents:
+def _room_and_furniture(spec: SceneFile) -> Contents:
     """The room, boxes, boards and furniture."""
-    of = cache(partial(_material, spec=spec))
-    instances = [*_room(spec, of), *_boxes(spec, of)]
-    for piece in spec.furniture:
-        with _sentence(f"furniture '{piece.name}'"):
-            made = Piece(piece.kind, piece.name, piece.at_m, piece.yaw_deg, piece.pitch_deg, piece.size)
-            key = json.dumps([asdict(made), spec.seed])  # scenes with other walls share it
-            instances.append(_kept(_pieces, KEPT_PIECES, key, partial(made.build, spec.seed)))
-    used = {*spec.materials, *(name for _, name in materials_used(spec))}
-    return Contents(*things(instances, {name: of(name) for name in sorted(used)}))
+    material = cache(partial(_material, spec=spec))
+    instances = [*_room(spec, material), *_boxes(spec, material)]
+    for entry in spec.furniture:
+        with _located(f"furniture '{entry.name}'"):
+            piece = Piece(entry.kind, entry.name, entry.at_m, entry.yaw_deg, entry.pitch_deg, entry.size)
+            key = json.dumps([asdict(piece), spec.seed])  # variants of a scene share their furniture
+            instances.append(_cached(_pieces, CACHED_PIECES, key, partial(piece.build, spec.seed)))
+    used_names = {*spec.materials, *(name for _, name in materials_used(spec))}
+    return Contents(*things(instances, {name: material(name) for name in sorted(used_names)}))
 
 
-def _room(spec: SceneFile, of: Callable[[str], Material]) -> Iterator[Instance]:
+def _room(spec: SceneFile, material: Callable[[str], Material]) -> Iterator[Instance]:
+    """The walls, floor, ceiling and windows of the scene's room, if it has one."""
     room = spec.room
     if room is None:
         return
-    openings = [Opening(w.wall, w.center_m, w.size_m, w.depth_m) for w in room.windows]
-    walls = {side: of(room.walls.get(side, room.wall)) for side in OUTWARD}
-    for name, parts in shell(room.size_m, openings, floor=of(room.floor), ceiling=of(room.ceiling), walls=walls):
-        if name.startswith("window_"):
-            window = room.windows[int(name.removeprefix("window_"))]
-            looks = of(window.reveal), of(window.pane)
-            yield name, [replace(part, material=look) for part, look in zip(parts, looks, strict=True)]
-        else:
+    openings = [Opening(window.wall, window.center_m, window.size_m, window.depth_m) for window in room.windows]
+    walls = {side: material(room.walls.get(side, room.wall)) for side in OUTWARD}
+    floor = material(room.floor)
+    ceiling = material(room.ceiling)
+    for name, parts in shell(room.size_m, openings, floor=floor, ceiling=ceiling, walls=walls):
+        if not name.startswith("window_"):
             yield name, parts
+            continue
+        window = room.windows[int(name.removeprefix("window_"))]
+        window_materials = (material(window.reveal), material(window.pane))
+        yield name, [replace(part, material=own) for part, own in zip(parts, window_materials, strict=True)]
 
 
-def _boxes(spec: SceneFile, of: Callable[[str], Material]) -> Iterator[Instance]:
+def _boxes(spec: SceneFile, material: Callable[[str], Material]) -> Iterator[Instance]:
+    """The boxes and boards that the scene file lists."""
     for index, box in enumerate(spec.boxes):
         mesh = block(box.size_m, bevel_m=0, transform=at(*box.center_m, yaw=box.yaw_deg))
-        yield box.name or f"box_{index}", [Part(mesh, of(box.material))]
+        yield box.name or f"box_{index}", [Part(mesh, material(box.material))]
     for index, board in enumerate(spec.boards):
-        material = of(board.material)
-        whole_tile = (0.0, material.tile_m, 0.0, material.tile_m)
+        board_material = material(board.material)
+        whole_tile = (0.0, board_material.tile_m, 0.0, board_material.tile_m)
         mesh = moved(card(board.size_m, cell=whole_tile), at(*board.center_m, yaw=board.yaw_deg))
-        yield board.name or f"board_{index}", [Part(mesh, material)]
+        yield board.name or f"board_{index}", [Part(mesh, board_material)]
 
 
 def _from_maker(spec: SceneFile) -> Iterator[Contents]:
-    """What the scene's maker returns."""
+    """The contents that the scene's maker returns, if the scene has a maker."""
     if spec.maker is not None:
-        # By its name, so that a change of the sandbox does not change the keys of scenes.
+        # Cache keys follow imports, but not this one. A change of the sandbox therefore does not change scenes' keys.
         maker = import_module("vobench.suite.maker")
-        made: MakerScene = maker.made_by(Path(spec.maker), seed=spec.seed, scene=spec.name)
-        yield Contents(made.things, made.materials, made.lights)
+        scene: MakerScene = maker.made_by(Path(spec.maker), seed=spec.seed, scene=spec.name)
+        yield Contents(scene.things, scene.materials, scene.lights)
 
 
 @contextmanager
-def _sentence(where: str) -> Iterator[None]:
-    """Whatever a maker raises as a SuiteError that names it."""
+def _located(where: str) -> Iterator[None]:
+    """Turn an unexpected exception into a SuiteError that says where it occurred."""
     try:
         yield
     except VobenchError:
         raise
     except Exception as error:  # the user's code may raise anything
-        raise SuiteError(f"{where}: {type(error).__name__}: {' '.join(str(error).split())}") from error
+        raise SuiteError(f"{where}: {error_sentence(error)}") from error
 
 
 def _model(spec: ModelSpec) -> Contents:
-    """A model where it stands; with a name of its own, the names in it begin with that."""
+    """The contents of a model file at the pose in the scene file. All names begin with the model's name, if given."""
     from vobench.asset.model import read_model
 
     model = read_model(spec.file, scale=spec.scale, up=spec.up, roles=spec.roles)
-    T = at(*spec.at_m, yaw=spec.yaw_deg)
-    before = f"{spec.name}." if spec.name else ""
-    placed = tuple(
-        replace(thing, name=before + thing.name, mesh=moved(thing.mesh, T), material=before + thing.material)
-        for thing in model.everything
-    )
-    lights = tuple(_moved(replace(light, name=before + light.name), T) for light in model.lights)
-    return Contents(placed, {before + name: material for name, material in model.materials.items()}, lights)
+    T_world_model = at(*spec.at_m, yaw=spec.yaw_deg)
+    prefix = f"{spec.name}." if spec.name else ""
+    placed_things = []
+    for thing in model.everything:
+        mesh = moved(thing.mesh, T_world_model)
+        placed = replace(thing, name=prefix + thing.name, mesh=mesh, material=prefix + thing.material)
+        placed_things.append(placed)
+    materials = {prefix + name: material for name, material in model.materials.items()}
+    lights = tuple(_moved(replace(light, name=prefix + light.name), T_world_model) for light in model.lights)
+    return Contents(tuple(placed_things), materials, lights)
 
 
 def _moved(light: Light, T_world_model: Array) -> Light:
+    """A light of a model at the model's pose in the world. Of a sun, only the azimuth changes."""
     if isinstance(light, Sun):
-        turn = float(np.rad2deg(np.arctan2(T_world_model[1, 0], T_world_model[0, 0])))
-        return replace(light, azimuth_deg=tuple(azimuth + turn for azimuth in light.azimuth_deg))
+        yaw_deg = float(np.rad2deg(np.arctan2(T_world_model[1, 0], T_world_model[0, 0])))
+        return replace(light, azimuth_deg=tuple(azimuth + yaw_deg for azimuth in light.azimuth_deg))
     if not isinstance(light, PointLight | SpotLight):
         return light
-    placed = replace(light, position_m=se3.apply(T_world_model, light.position_m[None])[0])
+    position_m = se3.apply(T_world_model, light.position_m[None])[0]
+    placed = replace(light, position_m=position_m)
     if isinstance(placed, SpotLight):
         placed = replace(placed, direction=T_world_model[:3, :3] @ placed.direction)
     return placed
 
 
 def listed_lights(spec: SceneFile) -> Iterator[Light]:
-    """The lights that a scene's file lists as such: lamps, sun and sky."""
+    """The lights that a scene file lists: lamps, sun and sky."""
     yield from (lamp.build() for lamp in spec.lamps)
     if spec.sun:
         yield _sun(spec.sun)
@@ -219,6 +243,7 @@ def _panorama(panorama: PanoramaSpec | None, sun: SunSpec | None) -> Surrounding
 
 
 def _sun(sun: SunSpec) -> Sun:
+    """The sun of a scene file, with one position or several at given times."""
     path = [(key.t_s, key.azimuth_deg, key.elevation_deg) for key in sun.path]
     if sun.azimuth_deg is not None and sun.elevation_deg is not None:
         path = [(0.0, sun.azimuth_deg, sun.elevation_deg)]
@@ -234,47 +259,60 @@ def _sun(sun: SunSpec) -> Sun:
     )
 
 
-def _glow(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterator[AreaLight]:
-    """Every thing that shines as a light; those of one name are numbered."""
-    count = Counter[str]()
+def _area_lights(things: Sequence[Thing], materials: Mapping[str, Material]) -> Iterator[AreaLight]:
+    """An area light for each luminous thing. Lights of things with the same name are numbered."""
+    counts = Counter[str]()
     for thing in things:
         emission = emitted_cd_m2(materials[thing.material])
         luminance = float(emission @ np.array(LUMINANCE))
-        nth = count[thing.name]
-        count[thing.name] = count[thing.name] + 1
-        red, green, blue = (emission / luminance).tolist()
-        name = f"{thing.name}.{nth}" if nth else thing.name
+        number = counts[thing.name]
+        counts[thing.name] += 1
+        name = f"{thing.name}.{number}" if number else thing.name
         power_lm = luminance * np.pi * areas_m2(corners(thing.mesh)).sum()
-        colour = (red, green, blue)
-        yield AreaLight(name, thing.mesh, power_lm, colour=colour, material=thing.material)
+        red, green, blue = (emission / luminance).tolist()
+        yield AreaLight(name, thing.mesh, power_lm, colour=(red, green, blue), material=thing.material)
 
 
 def _mover(mover: MoverSpec, spec: SceneFile) -> Contents:
-    columns = zip(*((key.t_s, key.position_m, key.yaw_deg) for key in mover.path), strict=True)
-    times_s, positions_m, yaw_deg = (np.array(column, float) for column in columns)
-    path = scripted.WaypointMotion(times_s, positions_m, yaw_deg, mover.repeats)
+    """A mover of the scene file, or the movers of a person's limbs, and their materials."""
+    motion = _waypoint_motion(mover)
     if mover.kind == "person":
-        return _walker(mover.name, path, spec.seed)
+        return _walker(mover.name, motion, spec.seed)
+    contents = _mover_contents(mover, spec)
+    moving = tuple(replace(thing, name=mover.name) for thing in contents.things)
+    return Contents(materials=contents.materials, movers=(scripted.Mover(mover.name, moving, motion),))
+
+
+def _waypoint_motion(mover: MoverSpec) -> scripted.WaypointMotion:
+    """The motion of a mover through the waypoints of its path."""
+    times_s = np.array([key.t_s for key in mover.path], float)
+    positions_m = np.array([key.position_m for key in mover.path], float)
+    yaw_deg = np.array([key.yaw_deg for key in mover.path], float)
+    return scripted.WaypointMotion(times_s, positions_m, yaw_deg, mover.repeats)
+
+
+def _mover_contents(mover: MoverSpec, spec: SceneFile) -> Contents:
+    """The things and materials of a mover: a model, a piece of furniture, or a box."""
     if mover.file:
-        own = _model(ModelSpec(file=mover.file, name=mover.name))
-    elif mover.kind:
-        with _sentence(f"mover '{mover.name}'"):
-            own = Contents(*things([Piece(mover.kind, mover.name, (0.0, 0.0, 0.0)).build(spec.seed)]))
-    else:
-        mesh = block(mover.size_m or (), bevel_m=0)
-        look = mover.material or ""
-        own = Contents((Thing(mover.name, mesh, look),), {look: _material(look, spec)})
-    moving = tuple(replace(thing, name=mover.name) for thing in own.things)
-    return Contents(materials=own.materials, movers=(scripted.Mover(mover.name, moving, path),))
+        return _model(ModelSpec(file=mover.file, name=mover.name))
+    if mover.kind:
+        with _located(f"mover '{mover.name}'"):
+            piece = Piece(mover.kind, mover.name, (0.0, 0.0, 0.0))
+            return Contents(*things([piece.build(spec.seed)]))
+    mesh = block(mover.size_m or (), bevel_m=0)
+    material_name = mover.material or ""
+    return Contents((Thing(mover.name, mesh, material_name),), {material_name: _material(material_name, spec)})
 
 
-def _walker(name: str, path: scripted.WaypointMotion, seed: int) -> Contents:
-    """Somebody who walks a path: a mover for each of their limbs, all of one name."""
-    who = walker(Piece("person", name, (0.0, 0.0, 0.0)).rng(seed))
-    made, materials = things([(f"{name}.{nth}", limb.parts) for nth, limb in enumerate(who.limbs)])
+def _walker(name: str, motion: scripted.WaypointMotion, seed: int) -> Contents:
+    """A person who walks along a path: one mover per limb, all with the same name."""
+    person = walker(Piece("person", name, (0.0, 0.0, 0.0)).rng(seed))
+    limb_names = [f"{name}.{index}" for index in range(len(person.limbs))]
+    limb_parts = [(limb_name, limb.parts) for limb_name, limb in zip(limb_names, person.limbs, strict=True)]
+    all_things, materials = things(limb_parts)
     movers = []
-    for nth, limb in enumerate(who.limbs):
-        own = tuple(replace(thing, name=name) for thing in made if thing.name == f"{name}.{nth}")
-        gait = scripted.LimbMotion(path, who.cycle_m, limb.joints_m, limb.pitch_rad, who.rise_m)
-        movers.append(scripted.Mover(name, own, gait))
+    for limb_name, limb in zip(limb_names, person.limbs, strict=True):
+        limb_things = tuple(replace(thing, name=name) for thing in all_things if thing.name == limb_name)
+        limb_motion = scripted.LimbMotion(motion, person.cycle_m, limb.joints_m, limb.pitch_rad, person.rise_m)
+        movers.append(scripted.Mover(name, limb_things, limb_motion))
     return Contents(materials=materials, movers=tuple(movers))

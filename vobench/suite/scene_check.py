@@ -19,7 +19,7 @@ NAMED_SECTIONS = {"lamps": "", "boxes": "box", "boards": "board", "furniture": "
 
 
 def check_scene(spec: SceneFile, mistakes: Mistakes) -> None:
-    """Add what is wrong with a scene, of which sections or entries may be missing, to the mistakes in its file."""
+    """Find the mistakes in a scene, whose sections and entries may be incomplete, and add them to `mistakes`."""
     is_complete = not mistakes.found
     _check_materials(spec, mistakes)
     if is_complete:
@@ -66,7 +66,7 @@ def _room_materials(room: RoomSpec) -> Iterator[tuple[Keys, str]]:
 
 
 def _require_light(spec: SceneFile) -> None:
-    """Raise SuiteError if nothing in a scene can emit light. Makers, models and furniture may bring lights."""
+    """Raise SuiteError if nothing in a scene can emit light. Makers, models and furniture may contain lights."""
     strengths = [lamp.power_lm for lamp in spec.lamps]
     strengths += [source.illuminance_lx for source in (spec.sun, spec.sky) if source]
     has_luminous_material = any(isinstance(material, LuminousSpec) for material in spec.materials.values())
@@ -85,7 +85,7 @@ def _check_positions(spec: SceneFile, room: RoomSpec, mistakes: Mistakes) -> Non
 
 
 def _positions(spec: SceneFile) -> Iterator[tuple[Keys, Triple]]:
-    """The place in the file and the position of everything that should be inside the room."""
+    """The position of everything that should be inside of the room, with its place in the file."""
     for section in ("lamps", "boxes", "boards"):
         for index, thing in enumerate(getattr(spec, section)):
             yield (section, index, "center_m"), thing.center_m
@@ -95,7 +95,7 @@ def _positions(spec: SceneFile) -> Iterator[tuple[Keys, Triple]]:
 
 
 def _mover_positions(mover: MoverSpec) -> Iterator[Triple]:
-    """The positions of a mover. Furniture and models may stand on the floor; of a box it is the centre."""
+    """The positions of a mover. The position of a box is its centre; furniture and models may be on the floor."""
     for key in mover.path:
         x_m, y_m, z_m = key.position_m
         is_box = mover.size_m is not None
@@ -139,7 +139,10 @@ def _require_apart(window: WindowSpec, earlier: WindowSpec, earlier_index: int) 
 
 
 def _check_names(spec: SceneFile, mistakes: Mistakes) -> None:
-    """Find names that occur twice, generated ones included: lightings name lights, and ground truth names things."""
+    """Find names that occur twice, including generated names.
+
+    Names must be unique because lightings refer to lights by name, and the ground truth to things.
+    """
     taken_names = {SUN, SKY, *_room_names(spec.room)}
     for section, prefix in NAMED_SECTIONS.items():
         for index, thing in enumerate(getattr(spec, section)):

@@ -1,4 +1,4 @@
-"""Reads a scene's YAML, or a model as a scene, and finds the files that it names."""
+"""Reads the YAML file of a scene, or a model as a scene, and resolves the paths in it."""
 
 import hashlib
 import json
@@ -27,9 +27,9 @@ def read_scene(path: Path) -> SceneFile:
 def read_scene_with_mistakes(
     path: Path, changes: Mapping[str, Any] = MappingProxyType({})
 ) -> tuple[SceneFile, Mistakes]:
-    """The scene in a file, and all mistakes; if there are any, the scene lacks sections and entries.
+    """The scene in a file, and all mistakes in it. If there are mistakes, the scene is incomplete.
 
-    `changes` are values that replace the file's; their keys are joined by dots.
+    `changes` replaces values of the file; the keys of nested values are joined by dots.
     """
     if path.suffix.lower() in MODEL_SUFFIXES:
         if changes:
@@ -46,7 +46,7 @@ def read_scene_with_mistakes(
 
 
 def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> SceneFile:
-    """The scene with absolute paths of its files; relative ones start at `folder`."""
+    """The scene with absolute paths of its files. Relative paths start at `folder`."""
 
     def absolute(name: str, *keys: int | str) -> str:
         path = folder / name
@@ -67,7 +67,7 @@ def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> S
 
 
 def scene_content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
-    """The scene as JSON can hold it. Files are identified by name and content, not by path."""
+    """The scene as plain JSON values. Files are identified by their name and content, not by their path."""
     scene: dict[str, Any] = yaml_file.plain(spec, exclude=exclude)
     for part in (*scene.get("meshes", ()), *scene.get("movers", ())):
         if part.get("file"):

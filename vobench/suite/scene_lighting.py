@@ -1,4 +1,4 @@
-"""Lightings: other powers and levels for the lights of a scene."""
+"""Lightings, which replace the power or the level of lights in a scene."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -9,12 +9,12 @@ from vobench.scene.light import Light, Sky, Sun, scaled
 from vobench.suite.scene_spec import LightOverride
 from vobench.suite.yaml_source import YamlFile
 
-Lighting = dict[str, LightOverride]  # by the light's name
+Lighting = dict[str, LightOverride]  # by the name of the light
 
-# Names of the lights that a scene has at most one of.
+# The names of the lights of which a scene has at most one.
 SUN = "sun"
 SKY = "sky"
-# Prefixes of the names of things without a name in the file.
+# The prefixes of generated names, for things that have no name in the file.
 GENERATED_NAMES = ("box_", "board_", "window_", "wall_", "floor", "ceiling")
 
 
@@ -32,7 +32,7 @@ def with_lighting(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, .
 
 
 def _override_light(light: Light, override: LightOverride) -> Light:
-    """The light with another level. Another power becomes a level, so that its light is computed only once."""
+    """The light with another level. Another power is converted to a level, so that its light is computed only once."""
     is_daylight = isinstance(light, Sun | Sky)
     unsuitable_key = "power_lm" if is_daylight else "illuminance_lx"
     if getattr(override, unsuitable_key) is not None:
@@ -52,7 +52,7 @@ def _override_light(light: Light, override: LightOverride) -> Light:
 
 
 def require_possible(name: str, scene: YamlFile) -> None:
-    """Raise SuiteError if no light can have this name, in a scene that was read only in part."""
+    """Raise SuiteError if no light of a scene, which was read only in part, can have this name."""
     written_names = [*_written_names(scene.marked)]
     daylight_names = [light for light in (SUN, SKY) if light in scene.marked]
     known_names = [*written_names, *daylight_names]

@@ -1,4 +1,4 @@
-"""What a scene's YAML may say."""
+"""The settings in the YAML file of a scene."""
 
 from dataclasses import field, replace
 from typing import Annotated, Any, Literal
@@ -30,7 +30,7 @@ from vobench.setting import ByKind, Name, NonNegative, OneOf, Positive, Share, T
 
 @settings()
 class LevelSpec:
-    """The brightness of a light over time, relative to its nominal brightness; exactly one field is set."""
+    """The brightness of a light over time, relative to its nominal brightness. Exactly one field is set."""
 
     steady: NonNegative | None = None
     flicker: Flicker | None = None
@@ -58,7 +58,7 @@ STEADY = LevelSpec(steady=1.0)
 
 @settings()
 class LightOverride:
-    """Another power (lamps) or illuminance (sun and sky) of a light, or another level over time."""
+    """The changes of a light: another power (lamps), illuminance (sun and sky), or level over time."""
 
     power_lm: NonNegative | None = None
     illuminance_lx: NonNegative | None = None
@@ -69,7 +69,7 @@ Colour = tuple[Share, Share, Share]  # linear red, green and blue
 
 
 def unit_luminance_colour(colour: Colour) -> Rgb:
-    """The colour scaled to luminance 1. Raises SettingError for black, which light cannot have."""
+    """The colour scaled to luminance 1. Raises SettingError for black."""
     luminance = float(np.array(colour) @ np.array(LUMINANCE))
     if not luminance:
         raise SettingError("light should not be black (got [0, 0, 0])")
@@ -77,10 +77,10 @@ def unit_luminance_colour(colour: Colour) -> Rgb:
     return red, green, blue
 
 
-Hue = Annotated[Colour, ValueCheck(unit_luminance_colour)]  # of a light; it does not change the power
+Hue = Annotated[Colour, ValueCheck(unit_luminance_colour)]  # the colour of a light, which does not change its power
 
 
-# The light map of anything larger would not fit into memory.
+# The light map of a larger scene would not fit into memory.
 Side = Annotated[float, Gt(0), Le(300)]
 Size = tuple[Side, Side, Side]
 Elevation = Annotated[float, Gt(0), Le(90)]
@@ -88,7 +88,7 @@ Elevation = Annotated[float, Gt(0), Le(90)]
 
 @settings()
 class LuminousSpec:
-    """A light-emitting material: its front emits diffusely, in the hue of a linear RGB `colour`."""
+    """A light-emitting material. Its front emits diffusely, in the hue of the linear RGB `colour`."""
 
     kind: Literal["luminous"] = "luminous"
     luminance_cd_m2: Positive
@@ -106,7 +106,7 @@ Roughness = Annotated[float, Ge(0), Le(0.5)]
 
 @settings(kw_only=False)
 class DiffuseSpec(Procedural):
-    """A diffuse (Lambertian) material: its reflectance is its texture's times its linear RGB `colour`."""
+    """A diffuse (Lambertian) material. Its reflectance is that of its texture times the linear RGB `colour`."""
 
     colour: Colour = WHITE
     kind: Literal["matt"] = "matt"
@@ -120,7 +120,8 @@ class DiffuseSpec(Procedural):
 class PolishedSpec(Procedural):
     """A diffuse material under a clear coat, such as waxed stone, which reflects more at grazing angles.
 
-    `tint` scales the coat's reflection; `roughness` is the RMS slope of its facets (GGX alpha), 0 for a smooth coat.
+    `tint` scales the reflection of the coat. `roughness` is the RMS slope of its facets (GGX alpha); it is 0 for a
+    smooth coat.
     """
 
     eta: Eta = 1.5
@@ -136,7 +137,7 @@ class PolishedSpec(Procedural):
 
 @settings(kw_only=False)
 class MirrorSpec:
-    """A metal that reflects the share `tint` of the light at every angle; `roughness` as in Polished."""
+    """A metal that reflects the share `tint` of the light at every angle. `roughness` is that of PolishedSpec."""
 
     tint: Share = 0.9
     roughness: Roughness = 0.0
@@ -149,7 +150,10 @@ class MirrorSpec:
 
 @settings(kw_only=False)
 class GlassSpec:
-    """A thin pane that reflects a little and transmits the rest without refraction; `tint` scales the transmission."""
+    """A thin pane that reflects a small part of the light, and transmits the rest without refraction.
+
+    `tint` scales the transmission.
+    """
 
     eta: Eta = 1.5
     tint: Share = 1.0
@@ -168,7 +172,10 @@ MaterialSpec = Annotated[
 
 @settings()
 class WindowSpec:
-    """An opening in a wall with a pane depth_m behind it; center_m is the position along the wall (x or y) and z."""
+    """An opening in a wall, with a pane at the distance `depth_m` behind it.
+
+    `center_m` is the position along the wall (x or y) and the height (z).
+    """
 
     wall: Wall
     center_m: tuple[float, float]
@@ -180,7 +187,7 @@ class WindowSpec:
 
 @settings()
 class RoomSpec:
-    """Four walls around the origin, a floor at z = 0 and a ceiling; `walls` are materials of single walls."""
+    """Four walls around the origin, a floor at z = 0, and a ceiling. `walls` maps single walls to materials."""
 
     size_m: Size
     floor: str
@@ -191,11 +198,11 @@ class RoomSpec:
 
     @property
     def extent(self) -> str:
-        """The size of the room in words."""
+        """The size of the room as text."""
         return f"{' × '.join(f'{side:g}' for side in self.size_m)} m around the origin"
 
     def holds(self, points_m: ArrayLike) -> NDArray[np.bool_]:
-        """Which points (..., 3) are within the walls, above the floor and below the ceiling."""
+        """Whether each point (..., 3) is inside of the room."""
         half_size_m = np.array(self.size_m) / 2
         center_m = [0, 0, half_size_m[2]]
         offset_m = np.abs(np.asarray(points_m) - center_m)
@@ -216,7 +223,10 @@ class BoxSpec:
 
 @settings()
 class BoardSpec:
-    """An upright rectangle, such as a picture, screen, mirror or pane; its visible side faces yaw_deg (0 along x)."""
+    """An upright rectangle, such as a picture, screen, mirror or pane.
+
+    Its visible side faces the direction `yaw_deg`; 0 is along x.
+    """
 
     name: Name | None = None
     center_m: Triple
@@ -227,7 +237,10 @@ class BoardSpec:
 
 @settings()
 class FurnitureSpec:
-    """A piece of furniture at at_m with its front facing yaw_deg; its random details depend on seed and name."""
+    """A piece of furniture at `at_m` whose front faces `yaw_deg`.
+
+    Its random details depend on its name and the seed.
+    """
 
     kind: Annotated[str, OneOf("piece of furniture", FURNITURE)]
     name: Name
@@ -239,10 +252,11 @@ class FurnitureSpec:
 
 @settings()
 class ModelSpec:
-    """A model from a glTF, OBJ, STL or PLY file with its origin at at_m.
+    """A model from a glTF, OBJ, STL or PLY file, with its origin at `at_m`.
 
-    `roles` maps globs of node names to roles. `scale` is the length of the file's unit in metres. `up` is the upward
-    axis, if it is not the format's.
+    `roles` maps globs of node names to roles.
+    `scale` is the length of the file's unit in metres.
+    `up` is the axis that points up, if it differs from that of the format.
     """
 
     file: Annotated[str, MinLen(1)]
@@ -394,9 +408,10 @@ class PathKey:
 
 @settings()
 class MoverSpec:
-    """A thing that moves in straight lines from key to key, again and again if it `repeats`.
+    """A thing that moves in straight lines from key to key. With `repeats`, it starts again at the end.
 
-    It is a box of size_m and material with its centre at position_m, or furniture or a model with its origin there.
+    It is a box with `size_m` and `material` whose centre is at `position_m`, or furniture or a model with its origin
+    there.
     """
 
     name: Name
@@ -420,7 +435,7 @@ class MoverSpec:
 
 @settings()
 class SceneFile:
-    """A scene, and the luminance of diffuse white that cameras are exposed for.
+    """A scene, and the luminance of diffuse white for which cameras are exposed.
 
     Without `white_cd_m2`, white follows from the light that cameras on the free path see.
 
@@ -446,5 +461,6 @@ class SceneFile:
     movers: tuple[MoverSpec, ...] = ()
 
     def __post_init__(self) -> None:
-        if not (self.room or self.maker or any((self.boxes, self.boards, self.furniture, self.meshes))):
+        has_objects = any((self.boxes, self.boards, self.furniture, self.meshes))
+        if not (self.room or self.maker or has_objects):
             raise SettingError("a scene needs something visible: room, boxes, boards, furniture, meshes or a maker")

@@ -1,4 +1,4 @@
-"""The recordings in a suite: what YAML may say of them, and the cases that follow."""
+"""The recordings in a suite: their settings, and their cases."""
 
 import re
 from collections.abc import Iterator
@@ -19,9 +19,11 @@ GLOB = re.compile(r"[*?\[]")
 class Source:
     """A recording, or several that match a pattern: sequences of vobench, dataset folders or bags.
 
-    Paths are relative to the suite's file. The form is detected from the content if it is not given. `calibration` and
-    `imu` are Kalibr's camchain.yaml and imu.yaml, `truth` is a trajectory file, and `rate_hz` the frame rate of images
-    without stamps. `topics` names the topics of a bag, if their own names are ambiguous.
+    Paths are relative to the file of the suite. The form is detected from the content if it is not given.
+    `calibration` and `imu` are Kalibr's camchain.yaml and imu.yaml.
+    `truth` is a trajectory file.
+    `rate_hz` is the frame rate of images without stamps.
+    `topics` says which topics of a bag are used, if that is ambiguous.
     """
 
     path: str
@@ -45,7 +47,10 @@ class Source:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecordedCase:
-    """One recording as a case; `variant` is its name on the axis `source`, `entry` its number in the suite's list."""
+    """A case that is a recording.
+
+    `variant` is its name on the axis `source`, and `entry` is its index in the suite's list.
+    """
 
     name: str
     variant: dict[str, str]
@@ -54,7 +59,7 @@ class RecordedCase:
 
 
 def as_sources(value: Any) -> Any:
-    """A list of sources: one path or mapping is a list of one, and a path is a source without other keys."""
+    """The value as a list of sources. A path stands for a source without other keys."""
     entries = value if isinstance(value, tuple | list) else (value,)
     return tuple({"path": entry} if isinstance(entry, str) else entry for entry in entries)
 
@@ -63,7 +68,7 @@ SOURCES = ShortForm(as_sources, {"anyOf": [{"type": "string"}, {"type": "object"
 
 
 def recorded_cases(spec: Source, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:
-    """The cases of one source; relative paths start at `folder`. Raises SuiteError if there is no such recording."""
+    """The cases of one source. Relative paths start at `folder`. Raises SuiteError if there is no such recording."""
     paths = _recording_paths(spec.path, folder)
     if spec.name and len(paths) > 1:
         raise SuiteError(f"{len(paths)} recordings match '{spec.path}', so one name '{spec.name}' is not enough")
@@ -74,9 +79,9 @@ def recorded_cases(spec: Source, folder: Path, *, entry: int = 0) -> Iterator[Re
 
 
 def case_name(path: Path) -> str:
-    """The name of a recording: that of its folder or file, in characters that a case's name may have.
+    """The name of the case of a recording: that of its folder or file, with only valid characters.
 
-    In the ASL layout the folder mav0 is the same for every recording, so the folder above it counts.
+    In the ASL layout, every recording is in a folder mav0, so the folder above it is used.
     """
     recording = path.parent if path.name == "mav0" else path
     stem = recording.name if recording.is_dir() else recording.stem
@@ -116,7 +121,7 @@ def _matches(written: str, folder: Path) -> list[Path]:
 
 
 def _visible_matches(base: Path, pattern_parts: tuple[str, ...], written: str) -> Iterator[Path]:
-    """The matches below a folder, without hidden ones unless the pattern asks for them. Raises SuiteError."""
+    """The matches below a folder. Hidden ones match only a pattern that begins with a dot. Raises SuiteError."""
     shows_hidden = _is_hidden(pattern_parts)
     count = 0
     for path in base.glob("/".join(pattern_parts)):

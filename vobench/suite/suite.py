@@ -1,4 +1,4 @@
-"""From a suite's name to its plan."""
+"""Reads a suite and creates its plan."""
 
 from collections import Counter
 from collections.abc import Mapping
@@ -9,7 +9,7 @@ from typing import Any
 from vobench.errors import SuiteError
 from vobench.setting import hints
 from vobench.suite import catalog, yaml_file
-from vobench.suite.entrant import EntrantReader
+from vobench.suite.estimator_entry import EstimatorEntryReader
 from vobench.suite.lookup import Lookup
 from vobench.suite.plan import Plan
 from vobench.suite.scenario_case import ScenarioCases
@@ -22,10 +22,10 @@ from vobench.suite.yaml_source import Mistakes
 def read_plan(
     name: str, *, only_estimators: tuple[str, ...] = (), changes: Mapping[str, str] = MappingProxyType({})
 ) -> Plan:
-    """The plan of the suite with that name, or in that file; nothing is simulated, no estimator's code is imported.
+    """The plan of a suite, given its name or path. Nothing is simulated, and no estimator is imported.
 
-    `only_estimators` are labels, globs of labels, or names of other estimators; `changes` are those of
-    `yaml_file.read_all`.
+    `only_estimators` are labels, globs of labels, or names of other estimators.
+    `changes` are those of `yaml_file.read_all`.
 
     Raises SuiteError with all mistakes, or UnknownNameError.
     """
@@ -38,7 +38,7 @@ def read_plan(
 
 
 def _require_axes(content: Mapping[str, Any], mistakes: Mistakes) -> None:
-    """Raise SuiteError if an incomplete suite lacks an axis, too; a misspelt key counts as the key it resembles."""
+    """Raise SuiteError if an incomplete suite also lacks an axis. A misspelt key counts as the most similar key."""
     intended_keys = set[str]()
     for key in content:
         intended_keys.update(get_close_matches(str(key), hints(Suite), n=1))
@@ -48,10 +48,10 @@ def _require_axes(content: Mapping[str, Any], mistakes: Mistakes) -> None:
 
 
 def _plan(suite: Suite, mistakes: Mistakes, only_estimators: tuple[str, ...]) -> Plan:
-    """The plan of a suite of which entries or sections may be missing. Raises SuiteError with all mistakes."""
+    """The plan of a suite, which may be incomplete. Raises SuiteError with all mistakes."""
     lookup = Lookup(mistakes.source.path.resolve())
-    entrant_reader = EntrantReader(suite, mistakes, lookup)
-    entrants = entrant_reader.only(only_estimators) if only_estimators else entrant_reader.all()
+    estimator_reader = EstimatorEntryReader(suite, mistakes, lookup)
+    estimator_entries = estimator_reader.only(only_estimators) if only_estimators else estimator_reader.all()
 
     axis_reader = AxisReader(suite, mistakes, lookup)
     scenes = axis_reader.scenes()
@@ -68,18 +68,18 @@ def _plan(suite: Suite, mistakes: Mistakes, only_estimators: tuple[str, ...]) ->
     mistakes.require_none()
     axis_cases = [axis_reader.case(variant, axes, replayed) for variant in variants]
     simulated = (*axis_cases, *scenario_cases)
-    return Plan(suite, simulated, recorded, entrants, tuple(lookup.entries), mistakes.source)
+    return Plan(suite, simulated, recorded, estimator_entries, tuple(lookup.entries), mistakes.source)
 
 
 def _require_distinct(names: list[str]) -> None:
-    """Raise SuiteError if two cases have one name."""
+    """Raise SuiteError if two cases have the same name."""
     for name, count in Counter(names).items():
         if count > 1:
             raise SuiteError(f"two cases are called '{name}'; rename a variant of an axis")
 
 
 def _recorded_cases(suite: Suite, mistakes: Mistakes, simulated_names: set[str]) -> tuple[RecordedCase, ...]:
-    """The recordings of a suite. One with the name of another case is a mistake."""
+    """The recordings of a suite. A recording with the same name as another case is a mistake."""
     folder = mistakes.source.path.parent
     recorded = list[RecordedCase]()
     for index, spec in enumerate(suite.source):

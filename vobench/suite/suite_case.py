@@ -19,16 +19,16 @@ from vobench.suite.suite_spec import Suite
 from vobench.suite.trajectory import read_replayed, read_times
 from vobench.suite.yaml_source import Mistakes
 
-USUAL_RIG = "ahead"  # name of the rig of suites that have none
+USUAL_RIG = "ahead"  # the name of the default rig
 USUAL_PITCH_DEG = 10
-SHARED_SETTINGS = ("rendering", "truth", "truth_noise", "frames", "seed")  # of all cases of a suite
+SHARED_SETTINGS = ("rendering", "truth", "truth_noise", "frames", "seed")  # the same for all cases of a suite
 
 Axes = dict[str, Mapping[str, Any]]  # the variants of each axis by name, in the order of AXES
 
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One combination of the axes: the case's name, and its name on each axis."""
+    """One combination of the axes: the name of the case, and the name of the variant on each axis."""
 
     name: str
     by_axis: dict[str, str]
@@ -36,18 +36,18 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class AxisReader:
-    """Reads the variants of a suite's axes, of which entries may be missing, and gathers mistakes."""
+    """Reads the variants of a suite's axes, which may be incomplete, and collects mistakes."""
 
     suite: Suite
     mistakes: Mistakes
     lookup: Lookup
 
     def _folder(self) -> Path:
-        """The suite's folder, where its relative paths start."""
+        """The folder of the suite, at which its relative paths start."""
         return self.mistakes.source.path.parent
 
     def scenes(self) -> dict[str, SceneFile]:
-        """The scenes by the names of their files. The suite's lightings are checked on each."""
+        """The scenes by the names of their files. The lightings of the suite are checked against each scene."""
         scenes = dict[str, SceneFile]()
         for index, name in enumerate(self.suite.scenes or ()):
             with self.mistakes.at("scenes", index):
@@ -62,7 +62,7 @@ class AxisReader:
         return scenes
 
     def _check_lightings(self, scene: SceneFile, scene_mistakes: Mistakes) -> None:
-        """Find lightings that name no light of the scene now, rather than after an hour of simulation."""
+        """Find lightings that name a light which the scene does not have, before anything is simulated."""
         lightings = self.suite.lightings
         is_scene_complete = not scene_mistakes.found
         lights: tuple[Light, ...] = ()
@@ -79,7 +79,7 @@ class AxisReader:
                         scene_lighting.require_possible(name, scene_mistakes.source)
 
     def replayed_poses(self) -> dict[str, str]:
-        """The poses of each replayed trajectory as TUM text, by the trajectory's name."""
+        """The poses of each replayed trajectory as TUM text, by the name of the trajectory."""
         texts = dict[str, str]()
         for name, spec in (self.suite.trajectories or {}).items():
             if not isinstance(spec, Replay):
@@ -91,7 +91,7 @@ class AxisReader:
         return texts
 
     def rigs(self) -> dict[str, RigSettings]:
-        """The rigs with the lenses of their files. Rigs that cannot be built are mistakes."""
+        """The rigs with the lenses from their files. A rig that cannot be built is a mistake."""
         rigs = dict(self.suite.rigs or {})
         for name, rig in rigs.items():
             with self.mistakes.at("rigs", name):
@@ -99,7 +99,7 @@ class AxisReader:
         return rigs
 
     def axes(self, scenes: dict[str, SceneFile], rigs: dict[str, RigSettings]) -> Axes:
-        """The variants of each axis, with a default rig and default trajectories if there are scenes."""
+        """The variants of each axis. If there are scenes, missing rigs and trajectories are replaced by defaults."""
         trajectories: Mapping[str, Any] = self.suite.trajectories or {}
         if scenes and not rigs:
             rigs = {USUAL_RIG: RigSettings(pitch_deg=USUAL_PITCH_DEG)}
@@ -114,8 +114,8 @@ class AxisReader:
         }
 
     def _default_trajectories(self, scenes: dict[str, SceneFile]) -> dict[str, Any]:
-        """A circle in the free space of each scene."""
-        from vobench.suite.free_way import circular_path
+        """A circular path in the free space of each scene."""
+        from vobench.suite.free_space import circular_path
         from vobench.suite.scene_build import build
 
         trajectories = dict[str, Any]()
@@ -126,7 +126,7 @@ class AxisReader:
         return trajectories
 
     def variants(self, axes: Axes) -> list[Variant]:
-        """Every combination of the axes; a default trajectory is combined with its own scene only."""
+        """Every combination of the axes. A default trajectory is combined only with its scene."""
         variants = _combinations(axes)
         if self.suite.trajectories:
             return variants
@@ -155,7 +155,7 @@ def _default_trajectory_name(scene: str, scenes: Collection[str]) -> str:
 
 
 def _combinations(axes: Axes) -> list[Variant]:
-    """Every combination of the axes, named after the variants of those axes that have several."""
+    """Every combination of the axes. Its name consists of the variants on axes that have several variants."""
     variants = list[Variant]()
     for names in product(*axes.values()):
         by_axis = dict(zip(AXES, names, strict=True))
@@ -170,15 +170,15 @@ def shared_settings(suite: Suite) -> dict[str, Any]:
 
 
 def check_buildable(rig: RigSettings) -> RigSettings:
-    """The same rig. Raises VobenchError if it, or its calibration error, cannot be built."""
+    """Return the rig if it can be built with its calibration error. Raises VobenchError otherwise."""
     true_rig(rig.build(), rig.calibration_error)
     return rig
 
 
 def scene_lights(scene: SceneFile, names: Collection[str]) -> tuple[Light, ...]:
-    """The lights of a scene, which include those of `names`.
+    """The lights of a scene, including those in `names`.
 
-    If the scene's file lists all of `names`, only the listed lights are returned and no geometry is built.
+    If the file of the scene lists all of `names`, only the listed lights are returned, and no geometry is built.
     """
     from vobench.suite.scene_build import build, listed_lights
 

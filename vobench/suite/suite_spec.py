@@ -1,4 +1,4 @@
-"""What a suite's YAML may say."""
+"""The settings in the YAML file of a suite."""
 
 from collections.abc import Collection
 from dataclasses import field, fields
@@ -29,8 +29,8 @@ NEEDS_SCENES = {"rigs", "trajectories"}
 class Rendering:
     """The engine that renders the images.
 
-    `raster` rasterises with precomputed light, `path` traces `samples` light paths through each pixel (None: the path
-    tracer's own default), and `pyrender` is the stock renderer of that name.
+    `raster` rasterises with precomputed light. `path` traces `samples` light paths through each pixel; None selects
+    the default of the path tracer. `pyrender` is the unchanged renderer of that library.
     """
 
     engine: Annotated[str, OneOf("engine", ENGINES)] = "raster"
@@ -48,9 +48,9 @@ class Rendering:
 
 @settings()
 class TruthNoise:
-    """Noise of the poses of the scored ground truth, as in a reference system of a real recording.
+    """Noise that is added to the scored ground truth, like that of the reference system of a real recording.
 
-    Standard deviations of the position along each axis, and of the rotation about each axis.
+    The fields are standard deviations: of the position along each axis, and of the rotation about each axis.
     """
 
     position_m: Annotated[float, Ge(0), Le(1)] = 0.0
@@ -62,7 +62,7 @@ EXACT = TruthNoise()
 
 @settings()
 class EstimatorSettings:
-    """An estimator with parameters and limits other than its manifest's."""
+    """An estimator, with the parameters and limits that differ from those of its manifest."""
 
     name: str
     label: Name | None = None
@@ -79,7 +79,7 @@ Severities = Annotated[tuple[Severity, ...], MinLen(1), ShortForm(_as_tuple, {"t
 
 
 def _at_all_severities(value: Any) -> Any:
-    """A list of calibration levels as a mapping that runs each at every severity."""
+    """A list of calibration levels as a mapping from each level to all severities."""
     if not isinstance(value, (list, tuple)):
         return value
     if not all(isinstance(level, str) for level in value):
@@ -150,9 +150,9 @@ class Suite:
 
 
 def missing_axis(given_keys: Collection[str]) -> str | None:
-    """What a suite with these keys lacks, in a sentence; None if it lacks nothing.
+    """A sentence about the axes that a suite with the given keys lacks; None if it lacks none.
 
-    A suite needs scenes, scenarios or a source, and rigs and trajectories need scenes.
+    A suite needs scenes, scenarios or a source. Rigs and trajectories need scenes.
     """
     keys = set(given_keys)
     if "scenes" in keys:

@@ -1,4 +1,4 @@
-"""What YAML may say of trajectories: their kinds, the keys of each mover, and the files of replayed ones."""
+"""The settings of trajectories in YAML: their kinds, the keys of each mover, and the files of replayed poses."""
 
 from pathlib import Path
 from typing import Annotated, Any, get_args
@@ -24,18 +24,18 @@ from vobench.trajectory.trajectory import Stamps, Trajectory
 Spatial = PoseSpline | Handheld | Rail | Quadrotor
 AnyTrajectory = Waypoints | Planar | Spatial | Replay
 KINDS = {get_args(hints(each)["kind"])[0]: each for each in get_args(AnyTrajectory)}
-# Keys of wheeled trajectories that not every mover has.
+# The keys of wheeled trajectories that only some movers have.
 MOVER_SPECIFIC_KEYS = set[str]().union(*MOVER_KEYS.values())
 
 
 def known_keys(spec: Wheeled) -> set[str]:
-    """The keys of a trajectory with its mover."""
+    """The keys that are allowed for a trajectory with its mover."""
     common_keys = set(hints(type(spec))) - MOVER_SPECIFIC_KEYS
     return common_keys | set(spec.mover_keys[spec.mover])
 
 
 def _require_keys_of_mover(value: Any, handler: ValidatorFunctionWrapHandler) -> Any:
-    """The trajectory, whose keys all belong to its mover. Raises SettingError."""
+    """Validate a trajectory. Raises SettingError for a key that its mover does not have."""
     spec = handler(value)
     if not isinstance(spec, Wheeled) or not isinstance(value, dict):
         return spec
@@ -48,7 +48,7 @@ def _require_keys_of_mover(value: Any, handler: ValidatorFunctionWrapHandler) ->
 
 
 def _keys_of_mover(spec: Any, handler: Any) -> Any:
-    """The serialised trajectory with those keys alone that its mover has, so that it can be read again."""
+    """Serialise a trajectory with only the keys that its mover has, so that it can be read again."""
     serialised = handler(spec)
     if not isinstance(spec, Wheeled):
         return serialised
@@ -66,7 +66,7 @@ TrajectorySpec = Annotated[
 
 
 def read_times(spec: Replay, folder: Path) -> Stamps | None:
-    """The stamps in the file `times`; None if the trajectory names none. Raises InputError."""
+    """The stamps in the file `times` of a trajectory; None if it names no such file. Raises InputError."""
     if not spec.times:
         return None
     path = folder / spec.times
@@ -74,7 +74,7 @@ def read_times(spec: Replay, folder: Path) -> Stamps | None:
 
 
 def read_replayed(spec: Replay, folder: Path, times: Stamps | None) -> str:
-    """The poses of the trajectory's file as TUM text, in body axes; relative paths start at `folder`.
+    """The poses in the file of a trajectory as TUM text, in body axes. Relative paths start at `folder`.
 
     Raises InputError.
     """
@@ -89,13 +89,13 @@ def read_replayed(spec: Replay, folder: Path, times: Stamps | None) -> str:
 
     move = spec.move()
     T = move.apply(parsed.T) if move else parsed.T  # (N, 4, 4)
-    # KITTI's six digits are not exact rotations.
+    # KITTI's matrices have six digits, so they are not exact rotations.
     rotations = se3.nearest_rotation(T[:, :3, :3])
     return format_tum(Trajectory(t_ns, se3.transform(rotations, T[:, :3, 3])))
 
 
 def _stamps(spec: Replay, times: Stamps | None, parsed: ParsedTrajectory) -> Stamps:
-    """The stamps of poses without any: from a file, or from a constant rate. Raises VobenchError."""
+    """The stamps for poses without stamps, from a file or a constant rate. Raises VobenchError."""
     if times is not None:
         t_ns = parsed.stamped_by(times)
         if t_ns is None:

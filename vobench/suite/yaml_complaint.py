@@ -17,10 +17,10 @@ UNKNOWN_KEY = "unexpected_keyword_argument"  # pydantic's type of the error
 def complaints(
     source: YamlFile, error: ValidationError, schema: Schema, unread: Collection[Keys] = ()
 ) -> Iterator[Mistake]:
-    """The mistakes that caused a validation error, unknown keys first.
+    """The mistakes that caused a validation error, with unknown keys first.
 
-    An error that another mistake explains is left out. `unread` are the places of values that could not be read; their
-    mistakes are reported elsewhere.
+    An error that is a consequence of another mistake is omitted. `unread` lists the places of values that could not be
+    read. Their mistakes have been reported already, so they are omitted too.
     """
     errors = sorted(error.errors(), key=lambda each: each["type"] != UNKNOWN_KEY)
     wrong_places = [*unread, *map(location, errors)]
@@ -41,7 +41,7 @@ def complaints(
 
 
 def _misspelt_places(errors: Collection[Any], schema: Schema) -> set[tuple[Any, ...]]:
-    """The places of the known keys that unknown keys resemble."""
+    """The places of the known keys that were probably meant by unknown keys."""
     places = set[tuple[Any, ...]]()
     for each in errors:
         if each["type"] == UNKNOWN_KEY:
@@ -51,7 +51,7 @@ def _misspelt_places(errors: Collection[Any], schema: Schema) -> set[tuple[Any, 
 
 
 def location(error: Any) -> Keys:
-    """The place of an error as pydantic reports it, followed by the keys that a SettingError names."""
+    """The place of one of pydantic's errors. The keys that a SettingError names are appended to it."""
     cause = error.get("ctx", {}).get("error")
     if isinstance(cause, SettingError):
         return (*error["loc"], *cause.keys)
@@ -60,19 +60,19 @@ def location(error: Any) -> Keys:
 
 
 def _contains_any(place: Keys, others: Collection[Keys]) -> bool:
-    """Whether one of the other places is inside this one."""
+    """Whether one of the other places is inside of this place."""
     return any(len(other) > len(place) and other[: len(place)] == place for other in others)
 
 
 def _nearest_key(error: Any, schema: Schema) -> str | None:
-    """The known key that an unknown key resembles most; None if it resembles none."""
+    """The known key that is most similar to an unknown key; None if no key is similar."""
     unknown_key = str(error["loc"][-1])
     nearest = get_close_matches(unknown_key, _known_keys(error["loc"], schema), n=1)
     return nearest[0] if nearest else None
 
 
 def _known_keys(place: Keys, schema: Schema) -> list[str]:
-    """The keys that the section around a place can have, sorted."""
+    """The keys that are allowed in the section that contains a place, sorted."""
     _, section = _walk(schema, place[:-1])
     return sorted(section.get("properties", {}))
 
@@ -83,7 +83,7 @@ def _sentence(error: Any, schema: Schema, source: YamlFile) -> str:
         return _about_unknown_key(error, schema, source)
     context = error.get("ctx", {})
     cause = context.get("error")
-    if isinstance(cause, SettingError):  # its sentence contains the value
+    if isinstance(cause, SettingError):  # the sentence contains the value already
         return cause.sentence
     template = COMPLAINTS.get(error["type"])
     if template is None:
@@ -102,9 +102,9 @@ def _about_unknown_key(error: Any, schema: Schema, source: YamlFile) -> str:
 
 
 def _about_other_kinds(place: Keys, schema: Schema, source: YamlFile) -> str:
-    """The sentence about an unknown key that belongs to other kinds of its section.
+    """The sentence about a key that belongs to other kinds of the section than the kind of this one.
 
-    Empty if no kind has the key, or if the key lacks only its unit.
+    Empty if no kind has the key, or if the key is known except that its unit is missing.
     """
     if len(place) < 2:
         return ""
@@ -114,30 +114,30 @@ def _about_other_kinds(place: Keys, schema: Schema, source: YamlFile) -> str:
     if str(kind) not in references_by_kind:
         return ""
 
-    owners = []
+    kinds_with_key = []
     for name, reference in references_by_kind.items():
         if key in _resolve(schema, reference)["properties"]:
-            owners.append(name)
+            kinds_with_key.append(name)
     lacks_unit = any(name.startswith(f"{key}_") for name in _known_keys(place, schema))
-    if not owners or lacks_unit:
+    if not kinds_with_key or lacks_unit:
         return ""
 
     is_kind_written = source.place((*section_keys, "kind")).value is not None
     this_kind = f"this is {kind}" if is_kind_written else f"without a kind this is {kind}"
-    return f"belongs to {', '.join(owners)}; {this_kind}"
+    return f"belongs to {', '.join(kinds_with_key)}; {this_kind}"
 
 
 def _references_by_kind(section: Schema) -> dict[str, str]:
-    """The references to the schemas of a section's kinds; empty if the section has no kinds."""
+    """The reference to the schema of each kind of a section; empty if the section has no kinds."""
     references: dict[str, str] = section.get("discriminator", {}).get("mapping", {})
     return references
 
 
 def _walk(schema: Schema, place: Keys) -> tuple[Keys, Schema]:
-    """The keys in the file that lead to a place, and the schema there.
+    """The keys in the file that lead to one of pydantic's places, and the schema at that place.
 
-    Pydantic's places have two parts that a file does not have: the kind of a section that has several kinds, and
-    "[key]" if a key is wrong instead of its value.
+    A place can have two parts that are not keys in the file: the kind of a section, and "[key]", which means that the
+    key is wrong instead of its value.
     """
     keys = list[int | str]()
     section = _without_alternatives(schema, schema)
@@ -154,13 +154,13 @@ def _walk(schema: Schema, place: Keys) -> tuple[Keys, Schema]:
 
 
 def _entry_schema(section: Schema, key: int | str) -> Schema:
-    """The schema of the entry at a key of a section, of a mapping or of a list; empty if it is unknown."""
+    """The schema of one entry of a section, a mapping or a list; empty if it is unknown."""
     property_schema: Schema | None = section.get("properties", {}).get(key)
     return property_schema or _value_schema(section) or section.get("items") or {}
 
 
 def _value_schema(section: Schema) -> Schema | None:
-    """The schema of the values of a mapping, whose keys may have to match a pattern; None for other sections."""
+    """The schema of the values of a mapping; None if the section is not a mapping."""
     if "patternProperties" not in section:
         additional: Schema | None = section.get("additionalProperties")
         return additional
@@ -169,7 +169,7 @@ def _value_schema(section: Schema) -> Schema | None:
 
 
 def _without_alternatives(schema: Schema, section: Schema) -> Schema:
-    """The first alternative of a section, which is its full form; the others are null or the name of a preset."""
+    """The first alternative of a section, which is the full form. The other ones are null or the name of a preset."""
     while "anyOf" in section or "$ref" in section:
         section = _resolve(schema, section["$ref"]) if "$ref" in section else section["anyOf"][0]
     return section

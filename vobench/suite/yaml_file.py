@@ -1,4 +1,4 @@
-"""Reads YAML into checked settings; a mistake names file, line, key, the value seen and what would be right."""
+"""Reads YAML files into checked settings, and reports mistakes with file, line, key and value."""
 
 import json
 import math
@@ -23,16 +23,16 @@ from vobench.suite.yaml_parser import parse_file, parse_text
 from vobench.suite.yaml_source import Keys, YamlFile, line_of, plain_tree
 
 Model = TypeVar("Model")
-INCLUDE = "include"  # the key that names another file of the same kind
-SET_OPTION = "--set"  # the option of `vobench run` that changes values of a file
+INCLUDE = "include"  # the key that refers to another file of the same kind
+SET_OPTION = "--set"  # the option of `vobench run` that replaces values of a file
 
 
 @dataclass(frozen=True, slots=True)
 class FileReading(Generic[Model]):
-    """A file as `model`, or the mistakes in it.
+    """The content of a file as settings, and the mistakes in it.
 
-    If there are mistakes, `model` holds only the entries without any, unchecked as a whole, and lacks sections that
-    are wrong altogether.
+    If there are mistakes, `model` contains only the correct entries, is not checked as a whole, and lacks sections
+    without a correct entry.
     """
 
     model: Model
@@ -41,7 +41,7 @@ class FileReading(Generic[Model]):
 
 
 def read(path: Path, model: type[Model], kind: Kind | None = None) -> Model:
-    """The file as `model`. Raises SuiteError with all mistakes, as `read_all` reports them."""
+    """The content of a file as settings. Raises SuiteError with all mistakes, as in `read_all`."""
     reading = read_all(path, model, kind=kind)
     if reading.mistakes:
         raise SuiteError(*reading.mistakes)
@@ -54,11 +54,11 @@ def read_all(
     changes: Mapping[str, str] = MappingProxyType({}),
     kind: Kind | None = None,
 ) -> FileReading[Model]:
-    """The file as far as it can be read, and all mistakes in it. Raises SuiteError if it is not such a file at all.
+    """The content of a file as far as it is correct, and all mistakes in it.
 
-    `changes` are values in YAML that replace the file's; their keys are joined by dots. A file that is obviously not
-    of `kind` is refused with a sentence that says so. A model with a field `include` includes files of this kind;
-    without a kind, suites.
+    `changes` are YAML values that replace values of the file; the keys of nested values are joined by dots.
+    If the settings have a field `include`, a file can include another file of the same `kind`, by default a suite.
+    Raises SuiteError if the file is not YAML, or is evidently of another kind.
     """
     if kind:
         _refuse(path, file_kind.about_model(kind, path))
@@ -77,7 +77,7 @@ def _refuse(path: Path, sentence: str | None) -> None:
 
 
 def _read_mapping(path: Path) -> tuple[YamlFile, list[Mistake]]:
-    """The file and its duplicate keys. Raises SuiteError if it is not a mapping."""
+    """The content of a file, and its duplicate keys. Raises SuiteError if it is not a mapping."""
     parsed = parse_file(path)
     source = YamlFile(path, parsed.tree)
     if not isinstance(parsed.tree, dict):
@@ -95,7 +95,7 @@ def _describe_content(tree: Any) -> str:
 
 
 def _read_with_included(path: Path, kind: Kind, including: tuple[Path, ...]) -> tuple[YamlFile, list[Mistake]]:
-    """The file with the one of its kind that it includes, by name or path, and the duplicate keys of both."""
+    """The content of a file merged with the file that it includes, and the duplicate keys of both."""
     source, duplicates = _read_mapping(path)
     name = source.marked.get(INCLUDE)
     if not isinstance(name, str):
@@ -112,7 +112,7 @@ def _read_with_included(path: Path, kind: Kind, including: tuple[Path, ...]) -> 
 
 
 def _changed(source: YamlFile, changes: Mapping[str, str]) -> YamlFile:
-    """The file with other values. Raises SuiteError for a key or a value that is not possible."""
+    """The content of a file with other values. Raises SuiteError for an impossible key or value."""
     tree = deepcopy(source.marked)
     for dotted_keys, value in changes.items():
         _set_value(tree, dotted_keys, value)
@@ -120,7 +120,7 @@ def _changed(source: YamlFile, changes: Mapping[str, str]) -> YamlFile:
 
 
 def _set_value(tree: Any, dotted_keys: str, value: str) -> None:
-    """Put a value, in YAML, in place of the one at these keys; sections that are missing are created."""
+    """Replace the value at some keys by a YAML value. Missing sections are created."""
     change = f"{SET_OPTION} {dotted_keys}={value}"
     *section_keys, last_key = [int(key) if key.isdigit() else key for key in dotted_keys.split(".")]
     section = tree
@@ -137,7 +137,7 @@ def _set_value(tree: Any, dotted_keys: str, value: str) -> None:
 
 
 def _subsection(tree: Any, key: int | str) -> Any:
-    """The value at a key; a new section if a mapping has none, None if a list has none."""
+    """The value at a key. If it is missing, a new section is added to a mapping; for a list, it is None."""
     if isinstance(tree, dict) and isinstance(key, str):
         return tree.setdefault(key, CommentedMap())
     if isinstance(tree, list) and isinstance(key, int) and key < len(tree):
@@ -146,7 +146,7 @@ def _subsection(tree: Any, key: int | str) -> Any:
 
 
 def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistake]) -> FileReading[Model]:
-    """The content of a file as `model`, or as much of it as is right."""
+    """The content of a file as settings, as far as it is correct."""
     unread = dict[Keys, str]()
     for file in source.files:
         unread.update(_not_in_json(file.marked, ()))
@@ -169,7 +169,7 @@ def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistak
 
 
 def _not_in_json(tree: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
-    """The places of values that JSON cannot hold, and what would be right there."""
+    """The places of values that JSON cannot represent, and what would be right there."""
     if isinstance(tree, dict):
         for key, value in tree.items():
             if isinstance(key, str):
@@ -188,7 +188,7 @@ def _not_in_json(tree: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
 def _intact_sections(
     model: type, data: Mapping[str, Any], wrong_places: list[Keys]
 ) -> tuple[dict[str, Any], dict[str, tuple[int, ...]]]:
-    """The sections of a file without their wrong entries, and the numbers of the entries that are left of each list."""
+    """The sections of a file without wrong entries, and for each list, the indices of the entries that remain."""
     sections = dict[str, Any]()
     kept = dict[str, tuple[int, ...]]()
     known = hints(model)
@@ -200,13 +200,13 @@ def _intact_sections(
         elif isinstance(value, list):
             kept[key] = tuple(index for index in range(len(value)) if index not in wrong_entries)
             value = [value[index] for index in kept[key]]
-        with suppress(ValidationError):  # the mistakes in it are known
+        with suppress(ValidationError):  # its mistakes have been recorded already
             sections[key] = TypeAdapter(known[key]).validate_json(json.dumps(value), strict=True)
     return sections, kept
 
 
 def _partial_model(model: type[Model], sections: Mapping[str, Any]) -> Model:
-    """An unchecked object with these fields and the defaults of others; it lacks required fields that are missing."""
+    """An unchecked object with the given fields, and defaults for the others. Missing required fields are not set."""
     partial = object.__new__(model)
     for each in fields(model):  # type: ignore[arg-type]
         default = each.default if each.default_factory is MISSING else each.default_factory()
@@ -221,15 +221,15 @@ _adapter: Callable[[Any], TypeAdapter[Any]] = cache(TypeAdapter)
 def checked(kind: type[Model], data: Any) -> Model:
     """Plain data as settings. Raises pydantic's ValidationError with all mistakes.
 
-    Strict as for JSON: lists and sections become tuples and objects, but text does not become a number, nor a number
-    a truth value.
+    The types are strict: lists become tuples and sections become objects, but a text is not accepted as a number, and
+    a number is not accepted as true or false.
     """
     settings: Model = _adapter(kind).validate_json(json.dumps(data), strict=True)
     return settings
 
 
 def checked_section(kind: type[Model], data: Any, at: FilePlace) -> Model:
-    """Data that was derived from the file at a place, as settings. Raises SuiteError with all mistakes."""
+    """Data that was derived from a place in a file, as settings. Raises SuiteError with all mistakes."""
     try:
         return checked(kind, data)
     except ValidationError as error:
@@ -244,7 +244,7 @@ def checked_section(kind: type[Model], data: Any, at: FilePlace) -> Model:
 
 
 def plain(settings: Any, *, exclude: Any = None) -> Any:
-    """Settings as JSON can hold them, without those to exclude; `checked` reads them again."""
+    """Settings as plain JSON values, without those to exclude. `checked` reads them again."""
     return _adapter(type(settings)).dump_python(settings, mode="json", exclude=exclude)
 
 

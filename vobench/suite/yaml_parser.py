@@ -1,4 +1,4 @@
-"""Parses YAML 1.2 within limits that keep a hostile file harmless, and reports duplicate keys."""
+"""Parses YAML 1.2, with limits that make hostile files harmless, and reports duplicate keys."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -12,20 +12,20 @@ from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from vobench.errors import FilePlace, Mistake, SuiteError
 
-# Limits far beyond what a person writes; a file beyond one of them is reported in one line.
+# The limits are far above what a person writes. A file that exceeds one of them is reported in one line.
 MOST_BYTES = 2 << 20
 MOST_NODES = 100_000
 MOST_DEPTH = 100
-MOST_DIGITS = 400  # of a number; no float has as many
+MOST_DIGITS = 400  # the largest number of characters of a number; every float is shorter
 
 NUMBER_TAGS = ("tag:yaml.org,2002:int", "tag:yaml.org,2002:float")
 TOO_DEEP = "brackets or indents are nested too deep"
-CACHED_FILES = 64  # scenarios change one scene again and again
+CACHED_FILES = 64  # scenarios read the same scene many times
 
 
 @dataclass(frozen=True, slots=True)
 class ParsedYaml:
-    """The tree of a YAML text, whose mappings and lists know their lines, and its duplicate keys."""
+    """The tree of a YAML text, whose mappings and lists contain their line numbers, and its duplicate keys."""
 
     tree: Any
     duplicates: tuple[Mistake, ...]
@@ -40,7 +40,7 @@ def parse_file(path: Path) -> ParsedYaml:
 
 
 def _read_text(path: Path) -> str:
-    """The text of a file, which may be of any kind. Raises SuiteError if it is too long or not text."""
+    """The text of a file. Raises SuiteError if it is too long or not text."""
     try:
         with path.open("rb") as file:
             content = file.read(MOST_BYTES + 1)
@@ -57,11 +57,11 @@ def _read_text(path: Path) -> str:
 
 @lru_cache(CACHED_FILES)
 def parse_text(path: Path, text: str) -> ParsedYaml:
-    """The content of a text; `path` is what mistakes name. Raises SuiteError if it is not YAML.
+    """The content of a YAML text. `path` is the file to name in mistakes. Raises SuiteError if it is not YAML.
 
     The tree is shared between calls, so it must not be changed.
     """
-    # YAML 1.2: 1e-3 is a number, 'no' a word.
+    # In YAML 1.2, 1e-3 is a number and 'no' is text.
     yaml = YAML(typ="rt", pure=True)
     yaml.Constructor = _Constructor
     try:
@@ -73,7 +73,7 @@ def parse_text(path: Path, text: str) -> ParsedYaml:
         raise SuiteError(Mistake(" ".join(str(error).split()), (FilePlace(str(path)),))) from None
     except RecursionError:
         raise SuiteError(Mistake(TOO_DEEP, (FilePlace(str(path)),))) from None
-    except Exception as error:  # the library meets content that its authors did not expect
+    except Exception as error:  # the library raises other exceptions for content that it does not expect
         problem = " ".join(str(error).split())
         sentence = f"not readable as YAML ({type(error).__name__}: {problem})"
         raise SuiteError(_mistake_at(path, yaml.constructor.mark, sentence)) from None
@@ -88,18 +88,18 @@ def _mistake_at(path: Path, mark: Any, sentence: str) -> Mistake:
 
 
 class _Constructor(RoundTripConstructor):
-    """Builds the tree of a file. The first of duplicate keys counts; the others are recorded.
+    """Builds the tree of a file. Of duplicate keys, the first is used and the others are recorded.
 
-    A document that would be too large with its aliases expanded is refused before any of it is built.
+    A document whose aliases would expand to too many values is refused before the tree is built.
     """
 
     def __init__(self, *args: Any, **options: Any) -> None:
         super().__init__(*args, **options)
         self.duplicates: list[tuple[Any, str]] = []  # mark and sentence
-        self.mark: Any = None  # of the node that is being built
+        self.mark: Any = None  # the mark of the node that is being built
 
     def construct_document(self, node: Any) -> Any:
-        """The content of a document. Raises ConstructorError if it is beyond a limit."""
+        """The content of a document. Raises ConstructorError if it exceeds a limit."""
         _require_limits(node)
         return super().construct_document(node)
 
@@ -119,10 +119,10 @@ class _Constructor(RoundTripConstructor):
 
 
 def _require_limits(root: Node) -> None:
-    """Raise ConstructorError if a document is too large or contains itself. An alias counts as what it repeats."""
-    size_by_id = dict[int, int]()  # nodes in the subtree of each node
-    open_ids = set[int]()  # nodes between the root and the current node
-    pending = [(root, False)]  # a node, and whether its subtree is measured
+    """Raise ConstructorError if a document is too large or contains itself. An alias counts as the repeated value."""
+    size_by_id = dict[int, int]()  # the number of nodes in the subtree of each node
+    open_ids = set[int]()  # the nodes between the root and the current node
+    pending = [(root, False)]  # nodes to visit, and whether their children have been measured
     while pending:
         node, is_measured = pending.pop()
         children = _children(node)

@@ -1,4 +1,4 @@
-"""A YAML file with the lines of its keys, and the mistakes in it."""
+"""The content of a YAML file with the line of each key, and the mistakes in it."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -24,8 +24,9 @@ class _FoundPlace:
 class YamlFile:
     """The content of a YAML file, and the line of each key.
 
-    `marked` is the tree as it was parsed. If entries of its lists are left out, `kept` has the numbers of the others in
-    the file. The keys of the file `included` count where this file has none.
+    `marked` is the tree that was parsed.
+    `kept` has the original indices of the entries of each list from which entries were removed.
+    `included` is the file that this one includes. Its keys apply if this file does not have them.
     """
 
     path: Path
@@ -35,9 +36,9 @@ class YamlFile:
 
     @property
     def plain(self) -> Any:
-        """The content in Python's built-in types, merged over the included file's.
+        """The content in Python's built-in types, merged over that of the included file.
 
-        A key without a value removes the included file's.
+        A key without a value removes the key of the included file.
         """
         own = plain_tree(self.marked)
         if self.included is None:
@@ -46,15 +47,15 @@ class YamlFile:
 
     @property
     def files(self) -> "tuple[YamlFile, ...]":
-        """This file, the one it includes, the one that includes, and so on."""
+        """This file, the file that it includes, the file that that one includes, and so on."""
         if self.included is None:
             return (self,)
         return self, *self.included.files
 
     def placed(self, error: VobenchError, *keys: int | str) -> tuple[Mistake, ...]:
-        """The mistakes of an error with the place of these keys in front of their own.
+        """The mistakes of an error, with the place of the given keys in front of their places.
 
-        Without keys, only mistakes without a place get one: this file.
+        Without keys, a mistake without a place gets this file as its place.
         """
         place = self.place(self.written(keys))
         mistakes = list[Mistake]()
@@ -66,12 +67,12 @@ class YamlFile:
         return tuple(mistakes)
 
     def place(self, keys: Keys) -> FilePlace:
-        """The place of the last of these keys that the file, or one that it includes, has."""
+        """The place of the last of the given keys that exists in this file or an included one."""
         found_places = [file._find_place(keys) for file in self.files]
         return max(found_places, key=lambda found: found.depth).place
 
     def _find_place(self, keys: Keys) -> _FoundPlace:
-        """The place of the last of these keys that this file has."""
+        """The place of the last of the given keys that exists in this file."""
         tree = self.marked
         line: int | None = None
         written_keys = list[int | str]()
@@ -90,7 +91,7 @@ class YamlFile:
         return _FoundPlace(depth, FilePlace(str(self.path), line, key=".".join(map(str, written_keys)), value=value))
 
     def written(self, keys: Keys) -> Keys:
-        """The keys with an entry's number as it is in the file."""
+        """The keys with the original indices of list entries."""
         if len(keys) < 2:
             return keys
         section, index, *rest = keys
@@ -100,7 +101,7 @@ class YamlFile:
 
 
 def _is_single_value_for_list(tree: Any, key: int | str) -> bool:
-    """Whether a key is the number of an entry, but the file has one value in place of a list."""
+    """Whether a key is the index of a list entry, but the file has a single value instead of a list."""
     if not isinstance(key, int):
         return False
     is_other_mapping = isinstance(tree, dict) and key not in tree
@@ -114,8 +115,8 @@ def _has_entry(tree: Any, key: int | str) -> bool:
 
 
 def _line_of_entry(tree: Any, key: int | str) -> int | None:
-    """The line, from 1 on, of an entry of a mapping or a list; None if the file does not contain the entry."""
-    lines = getattr(tree, "lc", None)  # values that were put in place of the file's have none
+    """The line, from 1, of an entry of a mapping or a list; None if the file does not contain the entry."""
+    lines = getattr(tree, "lc", None)  # values that replaced those of the file have no lines
     if not lines:
         return None
     if isinstance(tree, list):
@@ -127,33 +128,36 @@ def _line_of_entry(tree: Any, key: int | str) -> int | None:
 
 @dataclass(frozen=True, slots=True)
 class Mistakes:
-    """The mistakes in a file, gathered so that all of them are reported at once."""
+    """Collects the mistakes in a file, so that all of them are reported at once."""
 
     source: YamlFile
     found: list[Mistake] = field(default_factory=list)
 
     @contextmanager
     def at(self, *keys: int | str) -> Iterator[None]:
-        """A block whose error is recorded, with the place of these keys in front; execution continues after it."""
+        """Record the error that a block raises, with the place of the given keys.
+
+        Execution continues after the block.
+        """
         try:
             yield
         except VobenchError as error:
             self.found.extend(self.source.placed(error, *keys))
 
     def require_none(self) -> None:
-        """Raise SuiteError with all mistakes, each once, in the order of the file."""
+        """Raise SuiteError with all distinct mistakes, in the order of the file, if there are any."""
         distinct = {str(mistake): mistake for mistake in self.found}.values()
         if distinct:
             raise SuiteError(*sorted(distinct, key=line_of))
 
 
 def line_of(mistake: Mistake) -> int:
-    """The line of a mistake in the file that was asked for; 0 if it has none."""
+    """The line of a mistake in the requested file; 0 if it has none."""
     return mistake.places[0].line or 0 if mistake.places else 0
 
 
 def plain_tree(tree: Any) -> Any:
-    """A tree in Python's built-in types, without keys that are not text and values that JSON cannot hold."""
+    """A tree in Python's built-in types, without keys that are not text and values that JSON cannot represent."""
     if isinstance(tree, dict):
         return {str(key): plain_tree(value) for key, value in tree.items() if isinstance(key, str)}
     if isinstance(tree, list):
@@ -165,7 +169,7 @@ def plain_tree(tree: Any) -> Any:
 
 
 def without_nothing(tree: Any) -> Any:
-    """A tree without keys that have no value, which in YAML means the same as no key."""
+    """A tree without keys that have no value, because YAML treats them like missing keys."""
     if isinstance(tree, dict):
         with_value = {key: without_nothing(value) for key, value in tree.items()}
         return {key: value for key, value in with_value.items() if value is not None}

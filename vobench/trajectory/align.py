@@ -1,4 +1,4 @@
-"""Alignment of an estimate with the ground truth, and the parts of it that the data do not determine."""
+"""Aligns an estimate with the ground truth, and detects the parts of the alignment that are not observable."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ IDENTITY = np.eye(3)
 
 
 class _Shape(Enum):
-    """How much of a rotation two matched paths determine."""
+    """The parts of a rotation that two matched paths determine."""
 
     POINT = 0
     LINE = 1
@@ -36,7 +36,7 @@ class _Shape(Enum):
 
 @dataclass(frozen=True, slots=True)
 class _Centred:
-    """Matched positions (K, 3) in m minus their means; `rounding_m` is the resolution of their coordinates."""
+    """Matched positions (K, 3) in m minus their means. `rounding_m` is the resolution of their coordinates."""
 
     est: Array
     gt: Array
@@ -46,7 +46,7 @@ class _Centred:
 
     @classmethod
     def of_positions(cls, est_m: Array, gt_m: Array) -> "_Centred":
-        """Positions (K, 3), centred."""
+        """The positions (K, 3), centred."""
         est_mean = est_m.mean(axis=0)
         gt_mean = gt_m.mean(axis=0)
         largest_m = max(np.abs(est_mean).max(), np.abs(gt_mean).max())
@@ -61,9 +61,9 @@ class _Centred:
 
 @dataclass(frozen=True, slots=True)
 class Alignment:
-    """x_gt = scale · rotation @ x_est + translation, with rotation (3, 3) and translation (3,) in metres.
+    """The transform x_gt = scale · rotation @ x_est + translation; rotation is (3, 3), and translation (3,) in m.
 
-    `unobservable` names what the positions do not determine: "rotation", "roll about the path", "scale".
+    `unobservable` lists the parts that the positions do not determine: "rotation", "roll about the path", "scale".
     """
 
     kind: AlignmentKind
@@ -94,7 +94,7 @@ class Alignment:
         )
 
     def apply(self, T_est: Array) -> Array:
-        """Aligned poses (..., 4, 4) of the estimate: positions are scaled, orientations only rotated."""
+        """The aligned poses (..., 4, 4) of the estimate. The scale applies only to positions."""
         scaled_m = self.scale * T_est[..., :3, 3]
         positions_m = scaled_m @ self.rotation.T + self.translation
         R = self.rotation @ T_est[..., :3, :3]
@@ -108,7 +108,7 @@ def align(
     kind: AlignmentKind,
     first_n: int | None = None,
 ) -> Alignment:
-    """Alignment of matched poses (K, 4, 4), fitted to the first `first_n` of them, or to all.
+    """The alignment of matched poses (K, 4, 4), fitted to the first `first_n` of them or to all.
 
     se3, sim3, yaw (a rotation about z) and scale (sim3's, without its motion) fit the positions, origin the
     first pose. If the positions do not determine the rotation, it is as near as possible to the one that aligns
@@ -142,11 +142,11 @@ def align_positions(
     kind: Literal["se3", "sim3", "scale"],
     toward: Array = IDENTITY,
 ) -> Alignment:
-    """Least-squares alignment of positions (K, 3); of equally good rotations the one nearest to `toward`.
+    """The least-squares alignment of positions (K, 3). Of equally good rotations, the one nearest to `toward` is used.
 
-    If either side is stationary the rotation is `toward` and the scale 1, so that the errors are the
-    spread about the mean. On a line it is the smallest rotation from `toward` that aligns the directions.
-    Raises AlignmentError as `align`. Source: Umeyama (1991), eqs. 34-43.
+    If either side is stationary, the rotation is `toward` and the scale is 1, so that the errors are the spread about
+    the mean. For a straight path, it is the smallest rotation from `toward` that aligns the directions.
+    Raises AlignmentError as in `align`. Source: Umeyama (1991), eqs. 34-43.
     """
     _require_pairs(est_m, gt_m)
     centred = _Centred.of_positions(est_m, gt_m)
@@ -175,7 +175,7 @@ def _unobservable(shape: _Shape, kind: AlignmentKind) -> tuple[str, ...]:
 
 
 def _yaw_direction(M: Array) -> tuple[float, float]:
-    """Cosine and sine, times a common factor, of the yaw that best explains a matrix (2 or 3, 2 or 3)."""
+    """The cosine and sine, times a common factor, of the yaw that fits a matrix (2 or 3, 2 or 3) best."""
     cosine = M[0, 0] + M[1, 1]
     sine = M[1, 0] - M[0, 1]
     return cosine, sine
@@ -187,7 +187,7 @@ def align_yaw(
     *,
     toward: Array = IDENTITY,
 ) -> Alignment:
-    """Least-squares rotation about z and translation of positions (K, 3), for worlds with a known vertical.
+    """The least-squares rotation about z and translation of positions (K, 3), for worlds with a known vertical.
 
     If the horizontal motion does not determine the yaw, it is that of `toward`. Raises AlignmentError as `align`.
     Source: Zhang and Scaramuzza (2018), section III-C.
@@ -242,7 +242,7 @@ def _rotation(covariance: Array, shape: _Shape, toward: Array) -> Array:
 
 
 def _shape(centred: _Centred) -> _Shape:
-    """What two matched paths determine together."""
+    """The shape that says which parts of a rotation two matched paths determine."""
     extents = np.array([_extent(centred.est), _extent(centred.gt)])
     if _is_stationary(extents, centred.rounding_m):
         return _Shape.POINT
@@ -263,13 +263,13 @@ def _extent(path: Array) -> float:
 
 
 def _is_stationary(extents: Array, rounding_m: float) -> bool:
-    """Whether either of two paths, with their extents (2,) in m, moves no more than rounding."""
+    """Whether one of two paths with extents (2,) in m is stationary except for rounding errors."""
     smallest_m = max(NEGLIGIBLE * extents.max(), rounding_m)
     return bool(extents.min() <= smallest_m)
 
 
 def _is_line(path: Array) -> bool:
-    """Whether a centred path (K, 3) is straight to rounding."""
+    """Whether a centred path (K, 3) is straight except for rounding errors."""
     variances = np.linalg.eigvalsh(_covariance(path, path))
     return bool(variances[1] <= NEGLIGIBLE**2 * variances[2])
 
@@ -286,7 +286,7 @@ def _is_roll_uncertain(x: Array, y: Array) -> bool:
     if min(x_straightness, y_straightness) > NEARLY_STRAIGHT**2:
         return False
 
-    # The lateral motions as complex numbers: a roll is a factor, a reflection a conjugate.
+    # The lateral motions are complex numbers. A roll is a factor, and a reflection a conjugation.
     x_lateral = (x @ x_axes[:, :2]) @ [1, 1j]
     y_lateral = (y @ y_axes[:, :2]) @ [1, 1j]
     power = float(np.linalg.norm(x_lateral) * np.linalg.norm(y_lateral))
@@ -294,7 +294,7 @@ def _is_roll_uncertain(x: Array, y: Array) -> bool:
     reflected = abs(np.vdot(x_lateral, y_lateral.conj()))
     r = min(max(rotated, reflected) / power, 1.0)
 
-    # The measured numbers minus those fitted: two means, a roll, and two angles of a direction.
+    # The number of measured values minus that of fitted ones, which are two means, a roll, and two angles of direction.
     degrees_of_freedom = max(2 * len(x) - 5, 1)
     return bool(1 - r**2 > r**2 * degrees_of_freedom * MAX_ROLL_STD_RAD**2)
 

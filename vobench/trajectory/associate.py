@@ -1,4 +1,4 @@
-"""Association: pairs of estimated and ground-truth poses by their stamps."""
+"""Associates estimated poses with true poses by their stamps."""
 
 from dataclasses import dataclass
 from typing import Literal
@@ -12,13 +12,13 @@ from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
 Index = NDArray[np.int64]
 Method = Literal["nearest", "evo", "interpolate", "greedy", "in_order"]
-MAX_DIFF_NS = 10_000_000  # evo's and this project's default: less than half a frame at 30 Hz
-MAX_CANDIDATES = 20_000_000  # pairs within the window that "greedy" may compare: 0.6 GB
+MAX_DIFF_NS = 10_000_000  # the default, as in evo; it is less than half a frame at 30 Hz
+MAX_CANDIDATES = 20_000_000  # the largest number of pairs that "greedy" compares, in 0.6 GB
 
 
 @dataclass(frozen=True, slots=True)
 class Pairs:
-    """Pose gt[k] of the ground truth belongs to pose est[k] of the estimate, (K,) int64 in order of the truth."""
+    """K pairs of poses: the indices `gt` (K,) in the ground truth, increasing, and the indices `est` (K,)."""
 
     gt: Index
     est: Index
@@ -29,7 +29,7 @@ class Pairs:
 
 @dataclass(frozen=True, slots=True)
 class Matched:
-    """K pairs: their indices, their stamps (K,) on the truth's clock, and their poses (K, 4, 4)."""
+    """K pairs: their indices, their stamps (K,) on the clock of the truth, and their poses (K, 4, 4)."""
 
     pairs: Pairs
     t_ns: Stamps
@@ -48,12 +48,14 @@ def associate(
     offset_ns: int = 0,
     method: Method = "nearest",
 ) -> Pairs:
-    """Pairs of poses whose stamps, the estimate's shifted by offset_ns, are at most max_diff_ns apart; stamps sorted.
+    """Pairs of poses whose stamps differ by at most `max_diff_ns`, after `offset_ns` is added to those of the estimate.
 
-    nearest: each pose of the shorter side (the estimate, if equal) requests the nearest of the longer, the earlier
-    of two; of several that request one the nearest gets it. evo, interpolate: they share it, and ties are decided
-    in seconds as float64. greedy: of all pairs the closest first, each pose once, strictly within (TUM, rpg).
-    in_order: each estimated pose takes the nearest that is left (ov_eval).
+    Stamps must be sorted. The rules are:
+    nearest: each pose of the shorter side (the estimate, if equal) requests the nearest pose of the longer side, or the
+    earlier of two. If several request the same pose, the nearest of them gets it.
+    evo, interpolate: as above, but all of them get it, and ties are decided in float64 seconds.
+    greedy: the closest pairs first, each pose only once, with a difference strictly below the limit (TUM, rpg).
+    in_order: each estimated pose gets the nearest pose that is left (ov_eval).
     """
     if not len(gt_t_ns) or not len(est_t_ns):
         return Pairs(np.zeros(0, np.int64), np.zeros(0, np.int64))
@@ -79,7 +81,10 @@ def match(
     max_diff_ns: int = MAX_DIFF_NS,
     offset_ns: int = 0,
 ) -> Matched:
-    """The poses that `associate` pairs; "interpolate" interpolates the longer side at the shorter side's stamps."""
+    """The poses of the pairs of `associate`.
+
+    With "interpolate", the longer side is interpolated at the other stamps.
+    """
     pairs = associate(
         gt.t_ns,
         est.t_ns,
@@ -99,7 +104,7 @@ def match(
 
 
 def nearest(t: Stamps | Array, among: Stamps | Array) -> Index:
-    """The index (N,) of the sorted instants `among` nearest to each of t (N,); the earlier of two equally near."""
+    """The index (N,) of the nearest of the sorted instants `among` for each of t (N,); of two, the earlier one."""
     before = np.searchsorted(among, t, side="right") - 1
     before = np.maximum(before, 0)
     after = np.minimum(before + 1, len(among) - 1)
@@ -113,7 +118,7 @@ def _as_evo(
     max_diff_s: float,
     offset_s: float,
 ) -> Pairs:
-    """The pairs of evo 1.38, whose float64 seconds decide ties and limits by their rounding."""
+    """The pairs of evo 1.38, in which the rounding of float64 seconds decides ties and limits."""
     gt_s = _seconds(gt_ns)
     est_s = _seconds(est_ns)
     if len(est_s) > len(gt_s):
@@ -124,7 +129,7 @@ def _as_evo(
 
 
 def _nearest_within(shorter_s: Array, longer_s: Array, max_diff_s: float) -> tuple[Index, Index]:
-    """Indices (K,) of instants and of the nearest of the longer list, which several may share, within a difference."""
+    """The indices (K,) of instants, and of the nearest instants of the longer list, which may occur several times."""
     nearest_longer = nearest(shorter_s, longer_s)
     diff_s = np.abs(longer_s[nearest_longer] - shorter_s)
     is_beyond = shorter_s > longer_s[-1]
@@ -136,7 +141,7 @@ def _nearest_within(shorter_s: Array, longer_s: Array, max_diff_s: float) -> tup
 
 
 def _seconds(t_ns: Stamps) -> Array:
-    """The float64 nearest to the decimal digits of each stamp; above 2⁵³ ns the integer itself would round first."""
+    """The stamps as the nearest float64 in seconds. They are not converted from float64 ns, which round above 2⁵³."""
     is_exact = np.abs(t_ns) < 2**53
     whole_s = t_ns // 10**9
     fraction_s = t_ns % 10**9 / 1e9
@@ -144,12 +149,12 @@ def _seconds(t_ns: Stamps) -> Array:
 
 
 def _once_each(shorter_ns: Stamps, longer_ns: Stamps, max_diff_ns: int) -> tuple[Index, Index]:
-    """Indices (K,) of instants and of the nearest of the longer list, each of which goes to the nearest instant."""
+    """The indices (K,) of instants, and of the nearest instants of the longer list, each of which occurs only once."""
     nearest_longer = nearest(shorter_ns, longer_ns)
     diff_ns = np.abs(longer_ns[nearest_longer] - shorter_ns)
     requesting = np.flatnonzero(diff_ns <= max_diff_ns)
     requested = nearest_longer[requesting]
-    # lexsort is stable: for each requested pose the nearest comes first, the earlier before its equal.
+    # lexsort is stable. For each requested pose, the nearest one comes first, and of equal ones the earlier.
     order = np.lexsort((diff_ns[requesting], requested))
     is_first = np.diff(requested[order], prepend=-1) > 0
     chosen = order[is_first]
@@ -157,17 +162,17 @@ def _once_each(shorter_ns: Stamps, longer_ns: Stamps, max_diff_ns: int) -> tuple
 
 
 def _greedy(gt_ns: Stamps, est_ns: Stamps, max_diff_ns: int) -> Pairs:
-    """Source: the association of Sturm et al. (2012), whose ties go to the earlier stamps."""
+    """The pairs of Sturm et al. (2012), in which ties are decided for the earlier stamps."""
     first_gt = np.searchsorted(gt_ns, est_ns - max_diff_ns, side="right")
     end_gt = np.searchsorted(gt_ns, est_ns + max_diff_ns, side="left")
-    count = np.maximum(end_gt - first_gt, 0)  # of candidates for each estimated pose
+    count = np.maximum(end_gt - first_gt, 0)  # the number of candidates for each estimated pose
     n_candidates = count.sum()
     if n_candidates > MAX_CANDIDATES:
         raise AlignmentError(
             f"max_diff_ns should leave few candidates a pose, but {max_diff_ns} leaves {n_candidates} pairs to compare"
         )
 
-    # All candidates: the first of each estimated pose begins after those of the poses before it.
+    # The candidates of each estimated pose follow those of the poses before it.
     first_candidate = np.cumsum(count) - count
     est = np.repeat(np.arange(len(est_ns)), count)
     gt = np.arange(n_candidates) - np.repeat(first_candidate - first_gt, count)
@@ -183,14 +188,14 @@ def _greedy(gt_ns: Stamps, est_ns: Stamps, max_diff_ns: int) -> Pairs:
             is_est_free[j] = 0
             chosen.append(candidate)
 
-    # Two close pairs may cross: then only the truth's poses are in order.
+    # Two close pairs can cross, so only the true poses are in order.
     pairs = np.array(chosen, np.int64)
     pairs = pairs[np.argsort(gt[pairs])]
     return Pairs(gt[pairs], est[pairs])
 
 
 def _in_order(gt_ns: Stamps, est_ns: Stamps, max_diff_ns: int) -> Pairs:
-    """Source: the association of OpenVINS (Geneva et al., 2020), in which no pair goes back in time."""
+    """The pairs of OpenVINS (Geneva et al., 2020), which are in order of time on both sides."""
     gt_stamps = gt_ns.tolist()
     est_stamps = est_ns.tolist()
     nearest_gt = nearest(est_ns, gt_ns).tolist()

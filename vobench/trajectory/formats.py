@@ -1,4 +1,4 @@
-"""Trajectory files in the formats of TUM, KITTI, EuRoC and TartanAir, recognised by their content."""
+"""Reads and writes trajectories in the formats of TUM, KITTI, EuRoC and TartanAir."""
 
 import re
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ Rows = NDArray[np.intp]
 StampUnit = Literal["s", "ms", "us", "ns"]
 QuaternionOrder = Literal["xyzw", "wxyz"]  # in which a file lists the four components of a quaternion
 
-NORM_TOLERANCE = 1e-3  # rounding to 4 digits changes a norm by 1e-4; numbers that are no quaternion differ far more
+NORM_TOLERANCE = 1e-3  # rounding to 4 digits changes the norm of a quaternion by up to 1e-4
 DIGITS: dict[StampUnit, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}  # decimal places that resolve a nanosecond
 WORDS: dict[StampUnit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 MAX_NS = 2**63 - 1
@@ -29,17 +29,17 @@ SCALAR_FIRST = [3, 0, 1, 2]  # indices that reorder (x, y, z, w) to (w, x, y, z)
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
 # The usual notation of seconds; its numbers stay below MAX_NS.
 PLAIN = re.compile(r"([0-9]{1,9}|[0-8][0-9]{9})\.([0-9]{1,9})")
-NUMERIC = re.compile(r"[0-9eE+\-., \t\r\n]*")
+NUMERIC = re.compile(r"[0-9eE+\-., \t\r\n]*")  # a line that NumPy may read, with only characters of numbers
 EXACT = Context(prec=64, rounding=ROUND_HALF_EVEN)  # int64 nanoseconds need only 19 digits
 
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryTable:
-    """The numbers of a text file, and where each row stands in it.
+    """The numbers in the rows of a text file, and the line number of each row.
 
     `name` is the file's name, for messages.
     `lines` are the N line numbers, from 1.
-    `first` are the N first fields as text, so that stamps lose no digit.
+    `first` are the first fields of the N rows as text, because a stamp can have more digits than a float.
     `values` are the numbers (N, columns).
     """
 
@@ -49,12 +49,12 @@ class TrajectoryTable:
     values: Array
 
     def place(self, row: int) -> str:
-        """File and line of a row, for messages."""
+        """The file and line of a row, for messages."""
         return f"{self.name}:{self.lines[row]}"
 
 
 def content(text: str) -> list[tuple[int, str]]:
-    """The line number and text of each line with content.
+    """The number and the text of each line that has content.
 
     The byte order mark, comments, blank lines and carriage returns are removed.
     """
@@ -77,8 +77,8 @@ def read_table(
 ) -> TrajectoryTable:
     """The numbers in rows of `content`, one row per line.
 
-    A line has one field per column. If there is a `separator`, further fields may follow and are ignored.
-    `row` says what a line is, for messages.
+    A line has one field per column. With a `separator`, a line may have more fields, which are ignored.
+    `row` is a noun for what a line contains, for messages.
     Raises TrajectoryError with file, line and value for a field that is not a finite number.
     """
     line_numbers = [number for number, _ in rows]
@@ -93,7 +93,7 @@ def read_table(
 def stamps_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
     """The stamps (N,) in the first column, exact to the nanosecond.
 
-    Raises TrajectoryError if a stamp does not exceed the one before, or exceeds int64.
+    Raises TrajectoryError if a stamp is not greater than the one before it, or if it exceeds int64.
     """
     t_ns = _first_column_ns(table, unit)
     _require_steps(table, t_ns, least_step=1, demand="stamps must increase by 1 ns or more")
@@ -102,9 +102,11 @@ def stamps_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
 
 @dataclass(frozen=True, slots=True)
 class _DistinctRows:
-    """The rows of a table that do not repeat the number of the row before.
+    """The rows of a table whose number differs from that of the row before.
 
-    `numbers` (K,) are their numbers, `rows` (K,) their indices in the table, `notes` a sentence about the others.
+    `numbers` (K,) are the numbers of these rows.
+    `rows` (K,) are their indices in the table.
+    `notes` is a sentence about the other rows, if there are any.
     """
 
     numbers: Stamps
@@ -113,9 +115,9 @@ class _DistinctRows:
 
 
 def _distinct_rows(table: TrajectoryTable, numbers: Stamps, noun: str) -> _DistinctRows:
-    """The rows of a table without those that repeat a number; `noun` says what the numbers (N,) are.
+    """The distinct rows of a table, by the number (N,) of each row. `noun` says what a number is, for messages.
 
-    Raises TrajectoryError if a number is smaller than the one before.
+    Raises TrajectoryError if a number is smaller than the one before it.
     """
     _require_steps(table, numbers, least_step=0, demand=f"{noun}s must increase")
     repeated = np.flatnonzero(np.diff(numbers) == 0) + 1
@@ -158,9 +160,9 @@ def _first_column_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
 
 
 def _require_steps(table: TrajectoryTable, numbers: Stamps, *, least_step: int, demand: str) -> None:
-    """Check that each of the numbers (N,) exceeds the one before by `least_step` or more.
+    """Raise TrajectoryError unless each of the numbers (N,) exceeds the one before it by at least `least_step`.
 
-    Raises TrajectoryError with the `demand`, the first wrong row and the values of both rows.
+    The message consists of the first wrong row, the `demand`, and the values of this row and the row before it.
     """
     wrong_rows = np.flatnonzero(np.diff(numbers) < least_step) + 1
     if wrong_rows.size:
@@ -307,14 +309,14 @@ def _csv_layout(text: str) -> _CsvLayout:
     is_note = first_line.startswith("#") and first_line.count(",") < top_row.count(",")
     has_numbers = any(NUMBER.fullmatch(cell.strip()) for cell in top_row.split(","))
     if is_note and not has_numbers:
-        first_line = top_row  # the header is not a comment, but stands below one
+        first_line = top_row  # the header is below the comment
     title = first_line.lstrip("#")
     if not WORD.search(title):
         return _CsvLayout(rows, _stamp_unit("", rows), "wxyz")
 
     header_cells = [cell.strip().lower() for cell in title.split(",")]
     is_comment = first_line.startswith("#")
-    if not is_comment:  # `content` has removed comments already
+    if not is_comment:  # `content` has removed a header that is a comment
         rows = rows[1:]
     return _CsvLayout(rows, _stamp_unit(header_cells[0], rows), _quaternion_order(header_cells))
 
@@ -365,8 +367,7 @@ KITTI_COLUMNS = (
 )
 NUMBERED_COLUMNS = ("frame", *KITTI_COLUMNS)
 TARTANAIR_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
-# The largest element of R^T R - I in a rotation matrix. KITTI prints six digits, so its matrices have 1e-6.
-SKEW_TOLERANCE = 1e-3
+SKEW_TOLERANCE = 1e-3  # the largest element of R^T R - I; it is about 1e-6 in KITTI's files, which have six digits
 MAX_FRAME = 10**9
 
 
@@ -423,11 +424,12 @@ FORMS = (
 
 @dataclass(frozen=True, slots=True)
 class ParsedTrajectory:
-    """Poses and how they were read from a file.
+    """The poses in a file, and how they were read.
 
     `t_ns` (N,) are the stamps, None for a format without stamps.
     `T` (N, 4, 4) are the poses.
-    `unit` is the unit in which the stamps were read, and `form_unit` the one that the format has by default.
+    `unit` is the unit in which the stamps were read.
+    `form_unit` is the default unit of the format.
     `order` is the order in which quaternions were read, None for a format without quaternions.
     `frames` (N,) are the frame numbers, if the file has them instead of stamps.
     `notes` are sentences about rows that were left out.
@@ -442,9 +444,10 @@ class ParsedTrajectory:
     notes: tuple[str, ...] = ()
 
     def stamped_by(self, frames_ns: Stamps) -> Stamps | None:
-        """Stamps (N,) for poses that have none, taken from the stamps (F,) of all frames.
+        """Stamps (N,) for poses without stamps, selected from the stamps (F,) of all frames.
 
-        None if a frame number has no stamp, or, without frame numbers, if there are more or fewer stamps than poses.
+        Without frame numbers, there must be one stamp for each pose.
+        None if a frame number has no stamp, or if the numbers of stamps and poses differ.
         """
         if self.frames is None:
             is_one_each = len(frames_ns) == len(self.T)
@@ -455,10 +458,10 @@ class ParsedTrajectory:
 
 @dataclass(frozen=True, slots=True)
 class TrajectoryReading:
-    """A trajectory and how its file was read.
+    """A trajectory, and how its file was read.
 
     `unit` is the unit in which the stamps were read, None if the file has no stamps.
-    `form_unit` is the unit that the file's format has by default, None for a format without stamps.
+    `form_unit` is the default unit of the file's format, None for a format without stamps.
     `order` is the order in which quaternions were read, None if the file has none.
     `says_truth` is True if the file's name or a comment in it mentions ground truth.
     `is_unit_told` is True if the user specified the unit.
@@ -479,10 +482,12 @@ def parse_any(
     unit: StampUnit | None = None,
     order: QuaternionOrder | None = None,
 ) -> ParsedTrajectory:
-    """The poses in TUM, KITTI, TartanAir or EuRoC text; `name` is the file's name, for messages.
+    """The poses in the text of a TUM, KITTI, TartanAir or EuRoC file. The format is recognised by the content.
 
-    `unit` and `order` override the format's unit of stamps and order of quaternions. If rows repeat a stamp, the first
-    of them is used. Raises TrajectoryError for a text without poses, an unknown format or a wrong row.
+    `name` is the file's name, for messages.
+    `unit` and `order` override the format's unit of stamps and order of quaternions.
+    If several rows have the same stamp, the first one is used.
+    Raises TrajectoryError for a text without poses, an unknown format or a wrong row.
     """
     first_row = _first_row(written, name)
     if "," in first_row:
@@ -526,7 +531,7 @@ def _matrix_poses(table: TrajectoryTable) -> Array:
 
 
 def _frame_numbers(table: TrajectoryTable) -> Stamps:
-    """The first column (N,) as frame numbers. Raises TrajectoryError unless they are whole and from 0 to MAX_FRAME."""
+    """The first column (N,) as frame numbers. Raises TrajectoryError unless they are integers from 0 to MAX_FRAME."""
     numbers = table.values[:, 0]
     is_whole = numbers == np.floor(numbers)
     is_in_range = (numbers >= 0) & (numbers <= MAX_FRAME)
@@ -534,7 +539,7 @@ def _frame_numbers(table: TrajectoryTable) -> Stamps:
     if wrong_rows.size:
         row = wrong_rows[0]
         raise TrajectoryError(
-            f"{table.place(row)}: the first of 13 columns should be the number of a frame, whole and from 0 on, "
+            f"{table.place(row)}: the first of 13 columns should be the number of a frame, an integer from 0, "
             f"but is {table.first[row]}"
         )
     return numbers.astype(np.int64)
@@ -554,14 +559,14 @@ def _parse_stamped(
 
 
 def _first_row(written: str, name: str) -> str:
-    """The first line with content. Raises TrajectoryError if there is none, or if it has no known format."""
+    """The first line that has content. Raises TrajectoryError if there is none, or if its format is unknown."""
     start = written.lstrip()
     if start.startswith(LFS_POINTER):
         raise TrajectoryError(f"a Git-LFS pointer, not the file itself; fetch it with git lfs pull: {name}")
     rows = content(written)
     if not rows:
         reason = "all lines are comments" if start else "the file is empty"
-        raise TrajectoryError(f"no pose, for {reason}: {name}")
+        raise TrajectoryError(f"no pose, because {reason}: {name}")
     line_number, first_row = rows[0]
     columns = len(first_row.split())
     is_csv = "," in first_row

@@ -1,4 +1,4 @@
-"""Motion of a body: pose, velocity and acceleration at any instant, each the derivative of the other."""
+"""The motion of a body: its pose, velocity and acceleration at any instant."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -12,12 +12,12 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.trajectory.trajectory import Stamps
 
-STANDARD_GRAVITY_MPS2 = 9.80665  # exact by definition (3rd CGPM, 1901); it acts along -z of the world
+STANDARD_GRAVITY_MPS2 = 9.80665  # exact by definition (3rd CGPM, 1901); along -z of the world
 
 
 @dataclass(frozen=True, slots=True)
 class Kinematics:
-    """The motion of a body at K instants: of its origin relative to the world, in body axes.
+    """The motion of a body at K instants, relative to the world and in the axes of the body.
 
     T_world_body (K, 4, 4); velocity_mps (K, 3) and acceleration_mps2 (K, 3): the first and second derivative
     of its position in the world, turned into body axes (so without gravity); angular_velocity_radps (K, 3): angular
@@ -57,9 +57,9 @@ class Kinematics:
 
 
 class Motion(Protocol):
-    """The motion of a body through the world, exact at any instant.
+    """The motion of a body through the world, which can be evaluated at any instant.
 
-    It continues evenly for a little before `start_ns` and after `end_ns`, for shutters that are open there.
+    It continues at a constant rate shortly before `start_ns` and after `end_ns`, for shutters that are open there.
     """
 
     @property
@@ -72,10 +72,10 @@ class Motion(Protocol):
 
     @property
     def breaks_ns(self) -> Array:
-        """Instants (B,) float64 in ns, rising, between which acceleration is smooth: where it may jump."""
+        """The instants (B,) in ns, float64 and increasing, at which the acceleration may jump."""
 
     def at(self, t_ns: Stamps | Array) -> Kinematics:
-        """Pose and motion of the body at instants (K,), whole nanoseconds or fractions of them."""
+        """The pose and motion of the body at instants (K,) in ns, which may be fractions."""
 
 
 def level(x_m: Array, y_m: Array, heading_rad: Array) -> Array:
@@ -106,14 +106,14 @@ def along(
 
 
 LONGEST_S = 86_400.0
-SHORTEST_S = 1e-9  # of acceleration: an instant is a whole nanosecond
-HALVINGS = 80  # of a day, which leave less than float64 resolves
-NO_STAGE = 1e-9  # of the ramp's duration: a stage shorter than that is left out
+SHORTEST_S = 1e-9  # the shortest duration of an acceleration, because instants are integers in nanoseconds
+HALVINGS = 80  # the number of bisections, after which a part of a day is shorter than the resolution of float64
+NO_STAGE = 1e-9  # a stage that is shorter than this, relative to the ramp, is omitted
 
 
 @dataclass(frozen=True, slots=True)
 class TimeLaw:
-    """Progress along a path, in metres, radians or seconds, as a nondecreasing piecewise polynomial of time in s.
+    """The progress along a path, in metres, radians or seconds, as a nondecreasing piecewise polynomial of time in s.
 
     Raises MotionError for a duration above a day.
     """
@@ -122,7 +122,7 @@ class TimeLaw:
 
     def __post_init__(self) -> None:
         if not self.end_s - self.start_s <= LONGEST_S:
-            raise MotionError(f"the motion would last {self.end_s - self.start_s:.3g} s; a day is the longest")
+            raise MotionError(f"the motion would last {self.end_s - self.start_s:.3g} s; it should last at most a day")
 
     @property
     def start_s(self) -> float:
@@ -140,7 +140,10 @@ class TimeLaw:
         return float(self.progress(self.end_s))
 
     def at(self, t_s: Array) -> tuple[Array, Array, Array]:
-        """Progress (K,), its rate and the rate's derivative; outside its time it continues at the rate of its end."""
+        """The progress (K,), its rate and the derivative of its rate.
+
+        Before the start and after the end, the progress continues at a constant rate.
+        """
         inside_s = np.clip(t_s, self.start_s, self.end_s)
         outside_s = t_s - inside_s
         progress = self.progress(inside_s)
@@ -149,7 +152,7 @@ class TimeLaw:
         return progress + rate * outside_s, rate, np.where(inside_s == t_s, change, 0.0)
 
     def when(self, progress: Array) -> Array:
-        """The times (B,) at which a progress (B,) is passed, by bisection."""
+        """The times (B,) at which the progress reaches values (B,), by bisection."""
         early = np.full(len(progress), self.start_s)
         late = np.full(len(progress), self.end_s)
         for _ in range(HALVINGS):
@@ -161,9 +164,10 @@ class TimeLaw:
 
 
 def rest_to_rest(length: float, *, speed: float, acceleration: float) -> TimeLaw:
-    """From rest to `speed` and back to rest over `length`, at most at `acceleration`; a short path is slower.
+    """The law of a motion from rest to `speed` and back to rest over `length`, with at most `acceleration`.
 
-    Speed rises as the quintic 10τ³ - 15τ⁴ + 6τ⁵, so that acceleration begins and ends smoothly.
+    The speed increases as the quintic 10τ³ - 15τ⁴ + 6τ⁵, so that the acceleration begins and ends smoothly. On a short
+    path, the speed is not reached.
     Raises MotionError for a value that is not positive, and for a duration below an instant or above a day.
     """
     _require_positive(length, "the length of the path")
@@ -203,14 +207,14 @@ def evenly(
     begin: float = 0.0,
     rate: float = 1.0,
 ) -> TimeLaw:
-    """Progress from `begin` on at a constant rate."""
+    """The law of a constant rate of progress from `begin`."""
     coefficients = np.array([[rate], [begin]])
     times_s = np.array([start_s, end_s])
     return TimeLaw(scipy.interpolate.PPoly(coefficients, times_s))
 
 
 def in_stages(laws: Sequence[TimeLaw], *, pause_s: float = 0.0) -> TimeLaw:
-    """One law after another, each from the end of the last, with pauses between. Raises MotionError for its pause."""
+    """The law that consists of several laws in sequence, with pauses between them. Raises MotionError for the pause."""
     if not (np.isfinite(pause_s) and pause_s >= 0):
         raise MotionError(f"pause_s is {pause_s:g}; it should be a finite number of seconds, 0 or more")
     stages = list[tuple[float, Array]]()
@@ -223,7 +227,7 @@ def in_stages(laws: Sequence[TimeLaw], *, pause_s: float = 0.0) -> TimeLaw:
 
 
 def _in_turn(stages: Sequence[tuple[float, Array]]) -> TimeLaw:
-    """The law of polynomials (duration, coefficients (7,)), each shifted to the end of the one before."""
+    """The law of several polynomials (duration, coefficients (7,)), each starting at the end of the one before."""
     durations_s = [duration_s for duration_s, _ in stages]
     starts_s = np.concatenate([[0.0], np.cumsum(durations_s)])
     coefficients = np.stack([polynomial for _, polynomial in stages], -1)
@@ -235,23 +239,23 @@ def _in_turn(stages: Sequence[tuple[float, Array]]) -> TimeLaw:
     return TimeLaw(scipy.interpolate.PPoly(coefficients, starts_s))
 
 
-AT_REST = 1e-9  # progress per second: below it a break of the curve is also one of the law
+AT_REST = 1e-9  # at a lower rate of progress per second, a break of the curve is no break of the motion
 
 
 class Curve(Protocol):
-    """Poses by progress s along a path: metres of a path, radians of a turn, seconds of a recording."""
+    """Poses as a function of the progress s: metres of a path, radians of a turn, or seconds of a recording."""
 
     @property
     def breaks(self) -> Array:
-        """Progress (B,), rising, between which the second derivative of the pose is smooth."""
+        """The progress values (B,), increasing, at which the second derivative of the pose may jump."""
 
     def at(self, s: Array) -> Kinematics:
-        """Poses at s (K,) with velocities and accelerations as if s were seconds: derivatives by s."""
+        """The poses at s (K,), and their first and second derivatives with respect to s."""
 
 
 @dataclass(frozen=True, slots=True)
 class CurveMotion:
-    """The motion on a curve by a law of time; T_world_start is the pose of the curve's frame in the world."""
+    """The motion along a curve by a time law. T_world_start (4, 4) is the pose of the frame of the curve."""
 
     curve: Curve
     law: TimeLaw
@@ -269,7 +273,7 @@ class CurveMotion:
 
     @property
     def breaks_ns(self) -> Array:
-        """The times at which the law changes its polynomial, or the body passes a break of the curve in motion."""
+        """The times at which the law changes its polynomial, or at which the body passes a break of the curve."""
         passed_s = self.law.when(self.curve.breaks)
         rate = self.law.at(passed_s)[1]
         is_moving = rate > AT_REST

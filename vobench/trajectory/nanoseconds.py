@@ -1,4 +1,4 @@
-"""Stamps are whole nanoseconds: how many there are in the units that settings and messages use."""
+"""The number of nanoseconds in other units. Stamps are integers in nanoseconds."""
 
 NS_PER_S = 1_000_000_000
 NS_PER_MS = 1_000_000

@@ -1,4 +1,4 @@
-"""Estimation of the time offset between two clocks from angular speeds and speeds."""
+"""Estimates the time offset between two clocks from angular speeds and speeds."""
 
 from dataclasses import dataclass
 
@@ -10,9 +10,9 @@ from vobench.geometry.se3 import Array
 from vobench.trajectory.associate import nearest
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
-MIN_OVERLAP = 0.5  # share of the shorter recording that must overlap
+MIN_OVERLAP = 0.5  # the smallest share of the shorter recording that must overlap
 MIN_SAMPLES = 20
-WINDOW_STEPS = 5  # over which a speed is measured, to average the noise of single poses
+WINDOW_STEPS = 5  # the number of steps over which a speed is measured, to average the noise of single poses
 # Each search is REFINEMENT times as fine as the one before: 1/500 of a step at the end.
 ROUNDS = 3
 TRIES = 17
@@ -30,18 +30,18 @@ NO_VARIANCE = 1e-9  # of two standardised signals: below it either is constant w
 
 @dataclass(frozen=True, slots=True)
 class TimeOffset:
-    """The time to add to the estimate's stamps, and the correlation (-1..1) of both motions with it."""
+    """The time to add to the stamps of the estimate, and the correlation (-1..1) of both motions after that."""
 
     offset_ns: int
     correlation: float
 
 
 def estimate_offset(gt: Trajectory, est: Trajectory) -> TimeOffset:
-    """The offset of the estimate's clock that best correlates angular speeds, or else speeds.
+    """The offset of the estimate's clock for which angular speeds, or otherwise speeds, correlate best.
 
     Neither depends on the frames, and correlation does not depend on the scale, so no alignment is needed.
-    Every offset that leaves half of the shorter recording in common is tried. Source: Furgale et al. (2013).
-    Raises AlignmentError for recordings too short, or without motion.
+    All offsets are tried for which half of the shorter recording overlaps. Source: Furgale et al. (2013).
+    Raises AlignmentError for recordings that are too short or without motion.
     """
     step_ns = int(_step_ns(gt, est))
     _require_samples(gt, est, step_ns)
@@ -82,9 +82,9 @@ def motion_correlation(gt: Trajectory, est: Trajectory, offset_ns: int) -> float
 
 
 def offsets_in_stretches(gt: Trajectory, est: Trajectory, *, within_ns: int) -> Array:
-    """The offset (N,) of each of 8 stretches of the estimate's poses by itself, of offsets up to `within_ns`.
+    """The offset (N,) of each of 8 parts of the estimate, of offsets up to `within_ns`.
 
-    It is 0 for a stretch too short to determine one.
+    It is 0 for a part that is too short to determine an offset.
     """
     step_ns = _step_ns(gt, est)
     reach_ns = max(step_ns, within_ns)
@@ -117,7 +117,7 @@ def _require_samples(gt: Trajectory, est: Trajectory, step_ns: int) -> None:
 
 
 def speeds(trajectory: Trajectory, t_ns: Stamps, window_ns: int) -> tuple[Array, Array]:
-    """Angle turned and distance moved, each (N,), in the window that begins at each instant."""
+    """The angles (N,) and distances (N,) that a body moves in the windows that begin at instants (N,)."""
     T_begin = poses_at(trajectory, t_ns)
     T_end = poses_at(trajectory, t_ns + window_ns)
     R_begin_end = se3.transposed(T_begin[:, :3, :3]) @ T_end[:, :3, :3]
@@ -172,7 +172,7 @@ def _refined(
     *,
     reach_ns: float | None = None,
 ) -> int:
-    """The best offset up to a step or `reach_ns` from the coarse one, searched in finer and finer rounds."""
+    """The best offset within a step or `reach_ns` of the coarse one, from a search that is refined several times."""
     best_ns = coarse_ns
     reach_ns = step_ns if reach_ns is None else reach_ns
     window_ns = round(WINDOW_STEPS * step_ns)
@@ -193,9 +193,9 @@ def _likeness(
     offsets_ns: Stamps,
     window_ns: int,
 ) -> list[float] | None:
-    """For each offset the mean correlation of angular speeds and of speeds, at the same instants.
+    """The mean correlation of angular speeds and of speeds for each offset, at the same instants.
 
-    None if the trajectories hardly overlap, or no speed changes.
+    None if the trajectories hardly overlap, or if no speed changes.
     """
     first = max(int(gt.t_ns[0]) - int(offsets_ns.min()), int(est.t_ns[0]))
     end = min(int(gt.t_ns[-1]) - int(offsets_ns.max()), int(est.t_ns[-1]))

@@ -1,4 +1,4 @@
-"""A trajectory: stamps and poses; interpolation, and changes of axes and frame."""
+"""Trajectories, which are stamped poses, their interpolation, and changes of their axes and frames."""
 
 import re
 from collections.abc import Sequence
@@ -13,15 +13,15 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
 Stamps = NDArray[np.int64]
-SKEW = 1e-2  # text with three digits leaves RᵀR up to 3e-3 off the identity; a matrix that is no rotation far more
-LARGEST_M = 1e18  # a hundred light years; beyond it squares overflow float32, which the KITTI devkit sums in
-BLOCK = 1 << 14  # poses checked together: little memory, and they stay in the processor's cache
+SKEW = 1e-2  # the largest element of RᵀR - I; it is up to 3e-3 in a text with three digits
+LARGEST_M = 1e18  # a hundred light years; larger squares overflow float32, in which the KITTI devkit adds them
+BLOCK = 1 << 14  # the number of poses that are checked together, which fit into the processor's cache
 SMALL_SINE = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
 class Trajectory:
-    """Poses of one moving frame in one fixed frame, in order of time.
+    """The poses of a moving frame in a fixed frame, in order of time.
 
     t_ns is (N,) int64, strictly increasing; T_world_frame is (N, 4, 4) in metres.
     Raises TrajectoryError for wrong shapes, order or size, or an invalid rotation.
@@ -31,7 +31,8 @@ class Trajectory:
     T_world_frame: Array
 
     def __post_init__(self) -> None:
-        if self.T_world_frame.shape != (len(self.t_ns), 4, 4) or self.t_ns.dtype != np.int64:
+        has_one_pose_per_stamp = self.T_world_frame.shape == (len(self.t_ns), 4, 4)
+        if not has_one_pose_per_stamp or self.t_ns.dtype != np.int64:
             raise TrajectoryError(
                 f"a trajectory needs (N,) int64 stamps and (N, 4, 4) poses, "
                 f"got {self.t_ns.shape} {self.t_ns.dtype} and {self.T_world_frame.shape}"
@@ -57,11 +58,11 @@ class Trajectory:
 
     @property
     def positions_m(self) -> Array:
-        """Positions (N, 3)."""
+        """The positions (N, 3)."""
         return self.T_world_frame[:, :3, 3]
 
     def distances_m(self) -> Array:
-        """Path length (N,) from the first pose to each pose."""
+        """The path length (N,) from the first pose to each pose."""
         return path_lengths_m(self.positions_m)
 
     def of_mounted(self, T_frame_mounted: Array) -> "Trajectory":
@@ -70,12 +71,12 @@ class Trajectory:
 
 
 def step_lengths_m(positions_m: Array) -> Array:
-    """Distances (N - 1,) between successive positions (N, 3)."""
+    """The distances (N - 1,) between successive positions (N, 3)."""
     return np.asarray(np.linalg.norm(np.diff(positions_m, axis=0), axis=1))
 
 
 def path_lengths_m(positions_m: Array) -> Array:
-    """Path length (N,) from the first of positions (N, 3) to each of them."""
+    """The path length (N,) from the first of positions (N, 3) to each of them."""
     sums_m = np.cumsum(step_lengths_m(positions_m))
     return np.concatenate([[0.0], sums_m])[: len(positions_m)]
 
@@ -85,7 +86,7 @@ def _require_positions(T: Array, begin: int) -> None:
 
     `begin` is the number of the first pose, for the message.
     """
-    is_wrong = ~(np.abs(T) < LARGEST_M).all((1, 2))  # NaN compares as false
+    is_wrong = ~(np.abs(T) < LARGEST_M).all((1, 2))  # comparisons with NaN are false
     if not is_wrong.any():
         return
     bad = int(np.flatnonzero(is_wrong)[0])
@@ -112,9 +113,9 @@ def _require_rotations(T: Array, begin: int) -> None:
 
 
 def poses_at(trajectory: Trajectory, t_ns: Stamps) -> Array:
-    """Poses (N, 4, 4) of a trajectory of one pose or more, interpolated at t_ns (N,); outside its time its end poses.
+    """The poses (N, 4, 4) of a trajectory, interpolated at t_ns (N,). Outside of its time, the end poses are returned.
 
-    Source: Shoemake (1985), eq. of slerp, along the shorter arc.
+    The trajectory must have a pose. Source: Shoemake (1985), slerp along the shorter arc.
     """
     stamps = trajectory.t_ns
     T = trajectory.T_world_frame
@@ -132,7 +133,7 @@ def poses_at(trajectory: Trajectory, t_ns: Stamps) -> Array:
 
 
 def _slerp(R_begin: Array, R_end: Array, share: Array) -> Array:
-    """Rotations (N, 3, 3) at shares (N, 1) of the shorter arcs between rotations (N, 3, 3)."""
+    """The rotations (N, 3, 3) at shares (N, 1) of the shorter arcs between rotations (N, 3, 3)."""
     begin = se3.to_quaternion(R_begin)
     end = se3.to_quaternion(R_end)
     cosine = np.sum(begin * end, axis=-1, keepdims=True)
@@ -141,7 +142,7 @@ def _slerp(R_begin: Array, R_end: Array, share: Array) -> Array:
     sine = np.linalg.norm(end - cosine * begin, axis=-1, keepdims=True)
     angle = np.arctan2(sine, cosine)
 
-    is_small = sine < SMALL_SINE  # there linear weights are exact
+    is_small = sine < SMALL_SINE  # linear weights are accurate for small angles
     divisor = np.where(is_small, 1.0, sine)
     begin_weight = np.where(is_small, 1 - share, np.sin((1 - share) * angle) / divisor)
     end_weight = np.where(is_small, share, np.sin(share * angle) / divisor)
@@ -159,18 +160,20 @@ NORM_TOLERANCE = 1e-3
 
 @dataclass(frozen=True, slots=True)
 class PoseConvention:
-    """A change of the convention of poses: `matrix` is signed axes S (3, 3), or for a mount T_est_gt (4, 4).
+    """A change of the convention of poses. `matrix` is a signed permutation S (3, 3), or T_est_gt (4, 4) of a mount.
 
-    `axes`: the file uses other axes, T' = S T S⁻¹. `positions`: only its positions use other axes, p' = S p.
-    `mount`: its poses are of another frame of the same body, T' = T T_est_gt. `inverse`: its poses transform the
-    world to the frame, T' = T⁻¹. `rotations`: only its rotations do, R' = Rᵀ.
+    `axes`: poses use other axes; T' = S T S⁻¹.
+    `positions`: only positions use other axes; p' = S p.
+    `mount`: poses are those of another frame of the same body; T' = T T_est_gt.
+    `inverse`: poses transform from the world to the frame; T' = T⁻¹.
+    `rotations`: only rotations are inverted; R' = Rᵀ.
     """
 
     kind: Kind
     matrix: Array = field(default_factory=lambda: np.eye(3))
 
     def apply(self, T: Array) -> Array:
-        """Poses (..., 4, 4), changed."""
+        """The poses (..., 4, 4) in the changed convention."""
         R = T[..., :3, :3]
         positions_m = T[..., :3, 3]
         if self.kind == "mount":
@@ -198,7 +201,10 @@ class PoseConvention:
 
 
 def parse_pose_convention(word: str) -> PoseConvention:
-    """The move in words such as `axes:z,-x,-y`, `inverse` or `mount:x,y,z,qx,qy,qz,qw`. Raises InputError."""
+    """The change that a word describes, such as `axes:z,-x,-y`, `inverse` or `mount:x,y,z,qx,qy,qz,qw`.
+
+    Raises InputError.
+    """
     if word in INVERSES:
         return PoseConvention(INVERSES[word])
     kind, _, arguments = word.partition(":")
@@ -215,7 +221,7 @@ def parse_pose_convention(word: str) -> PoseConvention:
 
 
 def _axes(values: Sequence[str], word: str) -> Array:
-    """The signed permutation (3, 3) of three names of axes."""
+    """The signed permutation (3, 3) that three names of axes describe."""
     rows = []
     names = []
     for value in values:
@@ -230,7 +236,7 @@ def _axes(values: Sequence[str], word: str) -> Array:
 
 
 def _mount(values: Sequence[str], word: str) -> Array:
-    """The transform (4, 4) of the texts of a position and a quaternion."""
+    """The transform (4, 4) with the position and the quaternion in seven texts."""
     try:
         numbers = np.array([float(value) for value in values])
     except ValueError:

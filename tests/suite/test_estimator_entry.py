@@ -6,29 +6,32 @@ from vobench.errors import SuiteError, UnknownNameError
 
 
 def test_a_suites_parameters_go_over_the_manifests(bent):
-    assert [entrant.params for entrant in bent().entrants] == [{}, {"measure_s": 0.1}]
+    assert [estimator_entry.params for estimator_entry in bent().estimator_entries] == [{}, {"measure_s": 0.1}]
 
 
 def test_one_estimator_takes_part_twice_under_two_labels(bent):
     planned = bent(("stand_still,", "{name: constant_velocity, label: slow, params: {measure_s: 1}},"))
-    assert [(e.label, e.params["measure_s"]) for e in planned.entrants] == [("slow", 1), ("constant_velocity", 0.1)]
+    assert [(e.label, e.params["measure_s"]) for e in planned.estimator_entries] == [
+        ("slow", 1),
+        ("constant_velocity", 0.1),
+    ]
 
 
 def test_a_suites_limits_go_over_the_manifests(bent):
     planned = bent(("stand_still,", "{name: stand_still, limits: {frame_s: 1, memory_mib: 512}},"))
-    limits, usual = (entrant.limits for entrant in planned.entrants)
+    limits, usual = (estimator_entry.limits for estimator_entry in planned.estimator_entries)
     assert (limits.frame_s, limits.memory_mib, limits.start_s) == (1.0, 512, usual.start_s)
-    assert usual == planned.entrants[1].manifest.limits
+    assert usual == planned.estimator_entries[1].manifest.limits
 
 
-def test_each_mode_has_an_entrant_of_its_own(bent):
+def test_each_mode_has_an_entry_of_its_own(bent):
     planned = bent(("estimators:", "modes: [step, real_time]\nestimators:"))
-    assert [(e.label, e.mode, e.claims) for e in planned.entrants[:2]] == [
+    assert [(e.label, e.mode, e.claims) for e in planned.estimator_entries[:2]] == [
         ("stand_still", "step", ()),
         ("stand_still.real_time", "real_time", ("real time",)),
     ]
     alone = bent(("estimators:", "modes: [real_time]\nestimators:"))
-    assert next((e.label, e.mode) for e in alone.entrants) == ("stand_still", "real_time")
+    assert next((e.label, e.mode) for e in alone.estimator_entries) == ("stand_still", "real_time")
 
 
 @pytest.mark.parametrize(
@@ -48,13 +51,13 @@ def test_a_limit_that_is_none_is_refused_with_its_place(bent, limits, sentence):
 
 
 def test_parameters_reach_an_estimator_as_plain_python(bent):
-    (value,) = bent().entrants[1].params.values()
+    (value,) = bent().estimator_entries[1].params.values()
     assert type(value) is float
 
 
 def test_asking_for_estimators_takes_the_suites_own_settings_first(bent):
     planned = bent(only=("constant_velocity", "wheel_odometry"))
-    assert [(e.label, e.params) for e in planned.entrants] == [
+    assert [(e.label, e.params) for e in planned.estimator_entries] == [
         ("constant_velocity", {"measure_s": 0.1}),
         ("wheel_odometry", {}),
     ]
@@ -71,13 +74,19 @@ def test_asking_for_an_unknown_estimator_names_the_nearest(bent):
 
 
 def test_a_glob_asks_for_every_label_of_the_suite_that_matches(bent):
-    assert [entrant.label for entrant in bent(only=("*st*",)).entrants] == ["stand_still", "constant_velocity"]
-    assert [entrant.label for entrant in bent(only=("const*",)).entrants] == ["constant_velocity"]
+    assert [entry.label for entry in bent(only=("*st*",)).estimator_entries] == [
+        "stand_still",
+        "constant_velocity",
+    ]
+    assert [entry.label for entry in bent(only=("const*",)).estimator_entries] == ["constant_velocity"]
 
 
-def test_one_mode_listed_twice_is_one_entrant(bent):
+def test_one_mode_listed_twice_is_one_entry(bent):
     planned = bent(("estimators:", "modes: [step, step]\nestimators:"))
-    assert [entrant.label for entrant in planned.entrants] == ["stand_still", "constant_velocity"]
+    assert [entry.label for entry in planned.estimator_entries] == [
+        "stand_still",
+        "constant_velocity",
+    ]
 
 
 def test_a_label_that_another_mode_has_is_refused(bent):
@@ -94,7 +103,7 @@ def test_a_label_that_another_mode_has_is_refused(bent):
 def test_a_parameter_has_the_type_of_its_default_where_whole_numbers_may_be_fractions(bent, value, is_right):
     change = ("measure_s: 0.1", f"measure_s: {value}")
     if is_right:
-        assert bent(change).entrants[1].params == {"measure_s": float(value)}
+        assert bent(change).estimator_entries[1].params == {"measure_s": float(value)}
     else:
         with pytest.raises(SuiteError, match=r"parameter 'measure_s' should be of the type of its default 1\.0, got"):
             bent(change)
@@ -102,8 +111,8 @@ def test_a_parameter_has_the_type_of_its_default_where_whole_numbers_may_be_frac
 
 def test_a_limit_that_counts_is_a_whole_number_even_if_it_is_written_as_a_fraction(bent):
     planned = bent(("stand_still,", "{name: stand_still, limits: {memory_mib: 512.0}},"))
-    assert planned.entrants[0].limits.memory_mib == 512
-    assert isinstance(planned.entrants[0].limits.memory_mib, int)
+    assert planned.estimator_entries[0].limits.memory_mib == 512
+    assert isinstance(planned.estimator_entries[0].limits.memory_mib, int)
 
 
 def test_a_mistake_in_a_second_estimator_names_its_place(bent, tmp_path):

@@ -9,7 +9,7 @@ from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, moved, quad
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.free_way import (
+from vobench.suite.free_space import (
     CELL_M,
     FLOOR_STEP_M,
     MOST_LENGTH_M,

@@ -1,4 +1,4 @@
-"""The estimators of a suite, with their parameters, limits and modes."""
+"""Reads the estimators of a suite, with their parameters, limits and modes."""
 
 import fnmatch
 from collections.abc import Mapping, Sequence
@@ -17,10 +17,10 @@ from vobench.suite.yaml_source import Mistakes
 
 @dataclass(frozen=True, slots=True)
 class EstimatorEntry:
-    """An estimator as it takes part in a suite: its folder, manifest, parameters and limits.
+    """An entry in a suite's list of estimators: the estimator's folder, manifest, parameters and limits.
 
-    In mode `step` it receives the next frame when it has finished the previous one, in `real_time` when the camera
-    delivers it.
+    In mode `step`, the estimator gets the next frame when it has finished the previous one. In mode `real_time`, it
+    gets each frame when a camera would deliver it.
     """
 
     label: str
@@ -32,15 +32,15 @@ class EstimatorEntry:
 
     @property
     def claims(self) -> tuple[str, ...]:
-        """What a board shows beside the label."""
+        """The claims that the leaderboard shows beside the label."""
         if self.mode == "real_time":
             return (*self.manifest.claims, "real time")
         return tuple(self.manifest.claims)
 
 
 @dataclass(frozen=True, slots=True)
-class EntrantReader:
-    """Reads the estimators of a suite, of which entries may be missing, and gathers mistakes."""
+class EstimatorEntryReader:
+    """Reads the estimators of a suite, which may be incomplete, and collects mistakes."""
 
     suite: Suite
     mistakes: Mistakes
@@ -48,53 +48,54 @@ class EntrantReader:
 
     def all(self) -> tuple[EstimatorEntry, ...]:
         """Every estimator that the suite lists, in each of its modes."""
-        entrants = list[EstimatorEntry]()
+        entries = list[EstimatorEntry]()
         for index, spec in enumerate(self._specs()):
             with self.mistakes.at("estimators", index):
-                entrants += self._in_each_mode(self._read(spec, index), entrants)
-        return tuple(entrants)
+                entries += self._in_each_mode(self._read(spec, index), entries)
+        return tuple(entries)
 
     def only(self, names: Sequence[str]) -> tuple[EstimatorEntry, ...]:
-        """The suite's estimators of these labels, which may be globs, or other estimators with their defaults.
+        """The estimators of the suite with the given labels, which may be globs.
 
-        Raises UnknownNameError and SuiteError, because the mistake is not the suite's.
+        A name without a match refers to another estimator, which is run with its defaults. Raises UnknownNameError and
+        SuiteError instead of collecting mistakes, because the names are not in the suite.
         """
         index_by_label = dict[str, int]()
         for index, spec in enumerate(self._specs()):
             index_by_label.setdefault(spec.label or spec.name, index)
 
-        entrants = list[EstimatorEntry]()
+        entries = list[EstimatorEntry]()
         for label in self._labels_matching(names):
             index_in_suite = index_by_label.get(label)
             spec = EstimatorSettings(name=label) if index_in_suite is None else self._specs()[index_in_suite]
-            entrants += self._in_each_mode(self._read(spec, index_in_suite), entrants)
-        return tuple(entrants)
+            entries += self._in_each_mode(self._read(spec, index_in_suite), entries)
+        return tuple(entries)
 
     def _specs(self) -> tuple[EstimatorSettings, ...]:
         return getattr(self.suite, "estimators", ())
 
     def _labels_matching(self, names: Sequence[str]) -> list[str]:
-        """The suite's labels that match, or the name itself if none does."""
+        """The labels in the suite that match the names. A name without a match is returned itself."""
         known_labels = [spec.label or spec.name for spec in self._specs()]
         labels = list[str]()
         for name in names:
             labels += fnmatch.filter(known_labels, name) or [name]
         return labels
 
-    def _in_each_mode(self, entrant: EstimatorEntry, earlier: Sequence[EstimatorEntry]) -> list[EstimatorEntry]:
-        """The entrant in each mode of the suite; modes after the first are part of the label."""
+    def _in_each_mode(self, entry: EstimatorEntry, earlier: Sequence[EstimatorEntry]) -> list[EstimatorEntry]:
+        """The entry in each mode of the suite. The label contains the mode, except for the first mode."""
         modes = tuple(dict.fromkeys(getattr(self.suite, "modes", ("step",))))
         taken_labels = [other.label for other in earlier]
-        entrants = list[EstimatorEntry]()
+        entries = list[EstimatorEntry]()
         for mode in modes:
-            label = entrant.label if mode == modes[0] else f"{entrant.label}.{mode}"
+            label = entry.label if mode == modes[0] else f"{entry.label}.{mode}"
             if label in taken_labels:
                 raise SuiteError(f"two estimators are called '{label}'; give one of them another label")
-            entrants.append(replace(entrant, label=label, mode=mode))
-        return entrants
+            entries.append(replace(entry, label=label, mode=mode))
+        return entries
 
     def _read(self, spec: EstimatorSettings, index: int | None) -> EstimatorEntry:
-        """The entrant with its manifest. Raises VobenchError if there is no such estimator."""
+        """The entry for a section of the suite. Raises VobenchError if there is no such estimator."""
         folder = self.lookup.find("estimator", spec.name).path
         manifest = read_manifest(folder)
 
@@ -112,7 +113,7 @@ class EntrantReader:
 
 
 def _with_limit(limits: Limits, key: str, value: float) -> Limits:
-    """The limits with another value for one of them. Raises SuiteError for a fraction of what is counted."""
+    """The limits with another value for one of them. Raises SuiteError if the value should be an integer but is not."""
     new_value: float | None = value
     if isinstance(getattr(limits, key), int):
         new_value = nearest_whole(value)
@@ -123,9 +124,9 @@ def _with_limit(limits: Limits, key: str, value: float) -> Limits:
 
 
 def _check_parameter(key: str, value: Any, defaults: Mapping[str, Any]) -> None:
-    """Raise SuiteError unless the manifest has this parameter, with a default of the value's type.
+    """Raise SuiteError unless the manifest has this parameter, and its default has the type of the value.
 
-    A whole number may replace a fraction, and the reverse. A default of None allows any type.
+    Integers and floats can replace each other. A default of None allows any type.
     """
     if key not in defaults:
         raise SuiteError(unknown_name_sentence("parameter", key, list(defaults)))

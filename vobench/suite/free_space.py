@@ -1,4 +1,4 @@
-"""The free space on the floor of a scene, found by ray casting: its largest free circle, and a path in it."""
+"""Finds the free space on the floor of a scene by ray casting: the largest free circle, and a path in it."""
 
 from dataclasses import dataclass
 
@@ -15,14 +15,14 @@ from vobench.scene.scene import Scene, triangles
 
 Mask = NDArray[np.bool_]
 
-# The floor: nearly level faces at one height, to within a step.
+# The floor consists of nearly level faces at the same height, up to FLOOR_STEP_M.
 LEVEL = 0.99  # cosine of the steepest level face
 FLOOR_STEP_M = 0.02
-FLOOR_SHARE = 0.4  # of the largest level area at one height, which the floor has at least
+FLOOR_SHARE = 0.4  # the smallest area of the floor, relative to the largest level area at any height
 
 # The map of the floor, and the height of a body.
 CELL_M = 0.1
-MOST_CELLS = 600  # along one side
+MOST_CELLS = 600  # the largest number of cells along one side
 BODY_M = 0.6
 WALL_HEIGHTS_M = (0.1, 0.35, 0.6)  # where horizontal rays look for walls
 SIDES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # (4, 3) unit directions
@@ -74,9 +74,9 @@ class FloorMap:
 
 
 def largest_free_circle(faces: Triangles, caster: RayCaster) -> FreeCircle | None:
-    """The largest circle on the floor with nothing above it that is lower than a body's height; None if there is none.
+    """The largest circle on the floor with nothing above it up to the height of a body; None if there is none.
 
-    The floor is the lowest height with much level area, because roofs and upper storeys may have more of it.
+    The floor is at the lowest height with a large level area, because roofs and upper storeys may be larger.
     """
     floor = floor_map(faces, caster)
     return floor.largest_circle() if floor else None
@@ -102,7 +102,7 @@ def floor_map(faces: Triangles, caster: RayCaster) -> FloorMap | None:
     if not x_m.size or not y_m.size:
         return None
 
-    # A cell is free if a ray from a body's height meets the floor first, and no wall is near.
+    # A cell is free if a ray down from the height of a body hits the floor first, and if no wall is near.
     centres_m = np.stack(np.meshgrid(x_m, y_m), -1).reshape(-1, 2)  # (H * W, 2)
     starts_m = at_height(centres_m, floor_m + BODY_M)
     hits = caster.hits(starts_m, downward_directions(len(starts_m)))
@@ -113,7 +113,10 @@ def floor_map(faces: Triangles, caster: RayCaster) -> FloorMap | None:
 
 
 def _floor_height_m(level_corners_m: Array, height_steps: NDArray[np.int_]) -> float:
-    """The lowest height of level faces (F, 3, 3) with a large enough area; `height_steps` (F,) are their heights."""
+    """The lowest height at which level faces (F, 3, 3) have a large enough area.
+
+    `height_steps` (F,) are the heights of the faces in units of FLOOR_STEP_M.
+    """
     lowest_step = height_steps.min()
     area_by_step_m2 = np.bincount(height_steps - lowest_step, areas_m2(level_corners_m))
     large_steps = np.flatnonzero(area_by_step_m2 > FLOOR_SHARE * area_by_step_m2.max())
@@ -126,9 +129,9 @@ def at_height(places_m: Array, z_m: float) -> Array:
 
 
 def _away_from_walls(centres_m: Array, floor_m: float, cell_m: float, faces: Triangles, caster: RayCaster) -> Mask:
-    """Which cells (N, 2) have no wall within a cell's width, and are not inside a thing.
+    """Whether each cell (N, 2) has no wall within the width of a cell, and is not inside of a thing.
 
-    A point is inside a thing if rays to all sides hit faces from behind.
+    A point is inside of a thing if rays to all four sides hit the backs of faces.
     """
     is_clear = np.ones(len(centres_m), bool)
     for height_m in WALL_HEIGHTS_M:
@@ -149,7 +152,7 @@ def downward_directions(count: int) -> Array:
 
 
 def circular_path(scene: Scene) -> PoseSpline:
-    """A path around the centre of the scene's largest free circle, of a body that looks ahead.
+    """A circular path around the centre of the largest free circle of a scene. The body looks ahead.
 
     Raises SuiteError if the free circle or the scene is too small, or there is no floor.
     """
@@ -190,7 +193,7 @@ def _no_path(scene: Scene, reason: str) -> SuiteError:
 
 
 def _pose_on_circle(free: FreeCircle, radius_m: float, angle_rad: float) -> Pose:
-    """The pose on a circle around the centre of the free circle, along its tangent."""
+    """The pose at an angle of a circle around the centre of the free circle, along the tangent."""
     x_m = free.x_m + radius_m * float(np.cos(angle_rad))
     y_m = free.y_m + radius_m * float(np.sin(angle_rad))
     return Pose(
