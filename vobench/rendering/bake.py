@@ -22,7 +22,7 @@ from vobench.rendering.direct_light import direct_light, mirror_images
 from vobench.rendering.emitter import emitters
 from vobench.rendering.gathering import Rounds, Smoothing
 from vobench.rendering.geometry import FAR_M, RayCaster, are_panes, face_materials, offset_from_surface
-from vobench.rendering.indirect_light import MOST_RAYS, Gatherer, albedo, blend, bounced, response, surfels
+from vobench.rendering.indirect_light import MOST_RAYS, Gatherer, Surfels, albedo, blend, bounced, response, surfels
 from vobench.rendering.photons import Reflectors
 from vobench.rendering.texel import Texels, texel_areas_m2, texels
 from vobench.rendering.texel_layout import TexelLayout
@@ -255,10 +255,11 @@ def bake(
         len(scene.lights),
     )
     rays = max(settings.indirect_rays, SKY_RAYS if skies else 0)
+    rays_each = min(rays, MOST_RAYS / max(len(groups), 1))
     rounds = Rounds(
         gatherer,
         points.take(groups.middle),
-        side=int(np.sqrt(min(rays, MOST_RAYS / max(len(groups), 1)) / 2)),
+        side=round(np.sqrt(rays_each / 2)),
         done=lambda share: report(PLACED_DONE + (GATHER_DONE - PLACED_DONE) * share),
     )
     is_usable = rounds.met() + rounds.escaped > BLIND
@@ -270,57 +271,112 @@ def bake(
     # A surfel is represented by its points that rays have found, not by those that lie hidden under a rug.
     point_hits = np.bincount(layout.source, rounds.hits, len(points) + 1)
     weights = point_hits[: len(points)] + UNSEEN
-    scatters = albedo(faces, scene.materials, points)
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
-    of_lights = [emitters(scene.lights[index], visibility, t_ns=t_ns) for index, t_ns in instants]
     reflectors = Reflectors(gatherer, points, point_areas_m2, settings.seed)
-    lamp_count = sum(not isinstance(scene.lights[index], Sky) for index, _ in instants)
-    effort = settings.indirect_rays / INDIRECT_RAYS / max(lamp_count, 1)
-    direct = np.zeros((len(scene.lights), atlas.height, atlas.width), np.float32)
+
+    def by_photons(row: int, light: Floats) -> Floats:
+        """The illuminance (2, S) by way of mirroring faces, by each half of the photons."""
+        index, t_ns = instants[row]
+        if not settings.bounces or isinstance(scene.lights[index], Sky):
+            return np.zeros((2, len(groups)), np.float32)
+        share = settings.indirect_rays / INDIRECT_RAYS / len(instants)
+        light_emitters = emitters(scene.lights[index], visibility, t_ns=t_ns)
+        flux_lm = reflectors.flux_lm(light_emitters, light, effort=share, seed=[settings.seed, row])
+        return smoothing.density(flux_lm.T, area_m2).T
+
+    straight = _straight(
+        scene, settings, static, groups, weights, instants=instants, by_photons=by_photons, report=report
+    )
+    del static, points, layout  # bounces take memory of their own
+    indirect, noise = _bounces(scene, settings, rounds, smoothing, straight=straight, instants=instants)
+    first = [instants.index((index, key_times_ns(light)[0])) for index, light in enumerate(scene.lights)]
+    patches = Patches(
+        surfel_of=surfel_of,
+        reflectance=straight.reflectance,
+        area_m2=area_m2,
+        radiosity=straight.received[first] + straight.reflectance * indirect[first],
+    )
+    mean_noise = float(np.sqrt(np.average(noise**2, weights=area_m2))) if area_m2.sum() > 0 else 0.0
+    tracks = _tracks(instants, indirect, scene)
+    return BakedScene(
+        scene, faces, atlas, straight.direct, indirect[first], spread, patches, settings, tracks, mean_noise
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Straight:
+    """What K lights give before any bounce between bodies.
+
+    direct (L, H, W) as in BakedScene; of surfels reflectance (S, 3), illuminance_lx (K, S), the radiosity (K, S, 3)
+    that it gives them if the light is white, and by_mirrors_lx (2, K, S), by each half of the photons.
+    """
+
+    direct: Floats
+    reflectance: Floats
+    illuminance_lx: Floats
+    received: Floats
+    by_mirrors_lx: Floats
+
+
+def _straight(
+    scene: Scene,
+    settings: BakeSettings,
+    static: StaticScene,
+    groups: Surfels,
+    weights: Floats,
+    *,
+    instants: list[tuple[int, float]],
+    by_photons: Callable[[int, Floats], Floats],
+    report: Report,
+) -> _Straight:
+    """Trace the direct light of the lights at some instants; weights (P,) of points in their surfels."""
+    scatters = albedo(static.faces, scene.materials, static.points)
+    direct = np.zeros((len(scene.lights), static.atlas.height, static.atlas.width), np.float32)
+    illuminance_lx = np.zeros((len(instants), len(groups)), np.float32)
     received = np.zeros((len(instants), len(groups), 3), np.float32)
-    direct_lx = np.zeros((len(instants), len(groups)), np.float32)
-    by_mirrors = np.zeros((2, len(instants), len(groups)), np.float32)  # by each half of the photons
+    by_mirrors_lx = np.zeros((2, len(instants), len(groups)), np.float32)
     # Backwards, so that a moving sun's layer ends as that of its first instant.
     for row in reversed(range(len(instants))):
         index, t_ns = instants[row]
         light = direct_points(scene, index, static, settings, t_ns=t_ns)
+        illuminance_lx[row] = groups.mean(light[:, None], weights)[:, 0]
         received[row] = groups.mean(scatters * light[:, None], weights)
-        direct_lx[row] = groups.mean(light[:, None], weights)[:, 0]
         direct[index] = direct_layer(scene, index, static, light)
-        if settings.bounces and not isinstance(scene.lights[index], Sky):
-            halves_lm = reflectors.flux_lm(of_lights[row], light, effort=effort, seed=[settings.seed, row])
-            by_mirrors[:, row] = smoothing.density(halves_lm.T, area_m2).T
+        by_mirrors_lx[:, row] = by_photons(row, light)
         report(1 - (1 - GATHER_DONE) * row / len(instants))
-    reflectance = groups.mean(scatters, weights)
+    return _Straight(direct, groups.mean(scatters, weights), illuminance_lx, received, by_mirrors_lx)
 
-    del static, points, layout  # bounces take memory of their own
+
+def _bounces(
+    scene: Scene,
+    settings: BakeSettings,
+    rounds: Rounds,
+    smoothing: Smoothing,
+    *,
+    straight: _Straight,
+    instants: list[tuple[int, float]],
+) -> tuple[Floats, Floats]:
+    """The indirect light (K, S, 3) of surfels, and its noise (S,) relative to all light."""
     lights = _Lights(scene, instants)
+    received = straight.received
+    reflectance = straight.reflectance
     bounce = partial(bounced, received, reflectance, bounces=settings.bounces)
-    mean_by_mirrors = by_mirrors.mean(0)
-    pilot = bounce(rounds.table(), mean_by_mirrors + lights.of_skies(rounds.sky_lx()))
+    by_mirrors_lx = straight.by_mirrors_lx.mean(0)
+    pilot = bounce(rounds.table(), by_mirrors_lx + lights.of_skies(rounds.sky_lx()))
     gathered = rounds.refined(
         smoothing,
         radiosity=lights.luminance(received + reflectance * pilot),
         sky_weights=lights.sky_weights,
-        direct=lights.luminance(direct_lx[..., None]),
-        by_mirrors=np.stack([lights.luminance(half[..., None]) for half in by_mirrors]),
+        direct=lights.luminance(straight.illuminance_lx[..., None]),
+        by_mirrors=np.stack([lights.luminance(half_lx[..., None]) for half_lx in straight.by_mirrors_lx]),
         noise=settings.light_noise if settings.bounces else np.inf,
     )
-    indirect = bounce(gathered.near + gathered.far, mean_by_mirrors + lights.of_skies(gathered.sky_lx))
+    indirect = bounce(gathered.near + gathered.far, by_mirrors_lx + lights.of_skies(gathered.sky_lx))
     if settings.bounces:
         for row, sent in enumerate(received + reflectance * indirect):
             far_lx = gathered.far @ sent
             indirect[row] += smoothing.averaged(far_lx) - far_lx
-    first = [instants.index((index, key_times_ns(light)[0])) for index, light in enumerate(scene.lights)]
-    patches = Patches(
-        surfel_of=surfel_of,
-        reflectance=reflectance,
-        area_m2=area_m2,
-        radiosity=received[first] + reflectance * indirect[first],
-    )
-    tracks = _tracks(instants, indirect, scene)
-    noise = float(np.sqrt(np.average(gathered.noise**2, weights=area_m2 + 1e-12))) if len(groups) else 0.0
-    return BakedScene(scene, faces, atlas, direct, indirect[first], spread, patches, settings, tracks, noise)
+    return indirect, gathered.noise
 
 
 class _Lights:

@@ -465,7 +465,7 @@ class Gatherer:
             entries = (factor[chosen], (row[chosen], column[chosen]))
             return scipy.sparse.csr_matrix(entries, (len(points), self.surfels + self.lamps), dtype=np.float32)
 
-        found = np.concatenate(texels).astype(np.int32)
+        found = np.concatenate(texels)
         return Sample(table(is_near), table(~is_near), sky / ray_count, escaped, found)
 
     def deposited(self, photons: Photons) -> Floats:
@@ -510,7 +510,7 @@ class Gatherer:
         batch = batch.take(met)
         hits = hits.take(met)
         cosine = -along_normal[met]
-        texel = self.atlas.index(hits.at(self.atlas.light_px))
+        texel = self.atlas.index(hits.at(self.atlas.light_px)).astype(np.int32)
         scattered = batch.weight * self.response.scattered(hits.face, cosine)
         return _Step(batch, hits, cosine, texel, scattered, gone, from_panes)
 

@@ -67,6 +67,9 @@ class Reflectors:
         place_area_m2 = ends_m2[-1] / place_count if place_count else 0.0
 
         self._points_m = np.concatenate([points.points_m[self.texels], places_m]).astype(np.float32)
+        no_step = np.zeros((place_count, 3))
+        self._step_u_m = np.concatenate([points.step_u_m[self.texels], no_step]).astype(np.float32)
+        self._step_v_m = np.concatenate([points.step_v_m[self.texels], no_step]).astype(np.float32)
         self._normals = np.concatenate([points.planes[self.texels], normals]).astype(np.float32)
         self._face = np.concatenate([points.face[self.texels], bare[nth]]).astype(np.int32)
         self._area_m2 = np.concatenate([point_areas_m2[self.texels], np.full(place_count, place_area_m2)])
@@ -133,7 +136,7 @@ class Reflectors:
 
         def start(part: slice) -> Photons:
             random = np.random.default_rng([*seed, part.start])
-            number = random.random((5, part.stop - part.start), dtype=np.float32)
+            number = random.random((7, part.stop - part.start), dtype=np.float32)
             sample = (np.arange(part.start, part.stop) + number[0]) / count * ends[-1]
             place = np.minimum(np.searchsorted(ends, sample, side="right"), len(self) - 1)
             return self._photons(emitter, place, 1 / (count * chance[place]), number[1:])
@@ -154,17 +157,17 @@ class Reflectors:
         weight: Floats,
         number: Floats,
     ) -> Photons:
-        """Photons from places (P,), which stand for `weight` (P,) places each, by four numbers (4, P) in [0, 1)."""
+        """Photons from places (P,), which stand for `weight` (P,) places each, by six numbers (6, P) in [0, 1)."""
         visibility = self._gatherer.visibility
         response = self._gatherer.response
-        points = self._texels(place, number[:2].T)
+        points = self._texels(place, number[:4])
         flux_m2 = (self._area_m2[place] * weight).astype(np.float32)
 
         # A ray to somewhere on the emitter.
         ahead_m = np.einsum("ij,ij->i", emitter.ball.centre_m - points.points_m, points.planes)
         rows = np.flatnonzero((ahead_m > -emitter.ball.radius_m) & emitter.may_light(points.points_m))
         points = points.take(rows)
-        vectors_m, strength = emitter.towards(points)(number[2, rows], number[3, rows])
+        vectors_m, strength = emitter.towards(points)(number[4, rows], number[5, rows])
         cosine = points.cosine(vectors_m)
         flux_lm = strength * np.maximum(cosine, 0) * flux_m2[rows]
         lit = np.flatnonzero(flux_lm > 0)
@@ -191,12 +194,14 @@ class Reflectors:
             points.dither[is_leaving],
         )
 
-    def _texels(self, place: Rows, dither: Floats) -> Texels:
-        """Places (P,) as texels without a coat, so that all light that arrives there counts."""
+    def _texels(self, place: Rows, number: Floats) -> Texels:
+        """Somewhere on the area of places (P,), as texels without a coat, so that all light that arrives counts."""
         count = len(place)
+        across = number[2:] - np.float32(0.5)
+        aside_m = across[0][:, None] * self._step_u_m[place] + across[1][:, None] * self._step_v_m[place]
         no_step = np.zeros((count, 3), np.float32)
         return Texels(
-            points_m=self._points_m[place],
+            points_m=self._points_m[place] + aside_m,
             normals=self._normals[place],
             planes=self._normals[place],
             step_u_m=no_step,
@@ -205,5 +210,5 @@ class Reflectors:
             face=self._face[place],
             uv=np.zeros((count, 2), np.float32),
             eta=np.zeros(count, np.float32),
-            dither=np.ascontiguousarray(dither),
+            dither=np.ascontiguousarray(number[:2].T),
         )
