@@ -131,7 +131,9 @@ def mirror_images(
 # Steps of additive recurrences that fill the unit interval evenly: Roberts (2018), R2 and the golden ratio.
 JITTER = np.array([0.7548776662, 0.5698402910], np.float32)
 FOOTPRINT = np.array([0.6180339887, 0.3247179572], np.float32)
-WIDE_RAD = 0.6  # emitters that are seen wider need more rays
+# emitters that are seen narrower or wider need fewer or more rays
+NARROW_RAD = 0.15
+WIDE_RAD = 0.6
 MOST = 0.7  # share of rays from which on all are cast at once
 RIM = 2  # texels around a place of half shadow
 PARTIAL = 0.2  # share of the points around that see an emitter in part, from which a shadow takes more rays
@@ -168,7 +170,7 @@ def direct_light(
     receivers = Receivers(points, layout, cells, visibility, lit)
     sides = first_rays(emitter, points.points_m[lit], side)
     if emitter.sky == "pane":
-        return receivers.pane_light(emitter, side)
+        return receivers.pane_light(emitter, sides)
     if not (sides > 1).any():
         return receivers.hard_light(emitter, side)
     return receivers.soft_light(emitter, sides, side)
@@ -184,28 +186,14 @@ class Receivers:
     visibility: Visibility
     lit: Rows
 
-    def pane_light(self, emitter: Emitter, side: int) -> Floats:
-        """The sky's light (P,) in a pane, by rays from every other point along rows and columns.
-
-        Between them what would arrive with nothing in the way is interpolated, and the share that rays find smoothed.
-        """
-        points = self.points
-        layout = self.layout
-        share = np.zeros(len(points), np.float32)
-        shone = np.zeros(len(points), np.float32)
-        asked = self.lit[layout.is_sparse[self.lit]]
-        few = Rays(max(side // 2, 1))
-        pattern = self._pattern(stride=2)
-        total, _, unshaded = arriving(emitter, points, asked, self.visibility, few, pattern)
-        share[asked] = total / np.maximum(unshaded, LEAST_LX)
-        shone[asked] = unshaded > 0
-
-        shares = layout.blurred(layout.blurred(layout.interpolated(share * shone)))
-        counts = layout.blurred(layout.blurred(layout.interpolated(shone)))
-        lit = asked[shares[asked] > 0]
-        light = np.zeros(len(points), np.float32)
-        light[lit], _ = open_light(emitter, points, lit, few.side)
-        return layout.interpolated(light) * shares / np.maximum(counts, np.float32(1e-3))
+    def pane_light(self, emitter: Emitter, sides: NDArray[np.int64]) -> Floats:
+        """The sky's light (P,) in a pane, by side x side (N,) rays from every other point along rows and columns."""
+        light = np.zeros(len(self.points), np.float32)
+        is_sparse = self.layout.is_sparse[self.lit]
+        for side in np.unique(sides):
+            asked = self.lit[(sides == side) & is_sparse]
+            light[asked] = arriving(emitter, self.points, asked, self.visibility, Rays(int(side)))[0]
+        return self.layout.blurred(self.layout.interpolated(light))
 
     def hard_light(self, emitter: Emitter, side: int) -> Floats:
         """Light (P,) of an emitter that is so narrow that one ray tells, but for the edges of shadows."""
@@ -350,11 +338,15 @@ def first_rays(
 ) -> NDArray[np.int64]:
     """How many rays along a side points (P, 3) need to tell whether they see an emitter: one where shadows are hard."""
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
-    conditions = [width_rad == 0, width_rad < WIDE_RAD]
-    return np.select(conditions, [1, max(side // 2, 1)], max(3 * side // 4, 1))
+    is_pane = emitter.sky == "pane"
+    narrow = max(side // 2, 1)
+    middle = max(3 * side // 4, 1) if is_pane else narrow
+    wide = side if is_pane else max(3 * side // 4, 1)
+    conditions = [width_rad == 0, width_rad < NARROW_RAD, width_rad < WIDE_RAD]
+    return np.select(conditions, [1, narrow, middle], wide)
 
 
-def arriving(
+def arriving(  # noqa: PLR0917
     emitter: Emitter,
     points: Texels,
     rows: Rows,

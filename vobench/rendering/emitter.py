@@ -183,7 +183,7 @@ class MeshPanel(Emitter):
 
     @property
     def open_side(self) -> int:
-        """As many as a mesh close by takes."""
+        """As many as the shape of a mesh takes."""
         return 8
 
     def towards(self, texels: Texels) -> Aim:
@@ -209,33 +209,6 @@ class MeshPanel(Emitter):
     def width_rad(self, points_m: Floats) -> Floats:
         """As wide as a sphere around it, at most."""
         return _width_rad(self.ball, points_m)
-
-    def open_light(self, texels: Texels) -> Floats:
-        """The sum over MESH_PLACES in fixed places; NaN from near, where these would show."""
-        along_curve = (np.arange(MESH_PLACES) + 0.5) / MESH_PLACES
-        across = np.arange(MESH_PLACES) * GOLDEN % 1
-        places_m = sample_points(self.corners_m, along_curve, across)
-        area_m2 = areas_m2(self.corners_m)
-        ends = np.cumsum(area_m2) / area_m2.sum()
-        triangle = np.minimum(np.searchsorted(ends, along_curve, side="right"), len(ends) - 1)
-        normals = face_normals(self.corners_m)[triangle]
-        intensity_cd = np.float32(self.light.luminance_cd_m2 * area_m2.sum() / MESH_PLACES)
-
-        distances_m = lengths(texels.points_m - self.ball.centre_m.astype(np.float32))
-        is_near = distances_m < MESH_NEAR * self.ball.radius_m
-        light = np.zeros(len(texels), np.float32)
-        for place_m, normal in zip(places_m.astype(np.float32), normals.astype(np.float32), strict=True):
-            vectors_m = place_m - texels.points_m
-            strength = _from_area(intensity_cd, vectors_m, vectors_m @ normal)
-            cosine = texels.cosine(vectors_m)
-            light += strength * np.maximum(cosine, 0) * texels.entering(cosine)
-        light[is_near] = np.nan
-        return light
-
-
-MESH_PLACES = 64
-MESH_NEAR = 3.0  # radii of a mesh, within which its places would show one by one
-GOLDEN = 0.6180339887
 
 
 def panel_emitter(light: AreaLight) -> Panel | MeshPanel:
@@ -331,11 +304,6 @@ def sun_emitter(light: Sun, t_ns: float) -> SunDisc:
     return SunDisc(light, direction, BoundingSphere(FARTHEST_M * direction, FARTHEST_M * SUN_RADIUS_RAD))
 
 
-# along a side of a pane, fixed places that tell how bright it is: without and with other panes behind or before it
-PLACES = 2
-PLACES_BEFORE_PANES = 4
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class SkyPane(Emitter):
     """The sky through one pane: only rays that cross no other pane behind it, so that none counts twice."""
@@ -359,27 +327,6 @@ class SkyPane(Emitter):
             return (FAR_M * direction).astype(np.float32), strength.astype(np.float32)
 
         return aim
-
-    def open_light(self, texels: Texels) -> Floats:
-        """By Lambert's formula and the mean luminance in a few fixed places; NaN where the formula does not hold."""
-        if self.face is None:
-            return np.full(len(texels), np.nan, np.float32)
-        projected_sr = SeenRectangle(self.face, texels.points_m).projected_sr(texels.normals, texels.planes)
-        places = self._places(texels)
-        follows = self._followed()
-        side = PLACES_BEFORE_PANES if any(follows) else PLACES
-        even = np.zeros(len(texels))
-        bright = np.zeros(len(texels))
-        for column, row in np.ndindex(side, side):
-            a = np.full(len(texels), (column + 0.5) / side, np.float32)
-            b = np.full(len(texels), (row + 0.5) / side, np.float32)
-            vectors_m, _ = places(a, b)
-            direction = vectors_m / lengths(vectors_m)[:, None]
-            cosine = np.maximum(texels.cosine(direction), 0)
-            luminance = self._luminance(texels.points_m + vectors_m, direction, follows)
-            even += cosine
-            bright += cosine * luminance * texels.entering(cosine)
-        return (projected_sr * bright / np.maximum(even, 1e-12)).astype(np.float32)
 
     def _luminance(self, places_m: Floats, directions: Floats, follows: tuple[bool, bool]) -> Floats:
         """What is seen (P,) through places (P, 3) of the pane, nothing where panes of the sky follow."""
@@ -491,11 +438,9 @@ def _sky_table_of(
     height = 1 - (2 * nth + 1) / SKY_DIRECTIONS
     directions = _by_height(height, nth * GOLDEN_RAD)  # Fibonacci's lattice
     sent = sky.luminance_cd_m2(directions) * 4 * np.pi / SKY_DIRECTIONS
-    tilt_rad = np.linspace(0, np.pi, TABLE_STEPS + 1)
-    turn_rad = np.linspace(-np.pi, np.pi, 2 * TABLE_STEPS + 1)
-    table = np.empty((len(tilt_rad), len(turn_rad)))
-    for row, tilt in enumerate(tilt_rad):
-        normals = _by_height(np.full(len(turn_rad), np.cos(tilt)), turn_rad)
+    table_normals = _table_directions()
+    table = np.empty(table_normals.shape[:2])
+    for row, normals in enumerate(table_normals):
         cosine = np.maximum(normals @ directions.T, 0)
         entering = 1 - fresnel(cosine, eta) if eta else 1.0
         table[row] = (cosine * entering * sent).sum(1)
@@ -508,9 +453,17 @@ def _sky_table(sky: Sky, eta: float) -> Floats:
 
 
 def _by_height(height: Floats, turn_rad: Floats) -> Floats:
-    """Unit vectors (N, 3) by their height and the angle around the vertical (N,)."""
+    """Unit vectors (..., 3) by their height and the angle around the vertical (...)."""
     level = np.sqrt(np.maximum(1 - height**2, 0))
     return np.stack([level * np.cos(turn_rad), level * np.sin(turn_rad), height], -1)
+
+
+def _table_directions() -> Floats:
+    """The directions (TABLE_STEPS + 1, 2 TABLE_STEPS + 1, 3) that the entries of a table stand for."""
+    tilt_rad = np.linspace(0, np.pi, TABLE_STEPS + 1)
+    turn_rad = np.linspace(-np.pi, np.pi, 2 * TABLE_STEPS + 1)
+    tilt, turn = np.meshgrid(tilt_rad, turn_rad, indexing="ij")
+    return _by_height(np.cos(tilt), turn)
 
 
 def _read_by_normal(table: Floats, normals: Floats) -> Floats:
