@@ -395,6 +395,9 @@ class ShadedLight:
 
         Their shade may be missing where none of the views leads.
         """
+        if not self._movers.bodies:
+            self.update(values)
+            return
         key = (self._movers.poses(t_ns).tobytes(), tuple(suns_ns), colours.tobytes(), id(values))
         if key != self._key:
             self.update(values)

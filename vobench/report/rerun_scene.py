@@ -14,6 +14,7 @@ from vobench.errors import VobenchError
 from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene, load_baked
 from vobench.rendering.illumination import Illumination
+from vobench.rendering.texel_owner import owners
 from vobench.report import blueprint
 from vobench.report.rerun_stream import FrameStream
 from vobench.runner.folder import CASE, SEQUENCE, RunFolder
@@ -110,6 +111,11 @@ def _baked_folder(sequence: Path) -> Path | None:
 def _light_texture(light: BakedScene) -> NDArray[np.uint8]:
     """The light map at the start, (H, W, 3) in sRGB, with at most MOST_TEXELS on a side."""
     radiance = Illumination(light).at(0, 0)
+    if light.scene.movers:
+        # Their light depends on where they are: here they have the mean of all that is lit.
+        face = owners(light.atlas).face.reshape(radiance.shape[:2])
+        is_mover = (face >= 0) & (light.faces.mover[face] >= 0)
+        radiance = np.where(is_mover[..., None], radiance[radiance > 0].mean(), radiance)
     step = -(-max(radiance.shape) // MOST_TEXELS)
     radiance = radiance[::step, ::step]
     lit = radiance[radiance > 0]
