@@ -39,7 +39,7 @@ def test_a_convex_thing_casts_the_shade_of_its_hull_and_a_sheet_its_own() -> Non
 
 def test_a_shape_that_its_hull_would_fill_keeps_its_gap() -> None:
     """Two pillars of one thing: a hull would close what is between them."""
-    pair = np.concatenate([PILLAR.triangles, PILLAR.triangles + [2.0, 0, 0]])
+    pair = np.concatenate([PILLAR.triangles, PILLAR.triangles + np.array([2.0, 0, 0])])
     caster = RayCaster(table([Thing("pair", PILLAR, "grey")], [-1], [-1]))
     assert caster.occluded(np.array([[0.4, -5, 1.0]]), np.array([[0.4, 5, 1.0]])).all()
     middles = occluder(pair).mean(1)

@@ -103,7 +103,7 @@ MOST_PROBES = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class MovingBody:
     """Movers of one name, that is a thing or all limbs of a person.
 
     corners_m (K, 3, 3): what casts their shade, each face in the frame of its mover (K,). probes_m (N, 3): places
@@ -132,7 +132,7 @@ class Body:
         return np.asarray(last * np.clip(share, 0, 1))
 
 
-def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mask) -> list[Body]:
+def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mask) -> list[MovingBody]:
     """The bodies among movers that have solid faces (F,), as they are at the start."""
     result = []
     for _, members in groupby(range(len(scene_movers)), key=lambda nth: scene_movers[nth].name):
@@ -153,7 +153,7 @@ def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mas
         if not shapes_m:
             continue
         no_part = np.zeros(0, np.int64)
-        body = Body(movers, np.concatenate(shapes_m), np.concatenate(shape_movers), np.zeros((1, 3)), no_part)
+        body = MovingBody(movers, np.concatenate(shapes_m), np.concatenate(shape_movers), np.zeros((1, 3)), no_part)
         T_world_movers = np.array([mover.path.pose(0) for mover in scene_movers])
         T_first_world = se3.inverse(T_world_movers[movers[0]])
         points_m = se3.apply(T_first_world, body.placed(T_world_movers).reshape(-1, 3))
@@ -355,7 +355,7 @@ class MoverLightAt:
         return total
 
 
-def _part_spheres(bodies: Sequence[Body], occluders_m: Sequence[Array]) -> BoundingSphere:
+def _part_spheres(bodies: Sequence[MovingBody], occluders_m: Sequence[Array]) -> BoundingSphere:
     """Spheres (S,) around the parts of all bodies."""
     balls = []
     for body, corners_m in zip(bodies, occluders_m, strict=True):

@@ -108,14 +108,20 @@ def _baked_folder(sequence: Path) -> Path | None:
     return None
 
 
+def _light_map(light: BakedScene) -> NDArray[np.float32]:
+    """The light at the start (H, W, 3). That of movers depends on where they are: they have the mean of the others."""
+    radiance = Illumination(light).at(0, 0)
+    if not light.scene.movers:
+        return radiance
+    face = owners(light.atlas).face.reshape(radiance.shape[:2])
+    is_mover = (face >= 0) & (light.faces.mover[face] >= 0)
+    mean = radiance[radiance > 0].mean() if radiance.any() else 0.0
+    return np.where(is_mover[..., None], np.float32(mean), radiance)
+
+
 def _light_texture(light: BakedScene) -> NDArray[np.uint8]:
     """The light map at the start, (H, W, 3) in sRGB, with at most MOST_TEXELS on a side."""
-    radiance = Illumination(light).at(0, 0)
-    if light.scene.movers:
-        # Their light depends on where they are: here they have the mean of all that is lit.
-        face = owners(light.atlas).face.reshape(radiance.shape[:2])
-        is_mover = (face >= 0) & (light.faces.mover[face] >= 0)
-        radiance = np.where(is_mover[..., None], radiance[radiance > 0].mean(), radiance)
+    radiance = _light_map(light)
     step = -(-max(radiance.shape) // MOST_TEXELS)
     radiance = radiance[::step, ::step]
     lit = radiance[radiance > 0]
