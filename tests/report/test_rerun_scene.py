@@ -105,9 +105,7 @@ def test_the_light_map_is_white_at_its_percentile_and_small(monkeypatch):
 
 
 def test_a_scene_without_light_is_black(monkeypatch):
-    monkeypatch.setattr(
-        rerun_scene, "Illumination", lambda light: SimpleNamespace(at=lambda layer, t_ns: np.zeros((8, 8, 3)))
-    )
+    monkeypatch.setattr(rerun_scene, "_light_map", lambda light: np.zeros((8, 8, 3)))
     assert rerun_scene._light_texture(None).max() == 0
 
 

@@ -555,7 +555,7 @@ class MoverLight:
             if isinstance(light, PointLight | SpotLight | Sun):
                 [emitter] = emitters(light, self._visibility, t_ns=suns_ns[index])
                 rows.append(self._by_one_ray(emitter, points, middle))
-        return np.array(rows, np.float32).reshape(-1, len(points))
+        return np.array(rows, np.float32).reshape(len(rows), len(points))
 
     def _by_one_ray(self, emitter: Emitter, points: Texels, middle: Floats) -> Floats:
         vectors_m, strength = emitter.towards(points)(middle, middle)

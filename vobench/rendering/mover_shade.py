@@ -448,7 +448,7 @@ class ShadedLight:
     def _show_movers(self, colours: Floats) -> None:
         """Draw the light on movers."""
         at = self._at
-        if at is None:
+        if at is None or not len(at.points):
             return
         count = len(at.points)
         columns = np.zeros((count, sum(POINT_FLOATS)), np.float32)
