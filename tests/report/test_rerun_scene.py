@@ -93,7 +93,7 @@ def test_what_moves_is_a_mesh_of_its_own_that_goes_its_way(run_viewer, tmp_path)
 def test_the_light_map_is_white_at_its_percentile_and_small(monkeypatch):
     radiance = np.zeros((3000, 40, 3))
     radiance[:1000] = np.linspace(0.001, 2.0, 1000)[:, None, None]
-    monkeypatch.setattr(rerun_scene, "Illumination", lambda light: SimpleNamespace(at=lambda layer, t_ns: radiance))
+    monkeypatch.setattr(rerun_scene, "_light_map", lambda light: radiance)
     texture = rerun_scene._light_texture(None)
     assert texture.shape == (1000, 14, 3)
     assert texture.dtype == np.uint8
@@ -105,9 +105,7 @@ def test_the_light_map_is_white_at_its_percentile_and_small(monkeypatch):
 
 
 def test_a_scene_without_light_is_black(monkeypatch):
-    monkeypatch.setattr(
-        rerun_scene, "Illumination", lambda light: SimpleNamespace(at=lambda layer, t_ns: np.zeros((8, 8, 3)))
-    )
+    monkeypatch.setattr(rerun_scene, "_light_map", lambda light: np.zeros((8, 8, 3)))
     assert rerun_scene._light_texture(None).max() == 0
 
 

@@ -12,7 +12,7 @@ from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.bake import BakedScene, bodies
-from vobench.rendering.emitter import Emitter, emitters
+from vobench.rendering.emitter import Emitter, emitters, rectangle
 from vobench.rendering.geometry import BoundingSphere, are_panes, sample_points, tangents
 from vobench.rendering.indirect_light import Gatherer, response
 from vobench.rendering.texel import Texels
@@ -103,7 +103,7 @@ MOST_PROBES = 6
 
 
 @dataclass(frozen=True, slots=True)
-class Body:
+class MovingBody:
     """Movers of one name, that is a thing or all limbs of a person.
 
     corners_m (K, 3, 3): what casts their shade, each face in the frame of its mover (K,). probes_m (N, 3): places
@@ -132,7 +132,7 @@ class Body:
         return np.asarray(last * np.clip(share, 0, 1))
 
 
-def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mask) -> list[Body]:
+def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mask) -> list[MovingBody]:
     """The bodies among movers that have solid faces (F,), as they are at the start."""
     result = []
     for _, members in groupby(range(len(scene_movers)), key=lambda nth: scene_movers[nth].name):
@@ -153,7 +153,7 @@ def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mas
         if not shapes_m:
             continue
         no_part = np.zeros(0, np.int64)
-        body = Body(movers, np.concatenate(shapes_m), np.concatenate(shape_movers), np.zeros((1, 3)), no_part)
+        body = MovingBody(movers, np.concatenate(shapes_m), np.concatenate(shape_movers), np.zeros((1, 3)), no_part)
         T_world_movers = np.array([mover.path.pose(0) for mover in scene_movers])
         T_first_world = se3.inverse(T_world_movers[movers[0]])
         points_m = se3.apply(T_first_world, body.placed(T_world_movers).reshape(-1, 3))
@@ -181,11 +181,11 @@ def _probes_m(points_m: Array) -> Array:
     return np.asarray(low_m + shares * size_m)
 
 
-# Samples of a panel for each metre of its radius, at least and at most; of a pane; of the open sky.
+# Samples of a panel and of a pane for each metre of its radius, and how many at least and at most.
 PER_RADIUS_M = 14
+PANE_PER_RADIUS_M = 5
 FEWEST_SAMPLES = 2
-PANEL_SAMPLES = 8
-PANE_SAMPLES = 5
+PANEL_SAMPLES = 9
 OPEN_SKY_SAMPLES = MOST_SAMPLES
 GOLDEN = (0.7548776662, 0.5698402910)  # steps that fill the unit square evenly: Roberts (2018), R2
 
@@ -241,15 +241,29 @@ def _with_fewer(emitter: SampledEmitter, most: int) -> SampledEmitter:
     )
 
 
-def _square(count: int) -> tuple[Array, Array]:
-    """Two numbers (count,) each that fill the unit square evenly."""
+def _spread(corners_m: Array, count: int) -> Array:
+    """About so many points (K, 3) all over triangles, whose mean is the middle of their area.
+
+    On a rectangle they are the middles of cells that are nearly square.
+    """
+    face = rectangle(corners_m)
+    if face is not None:
+        width_m = np.linalg.norm(face.edge_u_m)
+        length_m = np.linalg.norm(face.edge_v_m)
+        columns = int(np.clip(np.rint(np.sqrt(count * width_m / length_m)), 1, count))
+        rows = max(1, count // columns)
+        u, v = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
+        return np.asarray(face.corner_m + u.reshape(-1, 1) * face.edge_u_m + v.reshape(-1, 1) * face.edge_v_m)
     steps = np.arange(count)[:, None] * GOLDEN + 0.5
     a, b = (steps % 1).T
-    return a, b
+    points_m = sample_points(corners_m, a, b)
+    area_m2 = areas_m2(corners_m)
+    middle_m = area_m2 @ corners_m.mean(1) / area_m2.sum()
+    return np.asarray(points_m + middle_m - points_m.mean(0))
 
 
-def _sample_count(radius_m: float) -> int:
-    return int(np.clip(np.rint(PER_RADIUS_M * radius_m), FEWEST_SAMPLES, PANEL_SAMPLES))
+def _sample_count(wanted: float) -> int:
+    return int(np.clip(np.rint(wanted), FEWEST_SAMPLES, PANEL_SAMPLES))
 
 
 def _ball(corners_m: Array) -> BoundingSphere:
@@ -261,14 +275,13 @@ def _ball(corners_m: Array) -> BoundingSphere:
 def _sampled_panel(index: int, light: AreaLight) -> SampledEmitter:
     corners_m = mesh_corners(light.mesh)
     ball = _ball(corners_m)
-    count = _sample_count(ball.radius_m)
-    a, b = _square(count)
-    face_ends_m2 = np.cumsum(areas_m2(corners_m))
-    face = np.searchsorted(face_ends_m2, a * face_ends_m2[-1], side="right")
-    normals = face_normals(corners_m)[np.minimum(face, len(corners_m) - 1)]
-    places = np.column_stack([sample_points(corners_m, a, b), np.ones(count)])
-    strength = np.full(count, light.luminance_cd_m2 * face_ends_m2[-1] / count)
-    return SampledEmitter(index, ball, places, np.column_stack([normals, np.zeros(count)]), strength)
+    points_m = _spread(corners_m, _sample_count(PER_RADIUS_M * ball.radius_m))
+    count = len(points_m)
+    middles_m = corners_m.mean(1)
+    nearest = np.linalg.norm(points_m[:, None] - middles_m, axis=2).argmin(1)
+    axes = np.column_stack([face_normals(corners_m)[nearest], np.zeros(count)])
+    strength = np.full(count, light.luminance_cd_m2 * areas_m2(corners_m).sum() / count)
+    return SampledEmitter(index, ball, np.column_stack([points_m, np.ones(count)]), axes, strength)
 
 
 def _sampled_sky(index: int, light: Sky, visibility: Visibility) -> list[SampledEmitter]:
@@ -276,8 +289,9 @@ def _sampled_sky(index: int, light: Sky, visibility: Visibility) -> list[Sampled
     result = []
     for pane in visibility.sky_panes:
         ball = _ball(pane.corners_m)
-        count = PANE_SAMPLES
-        places = np.column_stack([sample_points(pane.corners_m, *_square(count)), np.ones(count)])
+        points_m = _spread(pane.corners_m, _sample_count(PANE_PER_RADIUS_M * ball.radius_m))
+        count = len(points_m)
+        places = np.column_stack([points_m, np.ones(count)])
         strength = np.full(count, areas_m2(pane.corners_m).sum() / count)
         result.append(SampledEmitter(index, ball, places, np.tile([*pane.normal, 1.0], (count, 1)), strength))
     directions = _spiral(2 * OPEN_SKY_SAMPLES)[:OPEN_SKY_SAMPLES]
@@ -341,7 +355,7 @@ class MoverLightAt:
         return total
 
 
-def _part_spheres(bodies: Sequence[Body], occluders_m: Sequence[Array]) -> BoundingSphere:
+def _part_spheres(bodies: Sequence[MovingBody], occluders_m: Sequence[Array]) -> BoundingSphere:
     """Spheres (S,) around the parts of all bodies."""
     balls = []
     for body, corners_m in zip(bodies, occluders_m, strict=True):
@@ -541,7 +555,7 @@ class MoverLight:
             if isinstance(light, PointLight | SpotLight | Sun):
                 [emitter] = emitters(light, self._visibility, t_ns=suns_ns[index])
                 rows.append(self._by_one_ray(emitter, points, middle))
-        return np.array(rows, np.float32).reshape(-1, len(points))
+        return np.array(rows, np.float32).reshape(len(rows), len(points))
 
     def _by_one_ray(self, emitter: Emitter, points: Texels, middle: Floats) -> Floats:
         vectors_m, strength = emitter.towards(points)(middle, middle)

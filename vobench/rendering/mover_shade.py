@@ -395,6 +395,9 @@ class ShadedLight:
 
         Their shade may be missing where none of the views leads.
         """
+        if not self._movers.bodies:
+            self.update(values)
+            return
         key = (self._movers.poses(t_ns).tobytes(), tuple(suns_ns), colours.tobytes(), id(values))
         if key != self._key:
             self.update(values)
@@ -445,7 +448,7 @@ class ShadedLight:
     def _show_movers(self, colours: Floats) -> None:
         """Draw the light on movers."""
         at = self._at
-        if at is None:
+        if at is None or not len(at.points):
             return
         count = len(at.points)
         columns = np.zeros((count, sum(POINT_FLOATS)), np.float32)

@@ -14,6 +14,7 @@ from vobench.errors import VobenchError
 from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene, load_baked
 from vobench.rendering.illumination import Illumination
+from vobench.rendering.texel_owner import owners
 from vobench.report import blueprint
 from vobench.report.rerun_stream import FrameStream
 from vobench.runner.folder import CASE, SEQUENCE, RunFolder
@@ -107,9 +108,20 @@ def _baked_folder(sequence: Path) -> Path | None:
     return None
 
 
+def _light_map(light: BakedScene) -> NDArray[np.float32]:
+    """The light at the start (H, W, 3). That of movers depends on where they are: they have the mean of the others."""
+    radiance = Illumination(light).at(0, 0)
+    if not light.scene.movers:
+        return radiance
+    face = owners(light.atlas).face.reshape(radiance.shape[:2])
+    is_mover = (face >= 0) & (light.faces.mover[face] >= 0)
+    mean = radiance[radiance > 0].mean() if radiance.any() else 0.0
+    return np.where(is_mover[..., None], np.float32(mean), radiance)
+
+
 def _light_texture(light: BakedScene) -> NDArray[np.uint8]:
     """The light map at the start, (H, W, 3) in sRGB, with at most MOST_TEXELS on a side."""
-    radiance = Illumination(light).at(0, 0)
+    radiance = _light_map(light)
     step = -(-max(radiance.shape) // MOST_TEXELS)
     radiance = radiance[::step, ::step]
     lit = radiance[radiance > 0]
