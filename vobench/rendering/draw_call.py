@@ -228,7 +228,6 @@ class DrawCalls:
         GL.glDepthMask(GL.GL_TRUE)
         GL.glEnable(GL.GL_CULL_FACE)
 
-
     def _rim(self, runs: Sequence[tuple[int, int]], copies: int) -> None:
         """Blend the rims of holes over what is behind them, where nothing solid of their own is."""
         GL.glDepthMask(GL.GL_FALSE)

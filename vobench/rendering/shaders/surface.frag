@@ -98,10 +98,11 @@ void main()
     vec4 texel = texture(body_texture, at_texture, view.lod_bias[layer]);
     colour *= SHADE(texel);
 #ifdef HAS_CUTOUT
-    // The rim of a hole is as wide as a pixel, or as the mask's own ramp where a texel is larger.
-    float widest = 2.0 * min(batch.cutout, 1.0 - batch.cutout);
-    float width = max(min(fwidth(texel.a), widest), NARROWEST_RIM);
-    float covered = clamp((texel.a - batch.cutout) / width + 0.5, 0.0, 1.0);
+    // Half of the rim is covered: there opacity is what a ray takes for the edge; the rim is a pixel wide.
+    float rim = clamp(batch.cutout, NARROWEST_RIM, 1.0 - NARROWEST_RIM);
+    float widest = 2.0 * min(rim, 1.0 - rim);
+    float width = clamp(fwidth(texel.a), NARROWEST_RIM, widest);
+    float covered = clamp((texel.a - rim) / width + 0.5, 0.0, 1.0);
 #ifdef IS_RIM
     if (covered < LEAST_COVERED || covered >= SOLID) discard;
 #else
