@@ -12,9 +12,10 @@ from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.bake import BakedScene, bodies
-from vobench.rendering.emitter import Emitter, emitters, rectangle
+from vobench.rendering.emitter import Emitter, emitters
 from vobench.rendering.geometry import BoundingSphere, are_panes, sample_points, tangents
 from vobench.rendering.indirect_light import Gatherer, response
+from vobench.rendering.solid_angle import rectangle
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_owner import Owners
 from vobench.rendering.uniform_block import MOST_MAPS, MOST_REACHES, MOST_SAMPLES
