@@ -4,16 +4,19 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.geometry import RAY_OFFSET_M
-from vobench.rendering.lamp_shadow import LAMPS_AT_ONCE, Bits
 from vobench.rendering.occlusion import Bodies, dot
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.scene import Scene
 
+Bits = NDArray[np.uint32]
+
+LAMPS_AT_ONCE = 32  # a bit each
 SUN_DISTANCE_M = 1e4  # beyond every scene
 EVERYWHERE = -2.0  # cosine less than any
 
@@ -68,6 +71,11 @@ class LampGroup:
 
     lamps: tuple[Lamp, ...]
     facing: Bits
+
+    def pixels_facing(self, facing: Bits) -> Iterator[tuple[Lamp, NDArray[np.intp]]]:
+        """Each lamp with the pixels (P,) that are turned to it, by their bits (R,)."""
+        for nth, lamp in enumerate(self.lamps):
+            yield lamp, np.flatnonzero(facing & np.uint32(1 << nth))
 
     def bits_before(self, normals: Array, offsets_m: Array) -> Bits:
         """Bits (P,) of the lamps that planes (P, 3), offsets_m (P,) from the origin, are turned to."""

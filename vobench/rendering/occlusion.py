@@ -26,8 +26,6 @@ WATERTIGHT = 1e-3 * RESOLUTION  # a ray that passes a face's edge this close has
 STEP_EDGES = 3  # edge tolerances that a ray moves on past a back, or aside to look for other faces
 ASIDE = 5  # directions in which faces are looked for: straight on and to four sides
 AXES = np.eye(3)
-PLANE_DIGITS = 4  # of normals and of offsets in metres that are equal for faces of one plane
-NO_PLANE = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +56,8 @@ class Body:
 class Bodies:
     """The faces of a scene, each in its body's frame, and rays against them; body 0 is all that stands.
 
-    normals (F + 1, 3) and offsets_m (F + 1,) are the planes of faces, body (F + 1,) whose they are, and plane_numbers
-    (F + 1,) are equal for faces in one plane; the last entry, that of the face -1, is nothing.
+    normals (F + 1, 3) and offsets_m (F + 1,) are the planes of faces, body (F + 1,) whose they are; the last entry,
+    that of the face -1, is nothing.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -76,9 +74,6 @@ class Bodies:
         largest_m = float(np.abs(corners_m).max(initial=0.0))
         self._edge_m = RESOLUTION * max(1.0, largest_m)
         self.ray_offset_m = max(RAY_OFFSET_M, self._edge_m)
-        plane_rows = np.column_stack([self.normals, self.offsets_m, self.body])
-        self.plane_numbers = _numbered(np.round(plane_rows, PLANE_DIGITS)).astype(np.int32)
-        self.plane_numbers[-1] = NO_PLANE
         self._twin = back_faces(self.faces)
         self._cut_outs = CutOuts(self.faces, scene.materials)
 

@@ -4,7 +4,7 @@ import os
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -14,8 +14,7 @@ from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Indices, Mask, Pixels
 from vobench.rendering.lamp import Lamp, LampGroup, lamp_groups, lamps_on
-from vobench.rendering.lamp_shadow import blocks_of, hidden_lamps
-from vobench.rendering.occlusion import NO_PLANE, Bodies, dot
+from vobench.rendering.occlusion import Bodies, dot
 from vobench.rendering.shot import CameraShot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene
@@ -137,34 +136,21 @@ class Band:
         lift_m = self._bodies.ray_offset_m * normals
         starts_m = (self._world_m + lift_m).astype(np.float32)
         offsets_m = dot(self._world_m, normals) if self._movers else np.empty(0)
-        plane = self._bodies.plane_numbers[self._face]
-        for _, pixels in self._movers:
-            plane[pixels] = NO_PLANE
-        width = picture.camera.width_px
-        blocks = blocks_of(len(plane) // width, width)
-
         count = np.zeros(len(self._face), np.uint16)
         for group in picture.lamps:
             facing = group.facing[self._face]
             for _, pixels in self._movers:
                 is_diffuse = picture.ids.diffuse[self._face[pixels]]
                 facing[pixels] = np.where(is_diffuse, group.bits_before(normals[pixels], offsets_m[pixels]), 0)
-            is_hidden = partial(self._is_hidden, group.lamps, starts_m, T_bodies_world)
-            count += np.bitwise_count(hidden_lamps(blocks, plane, facing, is_hidden))
+            for lamp, pixels in group.pixels_facing(facing):
+                count[pixels] += self._is_hidden(lamp, starts_m, T_bodies_world, pixels)
         return count
 
-    def _is_hidden(
-        self,
-        lamps: Sequence[Lamp],
-        starts_m: Floats,
-        T_bodies_world: Sequence[Array],
-        nth: int,
-        pixels: Pixels,
-    ) -> Mask:
+    def _is_hidden(self, lamp: Lamp, starts_m: Floats, T_bodies_world: Sequence[Array], pixels: Pixels) -> Mask:
         """Whether something is between a lamp that shines towards pixels (P,) and what they show at starts_m (R, 3)."""
         pixel_starts_m = starts_m[pixels]
-        vectors_m = lamps[nth].vectors_m(pixel_starts_m)
-        is_lit = np.broadcast_to(lamps[nth].shines(vectors_m), len(pixels))
+        vectors_m = lamp.vectors_m(pixel_starts_m)
+        is_lit = np.broadcast_to(lamp.shines(vectors_m), len(pixels))
         reach = np.where(is_lit, np.float32(1 - LAMP_TOLERANCE), NO_RAY)
         T_bodies_pixels = [of_rays(T_body_world, pixels) for T_body_world in T_bodies_world]
         return self._bodies.blocked(pixel_starts_m, vectors_m, T_bodies_pixels, reach)
