@@ -224,7 +224,7 @@ def test_a_terminal_that_knows_no_degree_sign_gets_a_table_all_the_same(ran, her
     environment = os.environ | {"PYTHONIOENCODING": "ascii", "LC_ALL": "C"}
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, env=environment, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
-    assert b"? first" in done.stdout
+    assert b"? best" in done.stdout
 
 
 @pytest.mark.parametrize("words", [("list", "--json"), ("metrics",), ("report", "runs/tiny")], ids=" ".join)

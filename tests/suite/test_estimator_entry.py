@@ -27,8 +27,8 @@ def test_a_suites_limits_go_over_the_manifests(bent):
 def test_each_mode_has_an_entry_of_its_own(bent):
     planned = bent(("estimators:", "modes: [step, real_time]\nestimators:"))
     assert [(e.label, e.mode, e.claims) for e in planned.estimator_entries[:2]] == [
-        ("stand_still", "step", ()),
-        ("stand_still.real_time", "real_time", ("real time",)),
+        ("stand_still", "step", ("baseline",)),
+        ("stand_still.real_time", "real_time", ("baseline", "real time")),
     ]
     alone = bent(("estimators:", "modes: [real_time]\nestimators:"))
     assert next((e.label, e.mode) for e in alone.estimator_entries) == ("stand_still", "real_time")

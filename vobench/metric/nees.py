@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import stats
 
 from vobench.errors import TrajectoryError
 from vobench.geometry import se3
@@ -81,6 +80,8 @@ def median_interval(samples: float, degrees_of_freedom: int) -> tuple[float, flo
 
     `samples` is the number of independent ones. The median has the quantile of a beta distribution.
     """
+    from scipy import stats
+
     half = (samples + 1) / 2
     quantiles = stats.beta.ppf([0.025, 0.975], half, half)
     low, high = stats.chi2.ppf(quantiles, degrees_of_freedom)

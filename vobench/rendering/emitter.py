@@ -2,8 +2,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import lru_cache
+from dataclasses import dataclass, field
 from typing import ClassVar, Protocol
 
 import numpy as np
@@ -382,6 +381,7 @@ class OpenSky(Emitter):
     light: Sky
     visibility: Visibility
     ball: BoundingSphere
+    tables: dict[float, Floats] = field(default_factory=dict, repr=False)
 
     def towards(self, texels: Texels) -> Aim:
         """Directions as dense as their cosine."""
@@ -414,8 +414,14 @@ class OpenSky(Emitter):
         is_flat = np.einsum("ij,ij->i", texels.normals, texels.planes) > FLAT
         for eta in np.unique(texels.eta):
             rows = np.flatnonzero(is_flat & (texels.eta == eta))
-            light[rows] = _read_by_normal(_sky_table(self.light, float(eta)), texels.normals[rows])
+            light[rows] = _read_by_normal(self._table(float(eta)), texels.normals[rows])
         return light
+
+    def _table(self, eta: float) -> Floats:
+        """The light that enters a coat of this index, by the normal; computed once."""
+        if eta not in self.tables:
+            self.tables[eta] = _sky_table(self.light, eta)
+        return self.tables[eta]
 
 
 FLAT = 1 - 1e-5  # cosine of a normal of the shape to that of its face, from which the face alone limits the sky
@@ -424,16 +430,8 @@ SKY_DIRECTIONS = 4096
 GOLDEN_RAD = np.pi * (3 - np.sqrt(5))
 
 
-@lru_cache(maxsize=16)
-def _sky_table_of(
-    kind: str,
-    illuminance_lx: float,
-    ground_albedo: float,
-    sun: tuple[float, float, float],
-    eta: float,
-) -> Floats:
+def _sky_table(sky: Sky, eta: float) -> Floats:
     """Illuminance (TABLE_STEPS + 1, 2 TABLE_STEPS + 1) that enters a face under the whole sky, by its normal."""
-    sky = Sky("", illuminance_lx, kind, np.array(sun), ground_albedo)
     nth = np.arange(SKY_DIRECTIONS)
     height = 1 - (2 * nth + 1) / SKY_DIRECTIONS
     directions = _by_height(height, nth * GOLDEN_RAD)  # Fibonacci's lattice
@@ -445,11 +443,6 @@ def _sky_table_of(
         entering = 1 - fresnel(cosine, eta) if eta else 1.0
         table[row] = (cosine * entering * sent).sum(1)
     return table
-
-
-def _sky_table(sky: Sky, eta: float) -> Floats:
-    x, y, z = (float(coordinate) for coordinate in sky.sun_direction)
-    return _sky_table_of(sky.kind, sky.illuminance_lx, sky.ground_albedo, (x, y, z), eta)
 
 
 def _by_height(height: Floats, turn_rad: Floats) -> Floats:

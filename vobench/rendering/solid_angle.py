@@ -117,8 +117,10 @@ class SeenRectangle:
         leaves_at = np.ones((3, len(rows)))
         enters_at = np.ones((3, len(rows)))
         for nth in range(4):
-            start, end = corners[nth - 1], corners[nth]
-            start_height, end_height = heights[nth - 1], heights[nth]
+            start = corners[nth - 1]
+            end = corners[nth]
+            start_height = heights[nth - 1]
+            end_height = heights[nth]
             rise = end_height - start_height
             share = np.clip(-start_height / np.where(rise == 0, 1, rise), 0, 1)
             crossing = start + share * (end - start)
