@@ -14,19 +14,23 @@ from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_space import FreeCircle, largest_free_circle
 from vobench.suite.viewpoint import is_place
 
-EYE_HEIGHT_M = 1.2
+EYE_HEIGHT_M = 1.2  # the height of the viewer above the floor
 DIRECTIONS = 4096  # the number of random directions in which a survey looks for the backs of faces
-MAX_FACES_OF_RECTANGLE = 2  # an object with more faces is expected to be closed
+MAX_FACES_OF_RECTANGLE = 2  # an object with more faces should be a closed surface
 
 
 @dataclass(frozen=True, slots=True)
 class SceneSurvey:
     """The contents of a scene at its start, and the defects of its meshes.
 
-    `open_edges` are edges of a single face, of all objects but rectangles. `twins` are faces with the corners of
-    another face. `backs` is the share of directions in which a viewer sees the back of a face first; backs are not
-    drawn. The viewer is in the free circle, or in the centre of the scene if there is none. `free` is None if there is
-    no floor. `is_place` is whether a body can drive there; otherwise the scene is an object.
+    `textures_mb` is the size of all textures in memory, in megabytes.
+    `low_m` and `high_m` are opposite corners of the bounding box.
+    `open_edges` is the number of edges that belong to only one face; those of rectangles are not counted.
+    `twins` is the number of faces with the same corners as an earlier face.
+    `backs` is the share of view directions in which the nearest face shows its back, which is not drawn. The viewer is
+    in the free circle; without one, it is in the centre of the scene.
+    `free` is the largest circle of free floor, None if there is no floor.
+    `is_place` is whether a robot can drive in the scene; otherwise the scene is an object.
     """
 
     things: int
@@ -44,7 +48,7 @@ class SceneSurvey:
 
 
 def survey(scene: Scene) -> SceneSurvey:
-    """Survey a scene. Its light is not computed."""
+    """The survey of a scene at its start. Its lighting is not computed."""
     faces = triangles(scene, t_ns=0)
     caster = RayCaster(faces)
     point_ids = _point_ids(faces)
@@ -85,7 +89,7 @@ def _rounded(point_m: ArrayLike) -> tuple[float, float, float]:
 
 
 def _point_ids(faces: Triangles) -> NDArray[np.intp]:
-    """The index (F, 3) of the point at each corner; corners in the same place share a point."""
+    """The index (F, 3) of the point at each corner; corners at the same position have the same index."""
     _, point_ids = welded(faces.corners_m.reshape(-1, 3))
     return point_ids.reshape(-1, 3)
 
@@ -95,14 +99,14 @@ def _open_edges(faces: Triangles, point_ids: NDArray[np.intp]) -> int:
     face_counts = np.bincount(faces.thing, minlength=len(faces.things))
     solid_things = np.flatnonzero(face_counts > MAX_FACES_OF_RECTANGLE)
     is_solid = np.isin(faces.thing, solid_things)
-    # Each object has a separate range of point ids, so that two objects never share an edge.
+    # Each object gets a separate range of point ids, so that two objects never share an edge.
     point_count = point_ids.max(initial=0) + 1
-    first_id = faces.thing[is_solid, None] * point_count
-    return len(open_edges(point_ids[is_solid] + first_id))
+    id_offset = faces.thing[is_solid, None] * point_count
+    return len(open_edges(point_ids[is_solid] + id_offset))
 
 
 def _twins(point_ids: NDArray[np.intp]) -> int:
-    """The number of faces that have the same three points as an earlier face."""
+    """The number of faces whose three points are those of an earlier face, in any order."""
     sorted_corners = np.sort(point_ids, axis=1)
     first_faces, _ = distinct(sorted_corners)
     return len(point_ids) - len(first_faces)

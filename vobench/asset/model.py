@@ -33,16 +33,16 @@ Key = TypeVar("Key")
 ROLES = ("mirror", "pane", "lamp", "mover", "ignored")
 GLTF_SUFFIXES = (".glb", ".gltf")
 Z_UP_SUFFIXES = (".stl", ".ply")  # by convention, because these formats do not define the up axis
-SILVER_TINT = 0.9  # the tint of a mirror whose material is not a metal
-LEAST_M2 = 1e-12  # faces with a smaller area are removed
-CLOSED_M = 1.0  # a camera cannot be inside a closed body of at most this size, so it never sees the backs of its faces
+SILVER_TINT = 0.9  # the reflectance of a mirror whose material is not a metal
+LEAST_M2 = 1e-12  # the smallest area of a face; smaller faces are removed
+CLOSED_M = 1.0  # the largest extent of a closed body that cannot contain a camera, so its back faces are never seen
 SMALLEST_M = 0.05  # a smaller model is probably in another unit
 PLACE_M = 3.0  # a larger model may be a place, such as a room, instead of an object
 TYPICAL_M = 5.0  # the extent of most models
 LARGEST_M = 500.0  # a larger model is probably in another unit
 FARTHEST_M = 1e7  # a model with vertices farther from the origin is probably damaged
-LYING = 2.0  # a place probably lies on its side if its area along one axis exceeds that along another by this factor
-FLAT = 0.5  # the height of a place is usually less than this share of its length and of its width
+LYING = 2.0  # the ratio of sideways-facing area to upward-facing area above which a place probably lies on its side
+FLAT = 0.5  # the height of a place is usually less than this share of its width and of its depth
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # T_model_file of a file with y up
 
 
@@ -60,7 +60,7 @@ class Model:
     """The contents of a model file in metres, with z up.
 
     `lamps` lists the names of the things that are lamps.
-    `notes` lists what was read differently from the file, and what is probably wrong with it.
+    `notes` are sentences about what was read differently from the file, and about probable mistakes in the file.
     `dropped` is the number of faces that were removed because they have no area.
     """
 
@@ -108,13 +108,14 @@ def read_model(
     roles: Mapping[str, str] = {},
     up: str | None = None,
 ) -> Model:
-    """The contents of a glTF, OBJ, STL or PLY file whose unit is `scale` metres.
+    """Read a glTF, OBJ, STL or PLY file.
 
-    `roles` maps a glob of node names to a role. It overrides the role in the file (extras: {"vobench": "mirror"}).
-    A node without a role has the role of its nearest ancestor that has one.
+    `scale` is the length of one unit of the file in metres.
+    `roles` maps a glob pattern for node names to a role. It overrides the role in the file, which is stored as
+    extras: {"vobench": "mirror"}. A node without a role inherits that of its nearest ancestor with a role.
     `up` is the axis of the file that points up, "y" or "z". By default it is that of the format.
-    As in glTF, an emission of 1 is 1 cd/m², and the units of lights are cd and lx. `scale` does not change them.
-    Raises ModelError with the file, the node and advice.
+    As in glTF, an emission of 1 is 1 cd/m², and lights are given in cd or lx. `scale` does not change these values.
+    Raises ModelError, whose message names the file and the node and says how to correct them.
     """
     path = Path(path)
     with located(str(path)), np.errstate(all="ignore"):
@@ -149,7 +150,7 @@ def _T_model_file(scale: float, up_axis: str) -> Array:
 
 
 def _gltf(path: Path, *, is_gltf: bool) -> tuple[Gltf, list[str]]:
-    """The reader of a file, and notes on what is missing; a file of another format is converted to glTF first."""
+    """The glTF content of a file, and notes on missing files. A file in another format is converted to glTF first."""
     if is_gltf:
         return read_gltf(path.read_bytes(), path.parent, has_srgb_vertices=False), []
     data, missing = read_as_glb(path)
@@ -217,7 +218,7 @@ def _model(primitives: Sequence[Primitive], lights: Sequence[ModelLight], roles:
 
 
 def _parts(primitives: Sequence[Primitive], roles: Roles) -> tuple[list[_Part], dict[str, Material]]:
-    """The parts of a model, one for each primitive, and their materials by unique names."""
+    """The parts of a model, one for each primitive, and a mapping from unique names to their materials."""
     node_names = _unique_names({primitive.node: primitive.node.names[-1] for primitive in primitives})
     role_by_node = {node: _role(node, roles) for node in node_names}
     named_materials = [_in_role(primitive.look, role_by_node[primitive.node].name) for primitive in primitives]
@@ -275,14 +276,14 @@ def _shifted(thing: Thing, offset_m: Array) -> Thing:
 
 
 def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:
-    """A unique name for each key: the wanted name, with a number if an earlier key has it, as in 'chair_2'."""
+    """A unique name for each key: the wanted name, with a number appended if it is already in use, as in 'chair_2'."""
     reserved = set(wanted.values())
-    given: set[str] = set()
+    used: set[str] = set()
     unique_names: dict[Key, str] = {}
     for key, name in wanted.items():
-        unique = name if name not in given else next(_free_names(name, reserved))
+        unique = name if name not in used else next(_free_names(name, reserved))
         reserved.add(unique)
-        given.add(unique)
+        used.add(unique)
         unique_names[key] = unique
     return unique_names
 
@@ -294,7 +295,10 @@ def _free_names(name: str, reserved: set[str]) -> Iterator[str]:
 
 
 def _role(node: Node, roles: Roles) -> _Role:
-    """The role of a node, or of its nearest ancestor with a role. `ignored` and `mover` apply to all descendants."""
+    """The role of a node; without a role of its own, that of its nearest ancestor with a role.
+
+    The roles `ignored` and `mover` apply to all descendants, even to those with another role.
+    """
     names = [_own_role(name, in_file, roles) for name, in_file in zip(node.names, node.roles, strict=True)]
     for name in names:
         if name and name not in ROLES:
@@ -313,7 +317,10 @@ def _own_role(node_name: str, role_in_file: str, roles: Roles) -> str:
 
 
 def _in_role(look: Look, role: str) -> tuple[str, Material]:
-    """The name and the material of a look in a role. The tint of a mirror is that of its metal, or of silver."""
+    """The name and the material of a look for an object with a role.
+
+    The reflectance of a mirror is the luminance of its metal's colour; if it is not a metal, it is that of silver.
+    """
     material = look.material
     if role == "mirror":
         is_metal = material.metal > 0.5
@@ -327,8 +334,8 @@ def _in_role(look: Look, role: str) -> tuple[str, Material]:
 def _note_on_axis(model: Model, path: Path, axis: str) -> list[str]:
     """A note if a model that was read with `axis` up is probably a place that lies on its side.
 
-    There are two signs. Most of its area faces sideways instead of up and down, or it is flat in a horizontal
-    direction, whereas rooms are flat in height.
+    There are two signs: the area that faces along y is more than twice that along z, or the place is much shorter along
+    y than along x and z. Rooms are usually shortest along z.
     """
     corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])
     width_m, depth_m, height_m = np.ptp(corners_m, axis=(0, 1))
@@ -338,14 +345,14 @@ def _note_on_axis(model: Model, path: Path, axis: str) -> list[str]:
     is_place = max(width_m, depth_m, height_m) > PLACE_M
     faces_sideways = sideways_m2 > LYING * up_m2
     has_large_sides = LYING * sideways_m2 > up_m2
-    is_shallow = depth_m < FLAT * min(width_m, height_m)
-    is_flat_sideways = is_shallow and height_m > PLACE_M and has_large_sides
-    if not (is_place and (faces_sideways or is_flat_sideways)):
+    is_flat_along_y = depth_m < FLAT * min(width_m, height_m)
+    is_tall_slab = is_flat_along_y and height_m > PLACE_M and has_large_sides
+    if not (is_place and (faces_sideways or is_tall_slab)):
         return []
-    other = "z" if axis == "y" else "y"
+    other_axis = "z" if axis == "y" else "y"
     return [
-        f"stands on its side? It is read with {axis} up; if {other} is up, say so in a scene's YAML: "
-        f"meshes: [{{file: {path.name}, up: {other}}}]"
+        f"stands on its side? It is read with {axis} up; if {other_axis} is up, say so in a scene's YAML: "
+        f"meshes: [{{file: {path.name}, up: {other_axis}}}]"
     ]
 
 
@@ -358,13 +365,14 @@ def _note_on_unit(model: Model) -> list[str]:
 
     questions = {0.001: "in millimetres?", 0.01: "in centimetres?", 100.0: "shrunk twice?", 1000.0: "shrunk twice?"}
     positive_span_m = max(span_m, 1e-9)
-    likeliest = min(questions, key=lambda scale: abs(np.log(positive_span_m * scale / TYPICAL_M)))
-    return [f"spans {span_m:,.4g} m: {questions[likeliest]} scale: {likeliest:g}"]
+    likeliest_scale = min(questions, key=lambda scale: abs(np.log(positive_span_m * scale / TYPICAL_M)))
+    return [f"spans {span_m:,.4g} m: {questions[likeliest_scale]} scale: {likeliest_scale:g}"]
 
 
 def _cleaned(primitive: Primitive) -> Primitive:
-    """A primitive in the frame of the model, without faces that have no area, and with all normals and visible backs.
+    """The primitive, transformed to the frame of the model and repaired.
 
+    Faces without area are removed, and missing normals are computed. Faces whose backs are visible are doubled.
     Raises ModelError for vertices that are not finite, or too far from the origin.
     """
     mesh = primitive.mesh

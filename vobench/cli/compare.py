@@ -1,4 +1,4 @@
-"""vobench compare."""
+"""The command vobench compare, which lists the scores that differ between two runs."""
 
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -15,9 +15,9 @@ from vobench.runner.bundle import merged, opened
 from vobench.runner.folder import RunFolder
 from vobench.runner.rescore import check, wrong_truths
 
-REGRESSED = 3  # the exit code if a score got worse
+REGRESSED = 3  # the exit code if a score became worse or a trial fails that did not fail before
 HEADINGS = ("estimator", "verdict", "old", "new", "ratio", "p")
-RATIO_EXPLANATION = "ratio: new loss to old, 1 - lost-aware score"
+RATIO_EXPLANATION = "ratio: new loss / old loss, where the loss is 1 - lost-aware score"
 
 
 def compare_command(
@@ -26,11 +26,11 @@ def compare_command(
     *,
     at_most: Annotated[
         float | None,
-        typer.Option(help="Errors of more than this times the old ones count as worse, significant or not."),
+        typer.Option(help="The largest ratio between old and new errors that still counts as alike."),
     ] = None,
     json: Json = False,
 ) -> None:
-    """Print which scores changed between two runs; the exit code is 3 if one got worse or a trial fails now."""
+    """Print the scores that differ between two runs; exit code 3 if one is worse or a trial fails that did not."""
     with (
         opened(old, terminal.warn) as old_folder,
         opened(new, terminal.warn) as new_folder,
@@ -51,7 +51,7 @@ def compare_command(
 
 
 def _checked_board(folder: RunFolder, path: Path) -> Board:
-    """Score the trials of a run again, warn about stored scores that differ, and return the board."""
+    """Recompute the scores of a run, warn about stored scores that differ, and return the leaderboard."""
     is_bundle = path.is_file()
     wrong_truth_by_case = wrong_truths(folder) if is_bundle else {}
     checked = check(folder, wrong_truth_by_case)
@@ -61,9 +61,9 @@ def _checked_board(folder: RunFolder, path: Path) -> Board:
 
 
 def _print_changes(changes: Sequence[compare.ScoreChange], environment_differences: Sequence[str]) -> None:
-    """Print the totals, the cells of the board that changed, and the differences between the environments."""
+    """Print the scores over all cases, the cells that changed, and the differences between the environments."""
     console = terminal.console()
-    totals = [change for change in changes if not change.case]
+    totals = [change for change in changes if not change.case]  # over all cases
     cells = [change for change in changes if change.case]
     changed_cells = [cell for cell in cells if cell.verdict != compare.SAME]
 
@@ -80,7 +80,7 @@ def _print_changes(changes: Sequence[compare.ScoreChange], environment_differenc
 
 
 def _row(change: compare.ScoreChange) -> list[str]:
-    """The cells of a change, in the order of HEADINGS."""
+    """The row of the table for a change, with the columns HEADINGS."""
     p_value = "" if change.p is None else f"{change.p:.2g}"
     return [change.estimator, change.verdict, change.old, change.new, _format_ratio(change), p_value]
 

@@ -30,12 +30,12 @@ TIMES = "times.txt"
 POSES = "poses.txt"
 T_BODY_GREY = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))
 TRUTH = (
-    "of the left grey camera; its world is that camera at the start, turned from "
+    "the trajectory of the left grey camera; its world is the first frame of this camera, with the axes rotated from "
     "x right, y down, z ahead to x ahead, y left, z up."
 )
 FIRST_SIZE_PX = (1241, 376)  # the pictures of sequences 00 to 02
-MOST_OFF_CENTER = 0.1  # the largest distance of the principal point from the centre, as a share of the picture's size
-SKEW_TOLERANCE = 1e-6  # the largest deviation of an element that should be 0 or 1; KITTI prints seven digits
+MOST_OFF_CENTER = 0.1  # the largest offset of the principal point from the centre, as a share of the picture's size
+SKEW_TOLERANCE = 1e-6  # the largest error of an element of K that should be 0 or 1; KITTI prints seven digits
 
 
 def _is_kitti(folder: Path) -> bool:
@@ -113,7 +113,7 @@ def _calibrated_rig(
     matrix_names = [_matrix_name(folder_name) for folder_name in names]
     for matrix_name, folder_name in zip(matrix_names, names, strict=True):
         if matrix_name not in matrices:
-            raise InputError(f"{path}: no matrix {matrix_name}, which is that of {folder_name}")
+            raise InputError(f"{path}: no matrix {matrix_name}, the projection matrix of {folder_name}")
     rig = on_body(_rig(path, matrices, matrix_names, size_px), T_BODY_GREY)
     unused = [name for name in matrices if name not in matrix_names]
     notes = (f"{', '.join(unused)} of {CALIBRATION} were not used.",) if unused else ()
@@ -141,8 +141,8 @@ def read_pair(path: Path, size_px: tuple[int, int] | None = None) -> Rig:
     if off_center > MOST_OFF_CENTER:
         width, height = FIRST_SIZE_PX
         raise InputError(
-            f"{path}: {matrix_names[0]} has its principal point at {center_px.tolist()}, so pictures are not {width} x "
-            f"{height} as KITTI's are; give size_px"
+            f"{path}: {matrix_names[0]} has its principal point at {center_px.tolist()}, so pictures do not have "
+            f"KITTI's size of {width} x {height}; pass size_px"
         )
     return rig
 
@@ -228,13 +228,13 @@ def write_kitti(source: ExportSource, views: Views, folder: Path) -> list[str]:
 
 
 def _is_exported(source: ExportSource) -> NDArray[np.bool_]:
-    """Which frames (N,) are exported: those for which the truth has a pose, or all frames if it has none for any."""
+    """Which frames (N,) are exported: those within the time span of the truth, or all frames if none is within it."""
     stamps = source.sequence.frame_stamps()
     all_frames = np.ones(len(stamps), bool)
     if source.truth is None:
         return all_frames
-    has_truth = _is_within(source.truth, stamps)
-    return has_truth if has_truth.any() else all_frames
+    is_within = _is_within(source.truth, stamps)
+    return is_within if is_within.any() else all_frames
 
 
 def _is_within(truth: Trajectory, stamps: Stamps) -> NDArray[np.bool_]:
@@ -255,7 +255,7 @@ def kitti_path(
 ) -> Trajectory | None:
     """The poses of the left camera at stamps (N,) in the frame of the first of them, as in KITTI.
 
-    None if the truth has a pose for none of the stamps.
+    None if no stamp is within the time span of the truth.
     """
     if not _is_within(truth, stamps).any():
         return None
@@ -282,7 +282,7 @@ def _picture_notes(source: ExportSource, views: Views) -> list[str]:
         return ["The pair was recorded rectified, so its pixels are unchanged."] if is_pair else []
     dark_shares = [views.dark_share(side, source.rig.camera(side)) for side in views.rig.sides]
     dark = max(dark_shares)
-    dark_note = f"; up to {dark:.1%} of a picture is outside the recorded one and black" if dark else ""
+    dark_note = f"; up to {dark:.1%} of a picture is black, because it was not recorded" if dark else ""
     return [
         "KITTI needs rectified pictures: these were resampled, with linear interpolation between pixels, "
         f"which loses detail{dark_note}."
@@ -304,7 +304,10 @@ def _write_poses(
         return ["No picture lies within the truth's time, so there is no poses.txt."]
     (folder / POSES).write_text(format_kitti(path.T_world_frame), encoding="utf-8")
 
-    notes = ["The poses are those of the left camera relative to the first picture, as in KITTI: no world, no gravity."]
+    notes = [
+        "As in KITTI, the poses are those of the left camera relative to its first pose; the world frame and the "
+        "direction of gravity are not exported."
+    ]
     is_between = ~np.isin(stamps, truth.t_ns)
     interpolated = int(np.sum(is_between))
     if interpolated:

@@ -22,11 +22,18 @@ from vobench.geometry.se3 import Array
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrackerSettings:
-    """How corners are selected and tracked. The picture is divided into 6 x 4 cells."""
+    """How corners are selected and tracked. The picture is divided into 6 x 4 cells.
+
+    `corner_distance_px` is the smallest distance between two corners in a cell.
+    `margin_px` is the smallest distance of a corner from the border, so that its window is inside of the picture.
+    `window_px` is the side of the window that is tracked.
+    `min_points` is the smallest number of points of a keyframe, and of tracks from which a pose is estimated.
+    `ransac_px` is the largest reprojection error of an inlier.
+    """
 
     corners_per_cell: int
     corner_distance_px: float
-    margin_px: int  # part of the window of a corner closer to the border would be outside of the picture
+    margin_px: int
     window_px: int
     min_points: int
     ransac_px: float
@@ -37,7 +44,7 @@ class Keyframe:
     """A stereo pair with N points that have a measured disparity.
 
     `left_px` and `right_px` (N, 2) are the pixels of the points in both pictures.
-    `disparity_px` (N,) are the disparities as measured.
+    `disparity_px` (N,) are the measured disparities, which include the disparity offset.
     """
 
     left: Image
@@ -52,8 +59,8 @@ class Followed:
     """N tracks from the keyframe ("last") to the current stereo pair.
 
     `uv_last_px` and `uv_px` (N, 2) are pixels in the left pictures.
-    `disparity_last_px` and `disparity_px` (N,) are the disparities as measured. A current disparity is NaN if the point
-    is lost in the right picture.
+    `disparity_last_px` and `disparity_px` (N,) are the measured disparities, which include the disparity offset.
+    A current disparity is NaN if the point is lost in the right picture.
     """
 
     uv_last_px: Points
@@ -73,7 +80,8 @@ class Followed:
 class StereoTracker:
     """Tracks the points of one keyframe into each new stereo pair.
 
-    Points are tracked from left to left and from right to right picture, so that errors of the calibration cancel.
+    Points are tracked from one left picture to the next and from one right picture to the next, so that errors of the
+    stereo calibration affect both pairs equally and cancel.
     """
 
     def __init__(self, pair: StereoPair, settings: TrackerSettings) -> None:
@@ -89,14 +97,16 @@ class StereoTracker:
 
     def look(self, left: Image, right: Image) -> bool:
         """Make this pair the keyframe. If too few points have a depth, return False and keep the old keyframe."""
-        s = self._settings
-        corners = corners_per_cell(left, s.corners_per_cell, distance_px=s.corner_distance_px, margin_px=s.margin_px)
+        settings = self._settings
+        margin_px = settings.margin_px
+        distance_px = settings.corner_distance_px
+        corners = corners_per_cell(left, settings.corners_per_cell, distance_px=distance_px, margin_px=margin_px)
         corners = corners[self._pair.seen(corners)]
         right_px, disparity_px = self._pair.match(
-            left, right, corners, margin_px=s.margin_px, window_px=s.window_px, with_edges=False
+            left, right, corners, margin_px=margin_px, window_px=settings.window_px, with_edges=False
         )
         has_depth = np.isfinite(disparity_px)
-        if has_depth.sum() < s.min_points:
+        if has_depth.sum() < settings.min_points:
             return False
         self._keyframe = Keyframe(left, right, corners[has_depth], right_px[has_depth], disparity_px[has_depth])
         return True
@@ -147,14 +157,17 @@ class StereoTracker:
         is_predicted = np.isfinite(predicted_right_px)
         guess_px = np.where(is_predicted, predicted_right_px, keyframe.right_px).astype(np.float32)
 
-        # There is no backward check, because the least-squares fit detects points on which the cameras disagree.
+        # No forward-backward check: the robust fit reduces the weight of points whose two tracks are inconsistent.
         before, now = comparable(keyframe.right, right)
         right_px, is_found = lucas_kanade(before, now, keyframe.right_px, guess_px, window_px=self._settings.window_px)
         is_tracked = is_found & inside(right_px, right, self._settings.margin_px)
         return np.where(is_tracked, pair.disparity(uv_px, right_px), np.nan)
 
     def fit(self, followed: Followed) -> PoseFit | None:
-        """The pose T_now_last of the keyframe that fits the tracks; None if there are too few, or if no pose fits."""
+        """The pose T_now_last of the keyframe, estimated from the tracks.
+
+        None if there are fewer than `min_points` tracks, or if no pose fits them.
+        """
         if len(followed.uv_px) < self._settings.min_points:
             return None
         corrected_last_px = followed.disparity_last_px - self.offset.px
@@ -169,7 +182,7 @@ class StereoTracker:
         )
 
     def learn(self, followed: Followed, T_now_last: Array) -> None:
-        """Update the estimated disparity offset from tracks and the estimated pose T_now_last of the keyframe."""
+        """Update the estimate of the disparity offset, given tracks and the estimated pose T_now_last (4, 4)."""
         rays_last = self._pair.left.rays(followed.uv_last_px)
         rays_now = self._pair.left.rays(followed.uv_px)
         disparity_px = followed.disparity_last_px

@@ -12,21 +12,25 @@ from vobench.trajectory.associate import Index
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
-FRAME_NS = 30_000_000  # ground truth with shorter steps comes from motion capture, so its poses are not frames
-SLOT_NS = 200_000_000  # the length of a slot for such ground truth; a camera at 10 Hz has an image in every slot
-END_NS = 100_000_000  # the largest time between the last image of a camera at 10 Hz and the end of the recording
+FRAME_NS = 30_000_000  # ground truth with shorter steps is from motion capture, so its poses do not belong to frames
+SLOT_NS = 200_000_000  # the length of a slot for motion capture; a camera at 10 Hz has an image in every slot
+END_NS = 100_000_000  # the largest time from the last image of a camera at 10 Hz to the end of the recording
 
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
     """How much of a recording an estimate covers, and where it has gaps.
 
-    `of` says what a slot is: one frame, which is one true pose, or 0.2 s of time.
+    A slot is a frame, which is one true pose, or an interval of 0.2 s; `of` says which.
+    A gap is a run of slots without an estimated pose. It lasts from the last pose before the run, or the start of the
+    ground truth, to the first pose after the run, or the end.
+    A track is a run of estimated poses without a gap. Every track after the first one is a relocalisation.
+
     `ratio` is the share of slots with an estimated pose.
-    A gap is a run of slots without a pose. It lasts from the pose before it, or the start of the ground truth, to the
-    pose after it, or the end. `longest_gap_frames` counts the true poses in the gap that has the most slots.
-    A track is a run of poses without a gap. Every track after the first is a relocalisation.
-    `ends_lost` is True if the last slot has no pose or, for slots of time, if the last 0.1 s has none.
+    `longest_gap_frames` and `longest_gap_s` are the number of true poses in the gap with the most slots, and its
+    duration.
+    `first_lost_frame` is the index of the first true pose in a gap, None without gaps.
+    `ends_lost` is whether the last slot has no pose or, for slots of 0.2 s, the last 0.1 s has none.
     """
 
     ratio: float
@@ -42,27 +46,30 @@ class Coverage:
 
 
 def slots(gt_t_ns: Stamps, of: CoverageOf) -> Index:
-    """The index (N,) of the slot that each true pose belongs to, from 0. A complete estimate has a pose in every slot.
+    """The index (N,), from 0, of the slot of each true pose. A complete estimate has a pose in every slot.
 
-    "frames" makes each true pose a slot. "auto" does the same unless the true poses are denser than the frames of a
-    camera; then each 0.2 s is a slot. Slots do not depend on the estimate, so a missing pose cannot raise the coverage.
+    With "frames", each true pose is a slot. With "auto", each true pose is a slot unless the ground truth is from
+    motion capture, which has more poses than a camera has frames; then each interval of 0.2 s is a slot.
+    Slots do not depend on the estimate, so a missing pose cannot increase the coverage.
     """
     steps_ns = np.diff(gt_t_ns)
     has_frames = not len(steps_ns) or np.median(steps_ns) >= FRAME_NS
     if of == "frames" or has_frames:
         return np.arange(len(gt_t_ns))
     elapsed_ns = gt_t_ns - gt_t_ns[0]
-    slot_count = max(int(elapsed_ns[-1] // SLOT_NS), 1)
-    slot_with_empty = np.minimum(elapsed_ns // SLOT_NS, slot_count - 1)  # the last one includes the remainder
-    return np.unique(slot_with_empty, return_inverse=True)[1]
+    interval_count = max(int(elapsed_ns[-1] // SLOT_NS), 1)
+    interval = np.minimum(elapsed_ns // SLOT_NS, interval_count - 1)  # the last interval includes the remainder
+    return np.unique(interval, return_inverse=True)[1]  # intervals without a true pose are not slots
 
 
 @dataclass(frozen=True, slots=True)
 class _Intervals:
-    """The K + 1 intervals between the start of the ground truth, the K estimated poses and the end.
+    """The K + 1 intervals that K estimated poses divide the ground truth into.
 
-    `begin_frame`, `end_frame` (K + 1,) are the frames of the poses at both ends of an interval; -1 is the start, and N
-    the end. `begin_ns`, `end_ns` (K + 1,) are their stamps. `lost_slots` (K + 1,) counts the slots between them.
+    `begin_frame` and `end_frame` (K + 1,) are the indices of the true poses at both ends of each interval; the first
+    interval begins at -1, and the last one ends at N.
+    `begin_ns` and `end_ns` (K + 1,) are the stamps of these poses, limited to the time span of the ground truth.
+    `lost_slots` (K + 1,) is the number of slots inside each interval, which have no pose.
     """
 
     begin_frame: Index
@@ -73,11 +80,11 @@ class _Intervals:
 
 
 def coverage(gt_t_ns: Stamps, frames: Index, *, of: CoverageOf = "frames") -> Coverage:
-    """The coverage of a ground truth with stamps (N,), N > 0, by an estimate that has poses for `frames` (K,)."""
+    """The coverage of a ground truth with stamps (N,), N > 0, by an estimate of the true poses `frames` (K,)."""
     frames = np.unique(frames)
     slot = slots(gt_t_ns, of)
     slot_count = int(slot[-1] + 1)
-    is_time = slot_count < len(gt_t_ns)
+    has_time_slots = slot_count < len(gt_t_ns)
     intervals = _intervals(gt_t_ns, frames, slot)
     is_gap = intervals.lost_slots > 0
     has_pose = len(frames) > 0
@@ -93,14 +100,14 @@ def coverage(gt_t_ns: Stamps, frames: Index, *, of: CoverageOf = "frames") -> Co
         first_lost_frame = int(intervals.begin_frame[first] + 1)
 
     time_without_pose_at_end_ns = intervals.end_ns[-1] - intervals.begin_ns[-1]
-    is_end_late = is_time and time_without_pose_at_end_ns > END_NS
+    is_end_late = has_time_slots and time_without_pose_at_end_ns > END_NS
     return Coverage(
         ratio=len(np.unique(slot[frames])) / slot_count,
         gaps=int(np.count_nonzero(is_gap)),
         longest_gap_frames=longest_gap_frames,
         longest_gap_s=longest_gap_ns / NS_PER_S,
         first_lost_frame=first_lost_frame,
-        of="time" if is_time else "frames",
+        of="time" if has_time_slots else "frames",
         time_to_first_pose_s=float(intervals.end_ns[0] - gt_t_ns[0]) / NS_PER_S if has_pose else None,
         longest_track_s=_longest_track_ns(intervals) / NS_PER_S if has_pose else 0.0,
         relocalisations=int(np.count_nonzero(is_gap[1:-1])),
@@ -120,7 +127,7 @@ def _intervals(gt_t_ns: Stamps, frames: Index, slot: Index) -> _Intervals:
 
 
 def _longest_track_ns(intervals: _Intervals) -> float:
-    """The duration of the longest run of poses without a gap. There must be a pose."""
+    """The duration of the longest run of poses without a gap. There must be at least one pose."""
     pose_ns = intervals.end_ns[:-1]  # (K,)
     is_gap_between = intervals.lost_slots[1:-1] > 0  # (K - 1,)
     is_first = np.concatenate([[True], is_gap_between])
@@ -136,11 +143,11 @@ MIN_COVERAGE = 0.5  # an estimate that covers less of the recording counts as fa
 class TrackingFailure:
     """Whether an estimate failed, and how accurate its poses are.
 
-    `survived` is True if the estimate has a pose at the end and covers at least half of the recording.
+    `survived` is whether the estimate has a pose at the end and covers at least half of the recording.
     `lost_aware` is the lost-aware score.
-    `fail_m` is the position error above which a pose is wrong.
-    `confidently_wrong` counts the estimated poses that are wrong.
-    `lost_aware` and `confidently_wrong` are None if the robot is stationary, because `fail_m` is then 0.
+    `fail_m` is the position error above which a pose is wrong. It is 0 for a stationary robot; then `lost_aware` and
+    `confidently_wrong` are None.
+    `confidently_wrong` is the number of estimated poses that are wrong.
     """
 
     survived: bool
@@ -156,17 +163,17 @@ def failure(
     *,
     fail_m: float,
 ) -> TrackingFailure:
-    """The failure of an estimate from the position errors (K,) of its poses and their slots (K,).
+    """Whether an estimate failed, given the position errors (K,) and the slots (K,) of its poses.
 
-    A pose with an error above `fail_m` metres is wrong. If a slot has several poses, the best one is scored.
+    If a slot has several poses, only the one with the smallest error is scored.
     """
     survived = not covered.ends_lost and covered.ratio >= MIN_COVERAGE
     if fail_m <= 0:
         return TrackingFailure(survived, None, fail_m, None)
     slot_count = int(slots.max(initial=-1)) + 1
-    best_error_m = np.full(slot_count, np.inf)  # of each slot
-    np.minimum.at(best_error_m, slots, errors_m)
-    covered_errors_m = best_error_m[np.unique(slots)]
+    smallest_errors_m = np.full(slot_count, np.inf)  # (S,), one for each slot
+    np.minimum.at(smallest_errors_m, slots, errors_m)
+    covered_errors_m = smallest_errors_m[np.unique(slots)]
     lost_aware = lost_aware_score(covered_errors_m, covered.ratio, survived=survived, fail_m=fail_m)
     confidently_wrong = int(np.count_nonzero(errors_m > fail_m))
     return TrackingFailure(survived, lost_aware, fail_m, confidently_wrong)
@@ -179,21 +186,21 @@ def lost_aware_score(
     survived: bool,
     fail_m: float,
 ) -> float:
-    """The lost-aware score of a run with an error (K,) per covered slot: 1 is perfect, 0 means that no pose is right.
+    """The lost-aware score of a run, from 0 (no correct pose) to 1 (perfect), given the errors (K,) of covered slots.
 
-    The accuracy of a slot with error e is 1 - e / fail_m, clipped at 0. It is 0 for a slot without a pose. A is the
-    mean accuracy of all slots. It is the normalised area under the curve of the share of slots with an error below e,
-    for e from 0 to `fail_m`.
+    The accuracy of a slot with the error e is 1 - e / fail_m, clipped at 0; that of a slot without a pose is 0. A is
+    the mean accuracy of all slots. A equals the normalised area under the curve that gives the share of slots with an
+    error below e, for e from 0 to `fail_m`.
 
-    A run that survived scores 1/2 + A/2, a failed run A/2. A failed run therefore ranks below every run that survived.
-    Among runs that survived, and among failed runs, a larger error or another lost pose never raises the score.
+    The score is 1/2 + A/2 for a run that survived, and A/2 for a failed run, so a failed run ranks below every run that
+    survived. Within each of these two groups, a larger error or an additional lost pose never increases the score.
     """
     accuracy = np.clip(1.0 - errors_m / fail_m, 0.0, 1.0)
     mean_accuracy = float(np.mean(accuracy)) if len(errors_m) else 0.0
     area = mean_accuracy * coverage
     if survived:
         return 0.5 + 0.5 * area
-    # A failed run that is perfect in nearly all frames approaches 1/2, and must not round to it.
+    # The score of a failed run with nearly perfect accuracy must not be rounded to 1/2.
     largest_failed = float(np.nextafter(0.5, 0.0))
     return min(0.5 * area, largest_failed)
 
@@ -204,7 +211,7 @@ METRICS = (
         "coverage",
         "share of the recording with a pose",
         "1",
-        "slots with a pose / slots; a slot is a true pose, or 0.2 s of truth with more than 33 poses a second",
+        "slots with a pose / all slots; a slot is a true pose, or 0.2 s if the truth has more than 33 poses per second",
         OURS,
         TIMES,
         "whether the poses are right",
@@ -213,12 +220,12 @@ METRICS = (
     ),
     MetricDefinition(
         "lost_aware",
-        "accuracy with lost counted as failed, 1 best and 0 worst",
+        "accuracy, where lost slots count as 0; 1 is best, 0 is worst",
         "1",
-        "A/2 of a failed run, 1/2 + A/2 of a survivor; A: mean of 1 − e / (fail_ratio · path), cut at 0, lost slots 0",
+        "A/2 if the run failed, else 1/2 + A/2; A: mean over slots of max(0, 1 − e / (fail_ratio · path)), 0 if lost",
         OURS,
         ("fail_ratio", *TIMES, *POSES),
-        "differences beyond fail_ratio of the path: all of them are failures",
+        "differences between errors above fail_ratio · path: each of them scores 0",
         headline="score",
         full=False,
     ),

@@ -1,4 +1,4 @@
-"""Cut-outs: the holes that a texture's opacity leaves in faces."""
+"""Alpha cut-outs: holes in faces where the opacity of their texture is below a threshold."""
 
 from functools import lru_cache
 
@@ -12,27 +12,30 @@ from vobench.scene.mesh import Triangles
 
 
 class CutOuts:
-    """Faces whose texture leaves holes, by the opacity of their materials."""
+    """Finds the hits that lie in the hole of a cut-out.
+
+    `material` (F + 1,) is the index of each face's material among those with cut-outs, or -1. The last element is for
+    rays that hit no face, whose face is -1.
+    """
 
     def __init__(self, faces: Triangles, materials: dict[str, Material]) -> None:
         self._with_holes = {name: material for name, material in materials.items() if _has_holes(material)}
-        number_by_name = {name: number for number, name in enumerate(self._with_holes)}
-        number_by_thing = np.array([number_by_name.get(thing.material, -1) for thing in faces.things], np.int32)
-        # (F + 1,): the place of each face's material in _with_holes, -1 if not in it; the last is for rays that miss.
-        self.material = np.append(number_by_thing[faces.thing], -1)
+        index_by_name = {name: index for index, name in enumerate(self._with_holes)}
+        index_by_thing = np.array([index_by_name.get(thing.material, -1) for thing in faces.things], np.int32)
+        self.material = np.append(index_by_thing[faces.thing], -1)
         self._uv = faces.uv
 
     def holes(self, hits: Hits) -> Mask:
-        """Which hits (R,) are in a hole."""
+        """Which of R hits are in a hole; a ray that hits no face is not."""
         is_hole = np.zeros(len(hits.face), bool)
         if not self._with_holes:
             return is_hole
         material_of_hit = self.material[hits.face]
-        for number, material in enumerate(self._with_holes.values()):
-            rows = np.flatnonzero(material_of_hit == number)
+        for index, material in enumerate(self._with_holes.values()):
+            rows = np.flatnonzero(material_of_hit == index)
             u = hits.u[rows, None]
             v = hits.v[rows, None]
-            corners_uv_m = self._uv[hits.face[rows]]  # (R, 3, 2)
+            corners_uv_m = self._uv[hits.face[rows]]  # (K, 3, 2), of the K hits on this material
             a, b, c = np.moveaxis(corners_uv_m, 1, 0)
             uv_m = (1 - u - v) * a + u * b + v * c
             is_hole[rows] = ~opaque(material, uv_m / material.tile_m)
@@ -40,18 +43,22 @@ class CutOuts:
 
 
 def _has_holes(material: Material) -> bool:
+    """Whether a material can have holes: it has an opacity threshold, and a texture."""
     return material.cutout is not None and material.texture is not None
 
 
 def opaque(material: Material, places: Array) -> Mask:
-    """Whether a material is solid at places (R, 2), in tiles: where its opacity is no less than its cut-out."""
+    """Whether a material is opaque at texture coordinates `places` (R, 2), in tiles.
+
+    It is opaque where the opacity of its texture is at least the threshold `material.cutout`.
+    """
     opacity = _opacity(material)
     return np.asarray(_sampled(opacity, places) >= (material.cutout or 0.0))
 
 
 @lru_cache(maxsize=64)
 def _opacity(material: Material) -> Floats:
-    """The opacity (H, W) float32 of a material's texture, one pixel where it has none."""
+    """The alpha channel (H, W) of a material's texture, from 0 to 1; a single opaque pixel if it has none."""
     if material.texture is None:
         return np.ones((1, 1), np.float32)
     pixels = material.texture.pixels()
@@ -62,18 +69,21 @@ def _opacity(material: Material) -> Floats:
 
 
 def _sampled(tile: Floats, places: Array) -> Array:
-    """A tiled image (H, W) at places (R, 2) in tiles, by bilinear interpolation between the centres of its pixels."""
+    """The values (R,) of a repeated image `tile` (H, W) at texture coordinates `places` (R, 2), in tiles.
+
+    Values are interpolated bilinearly between pixel centres.
+    """
     height, width = tile.shape
     x = places[:, 0] * width - 0.5
     y = places[:, 1] * height - 0.5
     x0 = np.floor(x).astype(np.int64)
     y0 = np.floor(y).astype(np.int64)
-    x_share = x - x0
-    y_share = y - y0
+    x_fraction = x - x0
+    y_fraction = y - y0
     left = x0 % width
     right = (x0 + 1) % width
     top = y0 % height
     bottom = (y0 + 1) % height
-    upper = tile[top, left] * (1 - x_share) + tile[top, right] * x_share
-    lower = tile[bottom, left] * (1 - x_share) + tile[bottom, right] * x_share
-    return np.asarray(upper * (1 - y_share) + lower * y_share)
+    upper = tile[top, left] * (1 - x_fraction) + tile[top, right] * x_fraction
+    lower = tile[bottom, left] * (1 - x_fraction) + tile[bottom, right] * x_fraction
+    return np.asarray(upper * (1 - y_fraction) + lower * y_fraction)

@@ -1,4 +1,4 @@
-"""OpenGL draw calls for a batch of triangles, the sky and the mean of samples, with the uniforms that they read."""
+"""The OpenGL draw calls for surfaces, skies and the mean of samples, and the uniforms that they read."""
 
 from collections.abc import Mapping, Sequence
 from functools import cache
@@ -35,18 +35,18 @@ PROBE_UNIT = GL.GL_TEXTURE0 + 4
 PANORAMA_UNIT = GL.GL_TEXTURE0 + 5
 
 LAYERS = GL.GL_TEXTURE_2D_ARRAY
-CLIP_MARGIN_PX = 1 / 8
+CLIP_MARGIN_PX = 1 / 8  # the distance of the clip plane behind a mirror
 Block = NDArray[np.void]  # the values of one uniform block, a structured array of shape ()
-FADE = 0.1  # the range of roughness below PROBE_MOST in which the share of the probe falls to 0
+FADE = 0.1  # the width of the range of roughness below PROBE_MOST in which the share of the probe decreases to 0
 
 
 class DrawCalls:
     """The draw calls of a scene, and the shader programs and buffers that they share.
 
-    `panoramas` are those of the skies that have one, by the index of the sky.
-
-    They can be used while the OpenGL context in which they were created is current. `abilities` are the preprocessor
-    names of each batch's shader.
+    The OpenGL context in which an instance was created must be current whenever the instance is used.
+    `light` is the id of the light-map texture.
+    `panoramas` maps the index of a sky to its panorama; skies without a panorama are absent.
+    The attribute `abilities` lists, for each batch, the preprocessor names of its shader.
     """
 
     def __init__(
@@ -76,7 +76,7 @@ class DrawCalls:
         self._empty_vertex_array = GL.glGenVertexArrays(1)
         for capability in (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE):
             GL.glEnable(capability)
-        # The depth buffer holds nearness, which is 0 at infinity; see `view`.
+        # The depth buffer is reversed: it is 0 at infinity, and nearer surfaces have larger values; see `view`.
         GL.glClipControl(GL.GL_LOWER_LEFT, GL.GL_ZERO_TO_ONE)
         GL.glDepthFunc(GL.GL_GEQUAL)
         GL.glClearDepth(0.0)
@@ -88,7 +88,7 @@ class DrawCalls:
         weights: Rgb,
         probe: Probe | None,
     ) -> None:
-        """Set the uniforms, textures and state that all draw calls of a view share."""
+        """Set the uniforms, textures and state that are the same for all draw calls of a view."""
         values = self._pass_values
         values[...] = np.zeros((), PASS.dtype)
         _set_view(values, view, canvas, weights)
@@ -98,12 +98,12 @@ class DrawCalls:
         self._pass.update(0, values)
         self._pass.use(0)
         self._move(view)
-        # A mirror swaps left and right, and with them the orientation of front faces.
+        # Each reflection reverses the winding order of the faces.
         GL.glFrontFace(GL.GL_CW if view.depth % 2 else GL.GL_CCW)
         bind(LIGHT_UNIT, self._light)
 
     def _move(self, view: PinholeView) -> None:
-        """Upload the poses of moving objects, if they have changed."""
+        """Upload the poses of the movers if they have changed since the last view."""
         poses = np.array(view.T_world_movers).tobytes()
         if poses == self._uploaded_poses:
             return
@@ -127,7 +127,7 @@ class DrawCalls:
     ) -> None:
         """Draw the visible triangles of a batch. The textures of its reflections must be bound.
 
-        `abilities` are further preprocessor names for the shader.
+        `abilities` are preprocessor names for the shader, in addition to those of the batch, the view and the canvas.
         """
         batch_abilities = self.abilities[batch.index]
         view_abilities = ["IS_MIRRORED"] if view.mirror else []
@@ -147,8 +147,8 @@ class DrawCalls:
             self._elements.draw(runs, canvas.layers)
 
     def background(self, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
-        """Draw the skies in all pixels without a surface."""
-        # These pixels are still black, so additive blending sums the skies.
+        """Draw the sum of all skies in the pixels without a surface."""
+        # These pixels are black, so additive blending yields the sum.
         GL.glEnable(GL.GL_BLEND)
         GL.glBlendFunc(GL.GL_ONE, GL.GL_ONE)
         is_mono = canvas.abilities != ()
@@ -184,7 +184,7 @@ class DrawCalls:
         box: Box,
         share: float,
     ) -> None:
-        """Add the mean of a target's samples, multiplied by `share`, to a total; only pixels in the box change."""
+        """Add the mean of a target's samples, multiplied by `share`, to the pixels of `total` inside a box."""
         total.begin(box)
         canvas = target.canvas
         bind(LAYERS_UNIT, canvas.colour, LAYERS)
@@ -229,7 +229,10 @@ class DrawCalls:
         GL.glEnable(GL.GL_CULL_FACE)
 
     def _rim(self, runs: Sequence[tuple[int, int]], copies: int) -> None:
-        """Blend the rims of holes over what is behind them, where nothing solid of their own is."""
+        """Blend the partly transparent rims of holes over the surfaces behind them.
+
+        A rim is not drawn over the opaque part of its own surface, which has the same depth.
+        """
         GL.glDepthMask(GL.GL_FALSE)
         GL.glDepthFunc(GL.GL_GREATER)
         GL.glEnable(GL.GL_BLEND)
@@ -240,11 +243,11 @@ class DrawCalls:
         GL.glDepthMask(GL.GL_TRUE)
 
 
-MOST_TEXELS = 1 << 26  # of all textures together; in colour they occupy half a gigabyte
+MOST_TEXELS = 1 << 26  # the largest sum of the texels of all textures; in colour they occupy half a gigabyte
 
 
 def _textures(batches: Sequence[Batch]) -> dict[int, SurfaceTexture]:
-    """The textures of all batches by identity, reduced in resolution if they have too many texels together."""
+    """The textures of all batches by the id of the picture, reduced if their texels exceed MOST_TEXELS."""
     texture_by_id = {}
     for batch in batches:
         for texture in (batch.material.texture, batch.material.emission_texture):
@@ -261,9 +264,9 @@ def _textures(batches: Sequence[Batch]) -> dict[int, SurfaceTexture]:
 
 
 def _halvings(texel_counts: Array) -> NDArray[np.intp]:
-    """How often to halve the sides of each of N textures so that their texels sum to at most MOST_TEXELS.
+    """How often the sides of each texture (N,) are halved, so that the texels sum to at most MOST_TEXELS.
 
-    `texel_counts` (N,) are those at full resolution. In each step, the texture with the most texels is halved.
+    `texel_counts` (N,) are the texels at full resolution. In each step, the largest remaining texture is halved.
     """
     halvings = np.zeros(len(texel_counts), np.intp)
     while True:
@@ -278,7 +281,7 @@ def _abilities(batch: Batch, texture: SurfaceTexture | None) -> tuple[str, ...]:
     material = batch.material
     has_grey_colour = len({*material.colour}) == 1
     is_body = material.kind == "body"
-    is_name_set = {
+    is_defined = {
         "IS_PLANAR": batch.mirror is not None,
         "IS_PANE": batch.is_pane,
         "IS_MIRROR": material.kind == "mirror" and not batch.is_lamp,
@@ -292,7 +295,7 @@ def _abilities(batch: Batch, texture: SurfaceTexture | None) -> tuple[str, ...]:
         "HAS_EMISSION": batch.is_lamp or max(material.emission_cd_m2) > 0,
         "HAS_EMISSION_TEXTURE": material.emission_texture is not None,
     }
-    return tuple(name for name, is_set in is_name_set.items() if is_set)
+    return tuple(name for name, is_set in is_defined.items() if is_set)
 
 
 def _set_view(
@@ -301,13 +304,14 @@ def _set_view(
     canvas: Canvas,
     weights: Rgb,
 ) -> None:
-    """Set the uniforms of the view, except those of the probe."""
+    """Set the uniforms of a view, without those of the probe."""
     values["direct"] = view.direct.T
     values["eye"] = view.eye_m
     if view.mirror is not None:
-        # Clip slightly behind the mirror, so that surfaces that cross it leave no gap.
+        # The clip plane is slightly behind the mirror, so that no gap appears where a surface crosses the mirror.
         focal_px = min(view.camera.fx_px, view.camera.fy_px)
-        pixel_width_m = view.view_projection[3] / focal_px  # (4,), a linear function of the homogeneous point
+        # The product of `pixel_width_m` (4,) and a homogeneous point is the width of a pixel at the point's depth.
+        pixel_width_m = view.view_projection[3] / focal_px
         values["clip_plane"] = _coefficients(view.mirror) + pixel_width_m * CLIP_MARGIN_PX
     values["lod_bias"][: canvas.layers] = canvas.grid.lod_bias
     for index, plane in enumerate(view.mirrors):
@@ -351,6 +355,7 @@ def _set_batch(
 
 
 def _set_colour(values: np.void, batch: Batch, texture: SurfaceTexture | None) -> None:
+    """Set the reflectance of a body, or the colour of a mirror or pane, and its tint."""
     material = batch.material
     texture_scale = texture.scale if texture else 1.0
     scale = texture_scale if material.kind == "body" else material.tint
@@ -359,8 +364,9 @@ def _set_colour(values: np.void, batch: Batch, texture: SurfaceTexture | None) -
 
 
 def _set_emission(values: np.void, batch: Batch) -> None:
+    """Set the emission, and how often its texture is repeated in one tile of the material."""
     material = batch.material
-    # The light map contains a lamp's mean emission; its texture only distributes it over the lamp.
+    # The light map contains the mean emission of a lamp, so its texture is relative to the mean.
     mean_cd_m2 = emitted_cd_m2(material)
     relative_emission = np.divide(material.emission_cd_m2, mean_cd_m2, out=np.ones(3), where=mean_cd_m2 > 0)
     values["emission"] = relative_emission if batch.is_lamp else material.emission_cd_m2
@@ -370,7 +376,7 @@ def _set_emission(values: np.void, batch: Batch) -> None:
 
 
 def _set_coat(values: np.void, batch: Batch) -> None:
-    """Set the refraction of light that enters and leaves a body through its coat."""
+    """Set the constants of refraction for light that enters and leaves a body through its coat."""
     eta = batch.material.eta
     inner = inner_reflectance(eta)
     values["eta"] = eta
@@ -384,8 +390,8 @@ def _set_gloss(values: np.void, batch: Batch) -> None:
     material = batch.material
     # Rougher surfaces reflect less at grazing incidence: Lagarde (2011).
     normal_reflectance = ((1 - material.eta) / (1 + material.eta)) ** 2
-    dullness = 0.0 if batch.mirror else np.sqrt(material.roughness)
-    grazing_reflectance = max(1 - dullness, normal_reflectance)
+    grazing_loss = 0.0 if batch.mirror else np.sqrt(material.roughness)
+    grazing_reflectance = max(1 - grazing_loss, normal_reflectance)
     values["normal_reflectance"] = normal_reflectance
     values["grazing_rise"] = (grazing_reflectance - normal_reflectance) / (1 - normal_reflectance)
     values["metal"] = material.metal
@@ -396,7 +402,7 @@ def _set_gloss(values: np.void, batch: Batch) -> None:
 
 
 def probe_share(batch: Batch) -> float:
-    """The share of a batch's reflections that is read from the probe; it falls to 0 where roughness is PROBE_MOST."""
+    """The share of a batch's reflections that is read from the probe; it is 0 for a roughness of PROBE_MOST or more."""
     if batch.material.kind != "body":
         return 1.0
     margin = PROBE_MOST - batch.material.roughness

@@ -1,4 +1,4 @@
-"""Gathering with as many rays as the light's error asks for, and smoothing of light that comes from afar."""
+"""Adaptive gathering, with more rays where indirect light is noisy, and smoothing of light from far surfels."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,21 +15,22 @@ from vobench.rendering.texel import Texels
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-SMOOTHINGS = 4  # times that light from afar is averaged over neighbouring surfels
-PROBES = 8  # random patterns by which the noise of smoothed light is found
-DARK = 0.1  # of the mean light: noise of darker places is compared with this
-FAINTEST = 1e-9  # in lux, of a scene without light
-MOST_ROUNDS = 8  # of rays from a surfel
-ALONE = 1e-3  # weight by which the noise of a surfel counts for itself, where it has no neighbours
-FEWEST = 0.002  # share of the surfels for which another round is worth its overhead
+SMOOTHINGS = 4  # how often light from far surfels is averaged over neighbouring surfels
+PROBES = 8  # the number of random patterns from which the noise after smoothing is estimated
+DARK = 0.1  # the noise of a place darker than this share of the mean light is relative to this share
+FAINTEST = 1e-9  # the smallest light in lux that noise is relative to, for a scene without light
+MOST_ROUNDS = 8  # the largest number of rounds of rays from a surfel
+ALONE = 1e-3  # the weight of a surfel's own variance, which matters only without neighbours
+FEWEST = 0.002  # the share of noisy surfels up to which another round is not worth its overhead
 
 
 @dataclass(frozen=True, slots=True)
 class Gathered:
-    """What surfels (S,) receive: near and far (S, S) times their radiosity.
+    """The indirect light that S surfels receive.
 
-    sky_lx (K, S): the light of skies by way of mirrors, smoothed; noise (S,): the standard error of the light shown
-    there, relative to all light.
+    `near` and `far` (S, S) map the radiosity of all surfels to the light that comes from near and from far surfels.
+    `sky_lx` (K, S) is the smoothed light of each sky via mirrors.
+    `noise` (S,) is the standard error of the light that is shown at each surfel, relative to all light.
     """
 
     near: "csr_matrix"
@@ -39,36 +40,40 @@ class Gathered:
 
 
 class Smoothing:
-    """Averages over neighbouring surfels, by the weights (S, S) with which they light each other's middles.
+    """Averages values over neighbouring surfels.
 
-    One step exchanges light between neighbours, symmetrically, so that even light stays and none is lost.
+    `weights` (S, S) are the weights of all surfels in the light map at the centre of each surfel. Each step exchanges
+    equal shares between neighbours, so it preserves constant values and the sum.
     """
 
     def __init__(self, weights: "csr_matrix") -> None:
         self._weights = weights
         exchanged = weights.minimum(weights.T).tocsr()
         exchanged = exchanged - scipy.sparse.diags_array(exchanged.diagonal())
-        kept = 1 - np.asarray(exchanged.sum(1)).ravel()
-        self._step = (exchanged + scipy.sparse.diags_array(kept.astype(np.float32))).tocsr()
+        remaining = 1 - np.asarray(exchanged.sum(1)).ravel()
+        self._step = (exchanged + scipy.sparse.diags_array(remaining.astype(np.float32))).tocsr()
 
     def blended(self, values: Floats) -> Floats:
-        """Values (S, ...) as the light map shows them at the middles of the surfels."""
+        """The values (S, ...) as the light map shows them at the centres of the surfels."""
         return np.asarray(self._weights @ values)
 
     def averaged(self, values: Floats) -> Floats:
-        """Values (S, ...) averaged over a neighbourhood, whose sum stays."""
+        """The values (S, ...) averaged over neighbouring surfels; their sum is preserved."""
         for _ in range(SMOOTHINGS):
             values = self._step @ values
         return np.asarray(values, np.float32)
 
     def density(self, flux: Floats, area_m2: Floats) -> Floats:
-        """Flux (S, C) per area (S,), of surfels and their neighbours together."""
-        around = self.averaged(np.column_stack([flux, area_m2]))
-        return np.asarray(around[:, :-1] / np.maximum(around[:, -1:], 1e-12), np.float32)
+        """The flux density (S, C) from the flux and the area (S,), each averaged over neighbouring surfels."""
+        averages = self.averaged(np.column_stack([flux, area_m2]))
+        return np.asarray(averages[:, :-1] / np.maximum(averages[:, -1:], 1e-12), np.float32)
 
 
 class Rounds:
-    """Rays from surfels, in rounds of two halves that are compared: surfel by surfel, the difference is the noise."""
+    """The rays from surfels, in rounds.
+
+    Each round has two independent halves; their difference is an estimate of the noise.
+    """
 
     def __init__(
         self,
@@ -94,18 +99,18 @@ class Rounds:
         self.hits = gatherer.hits(halves[0]) + gatherer.hits(halves[1])
 
     def table(self) -> "csr_matrix":
-        """What the first round found (S, S)."""
+        """The matrix (S, S) of the first round, which maps the radiosity of surfels to the light that they receive."""
         surfels = self._gatherer.surfels
         total = sum(half.near + half.far for half in self._halves)
         return (total / 2)[:, :surfels].tocsr()
 
     def met(self) -> Floats:
-        """The share (S,) of rays of the first round that found light."""
+        """The share (S,) of the rays of the first round that ended at a surfel or a lamp."""
         tables = [half.near + half.far for half in self._halves]
         return np.asarray(sum(table.sum(1) for table in tables)).ravel() / 2
 
     def sky_lx(self) -> Floats:
-        """The illuminance (K, S) by skies in mirrors that the first round found."""
+        """The illuminance (K, S) by each sky via mirrors, from the first round."""
         return (self._halves[0].sky + self._halves[1].sky) / 2
 
     def refined(
@@ -119,10 +124,11 @@ class Rounds:
         noise: float,
         done: Callable[[float], object] | None = None,
     ) -> Gathered:
-        """Send further rays from surfels whose light is noisier than `noise`.
+        """The gathered light after further rays from all surfels whose relative standard error exceeds `noise`.
 
-        radiosity (S,), direct light (S,) and light by mirrors, by two sets of photons (2, S), are luminances, of all
-        lights together; sky_weights (K,): the luminance of the colour of each sky.
+        `radiosity` (S,), `direct` (S,) and `by_mirrors` (2, S), from two sets of photons, are luminances of all lights
+        together.
+        `sky_weights` (K,) is the luminance of the colour of each sky.
         """
         surfels = self._gatherer.surfels
         count = len(self._middles)
@@ -137,15 +143,15 @@ class Rounds:
         self._halves = []
         while True:
             stop.check()
-            found = _noise(smoothing, near_halves / rounds, far_halves / rounds, rounds, other_light)
-            rows = np.flatnonzero((found > noise) & (rounds < MOST_ROUNDS))
+            standard_error = _noise(smoothing, near_halves / rounds, far_halves / rounds, rounds, other_light)
+            rows = np.flatnonzero((standard_error > noise) & (rounds < MOST_ROUNDS))
             if len(rows) <= FEWEST * count:
                 break
-            passed = int(rounds[rows].max())
-            for repeat in range(passed):
+            round_count = int(rounds[rows].max())
+            for repeat in range(round_count):
                 for half in (0, 1):
                     sample = self._gatherer.sample(
-                        self._middles.take(rows), side=self._side, turn=2 * (passed + repeat) + half
+                        self._middles.take(rows), side=self._side, turn=2 * (round_count + repeat) + half
                     )
                     rows_near = sample.near[:, :surfels]
                     rows_far = sample.far[:, :surfels]
@@ -154,21 +160,24 @@ class Rounds:
                     sky[:, rows] += sample.sky
                     near = near + _at_rows(rows_near, rows, count)
                     far = far + _at_rows(rows_far, rows, count)
-            rounds[rows] += passed
+            rounds[rows] += round_count
             if done:
-                done(np.log2(2 * passed) / np.log2(2 * MOST_ROUNDS))
+                done(np.log2(2 * round_count) / np.log2(2 * MOST_ROUNDS))
         by_photons = smoothing.blended((by_mirrors[0] - by_mirrors[1]) / 2)
         photon_variance = smoothing.averaged(by_photons**2)
         light = _relative_to(smoothing.blended((near_halves + far_halves).mean(0) / rounds) + other_light)
-        found = np.sqrt(found**2 + photon_variance / light**2)
-        share = scipy.sparse.diags_array((1 / (2 * rounds)).astype(np.float32))
+        standard_error = np.sqrt(standard_error**2 + photon_variance / light**2)
+        inverse_counts = scipy.sparse.diags_array((1 / (2 * rounds)).astype(np.float32))
         return Gathered(
-            (share @ near).tocsr(), (share @ far).tocsr(), smoothing.averaged((sky / (2 * rounds)).T).T, found
+            (inverse_counts @ near).tocsr(),
+            (inverse_counts @ far).tocsr(),
+            smoothing.averaged((sky / (2 * rounds)).T).T,
+            standard_error,
         )
 
 
 def _at_rows(table: "csr_matrix", rows: Rows, count: int) -> "csr_matrix":
-    """A table (N, S) as rows (N,) of one with `count` rows."""
+    """A table with `count` rows that has the rows of a table (N, S) at the indices `rows` (N,); its others are empty."""
     entries = np.zeros(count, np.int64)
     entries[rows] = np.diff(table.indptr)
     starts = np.concatenate([[0], np.cumsum(entries)])
@@ -176,9 +185,10 @@ def _at_rows(table: "csr_matrix", rows: Rows, count: int) -> "csr_matrix":
 
 
 def _of_others(smoothing: Smoothing, variance: Floats, is_even: Mask) -> Floats:
-    """Variances (S,) averaged over neighbours of the other of two kinds, even and odd ones.
+    """The variances (S,), averaged over the neighbours in the other one of two random groups.
 
-    So no surfel is given more rays for what its own ones have found, or few bright rays would count too little.
+    `is_even` (S,) is whether a surfel is in the first group. Thus the rays of a surfel do not decide whether it gets
+    more rays. If they did, rare bright rays would get too small a weight.
     """
     weights = np.column_stack([is_even + ALONE, ~is_even + ALONE])
     of_kind = smoothing.averaged(variance[:, None] * weights) / smoothing.averaged(weights)
@@ -186,7 +196,7 @@ def _of_others(smoothing: Smoothing, variance: Floats, is_even: Mask) -> Floats:
 
 
 def _relative_to(light: Floats) -> Floats:
-    """The light (S,) that noise is compared with."""
+    """The light (S,) that noise is relative to: the given light, or a minimum in dark places."""
     darkest = max(DARK * float(light.mean()), FAINTEST)
     return np.asarray(np.maximum(light, darkest))
 
@@ -198,16 +208,16 @@ def _noise(
     rounds: Rows,
     other_light: Floats,
 ) -> Floats:
-    """The standard error (S,) of the light that is shown at surfels, relative to all light, by its halves (2, S).
+    """The standard error (S,) of the light that is shown at surfels, relative to all light.
 
-    Variances are averages over neighbours, as two halves alone say little. How much of them smoothing leaves is found
-    by smoothing random patterns.
+    It is estimated from the two halves (2, S) of near light and of far light. Variances are averaged over neighbours,
+    because two values give a poor estimate. Random patterns are smoothed to find how much noise smoothing leaves.
     """
     far = smoothing.averaged(far_halves.mean(0))
     light = smoothing.blended(near_halves.mean(0) + far) + other_light
     light = _relative_to(light)
 
-    # Of one round: what a mean of several has is smaller by their number.
+    # `variance` is that of one round. The variance of the mean of several rounds is smaller by their number.
     random = np.random.default_rng(0)
     is_even = random.random(len(rounds)) < 0.5
     deviations = []

@@ -1,4 +1,4 @@
-"""Moving bodies as light meets them: shapes that cast shade, samples of emitters, probes of the light around."""
+"""The light around moving bodies: occluders that cast their shadows, samples of emitters, and light probes."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -25,14 +25,15 @@ from vobench.scene.mesh import Triangles, areas_m2, distinct, face_normals
 from vobench.scene.mesh import corners as mesh_corners
 from vobench.scene.scene import Mover
 
-STEEPEST = 0.999  # sine of the angle of a frustum that is as good as open to all sides
-SKY_REACH = 10  # radii beyond which a body hides less than a hundredth of an open sky
+STEEPEST = 0.999  # the largest sine of the half-angle of a frustum, for points near the emitter
+SKY_REACH = 10  # the distance, in radii of a body, beyond which the body hides less than 1 % of an open sky
 
 
 def may_shade(movers: BoundingSphere, emitter: BoundingSphere, points: BoundingSphere) -> Mask:
-    """Whether (N,) a ray from within each of `points` (N,) to within the emitter's sphere can pass one of the movers'.
+    """Which of N spheres `points` may lie in the shadow of a mover, for the light of an emitter.
 
-    All rays lie in a cone frustum about the line between the two spheres, here one a little wider.
+    All rays from one sphere to that of the emitter are inside a conical frustum around the line between the centres.
+    A sphere of points is selected if a mover's sphere touches a slightly wider frustum, so no shadow is missed.
     """
     to_mover_m = movers.centre_m[:, None] - points.centre_m  # (S, N, 3)
     radius_m = np.reshape(movers.radius_m, (-1, 1))
@@ -54,17 +55,17 @@ def may_shade(movers: BoundingSphere, emitter: BoundingSphere, points: BoundingS
     return np.asarray(is_shading.any(0))
 
 
-HULL_DIRECTIONS = 20
-SMALL = 1 / 32  # of a body, a thing that casts no shade of its own
-HULL_FILLED = 1.4  # volume of a hull over that of the shape, above which the shape is not taken for its hull
-CELL = 1 / 24  # of the size of a shape that is no hull: vertices so close are merged
+HULL_DIRECTIONS = 20  # the number of directions in which the outermost vertex of a shape is found
+SMALL = 1 / 32  # a thing casts no shadow if its size relative to that of the body is smaller
+HULL_FILLED = 1.4  # the ratio of the volumes of hull and shape above which the hull does not represent the shape
+CELL = 1 / 24  # the size of a grid cell, relative to that of the shape, in which vertices are merged
 
 
 def occluder(corners_m: Array) -> Array:
-    """Few triangles (K, 3, 3) with nearly the silhouettes of a thing's (F, 3, 3).
+    """A few triangles (K, 3, 3) with nearly the same silhouettes as the faces (F, 3, 3) of a thing.
 
-    They are the convex hull of its outermost vertices. A shape that its hull does not resemble has close vertices
-    merged instead.
+    They are the convex hull of the outermost vertices. If the hull is much larger than the shape, vertices that are
+    close together are merged instead.
     """
     points_m = np.unique(corners_m.reshape(-1, 3), axis=0)
     outermost = np.unique((_spiral(HULL_DIRECTIONS) @ points_m.T).argmax(1))
@@ -80,7 +81,7 @@ def occluder(corners_m: Array) -> Array:
 
 
 def _merged(corners_m: Array) -> Array:
-    """Triangles (K, 3, 3) whose vertices in each cell of a grid are one, at their mean."""
+    """Triangles (K, 3, 3) with all vertices in a grid cell merged at their mean, without those that have no area."""
     points_m = corners_m.reshape(-1, 3)
     cell_m = max(float(np.ptp(points_m, axis=0).max()) * CELL, 1e-6)
     cell = distinct(np.rint(points_m / cell_m).astype(np.int64))[1]
@@ -91,24 +92,27 @@ def _merged(corners_m: Array) -> Array:
 
 
 def _spiral(count: int) -> Array:
-    """Unit vectors (count, 3) spread evenly over the sphere. Source: González (2010), the Fibonacci lattice."""
-    rows = np.arange(count) + 0.5
-    height = 1 - 2 * rows / count
-    angle = np.pi * (1 + np.sqrt(5)) * rows
+    """Unit vectors (count, 3), evenly distributed on the sphere. Source: González (2010), the Fibonacci lattice."""
+    steps = np.arange(count) + 0.5
+    height = 1 - 2 * steps / count
+    angle = np.pi * (1 + np.sqrt(5)) * steps
     radius = np.sqrt(1 - height**2)
     return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], -1)
 
 
-PROBES_M = 0.5  # between probes along a body
-MOST_PROBES = 6
+PROBES_M = 0.5  # the distance between the probes of a body
+MOST_PROBES = 6  # the largest number of probes of a body
 
 
 @dataclass(frozen=True, slots=True)
 class MovingBody:
-    """Movers of one name, that is a thing or all limbs of a person.
+    """Movers with the same name: a single thing, or all limbs of a person.
 
-    corners_m (K, 3, 3): what casts their shade, each face in the frame of its mover (K,). probes_m (N, 3): places
-    along the body, in the frame of its first mover; part (K,): the one that each face is near at the start.
+    `movers` are the indices of the movers in the scene.
+    `corners_m` (K, 3, 3) are the triangles that cast the body's shadow, each in the frame of its mover.
+    `mover` (K,) is the index of each triangle's mover.
+    `probes_m` (N, 3) are the positions of the light probes along the body, in the frame of its first mover.
+    `part` (K,) is the index of the probe that is nearest to each triangle at the start.
     """
 
     movers: tuple[int, ...]
@@ -118,25 +122,31 @@ class MovingBody:
     part: Rows
 
     def placed(self, T_world_movers: Array) -> Array:
-        """Its faces (K, 3, 3) in the world."""
+        """The triangles (K, 3, 3) in the world frame, given the poses (M, 4, 4) of all movers."""
         T = T_world_movers[self.mover]
-        turned_m = np.einsum("kij,kcj->kci", T[:, :3, :3], self.corners_m)
-        return np.asarray(turned_m + T[:, None, :3, 3])
+        rotated_m = np.einsum("kij,kcj->kci", T[:, :3, :3], self.corners_m)
+        return np.asarray(rotated_m + T[:, None, :3, 3])
 
     def probe_place(self, points_m: Array) -> Array:
-        """Where points (P, 3) in the first mover's frame lie between the probes: 0 (P,) at the first, 1 at the next."""
+        """The coordinate (P,) of points (P, 3) along the row of probes: 0 at the first probe, 1 at the second one.
+
+        The points are given in the frame of the first mover.
+        """
         last = len(self.probes_m) - 1
         if not last:
             return np.zeros(len(points_m))
         axis_m = self.probes_m[-1] - self.probes_m[0]
-        share = (points_m - self.probes_m[0]) @ axis_m / (axis_m @ axis_m)
-        return np.asarray(last * np.clip(share, 0, 1))
+        fraction = (points_m - self.probes_m[0]) @ axis_m / (axis_m @ axis_m)
+        return np.asarray(last * np.clip(fraction, 0, 1))
 
 
 def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mask) -> list[MovingBody]:
-    """The bodies among movers that have solid faces (F,), as they are at the start."""
+    """The bodies that the movers of a scene form; consecutive movers with the same name are one body.
+
+    `is_solid` (F,) selects the faces that can cast shadows. Movers without such faces form no body.
+    """
     result = []
-    for _, members in groupby(range(len(scene_movers)), key=lambda nth: scene_movers[nth].name):
+    for _, members in groupby(range(len(scene_movers)), key=lambda index: scene_movers[index].name):
         movers = tuple(members)
         body_rows = np.flatnonzero(is_solid & np.isin(faces.mover, movers))
         small_m = SMALL * _size_m(faces.corners_m[body_rows])
@@ -165,14 +175,14 @@ def moving_bodies(scene_movers: Sequence[Mover], faces: Triangles, is_solid: Mas
 
 
 def _size_m(corners_m: Array) -> float:
-    """The longest side of the box around faces (K, 3, 3)."""
+    """The longest side of the bounding box of faces (K, 3, 3); 0 without faces."""
     if not len(corners_m):
         return 0.0
     return float(np.ptp(corners_m.reshape(-1, 3), axis=0).max())
 
 
 def _probes_m(points_m: Array) -> Array:
-    """Places (N, 3) along the longest side of the box around points (P, 3)."""
+    """The positions (N, 3) of probes along the longest axis of the bounding box of points (P, 3)."""
     low_m = points_m.min(0)
     size_m = np.ptp(points_m, axis=0)
     longest = int(size_m.argmax())
@@ -182,22 +192,28 @@ def _probes_m(points_m: Array) -> Array:
     return np.asarray(low_m + shares * size_m)
 
 
-# Samples of a panel and of a pane for each metre of its radius, and how many at least and at most.
+# The number of samples per metre of the radius of a panel and of a pane, and the limits of this number.
 PER_RADIUS_M = 14
 PANE_PER_RADIUS_M = 5
 FEWEST_SAMPLES = 2
 PANEL_SAMPLES = 9
 OPEN_SKY_SAMPLES = MOST_SAMPLES
-GOLDEN = (0.7548776662, 0.5698402910)  # steps that fill the unit square evenly: Roberts (2018), R2
+GOLDEN = (0.7548776662, 0.5698402910)  # steps of a low-discrepancy sequence in the unit square: Roberts (2018), R2
 
 
 @dataclass(frozen=True, slots=True)
 class SampledEmitter:
-    """One thing that shines, of a light, as K samples: places (K, 4), a point and 1 or a direction and 0.
+    """An emitter, approximated by K samples.
 
-    axes (K, 4): the normal that it shines along and 0, or that of a pane, which shines to both sides, and 1; zeros
-    where it shines to all sides. strength (K,): illuminance times the squared distance, square to both. is_hard:
-    whether its shadows are, so that few of its rays tell where it is seen.
+    `light` is the index of the light that the emitter belongs to.
+    `ball` is the bounding sphere of the emitter; its radius is infinite for the open sky.
+    `places` (K, 4) are homogeneous: a position and 1, or the direction towards an infinitely distant sample and 0.
+    `axes` (K, 4) are the normal of a one-sided emitter and 0, or the normal of a two-sided pane and 1. They are 0 for
+    an emitter that radiates equally in all directions.
+    `strength` (K,) is the illuminance at normal incidence times the squared distance. It is the area for a pane, since
+    the luminance of the sky depends on the direction, and 1 for a hard emitter.
+    `is_hard` is whether the emitter casts hard shadows. Its illuminance is then computed at each point instead of at
+    the probes.
     """
 
     light: int
@@ -211,7 +227,10 @@ class SampledEmitter:
 def sampled_emitters(
     lights: Sequence[Light], visibility: Visibility, suns_ns: Sequence[float], most_samples: int = MOST_SAMPLES
 ) -> list[SampledEmitter]:
-    """All that shines, in the order of the lights; suns_ns (L,): the instant of each sun that moves."""
+    """The emitters of all lights, in the order of the lights. Each has at most `most_samples` samples.
+
+    `suns_ns` (L,) is the time at which the direction of a moving sun is evaluated.
+    """
     result = []
     for index, light in enumerate(lights):
         match light:
@@ -232,7 +251,7 @@ def sampled_emitters(
 
 
 def _with_fewer(emitter: SampledEmitter, most: int) -> SampledEmitter:
-    """The emitter with no more samples than so many."""
+    """The emitter with at most `most` of its samples; the strengths are scaled to compensate for the others."""
     count = len(emitter.places)
     if count <= most:
         return emitter
@@ -243,9 +262,9 @@ def _with_fewer(emitter: SampledEmitter, most: int) -> SampledEmitter:
 
 
 def _spread(corners_m: Array, count: int) -> Array:
-    """About so many points (K, 3) all over triangles, whose mean is the middle of their area.
+    """About `count` points (K, 3) that are distributed over triangles. Their mean is the centroid of the triangles.
 
-    On a rectangle they are the middles of cells that are nearly square.
+    On a rectangle, they are the centres of nearly square cells.
     """
     face = rectangle(corners_m)
     if face is not None:
@@ -259,21 +278,24 @@ def _spread(corners_m: Array, count: int) -> Array:
     a, b = (steps % 1).T
     points_m = sample_points(corners_m, a, b)
     area_m2 = areas_m2(corners_m)
-    middle_m = area_m2 @ corners_m.mean(1) / area_m2.sum()
-    return np.asarray(points_m + middle_m - points_m.mean(0))
+    centroid_m = area_m2 @ corners_m.mean(1) / area_m2.sum()
+    return np.asarray(points_m + centroid_m - points_m.mean(0))
 
 
 def _sample_count(wanted: float) -> int:
+    """The number of samples that is nearest to `wanted` within the limits."""
     return int(np.clip(np.rint(wanted), FEWEST_SAMPLES, PANEL_SAMPLES))
 
 
 def _ball(corners_m: Array) -> BoundingSphere:
+    """The smallest sphere around the centre of the bounding box that contains all corners."""
     points_m = corners_m.reshape(-1, 3)
     centre_m = (points_m.min(0) + points_m.max(0)) / 2
     return BoundingSphere(centre_m, float(np.linalg.norm(points_m - centre_m, axis=1).max()))
 
 
 def _sampled_panel(index: int, light: AreaLight) -> SampledEmitter:
+    """An area light as an emitter; each sample has the normal of the nearest face."""
     corners_m = mesh_corners(light.mesh)
     ball = _ball(corners_m)
     points_m = _spread(corners_m, _sample_count(PER_RADIUS_M * ball.radius_m))
@@ -286,7 +308,7 @@ def _sampled_panel(index: int, light: AreaLight) -> SampledEmitter:
 
 
 def _sampled_sky(index: int, light: Sky, visibility: Visibility) -> list[SampledEmitter]:
-    """The sky by each pane that shows it, and otherwise all around."""
+    """The emitters of a sky: one for each pane through which it is visible, and one for the open sky."""
     result = []
     for pane in visibility.sky_panes:
         ball = _ball(pane.corners_m)
@@ -298,29 +320,38 @@ def _sampled_sky(index: int, light: Sky, visibility: Visibility) -> list[Sampled
     directions = _spiral(2 * OPEN_SKY_SAMPLES)[:OPEN_SKY_SAMPLES]
     places = np.column_stack([directions, np.zeros(OPEN_SKY_SAMPLES)])
     strength = 2 * np.pi / OPEN_SKY_SAMPLES * light.luminance_cd_m2(directions)
-    around = BoundingSphere(np.zeros(3), np.inf)
-    return [*result, SampledEmitter(index, around, places, np.zeros((OPEN_SKY_SAMPLES, 4)), strength)]
+    everywhere = BoundingSphere(np.zeros(3), np.inf)
+    return [*result, SampledEmitter(index, everywhere, places, np.zeros((OPEN_SKY_SAMPLES, 4)), strength)]
 
 
-MARGIN = 1.08  # of the radius that a shadow map shows, so that its rim is empty
-WIDEST = 0.95  # sine of half the angle of a shadow map
-GATHER_RAYS = 36
-AXES = np.concatenate([np.eye(3), -np.eye(3)])
-FAR_M = 1e3
-SHARE_SAMPLES = 4  # of an emitter, that tell how much of a sky's light comes by it
-LIFT_M = 1e-3
+MARGIN = 1.08  # the radius that a shadow map covers, relative to that of the body, so that its border is empty
+WIDEST = 0.95  # the largest sine of half the field of view of a shadow map
+GATHER_RAYS = 36  # the number of rays from each face of a probe's cube
+AXES = np.concatenate([np.eye(3), -np.eye(3)])  # the normals of the faces of a probe's cube
+FAR_M = 1e3  # the length of a ray to the sky
+SHARE_SAMPLES = 4  # the number of samples of an emitter from which its share of the sky's light is estimated
+LIFT_M = 1e-3  # the distance of the origin of a ray from its surface
 
 
 @dataclass(frozen=True, slots=True)
 class MoverLightAt:
-    """Movers at one instant, as tables of the shaders `occluder` and `shade`.
+    """The movers at one instant and the light around them, as the input of the shaders `occluder` and `shade`.
 
-    occluders_m: of each body (B) its faces (K, 3, 3). maps (M, 3, 4): from the world to what a sample sees of a body,
-    body by body, for those of all samples (K) that reach it; map_of (B, K) is the map's number, -1 for none. spheres
-    (S,): around parts of the bodies sphere_body (S,). samples (K, 2, 4): places and axes. reach (N + B, K): the
-    strength of each sample as it arrives at each probe, and its mean at those of each body. cubes (N, 6, L, 3):
-    illuminance of faces along ±x, ±y and ±z by bounces, under each light at level 1. points (P, 2, 4): places and
-    between which probes, normals and eta of the coat; hard (H, P): illuminance by each emitter with hard shadows.
+    There are B bodies with N probes in total, K samples of all emitters, M shadow maps, and P points on movers.
+
+    `occluders_m` are the triangles (T, 3, 3) that cast the shadow of each body, in the world frame.
+    `maps` (M, 3, 4) are the matrices of the shadow maps; see `shadow_matrices`. A body has a map for each sample whose
+    light reaches it. The maps of a body are adjacent.
+    `map_of` (B, K) is the index of the map for each body and sample, -1 if there is none.
+    `spheres` are S bounding spheres of parts of the bodies; `sphere_body` (S,) is the index of each sphere's body.
+    `samples` (K, 2, 4) are the place and the axis of each sample.
+    `reach` (N + B, K) is the strength of each sample that arrives at each probe, followed by the mean over the probes
+    of each body.
+    `cubes` (N, 6, L, 3) are the indirect illuminances at each probe on faces with the normals AXES, for each light at
+    level 1.
+    `points` (P, 2, 4) are the position of each point and its coordinate among the probes, then its normal and the
+    refractive index of its coat.
+    `hard` (H, P) is the illuminance by each hard emitter, without the shadows of movers.
     """
 
     emitters: Sequence[SampledEmitter]
@@ -336,28 +367,31 @@ class MoverLightAt:
     hard: Floats
 
     def sample_range(self, emitter: int) -> tuple[int, int]:
-        """The first sample of an emitter, and how many it has."""
-        before = [len(other.places) for other in self.emitters[:emitter]]
-        return sum(before), len(self.emitters[emitter].places)
+        """The index of the first sample of an emitter, and the number of its samples."""
+        earlier_counts = [len(other.places) for other in self.emitters[:emitter]]
+        return sum(earlier_counts), len(self.emitters[emitter].places)
 
     def gathered(self, colours: Floats) -> Floats:
-        """Illuminance (P, 3) of the points by bounces, in lights of colours (L, 3)."""
+        """The indirect illuminance (P, 3) of the points, for lights with colours (L, 3).
+
+        The cubes of the two nearest probes are interpolated, and the faces are weighted by the squared normal.
+        """
         cubes = np.einsum("nslc,lc->nsc", self.cubes, colours)
-        place = self.points[:, 0, 3]
-        first = place.astype(np.int64)
-        share = (place - first)[:, None]
-        after = np.minimum(first + 1, len(cubes) - 1)
+        coordinate = self.points[:, 0, 3]
+        probe = coordinate.astype(np.int64)
+        fraction = (coordinate - probe)[:, None]
+        next_probe = np.minimum(probe + 1, len(cubes) - 1)
         normals = self.points[:, 1, :3]
         total = np.zeros((len(normals), 3), np.float32)
         for axis in range(3):
             side = np.where(normals[:, axis] < 0, axis + 3, axis)
-            light = (1 - share) * cubes[first, side] + share * cubes[after, side]
+            light = (1 - fraction) * cubes[probe, side] + fraction * cubes[next_probe, side]
             total += normals[:, axis, None] ** 2 * light
         return total
 
 
 def _part_spheres(bodies: Sequence[MovingBody], occluders_m: Sequence[Array]) -> BoundingSphere:
-    """Spheres (S,) around the parts of all bodies."""
+    """The bounding spheres (S,) of the parts of all bodies."""
     balls = []
     for body, corners_m in zip(bodies, occluders_m, strict=True):
         balls += [_ball(corners_m[body.part == part]) for part in np.unique(body.part)]
@@ -366,7 +400,11 @@ def _part_spheres(bodies: Sequence[MovingBody], occluders_m: Sequence[Array]) ->
 
 
 class MoverLight:
-    """The movers of a baked scene: bodies, the texels (P,) of theirs on the map, and the stationary part as rays."""
+    """Computes the light that movers block and receive in a baked scene.
+
+    `bodies` are the moving bodies.
+    `texels` (P,) are the indices of the texels of the light map that lie on movers.
+    """
 
     def __init__(self, baked: BakedScene, owner: Owners) -> None:
         faces = baked.faces
@@ -401,7 +439,7 @@ class MoverLight:
         self._probe_place = self._probe_places()
 
     def _probe_places(self) -> Floats:
-        """Between which of all probes each point (P,) lies."""
+        """The coordinate (P,) of each point among the probes of all bodies: i + f lies between probes i and i + 1."""
         T_world_movers = self.poses(0)
         first = 0
         result = np.zeros(len(self._mover), np.float32)
@@ -410,24 +448,30 @@ class MoverLight:
             T_first_world = se3.inverse(T_world_movers[body.movers[0]])
             T = T_first_world @ T_world_movers[self._mover[rows]]
             points_m = np.einsum("nij,nj->ni", T[:, :3, :3], self._points_m[rows]) + T[:, :3, 3]
-            # The last place is just short of a probe's own, so that it never leads to the next body.
+            # The coordinate stays below the last probe, so that interpolation never includes the next body.
             last = len(body.probes_m) - 1
             result[rows] = first + np.minimum(body.probe_place(points_m), max(last - 1e-3, 0))
             first += len(body.probes_m)
         return result
 
     def poses(self, t_ns: float) -> Array:
-        """T_world_mover (M, 4, 4) of all movers at an instant."""
+        """The poses T_world_mover (M, 4, 4) of all movers at a time."""
         return np.array([mover.path.pose(t_ns) for mover in self._scene.movers])
 
     def emitters(self, suns_ns: Sequence[float]) -> list[SampledEmitter]:
-        """All that shines; suns_ns (L,): the instant of each sun that moves."""
+        """The emitters of all lights. The arrays of the shaders limit the number of their samples.
+
+        `suns_ns` (L,) is the time at which the direction of a moving sun is evaluated.
+        """
         probe_count = sum(len(body.probes_m) for body in self.bodies)
         most = min(MOST_MAPS // max(len(self.bodies), 1), MOST_REACHES // max(probe_count, 1))
         return sampled_emitters(self._scene.lights, self._visibility, suns_ns, min(most, MOST_SAMPLES))
 
     def at(self, t_ns: float, suns_ns: Sequence[float]) -> MoverLightAt:
-        """The movers at an instant; suns_ns (L,): that of each sun that moves."""
+        """The movers at a time, and the light around them.
+
+        `suns_ns` (L,) is the time at which the direction of a moving sun is evaluated.
+        """
         T_world_movers = self.poses(t_ns)
         sampled = self.emitters(suns_ns)
         places = np.concatenate([np.zeros((0, 4)), *(emitter.places for emitter in sampled)])
@@ -437,10 +481,11 @@ class MoverLight:
         probes_m = [se3.apply(T_world_movers[body.movers[0]], body.probes_m) for body in self.bodies]
         all_probes_m = np.concatenate(probes_m)
         arriving = self._arriving(sampled, all_probes_m)
-        counts = [len(body) for body in probes_m]
-        by_body = [part.mean(0) for part in np.split(arriving, np.cumsum(counts)[:-1])]
+        probe_counts = [len(body_probes_m) for body_probes_m in probes_m]
+        arriving_by_body = np.split(arriving, np.cumsum(probe_counts)[:-1])
+        body_means = [part.mean(0) for part in arriving_by_body]
 
-        is_reaching = np.array(by_body) > 0
+        is_reaching = np.array(body_means) > 0
         map_of = np.where(is_reaching, np.cumsum(is_reaching).reshape(is_reaching.shape) - 1, -1)
         maps = [shadow_matrices(places[rows], ball) for rows, ball in zip(is_reaching, balls, strict=True)]
 
@@ -457,22 +502,25 @@ class MoverLight:
             spheres=spheres,
             sphere_body=np.repeat(np.arange(len(self.bodies)), [len(np.unique(body.part)) for body in self.bodies]),
             samples=np.stack([places, axes], 1).astype(np.float32),
-            reach=np.concatenate([arriving, by_body]).astype(np.float32),
+            reach=np.concatenate([arriving, body_means]).astype(np.float32),
             cubes=self._cubes(all_probes_m),
             points=points.astype(np.float32),
             hard=self._hard(points_m, normals, suns_ns),
         )
 
     def sky_shares(self, sampled: Sequence[SampledEmitter], places_m: Floats, normals: Floats) -> Floats:
-        """Share (P, E) of a sky's direct light at points that comes by each emitter, by few rays; 1 of others."""
+        """The share (P, E) of the sky's direct light at points (P, 3) that comes from each emitter.
+
+        It is estimated with SHARE_SAMPLES rays per emitter. It is 1 for the emitters of other lights.
+        """
         weights = np.ones((len(places_m), len(sampled)), np.float32)
         is_sky = np.zeros(len(sampled), bool)
         for nth, emitter in enumerate(sampled):
             is_sky[nth] = isinstance(self._scene.lights[emitter.light], Sky)
             if is_sky[nth]:
-                few = np.linspace(0, len(emitter.places) - 1, SHARE_SAMPLES).astype(int)
+                selected = np.linspace(0, len(emitter.places) - 1, SHARE_SAMPLES).astype(int)
                 weights[:, nth] = 0
-                for sample in few:
+                for sample in selected:
                     weights[:, nth] += self._seen(emitter, sample, places_m, normals)
                 weights[:, nth] *= len(emitter.places) / SHARE_SAMPLES
         for light in np.unique([emitter.light for emitter in sampled]):
@@ -482,7 +530,7 @@ class MoverLight:
         return weights
 
     def _seen(self, emitter: SampledEmitter, sample: int, places_m: Floats, normals: Floats) -> Floats:
-        """Illuminance (P,) of points by one sample of the sky."""
+        """The illuminance (P,) of points by one sample of the sky; 0 where the sample is occluded."""
         place = emitter.places[sample]
         axis = emitter.axes[sample, :3]
         vectors_m = place[:3] - place[3] * places_m
@@ -501,7 +549,10 @@ class MoverLight:
         return np.asarray(light, np.float32)
 
     def _arriving(self, sampled: Sequence[SampledEmitter], probes_m: Array) -> Array:
-        """The strength (N, K) of all samples as it arrives at probes (N, 3); of hard light as if nothing hid it."""
+        """The strength (N, K) of all samples that arrives at probes (N, 3).
+
+        Stationary faces reduce it. For hard emitters, the strength is that without occlusion.
+        """
         columns = []
         for emitter in sampled:
             place = emitter.places
@@ -511,17 +562,17 @@ class MoverLight:
             if not emitter.is_hard:
                 light = self._scene.lights[emitter.light]
                 directions = unit(vectors_m)
-                is_endless = isinstance(light, Sky)
-                if is_endless and np.isfinite(emitter.ball.radius_m):
+                is_sky = isinstance(light, Sky)
+                if is_sky and np.isfinite(emitter.ball.radius_m):
                     luminance = light.luminance_cd_m2(directions.reshape(-1, 3)) if isinstance(light, Sky) else 0
                     strength = strength * np.reshape(luminance, shape)
-                ends_m = FAR_M * directions if is_endless else vectors_m * (1 - 1e-3)
+                ends_m = FAR_M * directions if is_sky else vectors_m * (1 - 1e-3)
                 origins_m = np.broadcast_to(probes_m[:, None], vectors_m.shape).reshape(-1, 3)
                 passing = self._visibility.passing(
                     origins_m.astype(np.float32), ends_m.reshape(-1, 3).astype(np.float32)
                 ).reshape(shape)
-                if is_endless and not np.isfinite(emitter.ball.radius_m) and self._visibility.sky_panes:
-                    # What comes by panes counts there.
+                if is_sky and not np.isfinite(emitter.ball.radius_m) and self._visibility.sky_panes:
+                    # Light through a pane already belongs to the emitter of this pane.
                     by_pane = self._visibility.crosses_sky_pane(origins_m, ends_m.reshape(-1, 3)).reshape(shape)
                     passing = passing * ~by_pane
                 strength = strength * passing
@@ -529,7 +580,7 @@ class MoverLight:
         return np.concatenate([np.zeros((len(probes_m), 0)), *columns], 1)
 
     def _cubes(self, probes_m: Array) -> Floats:
-        """Illuminance (N, 6, L, 3) by bounces at probes (N, 3), of faces along ± each axis, of lights at level 1."""
+        """The indirect illuminance (N, 6, L, 3) at probes (N, 3), by the normals AXES and by lights at level 1."""
         normals = np.tile(AXES, (len(probes_m), 1)).astype(np.float32)
         lights = self._scene.lights
         places_m = np.repeat(probes_m, 6, axis=0).astype(np.float32)
@@ -548,7 +599,7 @@ class MoverLight:
         return result.reshape(len(probes_m), 6, len(lights), 3)
 
     def _hard(self, points_m: Array, normals: Array, suns_ns: Sequence[float]) -> Floats:
-        """Illuminance (H, P) of points by each light with hard shadows, those of the stationary part."""
+        """The illuminance (H, P) of points by each hard emitter; only stationary faces cast shadows."""
         points = _points(points_m.astype(np.float32), normals.astype(np.float32), self._eta)
         middle = np.full(len(points), 0.5, np.float32)
         rows = []
@@ -559,6 +610,7 @@ class MoverLight:
         return np.array(rows, np.float32).reshape(len(rows), len(points))
 
     def _by_one_ray(self, emitter: Emitter, points: Texels, middle: Floats) -> Floats:
+        """The illuminance (P,) of points by an emitter, with one shadow ray per point to its centre."""
         vectors_m, strength = emitter.towards(points)(middle, middle)
         cosine = points.cosine(vectors_m)
         light_lx = strength * np.maximum(cosine, 0) * points.entering(cosine)
@@ -568,35 +620,36 @@ class MoverLight:
 
 
 def _points(points_m: Floats, normals: Floats, eta: Floats | None = None) -> Texels:
-    """Points (P, 3) with normals, on no face of a map."""
+    """Points (P, 3) with normals in the form of texels that are not part of the light map."""
     count = len(points_m)
-    nowhere = np.zeros(count, np.int64)
+    no_index = np.zeros(count, np.int64)
     dither = np.random.default_rng(0).random((count, 2), dtype=np.float32)
     no_step = np.zeros((count, 3), np.float32)
-    bare = np.zeros(count, np.float32) if eta is None else eta
+    coat_eta = np.zeros(count, np.float32) if eta is None else eta
     no_uv = np.zeros((count, 2), np.float32)
-    no_face = nowhere.astype(np.int32)
-    return Texels(points_m, normals, normals, no_step, no_step, nowhere, no_face, no_uv, bare, dither)
+    no_face = no_index.astype(np.int32)
+    return Texels(points_m, normals, normals, no_step, no_step, no_index, no_face, no_uv, coat_eta, dither)
 
 
 def shadow_matrices(places: Array, ball: BoundingSphere) -> Array:
-    """Matrices (K, 3, 4) from the world to what samples (K, 4) see of a ball.
+    """The matrices (K, 3, 4) of the shadow maps that show a ball from samples (K, 4), applied to points in the world.
 
-    Across it they lead from -1 to 1, times the distance ahead where a sample is a place. The last row is that distance,
-    and along a direction from 0 to 1 through the ball, 1 being nearest to the light.
+    The first two coordinates range from -1 to 1 across the map. For a sample with a position, they are multiplied by
+    the third coordinate, which is the depth in metres. For a sample with a direction, the third coordinate increases
+    through the ball from 0 to 1 towards the light.
     """
-    is_near = places[:, 3] > 0
+    has_position = places[:, 3] > 0
     radius_m = MARGIN * ball.radius_m
     to_ball_m = ball.centre_m - places[:, :3]
     distance_m = np.maximum(np.linalg.norm(to_ball_m, axis=1), 1e-6)
-    ahead = np.where(is_near[:, None], to_ball_m / distance_m[:, None], -places[:, :3])
+    ahead = np.where(has_position[:, None], to_ball_m / distance_m[:, None], -places[:, :3])
     u_axis, v_axis = tangents(ahead)
     sine = np.minimum(radius_m / distance_m, WIDEST)
-    scale = np.where(is_near, np.sqrt(1 - sine**2) / sine, 1 / radius_m)[:, None]
-    origin_m = np.where(is_near[:, None], places[:, :3], ball.centre_m)
-    along = np.where(is_near[:, None], ahead, -ahead / (2 * radius_m))
+    scale = np.where(has_position, np.sqrt(1 - sine**2) / sine, 1 / radius_m)[:, None]
+    origin_m = np.where(has_position[:, None], places[:, :3], ball.centre_m)
+    along = np.where(has_position[:, None], ahead, -ahead / (2 * radius_m))
 
     rows = np.stack([scale * u_axis, scale * v_axis, along], 1)  # (K, 3, 3)
     offsets = -np.einsum("kij,kj->ki", rows, origin_m)
-    offsets[~is_near, 2] += 0.5
+    offsets[~has_position, 2] += 0.5
     return np.concatenate([rows, offsets[..., None]], 2)

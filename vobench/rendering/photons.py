@@ -1,4 +1,4 @@
-"""Light that lamps and the sun give by way of coats, metal, mirrors and panes, carried by photons."""
+"""Light of lamps and the sun that coats, metals, mirrors and panes reflect, computed with photons."""
 
 from collections.abc import Sequence
 
@@ -13,18 +13,23 @@ from vobench.rendering.texel import Texels
 from vobench.rendering.thread_pool import in_chunks
 from vobench.scene.mesh import areas_m2
 
-PHOTONS = 1 << 21  # of all lights together
-FEWEST = 1 << 14  # of an emitter
-PLACES = 1 << 15  # on panes and mirrors, which have no texels
-TYPICAL_COSINE = np.float32(0.6)  # at which the share that a face mirrors decides how many photons start there
-# the shares of photons that start on texels in proportion to their light, evenly on texels, and on panes and mirrors
+PHOTONS = 1 << 21  # the number of photons of all lights together
+FEWEST = 1 << 14  # the smallest number of photons of an emitter
+PLACES = 1 << 15  # the number of start points on panes and mirrors, which have no texels
+TYPICAL_COSINE = np.float32(0.6)  # the cosine of incidence at which reflectances are compared to distribute photons
+# The share of photons whose density on texels increases with the direct light, and the share with a uniform density on
+# texels. All other photons start on panes and mirrors.
 BY_LIGHT = 0.5
 EVENLY = 0.2
-CHUNK = 1 << 15
+CHUNK = 1 << 15  # the number of photons that a thread computes at a time
 
 
 class Reflectors:
-    """Places of a scene that mirror light, where photons set out: texels, and places on panes and mirrors."""
+    """The reflecting places of a scene, from which photons start: texels, followed by points on panes and mirrors.
+
+    `texels` are the indices of the reflecting texels. Photons are not traced from an emitter to a place; instead, each
+    place is connected to a random point on the emitter.
+    """
 
     def __init__(
         self,
@@ -40,29 +45,29 @@ class Reflectors:
         mirrored = self._mirrored(points.face, np.full(len(points), TYPICAL_COSINE))
         self.texels = np.flatnonzero(mirrored > FAINT)
 
-        # Panes and mirrors. A pane that has one side in the table mirrors on both.
-        every = np.arange(len(faces), dtype=np.int32)
-        face_mirrors = self._mirrored(every, np.full(len(faces), TYPICAL_COSINE))
-        is_bare = visibility.is_static & ~gatherer.response.scatters[:-1] & (face_mirrors > FAINT)
-        bare = np.flatnonzero(is_bare)
-        is_single = self._is_pane[bare] & (reversed_faces(faces.corners_m)[bare] < 0)
-        bare = np.concatenate([bare, bare[is_single]])
-        sign = np.ones(len(bare), np.float32)
-        sign[len(bare) - np.count_nonzero(is_single) :] = -1
+        # Faces without texels. A pane of a single face reflects on both sides, so it is added with the other normal.
+        all_faces = np.arange(len(faces), dtype=np.int32)
+        face_mirrors = self._mirrored(all_faces, np.full(len(faces), TYPICAL_COSINE))
+        is_mirror_face = visibility.is_static & ~gatherer.response.scatters[:-1] & (face_mirrors > FAINT)
+        mirror_faces = np.flatnonzero(is_mirror_face)
+        is_single_pane = self._is_pane[mirror_faces] & (reversed_faces(faces.corners_m)[mirror_faces] < 0)
+        mirror_faces = np.concatenate([mirror_faces, mirror_faces[is_single_pane]])
+        sign = np.ones(len(mirror_faces), np.float32)
+        sign[len(mirror_faces) - np.count_nonzero(is_single_pane) :] = -1
 
-        place_count = PLACES if len(bare) else 0
+        place_count = PLACES if len(mirror_faces) else 0
         number = np.random.default_rng([seed, 2]).random((2, place_count))
         along = (np.arange(place_count) + number[0]) / max(place_count, 1)
-        corners_m = faces.corners_m[bare]
-        bare_areas_m2 = areas_m2(corners_m)
-        ends_m2 = np.cumsum(bare_areas_m2)
-        nth = np.zeros(0, np.int64)
+        corners_m = faces.corners_m[mirror_faces]
+        mirror_areas_m2 = areas_m2(corners_m)
+        ends_m2 = np.cumsum(mirror_areas_m2)
+        row = np.zeros(0, np.int64)
         places_m = np.zeros((0, 3))
         if place_count:
-            nth = np.searchsorted(ends_m2, along * ends_m2[-1], side="right")
-            nth = np.minimum(nth, len(bare) - 1)
+            row = np.searchsorted(ends_m2, along * ends_m2[-1], side="right")
+            row = np.minimum(row, len(mirror_faces) - 1)
             places_m = sample_points(corners_m, along, number[1])
-        normals = faces.plane[bare[nth]] * sign[nth, None]
+        normals = faces.plane[mirror_faces[row]] * sign[row, None]
         places_m = offset_from_surface(places_m, normals)
         place_area_m2 = ends_m2[-1] / place_count if place_count else 0.0
 
@@ -71,7 +76,7 @@ class Reflectors:
         self._step_u_m = np.concatenate([points.step_u_m[self.texels], no_step]).astype(np.float32)
         self._step_v_m = np.concatenate([points.step_v_m[self.texels], no_step]).astype(np.float32)
         self._normals = np.concatenate([points.planes[self.texels], normals]).astype(np.float32)
-        self._face = np.concatenate([points.face[self.texels], bare[nth]]).astype(np.int32)
+        self._face = np.concatenate([points.face[self.texels], mirror_faces[row]]).astype(np.int32)
         self._area_m2 = np.concatenate([point_areas_m2[self.texels], np.full(place_count, place_area_m2)])
         self._weight = self._area_m2 * self._mirrored(self._face, np.full(len(self._face), TYPICAL_COSINE))
 
@@ -79,7 +84,7 @@ class Reflectors:
         return len(self._face)
 
     def _mirrored(self, face: Indices, cosine: Floats) -> Floats:
-        """The share (P,) that faces (P,) mirror."""
+        """The reflectance (P,) of faces (P,) at the given cosines of incidence."""
         share = self._gatherer.response.mirrored(face, cosine)
         panes = np.flatnonzero(self._is_pane[face])
         share[panes] = self._gatherer.visibility.pane_mirrors(face[panes], cosine[panes])
@@ -93,9 +98,11 @@ class Reflectors:
         effort: float,
         seed: Sequence[int],
     ) -> Floats:
-        """The flux (2, S) in lumens of a light of several emitters by way of mirroring faces, by two sets of photons.
+        """The flux (2, S) in lumens that surfels receive from a light via reflecting faces, by two sets of photons.
 
-        light_lx (P,): its direct light on all texels; effort: the share of all PHOTONS.
+        `emitters` are the parts of the light.
+        `light_lx` (P,) is its direct illuminance on all texels.
+        `effort` is the share of PHOTONS that is used for the light.
         """
         flux_lm = np.zeros((2, self._gatherer.surfels))
         if not len(self):
@@ -110,7 +117,7 @@ class Reflectors:
         return flux_lm
 
     def _chances(self, light_lx: Floats) -> Floats:
-        """The probability of each place to be where a photon starts, for the direct light (P,) of all texels."""
+        """The probability that a photon starts at each place, given the direct light (P,) on all texels."""
         texel_count = len(self.texels)
         texel_weight = self._weight[:texel_count]
         parts = [
@@ -131,7 +138,7 @@ class Reflectors:
         count: int,
         seed: Sequence[int],
     ) -> Photons:
-        """About `count` photons of an emitter, each as it leaves the first face that mirrors it."""
+        """About `count` photons of an emitter, as they leave the first face that reflects them."""
         ends = np.cumsum(chance)
 
         def start(part: slice) -> Photons:
@@ -157,13 +164,16 @@ class Reflectors:
         weight: Floats,
         number: Floats,
     ) -> Photons:
-        """Photons from places (P,), which stand for `weight` (P,) places each, by six numbers (6, P) in [0, 1)."""
+        """The photons that leave places (P,), drawn with random numbers (6, P) in [0, 1).
+
+        `weight` (P,) is the reciprocal of the expected number of photons from each place.
+        """
         visibility = self._gatherer.visibility
         response = self._gatherer.response
         points = self._texels(place, number[:4])
         flux_m2 = (self._area_m2[place] * weight).astype(np.float32)
 
-        # A ray to somewhere on the emitter.
+        # A shadow ray to a random point on the emitter.
         ahead_m = np.einsum("ij,ij->i", emitter.ball.centre_m - points.points_m, points.planes)
         rows = np.flatnonzero((ahead_m > -emitter.ball.radius_m) & emitter.may_light(points.points_m))
         points = points.take(rows)
@@ -179,7 +189,7 @@ class Reflectors:
         points = points.take(passed)
         incoming = vectors_m[passed] / np.linalg.norm(vectors_m[passed], axis=1, keepdims=True)
 
-        # The mirrored ray.
+        # The reflected ray. Roughness varies its normal.
         roughness = np.where(self._is_pane[points.face], 0, response.roughness[points.face])
         normals = facets(points.planes, roughness, points.dither, np.arange(len(points)))
         along_normal = np.einsum("ij,ij->i", incoming, normals)[:, None]
@@ -195,7 +205,7 @@ class Reflectors:
         )
 
     def _texels(self, place: Rows, number: Floats) -> Texels:
-        """Somewhere on the area of places (P,), as texels without a coat, so that all light that arrives counts."""
+        """Random points in the areas of places (P,), as texels. They have no coat, so that all arriving light counts."""
         count = len(place)
         across = number[2:] - np.float32(0.5)
         aside_m = across[0][:, None] * self._step_u_m[place] + across[1][:, None] * self._step_v_m[place]

@@ -1,4 +1,4 @@
-"""The luminance that rays through a baked scene show, by each of its lights, without drawing a picture."""
+"""The luminance along rays in a baked scene, for each light separately, without rendering a picture."""
 
 import zipfile
 from collections.abc import Iterable
@@ -18,19 +18,20 @@ from vobench.scene.light import AreaLight, Light, Sky
 from vobench.scene.material import LUMINANCE, Material, fresnel, linear, pane_reflectance, under_coat
 from vobench.trajectory.nanoseconds import NS_PER_S
 
-MOST_SURFACES = 12  # that one ray meets: panes, mirrors, holes and backs of faces
-FAINTEST = 1e-3  # share of a pixel below which a ray is not followed
-STEP_M = 1e-4  # beyond a surface, where the ray goes on
-LEVELS_NS = NS_PER_S  # lights count with their mean level over the first second
+MOST_SURFACES = 12  # the largest number of surfaces along a ray, including holes and backs of faces
+FAINTEST = 1e-3  # the share of a pixel below which a ray ends
+STEP_M = 1e-4  # the distance from a surface at which a ray continues
+LEVELS_NS = NS_PER_S  # the level of a light is its mean over the first second
 FILE = "seen_light.npz"
 
 
 @dataclass(frozen=True, slots=True)
 class SeenLight:
-    """What N rays show.
+    """The luminance along N rays.
 
-    luminance_cd_m2 (L, N): by each light alone at level 1. is_source (N,): whether a ray ends at a lamp or in the sky.
-    names, levels (L,): of the lights, their mean levels at first.
+    `luminance_cd_m2` (L, N) is the luminance due to each light alone, at level 1.
+    `is_source` (N,) is whether a ray ends at a lamp or in the sky.
+    `names` and `levels` (L,) are the names of the lights and their mean levels.
     """
 
     luminance_cd_m2: Floats
@@ -39,7 +40,7 @@ class SeenLight:
     levels: tuple[float, ...]
 
     def luminance(self, lights: Iterable[Light] = ()) -> Array:
-        """The luminance (N,) in cd/m² by all lights: those given at their levels, the others at the stored ones."""
+        """The luminance (N,) in cd/m² due to all lights. Lights that are not given have their stored levels."""
         level_by_name = {light.name: light.level.mean(0, LEVELS_NS) for light in lights}
         total = np.zeros(self.luminance_cd_m2.shape[1])
         for name, level, by_light in zip(self.names, self.levels, self.luminance_cd_m2, strict=True):
@@ -47,7 +48,7 @@ class SeenLight:
         return total
 
     def save(self, folder: Path) -> None:
-        """Write it into the folder of the scene's light."""
+        """Write the luminance to the folder of the scene's baked light."""
         np.savez(
             folder / FILE,
             luminance_cd_m2=self.luminance_cd_m2,
@@ -58,7 +59,7 @@ class SeenLight:
 
 
 def read_seen_light(folder: Path) -> SeenLight:
-    """What `SeenLight.save` wrote. Raises RenderError if it is damaged."""
+    """Read the file that `SeenLight.save` wrote. Raises RenderError if it cannot be read."""
     try:
         with (folder / FILE).open("rb") as file, np.load(file) as stored:
             names = tuple(stored["names"].tolist())
@@ -69,10 +70,10 @@ def read_seen_light(folder: Path) -> SeenLight:
 
 
 def seen_light(baked: BakedScene, origins_m: Array, directions: Array) -> SeenLight:
-    """What rays (N, 3) along unit directions show, without movers and the glints of small lamps.
+    """The luminance along rays (N, 3) with unit directions, without movers and without the glints of small lamps.
 
-    A ray that meets a coat or a metal shows its body and goes on as from a smooth mirror. Backs of faces are not there,
-    as in pictures.
+    A coat or a metal adds the light that its body scatters, and reflects the ray like a smooth mirror. As in pictures,
+    the backs of faces are invisible.
     """
     surfaces = _Surfaces(baked)
     count = len(origins_m)
@@ -100,7 +101,7 @@ def seen_light(baked: BakedScene, origins_m: Array, directions: Array) -> SeenLi
 
 @dataclass(frozen=True, slots=True)
 class _Rays:
-    """Rays (R, 3) along unit directions, each with its pixel (R,) and its share (R,) in it."""
+    """Rays (R, 3) with unit directions. `share` (R,) is the contribution of each ray to its `pixel` (R,)."""
 
     pixel: Rows
     origins_m: Array
@@ -111,7 +112,7 @@ class _Rays:
 
 
 class _Surfaces:
-    """The stationary faces of a baked scene, and what they show."""
+    """The stationary faces of a baked scene, and the light that they emit and reflect."""
 
     def __init__(self, baked: BakedScene) -> None:
         faces = baked.faces
@@ -119,7 +120,7 @@ class _Surfaces:
         self._faces = faces
         self._caster = RayCaster(faces, np.flatnonzero(faces.mover < 0))
         self._cutouts = CutOuts(faces, baked.scene.materials)
-        materials = [*face_materials(faces, baked.scene.materials), None]  # the last one for nothing
+        materials = [*face_materials(faces, baked.scene.materials), None]  # None is for rays without a hit
         thing = np.append(faces.thing, len(materials) - 1)
         self._materials = materials
         self._thing = thing
@@ -154,7 +155,7 @@ class _Surfaces:
         return np.asarray((hits.face >= 0) & (cosine < 0))
 
     def scattered(self, rays: _Rays, hits: Hits) -> Array:
-        """The luminous share (R,) of the light on a face that its body scatters; 0 where rays meet no body."""
+        """The luminous reflectance (R,) of the body that each ray hits, below its coat; 0 if it hits no body."""
         result = np.zeros(len(hits.face))
         is_body = self._is_front(rays, hits) & (self._kind[hits.face] == "body") & ~self._cutouts.holes(hits)
         rows = np.flatnonzero(is_body)
@@ -163,7 +164,7 @@ class _Surfaces:
         return result
 
     def illuminance_lx(self, hits: Hits) -> Array:
-        """The illuminance (L, R) on faces by each light alone at level 1, of the nearest texel."""
+        """The illuminance (L, R) of the nearest texel, due to each light alone at level 1."""
         baked = self._baked
         texel = baked.atlas.index(hits.at(baked.atlas.light_px))
         spread = baked.spread[texel]
@@ -174,7 +175,7 @@ class _Surfaces:
         return np.array(by_light).reshape(len(baked.scene.lights), len(texel))
 
     def _reflectance(self, hits: Hits) -> Array:
-        """The luminous reflectance (R,) of bodies, under their coats."""
+        """The luminous reflectance (R,) of bodies for light that has entered through their coats."""
         result = np.zeros(len(hits.face))
         thing = self._thing[hits.face]
         for number in np.unique(thing).tolist():
@@ -188,13 +189,13 @@ class _Surfaces:
         return result
 
     def _coat(self, rays: _Rays, hits: Hits) -> Array:
-        """The share (R,) that coats mirror; 0 where there is none."""
+        """The specular reflectance (R,) of coats; 0 without a coat."""
         cosine = np.einsum("ij,ij->i", self._faces.plane[hits.face], rays.directions)
         has_coat = (self._kind[hits.face] == "body") & (self._eta[hits.face] > 1)
         return np.where(has_coat, fresnel(cosine, np.maximum(self._eta[hits.face], 1.0)), 0.0)
 
     def followed(self, rays: _Rays, hits: Hits) -> _Rays:
-        """The rays that go on behind panes, holes and backs of faces, or from mirrors, coats and metals."""
+        """The rays that continue behind panes, holes and backs of faces, or are reflected by mirrors, coats and metals."""
         face = hits.face
         planes = self._faces.plane[face]
         cosine = np.einsum("ij,ij->i", planes, rays.directions)
@@ -220,7 +221,7 @@ class _Surfaces:
 
 
 def _metal_reflectance(material: Material | None) -> float:
-    """The luminous share that a mirror or a metal reflects; 0 for others."""
+    """The luminous reflectance of a mirror or a metal; 0 for other materials."""
     if material is None:
         return 0.0
     if material.kind == "mirror":
@@ -231,7 +232,10 @@ def _metal_reflectance(material: Material | None) -> float:
 
 
 def _reflectance_at(material: Material, places: Array) -> Array:
-    """The luminous reflectance (R,) of a texture's nearest pixels at places (R, 2) in tiles, times the colour."""
+    """The luminous reflectance (R,) of a material at texture coordinates `places` (R, 2), in tiles.
+
+    It is the value of the nearest pixel of the texture times the colour.
+    """
     colour = np.array(material.colour) * LUMINANCE
     if material.texture is None:
         return np.full(len(places), colour.sum())
@@ -239,7 +243,7 @@ def _reflectance_at(material: Material, places: Array) -> Array:
     height, width = pixels.shape[:2]
     column = np.floor(places[:, 0] * width).astype(np.int64) % width
     row = np.floor(places[:, 1] * height).astype(np.int64) % height
-    found = pixels[row, column]
+    nearest = pixels[row, column]
     if pixels.ndim == 2:
-        return np.asarray(found * colour.sum(), float)
-    return np.asarray(linear(found[:, :3]) @ colour, float)
+        return np.asarray(nearest * colour.sum(), float)
+    return np.asarray(linear(nearest[:, :3]) @ colour, float)

@@ -1,10 +1,10 @@
-"""Meshes, things that consist of a mesh and a material, and a table of all triangles of a scene.
+"""Meshes, things (a mesh with a material), and a table of all triangles of a scene.
 
 A mesh is a `trimesh.Trimesh` that was created with process=False, which preserves the order of its vertices.
 
-- A face is visible from the side on which its corners run counter-clockwise.
-- `mesh.visual.uv` (V, 2) are texture coordinates, in the unit of `Texture.tile_m`. v = 0 is row 0 of the picture.
-  trimesh's readers of mesh files have row 0 at v = 1.
+- A face is visible from the side on which its corners are in counter-clockwise order.
+- `mesh.visual.uv` (V, 2) are texture coordinates, in the unit of `Texture.tile_m`. Row 0 of the picture is at v = 0,
+  whereas it is at v = 1 in meshes that trimesh reads from files.
 - `mesh.vertex_normals` (V, 3) are the normals of the smooth shape that the triangles approximate. trimesh keeps given
   normals in a cache, so `mesh.copy()` drops them. `mesh.copy(include_cache=True)` and the functions of this module
   preserve them.
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 Faces = NDArray[np.int64]
 Index = NDArray[np.int32]
-# The size of the cells in which vertices are merged, everywhere in vobench. float32 resolves 1e-6 m at 10 m.
+# The size of the grid cells in which vertices are merged. At 10 m, float32 numbers are about 1e-6 m apart.
 WELD_M = 1e-5
 
 
@@ -48,7 +48,7 @@ def areas_m2(corners_m: Array) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshArrays:
-    """The arrays of a mesh. Most shapes are built from them, because a Trimesh takes much longer to create.
+    """The arrays of a mesh. Most shapes are built from arrays, because creating a Trimesh takes much longer.
 
     `vertices_m` (V, 3) are positions.
     `faces` (F, 3) are the vertex indices of each face.
@@ -104,8 +104,8 @@ def _inverse(matrix: bytes) -> tuple[Array, bool]:
 def joined_arrays(parts: Sequence[MeshArrays]) -> MeshArrays:
     """One mesh with the faces of all parts, in their order."""
     vertex_counts = [len(part.vertices_m) for part in parts]
-    first_vertices = np.cumsum([0, *vertex_counts])
-    faces = [part.faces + first_vertex for part, first_vertex in zip(parts, first_vertices, strict=False)]
+    vertex_offsets = np.cumsum([0, *vertex_counts])
+    faces = [part.faces + offset for part, offset in zip(parts, vertex_offsets, strict=False)]
     return MeshArrays(
         np.concatenate([np.zeros((0, 3)), *(part.vertices_m for part in parts)]),
         np.concatenate([np.zeros((0, 3), np.int64), *faces]),
@@ -130,8 +130,8 @@ def make_mesh(
 ) -> "Trimesh":
     """A mesh with vertices (V, 3), faces (F, 3), texture coordinates (V, 2) and normals (V, 3).
 
-    The arrays are copied and keep their order. Rays are cast without embree, because its set-up takes longer than
-    everything else.
+    The arrays are copied, and their order is preserved. The mesh does not use embree, because its set-up takes longer
+    than all other steps together.
     """
     from trimesh import Trimesh
     from trimesh.visual import TextureVisuals
@@ -185,7 +185,7 @@ def moved(mesh: "Trimesh", T_a_b: Array) -> "Trimesh":
 
 
 def copies(mesh: "Trimesh", poses: Iterable[Array]) -> "Trimesh":
-    """One mesh with a copy of the given mesh at each of the poses T (4, 4)."""
+    """One mesh that consists of a copy of the given mesh at each of the poses (4, 4)."""
     original = arrays(mesh)
     return joined_arrays([original.moved(T) for T in poses]).mesh()
 
@@ -262,22 +262,23 @@ def quad(
 
 
 def distinct(rows: NDArray[Any]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The G groups of equal rows among rows (N, K), sorted by their values.
+    """The distinct rows of an array (N, K), in lexicographic order.
 
-    Returns the index of the first row of each group (G,), and the group of each row (N,).
+    Returns the index (G,) of the first occurrence of each distinct row, and for each row the index (N,) of the distinct
+    row that it equals, like `np.unique` with `return_index` and `return_inverse`.
     """
     order = np.lexsort(rows.T[::-1])  # stable, and much faster than np.unique
     sorted_rows = rows[order]
     differs_from_previous = (np.diff(sorted_rows, axis=0) != 0).any(1)
-    is_first = np.append(True, differs_from_previous)[: len(rows)]  # the slice is for no rows
-    sorted_groups = np.cumsum(is_first) - 1
-    return order[is_first], sorted_groups[np.argsort(order)]
+    is_first = np.append(True, differs_from_previous)[: len(rows)]  # the slice removes the first element if N = 0
+    sorted_inverse = np.cumsum(is_first) - 1
+    return order[is_first], sorted_inverse[np.argsort(order)]
 
 
 def welded(points_m: Array) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """The P cells of size WELD_M that contain points (N, 3).
+    """Merge points (N, 3) that are in the same grid cell of size WELD_M.
 
-    Returns the index of the first point in each cell (P,), and the cell of each point (N,).
+    Returns the index (P,) of the first point in each occupied cell, and for each point the index (N,) of its cell.
     """
     cells = np.rint(points_m / WELD_M).astype(np.int64)
     return distinct(cells)
@@ -289,18 +290,18 @@ def open_edges(faces: NDArray[Any]) -> NDArray[np.int64]:
     from trimesh.grouping import group_rows
 
     edges = np.sort(faces_to_edges(faces), axis=1)  # type: ignore[no-untyped-call]
-    single = group_rows(edges, require_count=1)  # type: ignore[no-untyped-call]
-    return np.asarray(edges[single], np.int64)
+    open_rows = group_rows(edges, require_count=1)  # type: ignore[no-untyped-call]
+    return np.asarray(edges[open_rows], np.int64)
 
 
 def is_closed_body(mesh: MeshArrays) -> bool:
-    """Whether a mesh encloses a volume and its faces are visible from outside, after its vertices are welded."""
+    """Whether a mesh, with its vertices welded, encloses a volume and has its front faces outside."""
     from trimesh import Trimesh
 
     first_vertices, cells = welded(mesh.vertices_m)
     faces = cells[mesh.faces]
-    has_three_corners = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
-    body = Trimesh(mesh.vertices_m[first_vertices], faces[has_three_corners], process=False, use_embree=False)
+    has_distinct_corners = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
+    body = Trimesh(mesh.vertices_m[first_vertices], faces[has_distinct_corners], process=False, use_embree=False)
     return bool(body.is_volume)
 
 
@@ -315,7 +316,7 @@ def is_mesh(value: object) -> bool:
 class Thing:
     """A mesh with one material.
 
-    `name` is the instance that the mesh belongs to; the ground truth distinguishes instances by name.
+    `name` is the name of the instance; things with the same name are one instance in the ground truth.
     `material` is the name of the material.
     `spacing_m` is the distance between samples of the light on the mesh; None selects the renderer's default.
     """
@@ -328,13 +329,14 @@ class Thing:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Triangles:
-    """A table of all faces of a scene, in the order stationary things, visible lamps, movers.
+    """A table of all faces of a scene at one instant: first stationary things, then visible lamps, then movers.
 
-    `corners_m` (F, 3, 3), `normals` (F, 3, 3) and `uv` (F, 3, 2) belong to the three corners of each face. Positions
-    and normals are those at one instant.
+    `corners_m` (F, 3, 3), `normals` (F, 3, 3) and `uv` (F, 3, 2) are the positions, smooth normals and texture
+    coordinates of the three corners of each face.
     `plane` (F, 3) is the unit normal of the flat face.
     `thing` (F,) is the index of the face's thing in `things`.
-    `mover` and `lamp` (F,) are its indices among the scene's movers and lights; -1 if it belongs to none.
+    `mover` (F,) is the index of the face's mover in the scene, -1 for a stationary face.
+    `lamp` (F,) is the index of the face's light in the scene, -1 for a face that is not a lamp.
     """
 
     things: tuple[Thing, ...]
@@ -350,12 +352,12 @@ class Triangles:
         return len(self.corners_m)
 
     def some(self, which: NDArray[Any]) -> "Triangles":
-        """The table of the selected faces (K,)."""
+        """The table of the faces that are selected by an index or a mask `which`."""
         names = ("corners_m", "normals", "uv", "plane", "thing", "mover", "lamp")
         return replace(self, **{name: getattr(self, name)[which] for name in names})
 
     def moved(self, T_world_movers: Sequence[Array]) -> "Triangles":
-        """The table with the movers at poses (4, 4), if this table has their faces in the frames of the movers."""
+        """The table with each mover at its pose (4, 4). In this table, faces of movers must be in the mover's frame."""
         corners_m = self.corners_m.copy()
         normals = self.normals.copy()
         plane = self.plane.copy()
@@ -373,7 +375,7 @@ def table(
     mover: Sequence[int],
     lamp: Sequence[int],
 ) -> Triangles:
-    """The faces of things, each thing in the frame of its mesh.
+    """The table of the faces of things. The faces of each thing are in the frame of its mesh.
 
     `mover` and `lamp` are the index of each thing's mover and lamp; -1 if it has none.
     """

@@ -1,4 +1,4 @@
-"""Scenarios: a difficulty for odometry at severities from 0 to 5, with everything else unchanged."""
+"""Scenarios: simulated cases in which one difficulty for odometry increases from severity 0 to severity 5."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -23,7 +23,7 @@ NO_CAMERA = CameraSettings()
 class Setup:
     """The setup of a simulated case: one variant of each axis.
 
-    `scene_changes` replaces values of the scene file. The keys of nested values are joined by dots.
+    `scene_changes` maps keys of the scene file to new values. The keys of nested values are joined by dots.
     """
 
     scene: str
@@ -36,9 +36,11 @@ class Setup:
 
 @settings()
 class ScenarioFile:
-    """The content of a scenario file: a base setup, and for each severity, the keys that change.
+    """The content of a scenario file.
 
-    Omitted keys are taken from the included file, which is another scenario or a file with only a `base`.
+    `base` is the setup without any changes.
+    `severity` lists, for each severity from 0 to 5, the keys of the setup that differ from `base`.
+    `include` names a file from which omitted keys are taken: another scenario, or a file with only a `base`.
     """
 
     include: str | None = None
@@ -61,14 +63,18 @@ class Scenario:
         return self.setups[severity]
 
     def variant(self, severity: int, scene: str) -> dict[str, str]:
-        """The names of the variants: the scenario's name, followed by the severity on axes that it changes."""
-        setup_names = {axis: self._name_on(axis, severity, self.name) for axis in SETUP_AXES}
+        """The name of the variant on each axis, as in `Case.variant`; `scene` is the name of the scene.
+
+        A name ends with the severity if the setup of this severity differs on the axis from that of severity 0.
+        """
+        names = {axis: self._name_on(axis, severity, self.name) for axis in SETUP_AXES}
         scene_name = scene
         if self.setups[severity].scene_changes:
             scene_name = self._name_on("scene_changes", severity, f"{scene}.{self.name}")
-        return {"scene": scene_name, **setup_names}
+        return {"scene": scene_name, **names}
 
     def _name_on(self, axis: str, severity: int, name: str) -> str:
+        """The name, followed by the severity if it changes this field of the setup."""
         is_unchanged = getattr(self.setups[severity], axis) == getattr(self.setups[0], axis)
         return name if is_unchanged else f"{name}.{severity}"
 

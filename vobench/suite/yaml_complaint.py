@@ -17,12 +17,14 @@ UNKNOWN_KEY = "unexpected_keyword_argument"  # pydantic's type of the error
 def complaints(
     source: YamlFile, error: ValidationError, schema: Schema, unread: Collection[Keys] = ()
 ) -> Iterator[Mistake]:
-    """The mistakes that caused a validation error, with unknown keys first.
+    """The mistakes in a file that caused a validation error, with unknown keys first.
 
-    An error that is a consequence of another mistake is omitted. `unread` lists the places of values that could not be
-    read. Their mistakes have been reported already, so they are omitted too.
+    An error that only follows from another mistake is omitted: a required key that is missing because it is misspelt,
+    and a list that is too short because some of its entries are wrong.
+    `unread` lists the places of values that could not be read. Errors at these places are omitted, because the mistakes
+    have already been reported.
     """
-    errors = sorted(error.errors(), key=lambda each: each["type"] != UNKNOWN_KEY)
+    errors = sorted(error.errors(), key=lambda entry: entry["type"] != UNKNOWN_KEY)
     wrong_places = [*unread, *map(location, errors)]
     misspelt_places = _misspelt_places(errors, schema)
 
@@ -34,14 +36,14 @@ def complaints(
         is_key_misspelt = each["type"] == "missing" and place in misspelt_places
         if is_key_misspelt:
             continue
-        is_list_without_wrong_entries = each["type"] == "too_short" and _contains_any(place, wrong_places)
-        if is_list_without_wrong_entries:
+        is_list_with_wrong_entries = each["type"] == "too_short" and _contains_any(place, wrong_places)
+        if is_list_with_wrong_entries:
             continue
         yield Mistake(_sentence(each, schema, source), (source.place(keys),))
 
 
 def _misspelt_places(errors: Collection[Any], schema: Schema) -> set[tuple[Any, ...]]:
-    """The places of the known keys that were probably meant by unknown keys."""
+    """The place of the known key that each unknown key probably stands for."""
     places = set[tuple[Any, ...]]()
     for each in errors:
         if each["type"] == UNKNOWN_KEY:
@@ -51,7 +53,7 @@ def _misspelt_places(errors: Collection[Any], schema: Schema) -> set[tuple[Any, 
 
 
 def location(error: Any) -> Keys:
-    """The place of one of pydantic's errors. The keys that a SettingError names are appended to it."""
+    """The place of one of pydantic's errors. If a SettingError caused it, the keys that it names are appended."""
     cause = error.get("ctx", {}).get("error")
     if isinstance(cause, SettingError):
         return (*error["loc"], *cause.keys)
@@ -60,7 +62,7 @@ def location(error: Any) -> Keys:
 
 
 def _contains_any(place: Keys, others: Collection[Keys]) -> bool:
-    """Whether one of the other places is inside of this place."""
+    """Whether one of the other places is inside the section at this place."""
     return any(len(other) > len(place) and other[: len(place)] == place for other in others)
 
 
@@ -83,7 +85,7 @@ def _sentence(error: Any, schema: Schema, source: YamlFile) -> str:
         return _about_unknown_key(error, schema, source)
     context = error.get("ctx", {})
     cause = context.get("error")
-    if isinstance(cause, SettingError):  # the sentence contains the value already
+    if isinstance(cause, SettingError):  # its sentence already contains the wrong value
         return cause.sentence
     template = COMPLAINTS.get(error["type"])
     if template is None:
@@ -92,19 +94,20 @@ def _sentence(error: Any, schema: Schema, source: YamlFile) -> str:
 
 
 def _about_unknown_key(error: Any, schema: Schema, source: YamlFile) -> str:
-    """The sentence about an unknown key, with the nearest known key and all known keys."""
-    elsewhere = _about_other_kinds(error["loc"], schema, source)
-    if elsewhere:
-        return elsewhere
+    """The sentence about an unknown key, with the most similar known key and a list of all known keys."""
+    sentence_on_kinds = _about_other_kinds(error["loc"], schema, source)
+    if sentence_on_kinds:
+        return sentence_on_kinds
     nearest = _nearest_key(error, schema)
     guess = f" Did you mean {nearest!r}?" if nearest else ""
     return f"unknown key.{guess} Known: {', '.join(_known_keys(error['loc'], schema))}"
 
 
 def _about_other_kinds(place: Keys, schema: Schema, source: YamlFile) -> str:
-    """The sentence about a key that belongs to other kinds of the section than the kind of this one.
+    """The sentence about a key that this kind of section does not have, but other kinds of it have.
 
-    Empty if no kind has the key, or if the key is known except that its unit is missing.
+    For example, a lamp of the kind `point` has no `size_m`, but a `panel` has.
+    Empty if no kind has the key, or if only the unit is missing in the key, as in `power` for `power_lm`.
     """
     if len(place) < 2:
         return ""
@@ -134,9 +137,9 @@ def _references_by_kind(section: Schema) -> dict[str, str]:
 
 
 def _walk(schema: Schema, place: Keys) -> tuple[Keys, Schema]:
-    """The keys in the file that lead to one of pydantic's places, and the schema at that place.
+    """The path of keys in the file that corresponds to one of pydantic's places, and the schema at that place.
 
-    A place can have two parts that are not keys in the file: the kind of a section, and "[key]", which means that the
+    A place can contain two parts that are not keys of the file: the kind of a section, and "[key]", which says that a
     key is wrong instead of its value.
     """
     keys = list[int | str]()
@@ -169,7 +172,7 @@ def _value_schema(section: Schema) -> Schema | None:
 
 
 def _without_alternatives(schema: Schema, section: Schema) -> Schema:
-    """The first alternative of a section, which is the full form. The other ones are null or the name of a preset."""
+    """The first alternative of a section, which is its full form; the others are null or the name of a preset."""
     while "anyOf" in section or "$ref" in section:
         section = _resolve(schema, section["$ref"]) if "$ref" in section else section["anyOf"][0]
     return section

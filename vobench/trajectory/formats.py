@@ -20,16 +20,16 @@ StampUnit = Literal["s", "ms", "us", "ns"]
 QuaternionOrder = Literal["xyzw", "wxyz"]  # in which a file lists the four components of a quaternion
 
 NORM_TOLERANCE = 1e-3  # rounding to 4 digits changes the norm of a quaternion by up to 1e-4
-DIGITS: dict[StampUnit, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}  # decimal places that resolve a nanosecond
+DIGITS: dict[StampUnit, int] = {"s": 9, "ms": 6, "us": 3, "ns": 0}  # decimal places needed to resolve 1 ns
 WORDS: dict[StampUnit, str] = {"s": "seconds", "ms": "milliseconds", "us": "microseconds", "ns": "nanoseconds"}
 MAX_NS = 2**63 - 1
 SCALAR_LAST = [1, 2, 3, 0]  # indices that reorder (w, x, y, z) to (x, y, z, w)
 SCALAR_FIRST = [3, 0, 1, 2]  # indices that reorder (x, y, z, w) to (w, x, y, z)
 # Stricter than float(), which also accepts 1_000, nan, infinity and the digits of other scripts.
 NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]{1,3})?")
-# The usual notation of seconds; its numbers stay below MAX_NS.
+# Seconds with one to nine decimals, as in most files. The integer part is limited so that the stamp is below MAX_NS.
 PLAIN = re.compile(r"([0-9]{1,9}|[0-8][0-9]{9})\.([0-9]{1,9})")
-NUMERIC = re.compile(r"[0-9eE+\-., \t\r\n]*")  # a line that NumPy may read, with only characters of numbers
+NUMERIC = re.compile(r"[0-9eE+\-., \t\r\n]*")  # a line in which only numbers and separators can occur
 EXACT = Context(prec=64, rounding=ROUND_HALF_EVEN)  # int64 nanoseconds need only 19 digits
 
 
@@ -77,8 +77,8 @@ def read_table(
 ) -> TrajectoryTable:
     """The numbers in rows of `content`, one row per line.
 
-    A line has one field per column. With a `separator`, a line may have more fields, which are ignored.
-    `row` is a noun for what a line contains, for messages.
+    A line must have one field per column. With a `separator`, additional fields are ignored.
+    `row` is the noun for one row in error messages.
     Raises TrajectoryError with file, line and value for a field that is not a finite number.
     """
     line_numbers = [number for number, _ in rows]
@@ -102,11 +102,11 @@ def stamps_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
 
 @dataclass(frozen=True, slots=True)
 class _DistinctRows:
-    """The rows of a table whose number differs from that of the row before.
+    """The rows of a table after repeated stamps or frame numbers have been removed.
 
-    `numbers` (K,) are the numbers of these rows.
-    `rows` (K,) are their indices in the table.
-    `notes` is a sentence about the other rows, if there are any.
+    `numbers` (K,) are the stamps or frame numbers of the remaining rows.
+    `rows` (K,) are the indices of the remaining rows in the table.
+    `notes` has a sentence about the removed rows; it is empty if no row was removed.
     """
 
     numbers: Stamps
@@ -115,8 +115,9 @@ class _DistinctRows:
 
 
 def _distinct_rows(table: TrajectoryTable, numbers: Stamps, noun: str) -> _DistinctRows:
-    """The distinct rows of a table, by the number (N,) of each row. `noun` says what a number is, for messages.
+    """The first row of each run of rows with the same number, given the number (N,) of each row.
 
+    `noun` is the name of these numbers in messages.
     Raises TrajectoryError if a number is smaller than the one before it.
     """
     _require_steps(table, numbers, least_step=0, demand=f"{noun}s must increase")
@@ -162,7 +163,7 @@ def _first_column_ns(table: TrajectoryTable, unit: StampUnit) -> Stamps:
 def _require_steps(table: TrajectoryTable, numbers: Stamps, *, least_step: int, demand: str) -> None:
     """Raise TrajectoryError unless each of the numbers (N,) exceeds the one before it by at least `least_step`.
 
-    The message consists of the first wrong row, the `demand`, and the values of this row and the row before it.
+    `demand` is the part of the message that states this requirement.
     """
     wrong_rows = np.flatnonzero(np.diff(numbers) < least_step) + 1
     if wrong_rows.size:
@@ -171,7 +172,7 @@ def _require_steps(table: TrajectoryTable, numbers: Stamps, *, least_step: int, 
 
 
 def _read_fast(bodies: list[str], columns: int, separator: str | None) -> Array | None:
-    """The numbers (N, columns), read by NumPy in one call; None if the text has another form or a number overflows."""
+    """The numbers (N, columns), read by NumPy in one call; None if a line has another format or a number overflows."""
     if not bodies or not all(map(NUMERIC.fullmatch, bodies)):
         return None
     used_columns = range(columns) if separator else None
@@ -302,7 +303,7 @@ class _CsvLayout:
 
 
 def _csv_layout(text: str) -> _CsvLayout:
-    """The layout of a csv file, from its header, if it has one, and its stamps."""
+    """The layout of a csv file, inferred from its header and from its stamps. The header is optional."""
     first_line = text.removeprefix("\ufeff").lstrip().partition("\n")[0]
     rows = content(text)
     top_row = rows[0][1]
@@ -340,8 +341,8 @@ def _stamp_unit(header_cell: str, rows: list[tuple[int, str]]) -> StampUnit:
 def format_euroc(trajectory: Trajectory, more: Array | None = None) -> str:
     """A trajectory as EuRoC's csv text: stamps in nanoseconds, and values with all digits.
 
-    `more` adds columns: (N, 3) the velocity in the world frame (m/s), or (N, 9) also the biases of the gyroscope
-    (rad/s) and of the accelerometer (m/s^2).
+    `more` (N, 3) adds columns for the velocity in the world frame (m/s). `more` (N, 9) also adds columns for the biases
+    of the gyroscope (rad/s) and of the accelerometer (m/s^2).
     """
     q_xyzw = se3.to_quaternion(trajectory.T_world_frame[:, :3, :3])
     columns = [trajectory.positions_m, q_xyzw[:, SCALAR_FIRST]]
@@ -367,7 +368,7 @@ KITTI_COLUMNS = (
 )
 NUMBERED_COLUMNS = ("frame", *KITTI_COLUMNS)
 TARTANAIR_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
-SKEW_TOLERANCE = 1e-3  # the largest element of R^T R - I; it is about 1e-6 in KITTI's files, which have six digits
+SKEW_TOLERANCE = 1e-3  # for the elements of R^T R - I; they are about 1e-6 in KITTI's files, which have six digits
 MAX_FRAME = 10**9
 
 
@@ -393,13 +394,13 @@ def _require_rotations(table: TrajectoryTable, R: Array) -> None:
     """Raise TrajectoryError for the first of the matrices (N, 3, 3) that is not a rotation."""
     with np.errstate(over="ignore", invalid="ignore"):
         residuals = se3.transposed(R) @ R - np.eye(3)
-    skews = np.abs(residuals).max(axis=(1, 2), initial=0.0)
-    skewed_rows = np.flatnonzero(~(skews <= SKEW_TOLERANCE))  # includes NaN
+    deviations = np.abs(residuals).max(axis=(1, 2), initial=0.0)
+    skewed_rows = np.flatnonzero(~(deviations <= SKEW_TOLERANCE))  # includes NaN
     if skewed_rows.size:
         row = skewed_rows[0]
         raise TrajectoryError(
             f"{table.place(row)}: the first three columns of the matrix should be a rotation "
-            f"within {SKEW_TOLERANCE}, but R^T R is {skews[row]:.3g} off the identity"
+            f"within {SKEW_TOLERANCE}, but R^T R is {deviations[row]:.3g} off the identity"
         )
     mirrored_rows = np.flatnonzero(np.linalg.det(R) < 0)
     if mirrored_rows.size:
@@ -444,14 +445,14 @@ class ParsedTrajectory:
     notes: tuple[str, ...] = ()
 
     def stamped_by(self, frames_ns: Stamps) -> Stamps | None:
-        """Stamps (N,) for poses without stamps, selected from the stamps (F,) of all frames.
+        """The stamps (N,) of the poses in a file without stamps, given the stamps (F,) of all frames.
 
-        Without frame numbers, there must be one stamp for each pose.
-        None if a frame number has no stamp, or if the numbers of stamps and poses differ.
+        The poses are assigned to frames by their frame numbers. If the file has none, they are assigned in order, and
+        there must be as many poses as frames. None if a frame number is too large, or if the counts differ.
         """
         if self.frames is None:
-            is_one_each = len(frames_ns) == len(self.T)
-            return frames_ns if is_one_each else None
+            has_equal_counts = len(frames_ns) == len(self.T)
+            return frames_ns if has_equal_counts else None
         has_every_frame = self.frames[-1] < len(frames_ns)
         return frames_ns[self.frames] if has_every_frame else None
 
@@ -463,8 +464,8 @@ class TrajectoryReading:
     `unit` is the unit in which the stamps were read, None if the file has no stamps.
     `form_unit` is the default unit of the file's format, None for a format without stamps.
     `order` is the order in which quaternions were read, None if the file has none.
-    `says_truth` is True if the file's name or a comment in it mentions ground truth.
-    `is_unit_told` is True if the user specified the unit.
+    `says_truth` is whether the file's name or a comment in it mentions ground truth.
+    `is_unit_told` is whether the user specified the unit.
     """
 
     trajectory: Trajectory
@@ -482,11 +483,12 @@ def parse_any(
     unit: StampUnit | None = None,
     order: QuaternionOrder | None = None,
 ) -> ParsedTrajectory:
-    """The poses in the text of a TUM, KITTI, TartanAir or EuRoC file. The format is recognised by the content.
+    """The poses in the text of a TUM, KITTI, TartanAir or EuRoC file. The format is detected from the first row.
 
+    `written` is the text of the file.
     `name` is the file's name, for messages.
-    `unit` and `order` override the format's unit of stamps and order of quaternions.
-    If several rows have the same stamp, the first one is used.
+    `unit` and `order` override the detected unit of stamps and order of quaternion components.
+    If several rows have the same stamp, only the first of them is used.
     Raises TrajectoryError for a text without poses, an unknown format or a wrong row.
     """
     first_row = _first_row(written, name)
@@ -522,7 +524,10 @@ def _parse_numbered_matrices(table: TrajectoryTable) -> ParsedTrajectory:
 
 
 def _matrix_poses(table: TrajectoryTable) -> Array:
-    """The poses (N, 4, 4) whose first three matrix rows are the last 12 columns; rotations are not normalised."""
+    """The poses (N, 4, 4) in the last 12 columns, which are the upper three rows of the pose matrix, row by row.
+
+    The rotations are checked, but not normalised.
+    """
     matrices = table.values[:, -KITTI:].reshape(-1, 3, 4)
     R = matrices[:, :, :3]
     positions_m = matrices[:, :, 3]
