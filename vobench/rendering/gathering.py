@@ -177,7 +177,7 @@ class Rounds:
 
 
 def _at_rows(table: "csr_matrix", rows: Rows, count: int) -> "csr_matrix":
-    """A table with `count` rows with the rows of a table (N, S) at indices `rows` (N,); the other rows are empty."""
+    """A table with `count` rows: those of a table (N, S) at the indices `rows` (N,), and empty rows elsewhere."""
     entries = np.zeros(count, np.int64)
     entries[rows] = np.diff(table.indptr)
     starts = np.concatenate([[0], np.cumsum(entries)])

@@ -1,4 +1,4 @@
-"""The map of light as it is drawn: that of the stationary part, with the shade of movers and the light on them."""
+"""The light map as it is drawn: that of the stationary scene, with the shadows of movers and the light on them."""
 
 import ctypes
 from collections.abc import Mapping, Sequence
@@ -22,15 +22,15 @@ from vobench.rendering.view import Box, PinholeView
 from vobench.scene.light import Steady
 
 Views = Sequence[tuple[PinholeView, Box]]
-BLOCK = 64  # texels near one another, all of which are drawn or none
-CLUSTER = 16  # blocks that are culled together before each is
-WIDEST_M = 0.04  # between texels that are one to soft light: its shadows need no finer ones
-READ_M = 0.1  # from what a picture shows, as far as it reads light
-SHADOW_PX = 64  # along a side of one shadow map
-COLUMNS = 32  # of shadow maps in their atlas
-UNNOTICED = 1 / 150  # share of a place's direct light, about a step of 8 bits
-FLOAT16_STEP = 2.0**-11  # so much too small at most, once it is rounded down
-PLACED = 100_000  # texels at once
+BLOCK = 64  # the number of nearby sites that are drawn or culled together
+CLUSTER = 16  # the number of blocks that are culled together before they are culled one by one
+WIDEST_M = 0.04  # the largest distance between texels that share a site for soft light
+READ_M = 0.1  # the distance from the visible surfaces up to which a view reads the light map
+SHADOW_PX = 64  # the side of one shadow map
+COLUMNS = 32  # the number of shadow maps in a row of their atlas
+UNNOTICED = 1 / 150  # the largest invisible share of the direct light at a site, about one step of 8 bits
+FLOAT16_STEP = 2.0**-11  # the relative rounding error of float16
+PLACED = 100_000  # the number of texels whose positions are computed at a time
 FLOAT_BYTES = 4
 STEPS_PER_OCTAVE = 6  # of the light at a site, in its eight bits; the shader has the same
 
@@ -39,15 +39,18 @@ ATLAS = GL.GL_TEXTURE0
 MAPS = GL.GL_TEXTURE0 + 1
 
 SITE = np.dtype([("place", np.float32, 3), ("normal", np.int8, 4), ("texel", np.uint16, 2), ("width", np.float32)])
-# Place, normal and eta, texel, hard light, probe, gathered light: as the shader's locations.
+# The floats of each vertex attribute: position, normal and eta, texel, hard light, probe coordinate, indirect light.
 POINT_FLOATS = (3, 4, 2, 1, 1, 3)
 
 
 @dataclass(frozen=True, slots=True)
 class Sites:
-    """Texels (P,) of the stationary part, block by block of near ones; spheres around blocks and clusters.
+    """P points of the stationary scene at which shadows are drawn. Nearby sites are in the same block.
 
-    places_m, normals (P, 3). width_px (P,) is 2 where a site stands for its texel and those right, below and both.
+    `texels` (P,) are the indices of the sites' texels in the light map.
+    `places_m` and `normals` (P, 3) are their positions and normals.
+    `width_px` (P,) is 1, or 2 for a site that represents 2 x 2 texels, of which its own has the smallest index.
+    `blocks` and `clusters` are the bounding spheres of the blocks and of the clusters of blocks.
     """
 
     texels: Rows
@@ -58,7 +61,7 @@ class Sites:
     clusters: BoundingSphere
 
     def of_site(self, values: Floats, map_width: int) -> Floats:
-        """The least value (P,) of a map (H·W,) in each site's texels."""
+        """The smallest value (P,) of a map (H·W,) among the texels of each site."""
         least = values[self.texels]
         wide = np.flatnonzero(self.width_px == 2)
         for step in (1, map_width, map_width + 1):
@@ -66,7 +69,7 @@ class Sites:
         return least
 
     def shaded(self, movers: BoundingSphere, emitter: BoundingSphere, among: Mask) -> Rows:
-        """The blocks among some (N,) where movers may take some of an emitter's light."""
+        """The blocks in the mask `among` (N,) in which movers may block light of an emitter."""
         starts = np.arange(0, len(among), CLUSTER)
         clusters = np.flatnonzero(np.logical_or.reduceat(among, starts)) if len(starts) else starts
         clusters = clusters[may_shade(movers, emitter, self.clusters.take(clusters))]
@@ -76,7 +79,7 @@ class Sites:
         return np.asarray(blocks[may_shade(movers, emitter, self.blocks.take(blocks))])
 
     def seen(self, views: Views) -> Mask:
-        """The blocks (N,) that some of the views show, or read light beside."""
+        """Which blocks (N,) are in one of the views, or so close that a view reads their light."""
         seen_clusters = _seen(self.clusters, views)
         blocks = np.flatnonzero(np.repeat(seen_clusters, CLUSTER)[: len(self.blocks.radius_m)])
         result = np.zeros(len(self.blocks.radius_m), bool)
@@ -85,7 +88,7 @@ class Sites:
 
 
 def _seen(balls: BoundingSphere, views: Views) -> Mask:
-    """Which spheres (N,) some of the views show, or read light beside."""
+    """Which spheres (N,) are in one of the views, or so close that a view reads their light."""
     result = np.zeros(len(balls.radius_m), bool)
     for view, box in views:
         planes = bounds(view, box)
@@ -96,7 +99,7 @@ def _seen(balls: BoundingSphere, views: Views) -> Mask:
 
 
 def _sites(baked: BakedScene, owner: Owners, *, widest_m: float) -> Sites:
-    """All texels of the stationary part; four neighbours in one plane are one if they are no farther apart."""
+    """The sites of all stationary faces. Blocks of 2 x 2 texels up to `widest_m` apart in one plane share a site."""
     faces = baked.faces
     width = baked.atlas.width
     texels = np.flatnonzero((owner.face >= 0) & (faces.mover[owner.face] < 0))
@@ -146,7 +149,7 @@ def _sites(baked: BakedScene, owner: Owners, *, widest_m: float) -> Sites:
 
 
 def _boxes(low_m: Floats, high_m: Floats, count: int) -> tuple[Floats, Floats]:
-    """Boxes around so many boxes (N, 3) each, in their order."""
+    """The bounding boxes of each group of `count` consecutive boxes (N, 3)."""
     if not len(low_m):
         return low_m, high_m
     starts = np.arange(0, len(low_m), count)
@@ -159,14 +162,14 @@ def _around(low_m: Floats, high_m: Floats) -> BoundingSphere:
 
 
 def sky_shares(movers: MoverLight, sampled: Sequence[SampledEmitter], sites: Sites) -> Floats:
-    """Share (E, P) of its light that comes by each emitter to all texels; those of one block have the same."""
+    """The share (E, P) of a light's illuminance at each site that comes from each emitter; equal within a block."""
     middles = np.minimum(np.arange(len(sites.blocks.radius_m)) * BLOCK + BLOCK // 2, len(sites.texels) - 1)
     shares = movers.sky_shares(sampled, sites.places_m[middles], sites.normals[middles])
     return np.repeat(shares.T, BLOCK, axis=1)[:, : len(sites.texels)]
 
 
 class _ShadowAtlas:
-    """Moving bodies as all samples of emitters see them: nearness, one tile a map."""
+    """The shadow maps of all bodies in one depth texture, with a tile for each map."""
 
     def __init__(self) -> None:
         self.rows = 0
@@ -183,7 +186,7 @@ class _ShadowAtlas:
         return COLUMNS * SHADOW_PX, self.rows * SHADOW_PX
 
     def draw(self, at: MoverLightAt) -> None:
-        """Draw each body as every sample that reaches it sees it."""
+        """Draw the shadow map of each body for every sample whose light reaches it."""
         self._require_rows(max(-(-at.map_of.size // COLUMNS), 1))
         is_near = np.zeros((len(at.maps), 1, 4), np.float32)
         samples = np.broadcast_to(at.samples[:, 0, 3], at.map_of.shape)
@@ -232,7 +235,7 @@ class _ShadowAtlas:
 
 
 class _BufferTexture:
-    """Rows (N, 4) float32 that shaders read by index."""
+    """A float32 array (N, 4) whose rows shaders read by index."""
 
     def __init__(self) -> None:
         self._buffer = GL.glGenBuffers(1)
@@ -247,7 +250,7 @@ class _BufferTexture:
 
 
 class _Map:
-    """A map of light in colour that can be drawn onto."""
+    """A light map in colour that can be drawn to."""
 
     def __init__(self, width: int, height: int) -> None:
         self.id = GL.glGenTextures(1)
@@ -263,9 +266,10 @@ class _Map:
 
 
 class ShadedLight:
-    """A light texture for scenes with movers: `update` sets the light without them, `shade` puts them in.
+    """The texture of the light map of a scene with movers.
 
-    The shade is drawn where views lead, when they do; what is drawn at a texel depends on nothing but the instant.
+    `update` uploads the light without movers. `shade` adds their shadows and the light on them.
+    Shadows are drawn only where a view shows them. The value of a drawn texel depends on the time, not on the views.
     """
 
     def __init__(self, baked: BakedScene, values: Floats) -> None:
@@ -328,7 +332,7 @@ class ShadedLight:
         return buffer
 
     def _bind_sites(self, nth: int) -> None:
-        """Lay out the vertices of an emitter: all texels, with its direct light."""
+        """Define the vertex attributes of an emitter: its sites, and its direct light at each site."""
         GL.glBindVertexArray(self._site_arrays[nth])
         GL.glBindBuffer(GL.GL_ARRAY_BUFFER, self._site_buffers[self._is_hard[nth]])
         columns = (
@@ -347,9 +351,10 @@ class ShadedLight:
         GL.glVertexAttribPointer(3, 1, GL.GL_HALF_FLOAT, GL.GL_FALSE, 0, None)
 
     def _set_layer(self, nth: int, light_lx: Floats, share: Floats | float) -> None:
-        """Replace an emitter's direct light (H·W,) at level 1, the share of a light's (P,), where it is noticed.
+        """Upload the direct light of an emitter at its sites; it is 0 where it is too weak to be visible.
 
-        It is stored over its largest value, rounded down so that no more is taken than there is.
+        `light_lx` (H·W,) is the direct light of the emitter's light at level 1. `share` (P,) is the emitter's share.
+        Values are relative to the largest one, and reduced so that a shadow never removes more light than there is.
         """
         sites = self._site_sets[self._is_hard[nth]]
         site_lx = share * sites.of_site(light_lx, self._width)
@@ -362,7 +367,7 @@ class ShadedLight:
         GL.glBufferData(GL.GL_ARRAY_BUFFER, layer.nbytes, layer, GL.GL_DYNAMIC_DRAW)
 
     def update(self, values: Floats) -> None:
-        """Show a map (H, W, 3) without movers; the very array that is there already costs nothing."""
+        """Show a light map (H, W, 3) without movers. An array that is already shown is not uploaded again."""
         if values is self._base_values and self._key is None:
             return
         if values is not self._base_values:
@@ -376,7 +381,7 @@ class ShadedLight:
         self._restore()
 
     def _restore(self) -> None:
-        """Show the light without movers."""
+        """Show the uploaded light map without movers."""
         size = (self._width, self._height)
         GL.glBindFramebuffer(GL.GL_READ_FRAMEBUFFER, self._base.framebuffer)
         GL.glBindFramebuffer(GL.GL_DRAW_FRAMEBUFFER, self._drawn.framebuffer)
@@ -391,9 +396,9 @@ class ShadedLight:
         colours: Floats,
         views: Views,
     ) -> None:
-        """Put movers as they are at an instant into a map (H, W, 3), in lights of colours (L, 3) times their levels.
+        """Show a light map (H, W, 3) with the movers at a time, for lights with colours (L, 3) times their levels.
 
-        Their shade may be missing where none of the views leads.
+        Shadows may be missing where no view shows them.
         """
         if not self._movers.bodies:
             self.update(values)
@@ -418,7 +423,7 @@ class ShadedLight:
         self._end()
 
     def _draw_shade(self, nth: int, sites: Sites, among: Mask) -> None:
-        """Draw what movers take of an emitter's light at some of the blocks (N,)."""
+        """Subtract the light of an emitter that movers block, in the blocks of the mask `among` (N,)."""
         at = self._at
         if at is None:
             return
@@ -436,7 +441,7 @@ class ShadedLight:
         GL.glMultiDrawArrays(GL.GL_POINTS, firsts, counts, len(firsts))
 
     def _begin_moment(self, at: MoverLightAt, colours: Floats) -> None:
-        """Draw the shadow maps and the light on movers."""
+        """Draw the shadow maps and the light on movers for a new instant."""
         self._at = at
         self._colours = colours
         self._is_drawn = [np.zeros(len(sites.blocks.radius_m), bool) for sites in self._site_sets]
@@ -484,7 +489,7 @@ class ShadedLight:
         self._end()
 
     def _uniforms(self, nth: int, colour: Floats) -> NDArray[np.void]:
-        """The values of an emitter's block."""
+        """The values of the uniform block of an emitter."""
         at = self._at
         values = np.zeros((), SHADE.dtype)
         if at is None:
@@ -497,7 +502,7 @@ class ShadedLight:
         spheres = np.column_stack([at.spheres.centre_m, at.spheres.radius_m])
         sphere_body = at.sphere_body
         if len(spheres) > MOST_SPHERES:
-            # Then all bodies may hide what any does.
+            # The shader supports fewer spheres: one sphere around all of them stands for every body.
             sphere_body = np.full(1, -1)
             centre_m = spheres[:, :3].mean(0)
             reach_m = np.linalg.norm(spheres[:, :3] - centre_m, axis=1) + spheres[:, 3]
@@ -532,7 +537,7 @@ class ShadedLight:
         self._block.use(nth)
 
     def _begin(self) -> None:
-        """Add to the map of light from now on."""
+        """Set the OpenGL state for additive drawing to the light map."""
         GL.glBindFramebuffer(GL.GL_FRAMEBUFFER, self._drawn.framebuffer)
         GL.glViewport(0, 0, self._width, self._height)
         GL.glScissor(0, 0, self._width, self._height)
@@ -548,7 +553,7 @@ class ShadedLight:
 
 
 def _runs(blocks: Rows, count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """First and number (K,) of the texels, of so many, in blocks (N,); those of neighbours joined."""
+    """The first site and the number of sites of each run (K,) of consecutive blocks (N,), among `count` sites."""
     begins = np.flatnonzero(np.diff(blocks, prepend=-2) != 1)
     ends = np.append(begins[1:], len(blocks)) - 1
     firsts = blocks[begins] * BLOCK

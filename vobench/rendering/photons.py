@@ -205,7 +205,7 @@ class Reflectors:
         )
 
     def _texels(self, place: Rows, number: Floats) -> Texels:
-        """Random points in the areas of places (P,), as texels. They have no coat, so all arriving light counts."""
+        """Random points in the areas of places (P,), as texels without a coat, so that all arriving light counts."""
         count = len(place)
         across = number[2:] - np.float32(0.5)
         aside_m = across[0][:, None] * self._step_u_m[place] + across[1][:, None] * self._step_v_m[place]

@@ -195,7 +195,7 @@ class _Surfaces:
         return np.where(has_coat, fresnel(cosine, np.maximum(self._eta[hits.face], 1.0)), 0.0)
 
     def followed(self, rays: _Rays, hits: Hits) -> _Rays:
-        """The rays that continue behind panes, holes and backs of faces, or that mirrors, coats and metals reflect."""
+        """The rays that pass panes, holes and backs of faces, or that mirrors, coats and metals reflect."""
         face = hits.face
         planes = self._faces.plane[face]
         cosine = np.einsum("ij,ij->i", planes, rays.directions)
