@@ -144,6 +144,7 @@ def test_an_error_in_jupyter_is_one_line(here):
     assert line.startswith("UnknownNameError: no suite named 'tinny'. Did you mean 'tiny'?")
 
 
+@pytest.mark.slow
 def test_a_program_without_a_main_guard_runs_a_suite_once(here):
     """Workers must not import the program that started them."""
     (here / "program.py").write_text(

@@ -69,6 +69,7 @@ def test_a_board_orders_the_levels_of_noise_and_marks_the_oracle(bench, first):
     assert [finding for finding in verify_run(run) if finding.wrong] == []
 
 
+@pytest.mark.slow
 def test_a_covariance_of_the_body_becomes_the_cameras(bench, first, plugin):
     """The body's poses with noise, said to have its covariance: as honest as if the camera's were given."""
     folder = plugin(

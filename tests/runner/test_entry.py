@@ -126,6 +126,7 @@ def damaged(content: bytes, rng: random.Random) -> bytes:
 ROUNDS = 2
 
 
+@pytest.mark.slow
 def test_damage_to_any_file_of_every_entry_is_told_and_mended_and_scores_stay_equal(bench, first, tmp_path):
     """Lights, sequences, estimates and scores, their manifests among them: in each round one file of each entry."""
     rng, store, suite = random.Random(14), tmp_path / "cache", bench.plan()

@@ -157,6 +157,7 @@ def test_the_slip_of_every_frame_is_recorded_as_truth(base, dry):
     assert not none.any()
 
 
+@pytest.mark.slow
 def test_recordings_on_fresh_caches_in_this_process_and_in_another_are_the_same_bytes(base, tmp_path):
     again = recorded(tmp_path / "again")
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as worker:

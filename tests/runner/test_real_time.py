@@ -29,6 +29,7 @@ def slow(monkeypatch):
     monkeypatch.setattr(estimate_file, "EstimatorProcess", Slow)
 
 
+@pytest.mark.slow
 def test_60_ms_at_30_hz_loses_every_other_frame_and_the_board_says_so(bench, slow):
     run = bench.run(BOTH, RATE_30, cache="slow")
     trial = run.estimate("full", "wheel_odometry.real_time", 0)

@@ -216,6 +216,7 @@ def killed_amid_a_sequence(bench):
     raise AssertionError("no kill came before the end of the sequence")
 
 
+@pytest.mark.slow
 def test_a_killed_run_goes_on_and_ends_byte_identical_with_nothing_left_behind(bench, first):
     name = killed_amid_a_sequence(bench)
     resumed = bench.run(cache=name)
@@ -283,6 +284,7 @@ def test_who_gives_up_before_the_end_is_lost_however_much_it_covered(bench, firs
     assert score.reason == f"a pose for {score.coverage:.0%} of the frames and none at the end"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux lets a process forget its peak")
 def test_memory_does_not_grow_with_the_length_of_a_sequence(bench, plugin):
     script = Path(__file__).with_name("measure_memory.py")

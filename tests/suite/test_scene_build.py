@@ -191,6 +191,7 @@ def test_a_file_that_is_not_there_or_no_model_is_one_sentence(yard, tmp_path: Pa
         yard("meshes: [{file: bad.glb}]\n")
 
 
+@pytest.mark.slow
 def test_a_maker_gets_the_scenes_seed_and_what_it_raises_is_named(yard, tmp_path: Path) -> None:
     (tmp_path / "maker.py").write_text(MAKER)
     np.testing.assert_allclose(vertices(yard("maker: maker.py\n"), "column").mean(0)[:2], [3, 0], atol=0.05)
@@ -212,6 +213,7 @@ def make(seed):
 """
 
 
+@pytest.mark.slow
 def test_a_maker_may_return_meshes_of_trimesh_and_nothing_else(yard, tmp_path: Path) -> None:
     maker = tmp_path / "maker.py"
     maker.write_text(TRIMESH_MAKER)
