@@ -1,5 +1,7 @@
 """vobench realism measures a run's case and says what is off."""
 
+import pytest
+
 
 @pytest.mark.slow
 def test_a_case_is_measured_beside_the_bands_and_beside_another(vobench, ran, here):
