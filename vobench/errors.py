@@ -158,3 +158,8 @@ def require_known(kind: str, name: str, known: Iterable[str]) -> None:
     names = list(known)
     if name not in names:
         raise UnknownNameError(unknown_name_sentence(kind, name, names))
+
+
+def counted(number: int, noun: str) -> str:
+    """A number with a noun, in the plural unless it is 1."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vobench.metric.unit import make_design, place_mean, repeat_means, separate_places
+from vobench.metric.unit import make_design, mean_of_known, separate_places
 
 
 def test_drives_of_one_name_in_two_places_are_two():
@@ -35,10 +35,10 @@ def test_missing_values_are_left_out_at_every_level():
     means = design.means(values)
     assert means[0] == pytest.approx([4.0, 1.0])
     assert np.isnan(means[1, 0])
-    assert place_mean(means)[1] == 3.0
+    assert mean_of_known(means)[1] == 3.0
     repeats = np.array([[1.0, 3.0, np.nan], [np.nan, np.nan, np.nan]])
-    assert repeat_means(repeats)[0] == 2.0
-    assert np.isnan(repeat_means(repeats)[1])
+    assert mean_of_known(repeats)[0] == 2.0
+    assert np.isnan(mean_of_known(repeats)[1])
 
 
 def test_no_case_is_no_place():

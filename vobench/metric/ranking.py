@@ -15,7 +15,7 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.metric.significance import PairedDifference, holm, paired_difference, paired_p_values
-from vobench.metric.unit import Design, place_mean, repeat_means
+from vobench.metric.unit import Design, mean_of_known
 
 ALPHA = 0.05  # of the intervals of ranks and ratios, for all of a board together
 DECIDED = 0.02  # of the tests of neighbours, for all of a board together
@@ -80,7 +80,7 @@ class TrialTable:
 
     def log_losses_by_case(self) -> Array:
         """The mean logarithm of the loss by estimator and case (E, C)."""
-        return repeat_means(np.log(np.maximum(self.loss, MIN_LOSS)))
+        return mean_of_known(np.log(np.maximum(self.loss, MIN_LOSS)))
 
     def log_losses(self) -> Array:
         """The mean logarithm of the loss by estimator and place (E, P)."""
@@ -88,7 +88,7 @@ class TrialTable:
 
     def log_errors_by_case(self) -> Array:
         """The mean logarithm of the error by estimator and case (E, C), NaN where every trial failed."""
-        return repeat_means(np.log(np.maximum(self.error, MIN_LOSS)))
+        return mean_of_known(np.log(np.maximum(self.error, MIN_LOSS)))
 
 
 def trial_loss(lost_aware: float | None, *, survived: bool) -> float:
@@ -131,7 +131,7 @@ def rank(trials: TrialTable) -> list[Standing]:
 
 def _means(log_losses: Array) -> Array:
     """The mean (E,) over places, rounded so that equal ones are equal; 0 where no trial has a loss."""
-    means = np.nan_to_num(place_mean(log_losses))
+    means = np.nan_to_num(mean_of_known(log_losses))
     return np.asarray(np.round(means, DIGITS), float)
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vobench.errors import counted
 from vobench.geometry.se3 import Array
 from vobench.metric import nees
 from vobench.metric.ate import absolute
@@ -212,7 +213,7 @@ class Score:
 
     def __repr__(self) -> str:
         first = [f"{metric.name} {metric.statistics.rmse:.4g} {metric.unit}" for metric in self.metrics[:3]]
-        counts = f"{len(self.metrics)} metrics, {_count(len(self.warnings), 'warning')}"
+        counts = f"{len(self.metrics)} metrics, {counted(len(self.warnings), 'warning')}"
         return f"Score({', '.join(first)}, coverage {self.coverage.ratio:.3f}; {counts})"
 
     def to_frame(self) -> "pd.DataFrame":
@@ -351,8 +352,8 @@ def _matching_warnings(comparison: Comparison, covered: Coverage) -> Iterator[st
         yield _time_warning(covered)
     elif covered.gaps:
         yield (
-            f"the estimate has {n} of {_count(len(comparison.gt), 'frame')}; the first lost is "
-            f"{covered.first_lost_frame}, the longest gap {_count(covered.longest_gap_frames, 'frame')} "
+            f"the estimate has {n} of {counted(len(comparison.gt), 'frame')}; the first lost is "
+            f"{covered.first_lost_frame}, the longest gap {counted(covered.longest_gap_frames, 'frame')} "
             f"({covered.longest_gap_s:.3f} s)"
         )
     if n < n_estimated:
@@ -364,7 +365,7 @@ def _time_warning(covered: Coverage) -> str:
     return (
         f"the truth is too dense to have a pose a frame, so coverage counts time, in slots of {SLOT_NS / 1e9:g} s: "
         f"{covered.ratio:.1%}, the first pose after {covered.time_to_first_pose_s:.3f} s, "
-        f"{_count(covered.gaps, 'gap')}{longest}"
+        f"{counted(covered.gaps, 'gap')}{longest}"
     )
 
 
@@ -384,13 +385,8 @@ def _missing_warnings(comparison: Comparison, metrics: tuple[MetricResult, ...])
         yield "no lost-aware score: the truth is stationary, so its path has no length to compare errors with"
 
 
-def _count(number: int, noun: str) -> str:
-    """A number with a noun, in the plural unless it is 1."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
 def _delta(settings: ScoreSettings) -> str:
     """The distance between the poses of a pair, as text with its unit."""
     if settings.rpe_unit == "f":
-        return _count(int(settings.rpe_delta), "frame")
+        return counted(int(settings.rpe_delta), "frame")
     return f"{settings.rpe_delta:g} {UNIT_NAMES[settings.rpe_unit]}"

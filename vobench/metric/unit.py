@@ -68,20 +68,11 @@ def separate_places(cases: int) -> Design:
     return Design(numbers, numbers)
 
 
-def repeat_means(values: Array) -> Array:
-    """The means (..., C) of values (..., C, R) over the repeats that have one, NaN where none has."""
-    return _mean_of_known(values, axis=-1)
-
-
-def place_mean(values: Array) -> Array:
-    """The means (...) of values (..., P) over the places that have one, NaN where none has."""
-    return _mean_of_known(values, axis=-1)
-
-
-def _mean_of_known(values: Array, *, axis: int) -> Array:
+def mean_of_known(values: Array) -> Array:
+    """The means (...) of values (..., N), of repeats or places, over the known ones; NaN where none is known."""
     is_known = ~np.isnan(values)
-    counts = is_known.sum(axis=axis)
-    sums = np.where(is_known, values, 0.0).sum(axis=axis)
+    counts = is_known.sum(axis=-1)
+    sums = np.where(is_known, values, 0.0).sum(axis=-1)
     means = np.full(sums.shape, np.nan)
     np.divide(sums, counts, out=means, where=counts > 0)
     return means

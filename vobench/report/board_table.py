@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from math import floor, log10
 
+from vobench.errors import counted
 from vobench.report.board_metric import COSTS, METRICS
 from vobench.report.cell import Cell
 from vobench.report.cell_notes import notes
@@ -188,7 +189,7 @@ def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
     for group in groups:
         members = [total for total in board.totals if total.group == group]
         first = members[0]
-        counts = [_counted(first.cases, "case"), _counted(first.drives, "drive"), _counted(first.places, "place")]
+        counts = [counted(first.cases, "case"), counted(first.drives, "drive"), counted(first.places, "place")]
         scope = ", ".join([group, *counts] if group else counts)
         rows = [_total_row(total, headings) for total in members]
         tables.append((scope, [headings, *rows]))
@@ -197,10 +198,6 @@ def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
 
 def _total_row(total: Total, headings: Sequence[str]) -> list[str]:
     return [COLUMNS[heading](total) for heading in headings]
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}s" if count > 1 else f"{count} {noun}"
 
 
 def remarks(board: Board) -> list[str]:
@@ -221,7 +218,7 @@ def _undecided(above: Total, total: Total) -> str:
     more = (total.places_needed or 0) - total.places
     if more <= 0:
         return f"{order}; {found}"
-    return f"{order}; {found}, and {CHOSEN_RATIO:g} takes about {_counted(more, 'more place')}"
+    return f"{order}; {found}, and {CHOSEN_RATIO:g} takes about {counted(more, 'more place')}"
 
 
 def cell_notes(board: Board) -> list[str]:

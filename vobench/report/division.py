@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from vobench.report.cell import Cell
+from vobench.runner.folder import ORACLE, TrialScore
+from vobench.runner.score import NO_SCALE
 
 BASELINE = "baseline"
-ORACLE = "oracle"
 UNRANKED = (BASELINE, ORACLE)  # claims of estimators that are shown beside a ranking, not in it
-NO_SCALE = "Sim(3)"
 METRIC = "SE(3)"
 
 
@@ -36,9 +36,9 @@ class Division:
         return ", ".join(parts)
 
 
-def is_ranked(cell: Cell) -> bool:
-    """Whether the estimator of a cell has a rank: a baseline or an oracle has none."""
-    return not set(cell.claims) & set(UNRANKED)
+def is_ranked(of_estimator: Cell | TrialScore) -> bool:
+    """Whether the estimator of a cell or trial has a rank: a baseline or an oracle has none."""
+    return not set(of_estimator.claims) & set(UNRANKED)
 
 
 def divisions(cells: Sequence[Cell]) -> dict[Division, list[Cell]]:

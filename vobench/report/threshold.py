@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from vobench.errors import InputError, unknown_name_sentence
 from vobench.metric.definitions import DEFINITIONS
 from vobench.report.board_metric import COSTS, METRICS
-from vobench.report.division import UNRANKED
+from vobench.report.division import is_ranked
 from vobench.report.leaderboard import Board
 from vobench.runner.folder import SURVIVED, TrialScore, with_sequence
 
@@ -46,7 +46,7 @@ class Threshold:
         only if nothing else was run.
         """
         trials = with_sequence(scores)
-        competitors = [trial for trial in trials if not set(trial.claims) & set(UNRANKED)]
+        competitors = [trial for trial in trials if is_ranked(trial)]
         counted = competitors or trials
         if self.metric == FAILED:
             yield from self._broken_by_failures(counted)

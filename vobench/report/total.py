@@ -8,6 +8,7 @@ from statistics import fmean, median
 
 import numpy as np
 
+from vobench.errors import counted
 from vobench.metric import ranking
 from vobench.metric.unit import Design, make_design
 from vobench.report.cell import Cell
@@ -155,13 +156,9 @@ def _untested_remark(design: Design) -> list[str]:
     """The remark that there are too few drives or places for a test."""
     if design.drives >= ranking.MIN_DRIVES and design.places >= ranking.MIN_PLACES:
         return []
-    seen = f"{_counted(design.drives, 'drive')} in {_counted(design.places, 'place')}"
+    seen = f"{counted(design.drives, 'drive')} in {counted(design.places, 'place')}"
     required = f"{ranking.MIN_DRIVES} drives in {ranking.MIN_PLACES} places"
     return [f"Nothing is tested: {seen}, and a test requires {required}; ranks hold for these cases only"]
-
-
-def _counted(count: int, noun: str) -> str:
-    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def _trial_table(

@@ -5,7 +5,7 @@ from math import inf
 from statistics import fmean
 
 from vobench.errors import InputError, UnknownNameError
-from vobench.report.division import UNRANKED
+from vobench.report.division import is_ranked
 from vobench.runner.folder import STATUSES, SURVIVED, TrialScore, with_sequence
 
 CAMERAS = ("stereo", "mono", "colour")
@@ -41,7 +41,7 @@ def pick(scores: Sequence[TrialScore], *, case: str | None, estimator: str | Non
 
 def _most_telling(scores: Sequence[TrialScore]) -> list[TrialScore]:
     """The trials of estimators that see; without any those of estimators that are ranked, and else all."""
-    ranked_scores = [score for score in scores if not set(score.claims) & set(UNRANKED)]
+    ranked_scores = [score for score in scores if is_ranked(score)]
     seeing = [score for score in ranked_scores if set(score.sensors) & set(CAMERAS)]
     return seeing or ranked_scores or list(scores)
 

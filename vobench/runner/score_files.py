@@ -18,12 +18,12 @@ from vobench.metric.settings import ScoreSettings
 from vobench.runner.data_frame import data_frame
 from vobench.runner.metric_catalog import all_metrics
 from vobench.runner.trajectory_pair import TrajectorySource, read_pair
-from vobench.trajectory.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from vobench.runner.consistency import CovarianceConsistency
     from vobench.runner.data_frame import DataFrame
 
+NEES = "nees_pose"
 UNFITTED = ("none", "origin")  # alignments that use no pose but the first
 START_SHARE = 0.1  # of the largest variance: a smaller first one is the start of odometry
 ALL_TOGETHER = "pooled"  # what the rows of all sequences together are called
@@ -149,19 +149,13 @@ def _score_pair(
 
     covariance = read_covariances(pair.covariance, est.t_ns)
     scored = score(gt, est, settings=settings, metrics=metrics, covariance=covariance)
-    stated = CovarianceConsistency.of(_odometry_nees(gt, est, settings, covariance))
-    return ScoredPair(pair, scored, stated, read.by_frame, read.notes)
-
-
-def _odometry_nees(gt: Trajectory, est: Trajectory, settings: ScoreSettings, covariance: Array) -> Array:
-    """The NEES (K,) of poses; those of odometry are aligned at the first one, unless the settings fit nothing.
-
-    A fit over the whole path would take away part of the drift that the covariances of odometry state.
-    """
+    held = scored
     if settings.alignment not in UNFITTED and _states_drift(covariance):
-        settings = replace(settings, alignment="origin")
-    samples = score(gt, est, settings=settings, metrics=(DEFINITIONS["nees_pose"],), covariance=covariance).samples
-    return samples[0].errors
+        # A fit over the whole path would take away part of the drift that the covariances state.
+        at_origin = replace(settings, alignment="origin")
+        held = score(gt, est, settings=at_origin, metrics=(DEFINITIONS[NEES],), covariance=covariance)
+    nees = next(samples.errors for samples in held.samples if samples.of.id == NEES)
+    return ScoredPair(pair, scored, CovarianceConsistency.of(nees), read.by_frame, read.notes)
 
 
 def _states_drift(covariance: Array) -> bool:
