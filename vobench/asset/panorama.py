@@ -619,7 +619,7 @@ TREE_KINDS = 6
 
 
 @dataclass(frozen=True, slots=True)
-class _Tree:
+class _FarTree:
     """The look of a tree: opacity (N, N), normals (N, N, 3) to the right, up and towards the viewer, and its shade."""
 
     opacity: Floats
@@ -627,7 +627,7 @@ class _Tree:
     shade: Floats
 
 
-def _tree(rng: Rng) -> _Tree:
+def _tree(rng: Rng) -> _FarTree:
     """A crown of balls of leaves above a trunk, row 0 at the top."""
     places = (np.arange(TREE_PX, dtype=np.float32) + 0.5) / TREE_PX
     x, y = np.meshgrid(2 * places - 1, 1 - places)
@@ -662,7 +662,7 @@ def _tree(rng: Rng) -> _Tree:
     depth = np.clip((nearest + 0.3) / 0.6, 0, 1)
     shade = (0.45 + 0.55 * depth) * np.exp(0.25 * leaves)
     shade[trunk & (nearest < -8)] = 1.0
-    return _Tree(opacity, normals.astype(np.float32), shade.astype(np.float32))
+    return _FarTree(opacity, normals.astype(np.float32), shade.astype(np.float32))
 
 
 class _Trees:

@@ -125,7 +125,7 @@ def register() -> None:
     import drjit as dr
     import mitsuba as mi
 
-    class SunDisc(mi.Emitter):  # type: ignore[misc]
+    class SunPlugin(mi.Emitter):  # type: ignore[misc]
         """`irradiance` on a surface that faces `direction`, the unit vector towards the sun; itself unseen.
 
         Delta light to the integrator, as only emitter sampling finds it; its direction is drawn from the disc.
@@ -177,7 +177,7 @@ def register() -> None:
         def bbox(self) -> Any:
             return mi.ScalarBoundingBox3f()
 
-    mi.register_emitter(PLUGIN, SunDisc)
+    mi.register_emitter(PLUGIN, SunPlugin)
 
 
 SKY_PX = (512, 1024)  # rows and columns of the sky's picture: a third of a degree; even, so that none is the horizon
