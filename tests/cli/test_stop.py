@@ -128,10 +128,12 @@ def started(here):
         environment = os.environ | {"PYTHONPATH": search}
         process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         running.append(process)
+        lines = []
         for line in process.stderr:
             if line.strip().endswith(until):
                 return process
-        raise AssertionError(process.wait())
+            lines.append(line)
+        raise AssertionError(f"exit code {process.wait()} after it printed:\n{''.join(lines)}")
 
     yield start
     for process in running:

@@ -1,6 +1,7 @@
 """The command line: each command parses its arguments, calls one function and prints the result."""
 
 import atexit
+import faulthandler
 import os
 import select
 import signal
@@ -27,6 +28,8 @@ def main() -> None:
     """The entry point of the `vobench` command."""
     # Shown for names that have moved since the release a plugin was written for (`vobench/retired.py`).
     warnings.filterwarnings("default", message=r"vobench\.", category=DeprecationWarning)
+    if not faulthandler.is_enabled():
+        faulthandler.enable(STDERR)  # if a native library ends the process, the stack says where
     try:
         with _stoppable():
             from vobench.cli.app import run
