@@ -84,8 +84,7 @@ class SuiteError(InputError):
         lines = [str(mistake) for mistake in self._mistakes[:MOST_SAID]]
         more_count = len(self._mistakes) - len(lines)
         if more_count:
-            noun = "mistake" if more_count == 1 else "mistakes"
-            lines.append(f"and {more_count} more {noun}")
+            lines.append(f"and {counted(more_count, 'more mistake')}")
         super().__init__("\n".join(lines))
 
     @property
@@ -153,11 +152,12 @@ def unknown_name_sentence(kind: str, name: str, known: list[str]) -> str:
     return f"no {kind} named '{name}'.{guess} Known: {known_names}"
 
 
-def require_known(kind: str, name: str, known: Iterable[str]) -> None:
-    """Raise UnknownNameError, with the nearest known name, unless `name` is one of `known`."""
+def require_known(kind: str, name: str, known: Iterable[str]) -> str:
+    """Return `name` if it is one of `known`. Otherwise raise UnknownNameError with the nearest known name."""
     names = list(known)
     if name not in names:
         raise UnknownNameError(unknown_name_sentence(kind, name, names))
+    return name
 
 
 def counted(number: int, noun: str) -> str:

@@ -10,15 +10,15 @@ from pathlib import Path
 import pytest
 
 from vobench import __version__
-from vobench.cli import main
-from vobench.cli.app import VERBS, Verbs
+from vobench.cli import command_group, main
+from vobench.cli.command_group import CommandGroup
 from vobench.errors import UnknownNameError
 
 # ruff: noqa: E501 - a sentence stands in one line
 
 
 README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-COMMANDS = list(VERBS)
+COMMANDS = list(command_group.COMMANDS)
 HEAVY = ("numpy", "cv2", "pandas", "rerun", "scipy", "pydantic", "rich.table", "OpenGL", "trimesh")
 GT, EST = (
     "runs/tiny/latest/cases/short/ground_truth.tum",
@@ -49,7 +49,7 @@ def test_installed_commands_come_after_vobench_s_in_the_help_and_in_lists(vobenc
     install(tmp_path / "site", "zebra = vobench.cli.list:list_command\napple = vobench.cli.list:list_command\n")
     monkeypatch.syspath_prepend(str(tmp_path / "site"))
     names = [*COMMANDS, "apple", "zebra"]
-    assert Verbs().list_commands(None) == names
+    assert CommandGroup().list_commands(None) == names
     _, _, commands = vobench("--help").out.partition("Commands:\n")
     assert re.findall(r"^  (\w+)", commands, re.MULTILINE) == names
 

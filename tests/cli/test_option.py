@@ -6,7 +6,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from vobench.cli.app import Verbs
+from vobench.cli.command_group import CommandGroup
 from vobench.cli.option import RerunOptions, option_group, with_option_groups
 
 
@@ -86,7 +86,7 @@ def test_a_command_without_groups_is_unchanged():
 
 def test_a_shared_option_is_the_same_in_every_command_that_has_it():
     def helps(name, *commands):
-        options = [option for command in commands for option in Verbs().get_command(None, command).params]
+        options = [option for command in commands for option in CommandGroup().get_command(None, command).params]
         return [(option.help, option.opts) for option in options if option.name == name]
 
     for name, commands in (

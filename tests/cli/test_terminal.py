@@ -6,7 +6,6 @@ import pytest
 from rich.console import Console
 
 from vobench.cli import terminal
-from vobench.suite.catalog import CatalogEntry, find
 
 
 def test_no_text_of_others_steers_the_terminal():
@@ -17,15 +16,16 @@ def test_no_text_of_others_steers_the_terminal():
 
 
 @pytest.mark.parametrize(
-    ("origin", "name", "is_said"),
-    [("./estimators", "stand_still", True), ("path", "stand_still", False), ("./estimators", "mine", False)],
+    ("cells", "justify"),
+    [
+        (["1.5", "-3", "–"], "right"),
+        (["≥ 2", "+3 %", "×1.3", "[0.9, 1.1]", ".7", ""], "right"),
+        (["12 of 33", "4"], "right"),
+        (["1.5", "lost"], "left"),
+        (["stand_still"], "left"),
+        (["-e", "-j"], "left"),
+    ],
 )
-def test_an_estimator_that_hides_a_built_in_one_is_said(tmp_path, capsys, origin, name, is_said):
-    terminal.warn_about_hidden([CatalogEntry("estimator", name, tmp_path / name, origin)])
-    said = f"vobench: {name} is {tmp_path / name}, not the estimator included with vobench\n"
-    assert capsys.readouterr() == ("", said if is_said else "")
-
-
-def test_a_built_in_one_hides_none(capsys):
-    terminal.warn_about_hidden([find("estimator", "lk_epipolar")])
-    assert capsys.readouterr().err == ""
+def test_columns_of_numbers_alone_are_aligned_to_the_right(cells, justify):
+    column = terminal.table("", ["heading"], [[cell] for cell in cells]).columns[0]
+    assert column.justify == justify

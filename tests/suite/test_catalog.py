@@ -179,3 +179,17 @@ def test_a_folder_is_offered_as_a_path_only_for_the_kind_that_it_holds(here, kin
     with pytest.raises(UnknownNameError) as refused:
         catalog.find(kind, name)
     assert ("write ./" in str(refused.value)) is (kind == kind_inside)
+
+
+@pytest.mark.parametrize(
+    ("origin", "name", "is_said"),
+    [("./estimators", "stand_still", True), ("path", "stand_still", False), ("./estimators", "mine", False)],
+)
+def test_an_estimator_that_hides_a_built_in_one_is_said(tmp_path, origin, name, is_said):
+    sentences = catalog.hidden_builtins([catalog.CatalogEntry("estimator", name, tmp_path / name, origin)])
+    said = f"{name} is {tmp_path / name}, not the estimator included with vobench"
+    assert sentences == ([said] if is_said else [])
+
+
+def test_a_built_in_estimator_hides_none():
+    assert catalog.hidden_builtins([catalog.find("estimator", "lk_epipolar")]) == []

@@ -11,7 +11,7 @@ import typer
 from vobench import stop
 from vobench.cli import terminal
 from vobench.cli.option import Json
-from vobench.errors import InputError
+from vobench.errors import InputError, require_known
 from vobench.runner.key import cache_folder
 from vobench.runner.store import GB, Store, StoreEntry
 
@@ -36,7 +36,7 @@ def cache_command(
     json: Json = False,
 ) -> None:
     """List the content of the cache, make it smaller, or check all of it; exit code 1 if anything is damaged."""
-    terminal.known("action", action, ACTIONS)
+    require_known("action", action, ACTIONS)
     has_limits = keep_gb is not None or older is not None
     if has_limits and action != "gc":
         raise InputError(f"--keep-gb and --older require gc, not {action}")

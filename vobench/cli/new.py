@@ -9,7 +9,7 @@ import typer
 
 from vobench.cli import terminal
 from vobench.cli.option import Json
-from vobench.errors import InputError
+from vobench.errors import InputError, require_known
 from vobench.suite.scaffold import new_scene, new_suite, require_free, require_name
 
 SCAFFOLD = Path(__file__).parent / "scaffold"
@@ -48,7 +48,7 @@ def new_command(
     json: Json = False,
 ) -> None:
     """Create an estimator, a suite or a scene that works as it is."""
-    terminal.known("kind of thing to create", kind, tuple(CREATE))
+    require_known("kind of thing to create", kind, tuple(CREATE))
     if command and kind != "estimator":
         raise InputError(f"--command requires an estimator, not a {kind}")
     if source and kind == "estimator":

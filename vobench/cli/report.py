@@ -11,7 +11,7 @@ import typer
 from vobench.cli import terminal
 from vobench.cli.board import print_board
 from vobench.cli.option import Json
-from vobench.errors import UnknownNameError
+from vobench.errors import UnknownNameError, require_known
 from vobench.report import page
 from vobench.report.board_formats import FORMATS
 from vobench.report.board_metric import METRICS
@@ -65,7 +65,7 @@ def report_command(
 ) -> None:
     """Print the leaderboard of runs; all trials are scored again from their estimates and ground truth."""
     format_name = _choose_format(form, out, as_json=json)
-    terminal.known("metric", metric, METRICS)
+    require_known("metric", metric, METRICS)
     with ExitStack() as stack:
         signatures = [signature for run in runs if (signature := _signature(run, allowed_signers))]
         wrong_truth_by_case = dict[str, str]()
@@ -97,9 +97,9 @@ def _choose_format(form: str | None, out: Path | None, *, as_json: bool) -> str:
     if out is None:
         if as_json:
             return "json"
-        return terminal.known("format", form or TERMINAL, (TERMINAL, *FILE_FORMATS))
+        return require_known("format", form or TERMINAL, (TERMINAL, *FILE_FORMATS))
     if form is not None:
-        return terminal.known("format", form, FILE_FORMATS)
+        return require_known("format", form, FILE_FORMATS)
     if out.suffix.lower() not in FORMAT_BY_ENDING:
         known = ", ".join(FILE_FORMATS)
         raise UnknownNameError(f"no format has the ending of '{out.name}'; choose one with --format: {known}")

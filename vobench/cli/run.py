@@ -20,6 +20,7 @@ from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
 from vobench.runner.preflight import summarize
 from vobench.runner.store import SilentProgress
+from vobench.suite.catalog import hidden_builtins
 from vobench.suite.plan import Plan
 from vobench.suite.suite import read_plan
 
@@ -156,7 +157,8 @@ def run_command(
 
     thresholds = [parse_threshold(text) for text in fail_if or ()]
     plan = selection.read_plan(suite, changes.values())
-    terminal.warn_about_hidden(plan.found)
+    for sentence in hidden_builtins(plan.found):
+        terminal.warn(sentence)
     plan = limits.apply(plan)
     if dry_run:
         print_summary(summarize(plan, with_stages=True), as_json=json)

@@ -5,6 +5,7 @@ from typing import Annotated
 import typer
 
 from vobench.cli import terminal
+from vobench.errors import require_known
 from vobench.estimator.manifest import Manifest
 from vobench.suite.scenario import ScenarioFile
 from vobench.suite.scene_spec import SceneFile
@@ -24,5 +25,5 @@ def schema_command(
 ) -> None:
     """Print the JSON Schema of a suite's, scenario's, scene's or estimator's YAML, for editors and other programs."""
     del json
-    settings = FILES[terminal.known("schema", kind, FILES)]
+    settings = FILES[require_known("schema", kind, FILES)]
     terminal.print_json({"$schema": DIALECT, **json_schema(settings)})

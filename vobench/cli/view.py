@@ -8,7 +8,7 @@ import typer
 
 from vobench.cli import terminal
 from vobench.cli.option import Json, RunPath, option_group, with_option_groups
-from vobench.errors import InputError
+from vobench.errors import InputError, require_known
 from vobench.report.rerun import PictureForm
 from vobench.report.viewer import TrialRecording, open_viewer, save_recordings
 from vobench.runner.folder import open_run
@@ -60,7 +60,7 @@ def view_command(
     json: Json = False,
 ) -> None:
     """Show a run in Rerun, failures first."""
-    form = IMAGE_FORMS[terminal.known("form of pictures", pictures, IMAGE_FORMS)]
+    form = IMAGE_FORMS[require_known("form of pictures", pictures, IMAGE_FORMS)]
     selection.require_consistent()
     recordings = save_recordings(
         open_run(run),

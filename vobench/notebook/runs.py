@@ -281,25 +281,17 @@ def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | No
 
     A ratio of losses above `at_most` counts as worse. A run is a `Run`, its folder or a bundle. All trials are scored
     again from their estimates and ground truths; a UserWarning names those whose stored score differs. Raises
-    InputError if the two runs have nothing in common.
+    InputError if the two runs have nothing in common, or have different cases with the same name.
     """
     import pandas as pd
 
-    from vobench.report import compare as comparison
-    from vobench.report import page
-    from vobench.runner.bundle import opened
-    from vobench.runner.rescore import check, wrong_truths
+    from vobench.report.run_comparison import compare_runs
 
-    boards = []
-    for given in (old, new):
-        path = run_path(given)
-        with opened(path) as folder:
-            checked = check(folder, wrong_truths(folder) if path.is_file() else {})
-            boards.append(page.run_board(folder, checked.scores))
-        for note in checked.notes:
-            warnings.warn(f"{path.name}: {note}", stacklevel=2)
-    changes = comparison.compare(boards[0], boards[1], at_most=at_most)
-    return pd.DataFrame([_change_row(change) for change in changes])
+    notes: list[str] = []
+    comparison = compare_runs(run_path(old), run_path(new), notes.append, at_most=at_most)
+    for note in notes:
+        warnings.warn(note, stacklevel=2)
+    return pd.DataFrame([_change_row(change) for change in comparison.changes])
 
 
 def bundle(run: Run | Path | str, out: Path | str) -> Path:

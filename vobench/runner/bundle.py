@@ -327,12 +327,25 @@ def _is_same_path(one: Path, other: Path) -> bool:
     return bool(np.allclose(first.T_world_frame, second.T_world_frame, rtol=0, atol=SAME_POSE))
 
 
+def require_same_cases(old: RunFolder, new: RunFolder) -> None:
+    """Raise InputError if two runs have different cases with the same name."""
+    for case in sorted({score.case for score in new.scores()}):
+        _require_same_case(case, old.case(case), new.case(case), "the new run")
+
+
+def _require_same_case(case: str, one: Path, other: Path, name: str) -> None:
+    """Raise InputError if the folders of a case contain different true paths. `name` is the run of the other folder."""
+    one_truth = one / GROUND_TRUTH
+    other_truth = other / GROUND_TRUTH
+    has_both = one_truth.is_file() and other_truth.is_file()
+    if has_both and not _is_same_path(one_truth, other_truth):
+        raise InputError(f"case {case!r} is another one in {name}: its true path differs, so runs cannot be compared")
+
+
 def _link_case(folder: RunFolder, made: RunFolder, case: str, name: str) -> None:
     source = folder.case(case)
     target = made.case(case)
-    truths = [place / GROUND_TRUTH for place in (source, target)]
-    if all(truth.is_file() for truth in truths) and not _is_same_path(*truths):
-        raise InputError(f"case {case!r} is another one in {name}: its true path differs, so runs cannot be compared")
+    _require_same_case(case, target, source, name)
     target.mkdir(parents=True, exist_ok=True)
     # A run that could not create the case has no true path of it. The path of another run is linked then.
     for path in (source / each for each in (*OF_CASE, SEQUENCE)):

@@ -1,6 +1,7 @@
 """Reads the recordings of a plan before it is run, and imports them to the store as sequences."""
 
 import hashlib
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ from vobench.dataset.recording import NO_TRUTH, ReadOptions, Recording, Topics
 from vobench.errors import SuiteError
 from vobench.runner.ground_truth import is_known
 from vobench.runner.key import versions
+from vobench.runner.store import sweep, unfinished
 from vobench.suite.plan import Plan
 from vobench.suite.source import FILE_KEYS, RecordedCase
 from vobench.suite.yaml_file import plain
@@ -55,6 +57,36 @@ def read_case(case: RecordedCase) -> Recording:
     topics = Topics(**source.topics)
     options = ReadOptions(**files, rate_hz=source.rate_hz, topics=topics)
     return read(Path(source.path), form=source.form, options=options)
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedSequence:
+    """The form of a dataset that was imported, its number of frames, and notes on what was assumed or left out."""
+
+    form: str
+    frame_count: int
+    notes: tuple[str, ...]
+
+
+def import_dataset(path: Path, out: Path, *, form: str | None, options: ReadOptions) -> ImportedSequence:
+    """Convert a dataset's folder or a bag to a sequence in a new folder.
+
+    Without a form, it is recognized. Raises VobenchError if the dataset cannot be read, or `out` is not free.
+    """
+    from vobench.dataset.layout import read
+    from vobench.dataset.picture import require_free
+    from vobench.sequence import Sequence
+
+    require_free(out)
+    recording = read(path, form=form, options=options)
+    parent = out.resolve().parent
+    sweep(parent)
+    with unfinished(parent) as folder:
+        import_recording(recording, folder)
+        if out.is_dir():
+            out.rmdir()
+        folder.rename(out)
+    return ImportedSequence(recording.form, len(Sequence.open(out)), tuple(recording.notes))
 
 
 def import_recording(recording: Recording, folder: Path) -> None:

@@ -13,7 +13,7 @@ suites/scenarios/.
 
 import os
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from glob import escape
 from importlib.metadata import entry_points
@@ -55,6 +55,21 @@ class CatalogEntry:
     name: str
     path: Path
     origin: str
+
+
+def hidden_builtins(entries: Iterable[CatalogEntry]) -> list[str]:
+    """A sentence on each estimator that hides the built-in estimator of the same name.
+
+    An estimator that is given by its path hides none.
+    """
+    sentences = []
+    for entry in entries:
+        if entry.kind != "estimator" or entry.origin == "path":
+            continue
+        builtin = builtin_root() / "estimators" / entry.name
+        if builtin.is_dir() and entry.path.resolve() != builtin.resolve():
+            sentences.append(f"{entry.name} is {entry.path}, not the estimator included with vobench")
+    return sentences
 
 
 def builtin_root() -> Path:
