@@ -289,7 +289,8 @@ def _first_failure(copy: Path, arguments: Sequence[str]) -> Failure | None:
     log = copy / "pytest.log"
     cache = copy / ".pytest_cache"
     shutil.rmtree(cache, ignore_errors=True)
-    options = ["-x", "-v", "-n", "0", "-m", "", "-o", f"cache_dir={cache}", "--no-header", "--tb=no"]
+    own_files = ["-o", f"cache_dir={cache}", f"--basetemp={copy.parent / 'tests'}"]
+    options = ["-x", "-v", "-n", "0", "-m", "", "--no-header", "--tb=no", *own_files]
     environment = {
         **os.environ,
         "PYTHONPATH": str(copy),

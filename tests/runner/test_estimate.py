@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 from vobench.errors import TrajectoryError
+from vobench.estimator.process import EstimatorProcess
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import ImuCalibration, Rig, stereo_rig
-from vobench.estimator.process import EstimatorProcess
 from vobench.runner import estimate as estimate_file
 from vobench.runner.estimate import estimate
 from vobench.runner.folder import read_tum
