@@ -8,7 +8,7 @@ Each mutant changes one operator, constant or condition of one file, in a copy o
 module (``tests/<room>/test_<module>.py``) run first, then the quick tests of the room, then its slow ones, until one
 fails. The verdict is
 
-- killed: a test fails, or runs for more than ten minutes. The same test passes on the unchanged code.
+- killed: a test fails, or runs for more than five minutes. The same test passes on the unchanged code.
 - SURVIVED: all tests of the room pass. A test is missing, or the change is equivalent; that is for a reader to decide.
 - INVALID: the test that fails also fails on the unchanged code. Repair it, then try the mutant again.
 """
@@ -38,7 +38,7 @@ Verdict = Literal["killed", "SURVIVED", "INVALID"]
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("vobench", "tests", "scenes", "estimators", "suites", "docs", "examples", "benchmarks")
-TEST_TIME_LIMIT_S = 600.0  # a test that runs longer hangs, and counts as failed
+TEST_TIME_LIMIT_S = 300.0  # a test that runs longer hangs, and counts as failed
 LOOK_S = 0.1  # between looks whether pytest has ended
 NO_TESTS_COLLECTED = 5  # the exit code of pytest
 
