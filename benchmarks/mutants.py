@@ -2,29 +2,45 @@
 
     python benchmarks/mutants.py analysis                    # twenty mutants of one room
     python benchmarks/mutants.py report suite --count 10 --seed 3
-    python benchmarks/mutants.py analysis --only 7           # one of them again
+    python benchmarks/mutants.py analysis --only 7 12        # two of them again
 
 Each mutant changes one operator, constant or condition of one file, in a copy of the repository. The tests of that
-module (``tests/<room>/test_<module>.py``) run first, then the rest of the room's tests. A mutant survives if all of
-them pass; a survivor is either a missing test or an equivalent change, which a reader must decide.
+module (``tests/<room>/test_<module>.py``) run first, then the quick tests of the room, then its slow ones, until one
+fails. The verdict is
+
+- killed: a test fails, or runs for more than five minutes. The same test passes on the unchanged code.
+- SURVIVED: all tests of the room pass. A test is missing, or the change is equivalent; that is for a reader to decide.
+- INVALID: the test that fails also fails on the unchanged code. Repair it, then try the mutant again.
 """
 
 import argparse
 import ast
+import compileall
 import json
 import os
 import random
+import re
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+import time
+from collections import Counter
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from py_compile import PycInvalidationMode
+from typing import Any, Literal
+
+Verdict = Literal["killed", "SURVIVED", "INVALID"]
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("vobench", "tests", "scenes", "estimators", "suites", "docs", "examples", "benchmarks")
-TEST_TIME_LIMIT_S = 900.0  # a mutant that makes the tests hang counts as noticed
+TEST_TIME_LIMIT_S = 300.0  # a test that runs longer hangs, and counts as failed
+LOOK_S = 0.1  # between looks whether pytest has ended
+NO_TESTS_COLLECTED = 5  # the exit code of pytest
 
 COMPARISONS = {
     ast.Lt: "<=",
@@ -56,8 +72,9 @@ class Mutant:
         """The changed file."""
         return source[: self.first] + self.replacement.encode() + source[self.last :]
 
-    def describe(self, source: bytes) -> str:
+    def describe(self) -> str:
         """File, line and the line's text with the change in it."""
+        source = (ROOT / self.path).read_bytes()
         line_start = source.rfind(b"\n", 0, self.first) + 1
         line_end = source.find(b"\n", self.last)
         before = source[line_start : self.first].decode()
@@ -175,7 +192,11 @@ def _still_parses(mutant: Mutant) -> bool:
 
 
 def copy_of_the_repository(folder: Path) -> Path:
-    """Copies what the tests need into a folder, so that the working tree stays untouched."""
+    """Copies what the tests need into a folder, so that the working tree stays untouched.
+
+    The copy is compiled once. Python compares the compiled files with hashes of their sources, so that it never uses
+    the compiled file of another mutant.
+    """
     copy = folder / "vobench"
     copy.mkdir()
     for name in COPIED:
@@ -183,88 +204,207 @@ def copy_of_the_repository(folder: Path) -> Path:
     for file in ROOT.glob("*.*"):
         if file.is_file():
             shutil.copy2(file, copy / file.name)
+    compileall.compile_dir(copy / "vobench", quiet=1, invalidation_mode=PycInvalidationMode.CHECKED_HASH)
     return copy
 
 
-def is_noticed(copy: Path, room: str, mutant: Mutant) -> str:
-    """The first failing test (or ``timeout``); empty if every test of the room passes."""
-    room_tests = Path("tests") / room
-    module_tests = room_tests / f"test_{mutant.path.stem}.py"
-    stages = [[str(room_tests)]]
-    if (copy / module_tests).exists():
-        stages = [[str(module_tests)], [str(room_tests), f"--ignore={module_tests}"]]
+@dataclass(frozen=True, slots=True)
+class Failure:
+    """The first test that failed, by its pytest id, and whether it was ended because it hung."""
+
+    test: str
+    hung: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """The outcome of one mutant: a verdict, and the test that failed if there was one."""
+
+    verdict: Verdict
+    failure: Failure | None = None
+
+    def describe(self) -> str:
+        """A clause about the test; empty if all tests passed."""
+        if self.failure is None:
+            return ""
+        if self.verdict == "INVALID":
+            return f"fails without the mutant, too: {self.failure.test}"
+        how = "hangs" if self.failure.hung else "fails"
+        return f"{how}: {self.failure.test}"
+
+
+def try_mutant(copy: Path, room: str, mutant: Mutant) -> Outcome:
+    """Runs the tests of a room on one mutant until one fails.
+
+    A failure counts only if the same test passes on the unchanged code.
+    """
+    original = (copy / mutant.path).read_bytes()
+    (copy / mutant.path).write_bytes(mutant.apply(original))
+    try:
+        failure = _first_failure_of_the_room(copy, room, mutant.path.stem)
+    finally:
+        (copy / mutant.path).write_bytes(original)
+
+    if failure is None:
+        return Outcome("SURVIVED")
+    fails_unchanged = _first_failure(copy, [failure.test]) is not None
+    return Outcome("INVALID" if fails_unchanged else "killed", failure)
+
+
+def _first_failure_of_the_room(copy: Path, room: str, module: str) -> Failure | None:
+    """The first failure, looked for where it is most likely and cheapest: own tests, quick ones, slow ones."""
+    own, others = test_files(copy, room, module)
+    stages = []
+    if own:
+        stages.append([*own])
+    if others:
+        stages.append([*others, "-m", "not slow"])
+        stages.append([*others, "-m", "slow"])
     for stage in stages:
         failure = _first_failure(copy, stage)
         if failure:
             return failure
-    return ""
+    return None
 
 
-def _first_failure(copy: Path, arguments: list[str]) -> str:
-    options = ["-x", "-q", "-n", "0", "-m", "", "-p", "no:cacheprovider", "--no-header", "--tb=no"]
-    command = [sys.executable, "-m", "pytest", *options, *arguments]
-    environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
-    try:
-        result = subprocess.run(
-            command,
-            check=False,
+def test_files(copy: Path, room: str, module: str) -> tuple[list[str], list[str]]:
+    """The test file of a module, if there is one, and the others of its room: first those that import the module."""
+    imports_it = re.compile(rf"\b{room}\.{module}\b|from vobench\.{room} import .*\b{module}\b")
+    own = []
+    importing = []
+    others = []
+    for path in sorted((copy / "tests" / room).glob("test_*.py")):
+        name = str(path.relative_to(copy))
+        if path.stem == f"test_{module}":
+            own.append(name)
+        elif imports_it.search(path.read_text(encoding="utf-8")):
+            importing.append(name)
+        else:
+            others.append(name)
+    return own, [*importing, *others]
+
+
+def _first_failure(copy: Path, arguments: Sequence[str]) -> Failure | None:
+    """Runs pytest in the copy. Returns its first failing test, or the test that runs longer than the limit."""
+    log = copy / "pytest.log"
+    cache = copy / ".pytest_cache"
+    shutil.rmtree(cache, ignore_errors=True)
+    own_files = ["-o", f"cache_dir={cache}", f"--basetemp={copy.parent / 'tests'}"]
+    options = ["-x", "-v", "-n", "0", "-m", "", "--no-header", "--tb=no", *own_files]
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(copy),
+        "PYTHONDONTWRITEBYTECODE": "1",
+        "VOBENCH_CACHE": str(copy.parent / "cache"),
+    }
+    with log.open("wb") as output:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "pytest", *options, *arguments],
             cwd=copy,
             env=environment,
-            capture_output=True,
-            text=True,
-            timeout=TEST_TIME_LIMIT_S,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+            start_new_session=True,
         )
-    except subprocess.TimeoutExpired:
-        return "timeout"
-    if result.returncode in (0, 5):  # 5: no test collected
-        return ""
-    for line in result.stdout.splitlines():
-        if line.startswith(("FAILED", "ERROR")):
-            return line
-    return (result.stdout + result.stderr).strip().splitlines()[-1]
+        try:
+            hung = _await_end(process, log)
+        finally:
+            _end_group(process)
+
+    lines = log.read_text(encoding="utf-8", errors="replace").splitlines()
+    if hung:
+        started = [line for line in lines if "::" in line]
+        return Failure(started[-1].split(" PASSED")[0].strip() if started else arguments[0], hung=True)
+    if process.returncode in (0, NO_TESTS_COLLECTED):
+        return None
+    failed = cache / "v/cache/lastfailed"
+    if not failed.is_file():  # pytest itself failed, for example to import conftest.py
+        return Failure(arguments[0])
+    return Failure(next(iter(json.loads(failed.read_text(encoding="utf-8")))))
+
+
+def _await_end(process: subprocess.Popen[bytes], log: Path) -> bool:
+    """Waits for pytest, which writes a line before and after each test. Returns whether a test exceeds the limit."""
+    size = 0
+    changed_s = time.monotonic()
+    while process.poll() is None:
+        time.sleep(LOOK_S)
+        if log.stat().st_size != size:
+            size = log.stat().st_size
+            changed_s = time.monotonic()
+        if time.monotonic() - changed_s > TEST_TIME_LIMIT_S:
+            return True
+    return False
+
+
+def _end_group(process: subprocess.Popen[bytes]) -> None:
+    """Kills pytest and the processes that it started, as far as they have not left its session."""
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def try_room(copy: Path, room: str, numbered: Iterable[tuple[int, Mutant]]) -> list[dict[str, Any]]:
+    """Tries the mutants of a room, and prints the verdict on each one and their count."""
+    rows = []
+    verdicts: Counter[Verdict] = Counter()
+    for number, mutant in numbered:
+        outcome = try_mutant(copy, room, mutant)
+        verdicts[outcome.verdict] += 1
+        print(f"{number:3d} {outcome.verdict:8s} {mutant.describe()}", flush=True)
+        if outcome.failure:
+            print(f"             {outcome.describe()}", flush=True)
+        rows.append(
+            {
+                "room": room,
+                "number": number,
+                "mutant": mutant.describe(),
+                "verdict": outcome.verdict,
+                "test": outcome.failure.test if outcome.failure else "",
+            }
+        )
+    valid = verdicts["killed"] + verdicts["SURVIVED"]
+    print(f"{room}: {verdicts['killed']} of {valid} mutants killed", flush=True)
+    if verdicts["INVALID"]:
+        print(f"{room}: {verdicts['INVALID']} more are not counted, because a test fails on the unchanged code")
+    return rows
 
 
 def main() -> int:
-    """Reads the command line, tries each mutant and prints one line for it."""
+    """Reads the command line, and prints the mutants or tries them."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("rooms", nargs="+", help="folders of vobench/, as in analysis")
-    parser.add_argument("--count", type=int, default=20, help="mutants a room")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--only", type=int, help="number of one mutant (from 1)")
-    parser.add_argument("--list", action="store_true", help="print the mutants and run nothing")
-    parser.add_argument("--json", type=Path, help="write the outcomes here, too")
+    parser.add_argument("rooms", nargs="+", help="folders of vobench/, for example analysis")
+    parser.add_argument("--count", type=int, default=20, help="number of mutants per room (default 20)")
+    parser.add_argument("--seed", type=int, default=1, help="another seed draws other mutants (default 1)")
+    parser.add_argument("--only", type=int, nargs="+", metavar="N", help="try only the mutants with these numbers")
+    parser.add_argument("--list", action="store_true", help="print the mutants without running tests")
+    parser.add_argument("--json", type=Path, help="also write the outcomes to this file")
     options = parser.parse_args()
+    for room in options.rooms:
+        if not (ROOT / "vobench" / room).is_dir():
+            parser.error(f"no such room: vobench/{room}")
 
-    outcomes = []
+    if options.list:
+        for room in options.rooms:
+            for number, mutant in _chosen(room, options):
+                print(f"{number:3d} {mutant.describe()}")
+        return 0
+
+    rows = []
+    signal.signal(signal.SIGTERM, signal.default_int_handler)  # so that the copy is removed and pytest is ended
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copy = copy_of_the_repository(Path(folder))
         for room in options.rooms:
-            killed = 0
-            tried = 0
-            for number, mutant in enumerate(draw(room, options.count, options.seed), start=1):
-                if options.only not in (None, number):
-                    continue
-                original = (ROOT / mutant.path).read_bytes()
-                description = mutant.describe(original)
-                if options.list:
-                    print(f"{number:3d} {description}")
-                    continue
-
-                (copy / mutant.path).write_bytes(mutant.apply(original))
-                try:
-                    failure = is_noticed(copy, room, mutant)
-                finally:
-                    (copy / mutant.path).write_bytes(original)
-
-                tried += 1
-                killed += bool(failure)
-                outcomes.append({"room": room, "number": number, "mutant": description, "killed_by": failure})
-                print(f"{number:3d} {'killed  ' if failure else 'SURVIVED'} {description}", flush=True)
-            if tried:
-                print(f"{room}: {killed} of {tried} mutants killed", flush=True)
+            rows += try_room(copy, room, _chosen(room, options))
     if options.json:
-        options.json.write_text(json.dumps(outcomes, indent=2) + "\n")
+        options.json.write_text(json.dumps(rows, indent=2) + "\n")
     return 0
+
+
+def _chosen(room: str, options: argparse.Namespace) -> list[tuple[int, Mutant]]:
+    """The mutants of a room that the command line asks for, with their numbers from 1."""
+    numbered = enumerate(draw(room, options.count, options.seed), start=1)
+    return [(number, mutant) for number, mutant in numbered if options.only is None or number in options.only]
 
 
 if __name__ == "__main__":

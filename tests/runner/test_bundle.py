@@ -115,6 +115,12 @@ def test_the_same_estimators_trials_are_repeats_of_one_another_and_another_ones_
     assert found == [("mine", 0), ("mine", 1), ("mine of c", 0)]
 
 
+def test_a_run_without_a_name_is_not_left_out_of_a_merge(make):
+    runs = [make("a"), make("b")]
+    with pytest.raises(ValueError, match="shorter"), merged(runs, ["a"]):
+        pass
+
+
 def test_a_case_that_one_of_two_merged_runs_could_not_make_is_the_others(make):
     partial, whole = make("partial"), make("whole")
     case, *_ = CASES

@@ -81,6 +81,13 @@ def test_rims_that_turn_backwards_and_forwards_alike_are_a_turn_on_the_spot(read
     assert spin.as_dict()["path_m"] == pytest.approx(0, abs=1e-9)
 
 
+def test_a_turn_at_a_constant_rate_is_the_same_angle_from_frame_to_frame(read):
+    changes = ("angle_deg: 90, mover: unicycle", "angle_deg: 90, mover: unicycle, rate_hz: 20")
+    (spin,) = drive_plan(read(changes), trajectory="spin").drives
+    facts = spin.as_dict()
+    assert facts["max_turn_per_frame_deg"] == pytest.approx(facts["max_turn_degps"] / 20, rel=1e-3)
+
+
 def test_csv_and_tum_hold_the_true_motion_of_every_frame(read):
     (lift,) = drive_plan(read(), trajectory="lift").drives
     path = parse_tum(lift.tum(), name="lift")
@@ -96,6 +103,8 @@ def test_some_frames_are_those_of_the_whole_drive(read):
     part = drive_plan(read(("name: trajectories", "name: trajectories\nframes: [40, 70]")), trajectory="legs").drives[0]
     for name in ("voltages_V", "references", "rim_rad"):
         np.testing.assert_array_equal(getattr(part, name), getattr(whole, name)[40:70])
+    t_ns = whole.motion.t_ns
+    assert part.as_dict()["duration_s"] == pytest.approx((t_ns[69] - t_ns[40]) / 1e9)
 
 
 def test_the_table_has_the_values_of_the_dictionaries(read):

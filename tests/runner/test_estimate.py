@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from vobench.errors import TrajectoryError
+from vobench.estimator.process import EstimatorProcess
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import ImuCalibration, Rig, stereo_rig
@@ -23,6 +24,7 @@ from vobench.sequence import SequenceWriter
 from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Trial
+from vobench.suite.suite_spec import Mode
 
 LENS = Pinhole(64, 48, 50.0, 50.0, 31.5, 23.5)
 STEREO = replace(stereo_rig(LENS, pitch_deg=15), imu=ImuCalibration(np.eye(4), 100.0, 1e-4, 1e-3, 1e-5, 1e-4))
@@ -70,8 +72,9 @@ def recorded(folder: Path, rig: Rig, *, frames: int = 3) -> Path:
     return folder
 
 
-def estimated(tmp_path: Path, sequence: Path, plugin: Path) -> Path:
-    estimator_entry, folder = EstimatorEntry("mine", plugin, read_manifest(plugin), {}), tmp_path / "estimate"
+def estimated(tmp_path: Path, sequence: Path, plugin: Path, *, mode: Mode = "step") -> Path:
+    estimator_entry = EstimatorEntry("mine", plugin, read_manifest(plugin), {}, mode=mode)
+    folder = tmp_path / "estimate"
     folder.mkdir()
     estimate(Trial(Named(), estimator_entry, 0), sequence, folder, SilentProgress())
     return folder
@@ -124,6 +127,21 @@ def test_what_the_recording_cannot_serve_is_refused_before_it_starts(tmp_path, p
     assert (folder / estimate_file.LOG).read_text() == ""
     assert (folder / estimate_file.ESTIMATE).read_text() == ""
     assert seen(folder) == []
+
+
+@pytest.mark.parametrize(("wall_ms", "is_sent"), [(100.0, [True] * 5), (100.1, [True, False] * 2 + [True])])
+def test_in_real_time_a_frame_is_dropped_only_if_the_estimator_is_still_busy(
+    tmp_path, plugin, monkeypatch, wall_ms, is_sent
+):
+    class Steady(EstimatorProcess):
+        def process(self, frame):
+            return replace(super().process(frame), wall_ms=wall_ms)
+
+    monkeypatch.setattr(estimate_file, "EstimatorProcess", Steady)
+    sequence = recorded(tmp_path / "sequence", MONO, frames=5)  # 100 ms apart
+    folder = estimated(tmp_path, sequence, plugin("return Result(np.eye(4))"), mode="real_time")
+    statuses = [row["status"] for row in read_table(folder / ANSWERS)]
+    assert [status != estimate_file.DROPPED for status in statuses] == is_sent
 
 
 def test_tracks_come_back_in_the_order_of_frames(tmp_path):

@@ -72,6 +72,19 @@ def test_the_log_of_a_csv_has_the_rims_and_references_of_the_drive(driven):
     assert log.name == "drive.csv"
 
 
+def test_stamps_should_increase_if_only_by_a_nanosecond(tmp_path):
+    def write(*stamps_ns):
+        rows = [f"{t_ns},0,0,0,0" for t_ns in stamps_ns]
+        path = tmp_path / "drive.csv"
+        path.write_text("\n".join(["t_ns,left_rim_rad,right_rim_rad,u_ref_mps,omega_ref_radps", *rows]))
+        return path
+
+    log = read_csv_log(write(5, 6, 7), PIONEER_WHEELS)
+    assert log.t_ns.tolist() == [5, 6, 7]
+    with pytest.raises(InputError, match="t_ns should increase"):
+        read_csv_log(write(5, 6, 6), PIONEER_WHEELS)
+
+
 def test_every_case_of_a_run_is_identified_beside_the_theta_that_drove_it(first):
     found = identify_drives(first.path)
     assert [drive.name for drive in found.drives] == ["dim", "full"]
