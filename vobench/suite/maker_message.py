@@ -224,7 +224,7 @@ def decode(content: bytes) -> MakerScene:
         raise SuiteError(f"make() returns a {error.title} with a wrong {place}: {mistake['msg']}") from None
     except VobenchError:
         raise
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, struct.error) as error:
+    except (ValueError, KeyError, IndexError, TypeError, AttributeError, OverflowError, RecursionError, struct.error) as error:
         raise SuiteError(f"what the maker handed back cannot be read ({type(error).__name__}: {error})") from None
     return checked((things, materials, lights))
 
