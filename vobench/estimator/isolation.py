@@ -90,7 +90,7 @@ DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
 GRAPHICS = ("/dev/dri", "/dev/kfd", "/dev/dxg")
 GRAPHICS_PREFIX = "nvidia"
 PROCESSORS = ("/sys/devices/system/cpu", "/sys/devices/system/node")
-# Files of /proc that show the machine instead of the processes of the namespace. Root may read them without capabilities.
+# Files of /proc that show the machine instead of the processes of the namespace. Root needs no capability to read them.
 MASKED = (
     "allocinfo",
     "iomem",
