@@ -13,6 +13,9 @@ X86_64 = {
     "read": 0,
     "ioctl": 16,
     "socket": 41,
+    "fallocate": 285,
+    "msgget": 68,
+    "shmget": 29,
     "clone": 56,
     "kill": 62,
     "clone3": 435,
@@ -34,6 +37,9 @@ AARCH64 = {
     "read": 63,
     "ioctl": 29,
     "socket": 198,
+    "fallocate": 47,
+    "msgget": 186,
+    "shmget": 194,
     "clone": 220,
     "kill": 129,
     "clone3": 435,
@@ -119,6 +125,30 @@ def test_only_common_families_of_sockets_are_allowed(machine, family, is_allowed
 def test_nothing_can_be_typed_into_a_terminal(machine):
     assert called(machine, "ioctl", 0, TIOCSTI) == EPERM
     assert called(machine, "ioctl", 0, TCGETS) == ALLOW
+
+
+@machines
+@pytest.mark.parametrize("name", ["shmget", "msgget"])
+def test_memory_that_counts_as_nobodys_is_not_to_be_had(machine, name):
+    assert called(machine, name) == FAIL | errno.ENOSYS
+
+
+KEEP_SIZE = 1
+PUNCH_HOLE = 2
+
+
+@machines
+@pytest.mark.parametrize(
+    ("mode", "is_allowed"), [(0, True), (KEEP_SIZE, False), (KEEP_SIZE | 0x10, False), (KEEP_SIZE | PUNCH_HOLE, True)]
+)
+def test_no_space_is_reserved_beyond_the_end_of_a_file(machine, mode, is_allowed):
+    assert called(machine, "fallocate", 2, mode) == (ALLOW if is_allowed else FAIL | errno.EOPNOTSUPP)
+
+
+@machines
+def test_no_ioctl_reserves_space_beyond_the_end_of_a_file(machine):
+    for request in (0x40305828, 0x4030582A, 0x40305839):  # FS_IOC_RESVSP, FS_IOC_RESVSP64, FS_IOC_ZERO_RANGE
+        assert called(machine, "ioctl", 2, request) == EPERM
 
 
 @machines

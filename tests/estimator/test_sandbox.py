@@ -171,6 +171,22 @@ if os.path.exists(T['runs']): print(T['half'] + T['other_half'])
     "writes the pattern of core dumps": Attack(FILES, "sh", 'for f in core_pattern modprobe hotplug; do (cat /proc/sys/kernel/$f > kept && cat kept > /proc/sys/kernel/$f) 2>/dev/null && echo "$half$other_half $f"; done', works_bare=False),
     "loads a library into others": Attack(FILES, "sh", 'for f in /etc/ld.so.preload /etc/ld.so.cache /usr/lib/x.so /usr/local/lib/x.so; do (: >> "$f") 2>/dev/null && echo "$half$other_half $f"; done', works_bare=False),
     "climbs from its own root": Attack(FILES, "perl", "show(\"$_$T{truth}\") for ('/..', '/../../..', '/proc/self/root/..', '/proc/1/root', '/proc/1/cwd/../../..', '/proc/self/task/../../1/root');"),
+    "holds memory of System V that nobody has attached": Attack(SYSTEM_CALLS, "c", """
+#include <sys/shm.h>
+#include <sys/msg.h>
+static void attack(void) { if (shmget(IPC_PRIVATE, 4096, 0600 | IPC_CREAT) >= 0 || msgget(IPC_PRIVATE, 0600 | IPC_CREAT) >= 0) printf("%s%s", T("half"), T("other_half")); }""", works_bare=False),
+    "reserves disk space beyond the end of its log": Attack(SYSTEM_CALLS, "c", """
+#include <sys/ioctl.h>
+static void attack(void) { struct { short type, whence; long start, length; int more[6]; } space = {0, 0, 0, 1 << 22}; struct stat log;
+  fallocate(2, 1, 0, 1 << 22); ioctl(2, 0x4030582A, &space); ioctl(2, 0x40305828, &space);
+  fstat(2, &log); if (log.st_blocks > 4096) printf("%s%s", T("half"), T("other_half")); }""", works_bare=False),
+    "reads the machine's tables in /proc": Attack(PROCESSES, "sh", 'for f in keys kpageflags vmallocinfo slabinfo timer_list iomem kcore; do head -c 1 /proc/$f 2>/dev/null | grep -q . && echo "$half$other_half $f"; done', works_bare=False),
+    "opens the truth by openat2": Attack(FILES, "c", """static void attack(void) {
+  unsigned long long how[3] = {O_RDONLY, 0, 0x10}; char path[4096]; sprintf(path, "/proc/self/root/../..%s", T("truth"));
+  const char *names[] = {T("truth"), path}; int places[] = {AT_FDCWD, open("/", O_PATH), open(T("own"), O_PATH)};
+  for (int i = 0; i < 6; ++i) { how[2] = i < 3 ? 0 : 0x10; int fd = syscall(437, places[i % 3], names[i & 1], how, sizeof how); if (fd < 0) continue;
+    char at[64]; sprintf(at, "/proc/self/fd/%d", fd); show(at); } }"""),
+    "goes from its log to the folder of the log": Attack(FILES, "python", "for place in ('/proc/self/fd/2/..', '/proc/self/fd/1/../..', os.path.dirname(os.readlink('/proc/self/fd/2'))):\n    with suppress(OSError):\n        if os.listdir(place): print(T['half'] + T['other_half'])", works_bare=False),
     "opens the truth by an io_uring": Attack(SYSTEM_CALLS, "c", """static void attack(void) {
   char parameters[120] = {0}; if (syscall(425, 4, parameters) >= 0) printf("%s%s", T("half"), T("other_half")); }""", works_bare=False),
 }  # fmt: skip

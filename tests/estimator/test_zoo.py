@@ -159,6 +159,7 @@ ZOO = {
     "points of a plane": Animal(INVALID, "return Result(I, points=np.zeros((9, 2)))", "frame 0: points should be (N, 3)"),
     "a covariance that is none": Animal(INVALID, "return Result(I, covariance=-np.eye(6))", "frame 0: the covariance is not symmetric and positive"),
     "an infinite covariance": Animal(INVALID, "return Result(I, covariance=np.eye(6) * np.inf)", "frame 0: the covariance should be a finite"),
+    "a covariance that no score can use": Animal(INVALID, "return Result(I, covariance=np.eye(6) * 1e-320)", "frame 0: the covariance has a variance below 1e-24"),
     "revises what is none": Animal(INVALID, OK, "finish() must return poses", finish="return [np.eye(4)]"),
     "revises with NaN": Animal(INVALID, OK, "finish(): the pose should be a finite", finish="return {0: np.eye(4) * np.nan}"),
     "revises for ever": Animal(INVALID, OK, "the end: more revised poses than the 3 frames it had", finish="while True: send(b'REVI', struct.pack('<q', 0) + np.eye(4)[:3].tobytes())"),
@@ -193,6 +194,8 @@ ZOO = {
     "reads /proc of its parents": Animal(FINISHED, f"for pid in os.listdir('/proc'):\n    try: open(f'/proc/{{pid}}/cmdline').read()\n    except OSError: pass\n{OK}"),
     "looks for the truth beside it": Animal(CRASHED, "open('truth.mcap')", "FileNotFoundError"),
     "deletes its folder": Animal(FINISHED, f"if not frame.index: os.rmdir(os.getcwd())\n{OK}"),
+    "tracks and points beyond float32": Animal(FINISHED, "z = np.full((3, 2), 1e300)\nreturn Result(I, tracks=Tracks(z, z, z[:, 0] > 0), points=np.full((3, 3), 1e300))"),
+    "infinite points": Animal(FINISHED, "return Result(I, points=np.full((3, 3), np.inf))"),
     # It takes, and leaves behind.
     "allocates 10 GB": Animal(MEMORY, "np.ones(10 * 2**27)", "MemoryError: Unable to allocate 10.0 GiB"),
     "children that hold memory": Animal(MEMORY, "pid = os.fork()\nheld = bytearray(b'1') * (200 << 20)\ntime.sleep(30)", "its processes hold", memory_mib=300),

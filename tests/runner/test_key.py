@@ -1,12 +1,14 @@
 """A key changes with all that a result depends on, and with nothing else: not with words about the code."""
 
 import shutil
+import sys
 from pathlib import Path
 
 import pytest
 
+from vobench.estimator.sandbox import READ, SWITCH
 from vobench.runner import key
-from vobench.runner.key import PACKAGE, closure, code_digest, imported_by
+from vobench.runner.key import PACKAGE, closure, code_digest, folder_digest, imported_by
 from vobench.runner.task import ENTRIES
 from vobench.suite.catalog import builtin_root
 
@@ -196,3 +198,40 @@ def test_a_built_in_estimators_key_changes_with_the_code_behind_its_names(
     folder = builtin_root() / "estimators" / estimator
     before, after = digest_after(imported_by(folder, package=tree), file, "\nfrom ", "\nADDED = 1\nfrom ")
     assert (before != after) is is_of_it
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")
+def test_links_that_lead_out_of_a_folder_or_in_circles_do_not_count_and_are_not_walked(tmp_path, monkeypatch):
+    monkeypatch.delenv(READ, raising=False)
+    monkeypatch.delenv(SWITCH, raising=False)
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    (outside / "weights").write_text("1")
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "estimator.py").write_text("pass")
+    alone = folder_digest(own)
+    (own / "processes").symlink_to("/proc")
+    (own / "outside").symlink_to(outside)
+    (own / "itself").symlink_to("itself")
+    assert folder_digest(own) == alone
+    (own / "a").symlink_to(".")
+    (own / "b").symlink_to(".")
+    in_circles = folder_digest(own)
+    assert folder_digest(own) == in_circles
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")
+def test_what_a_link_leads_to_counts_where_the_folder_is_opened_to_estimators(tmp_path, monkeypatch):
+    monkeypatch.delenv(SWITCH, raising=False)
+    monkeypatch.setenv(READ, str(tmp_path / "outside"))
+    outside = tmp_path / "outside"
+    outside.mkdir()
+    own = tmp_path / "own"
+    own.mkdir()
+    (own / "outside").symlink_to(outside)
+    digests = set()
+    for weights in ("1", "2"):
+        (outside / "weights").write_text(weights)
+        digests.add(folder_digest(own))
+    assert len(digests) == 2

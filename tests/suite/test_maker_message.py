@@ -116,12 +116,18 @@ class TestHostile:
     def _first(header, name):
         return next(entry["fields"] for entry in header["objects"] if entry["class"] == name)
 
+    @staticmethod
+    def _first_array(header):
+        return TestHostile._first(header, "MeshArrays")["vertices_m"]["array"]
+
     def test_the_unchanged_one_is_read(self) -> None:
         assert len(decode(self._changed(lambda header: None)).things) == 2
 
     @pytest.mark.parametrize(
         "change",
         [
+            lambda header: TestHostile._first_array(header).update(offset=float("inf")),
+            lambda header: TestHostile._first_array(header).update(shape=[2**40, 2**40]),
             lambda header: header["objects"][0].update({"class": "Path"}),
             lambda header: header["objects"][0].update({"class": "__import__"}),
             lambda header: header["objects"][0]["fields"].update({"__class__": 1}),

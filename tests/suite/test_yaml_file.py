@@ -1,7 +1,7 @@
 """Settings in YAML: every mistake is a sentence with its line."""
 
+import os
 import time
-from pathlib import Path
 from typing import Annotated, Literal
 
 import pytest
@@ -163,9 +163,12 @@ def test_a_hostile_file_is_one_line_with_its_place_soon(tmp_path, name):
         assert str(path) in line or line.startswith("and ")
 
 
-def test_a_file_without_an_end_is_one_line():
-    with pytest.raises(SuiteError, match=r"/dev/zero: should be text of at most 2 MiB"):
-        read(Path("/dev/zero"), File)
+def test_a_device_or_a_pipe_is_one_line_and_is_not_waited_for(tmp_path):
+    os.mkfifo(tmp_path / "pipe.yaml")
+    (tmp_path / "zero.yaml").symlink_to("/dev/zero")
+    for name in ("pipe.yaml", "zero.yaml"):
+        with pytest.raises(SuiteError, match=f"cannot read .*{name}: not a regular file"):
+            read(tmp_path / name, File)
 
 
 def test_a_value_to_set_obeys_the_limits_of_files(tmp_path):

@@ -11,6 +11,8 @@ from vobench.estimator.protocol import Result, Status, Tracks
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 
+LEAST_VARIANCE = 1e-24  # of covariances; their inverse and their product with errors stay finite
+MOST_VARIANCE = 1e24
 FARTHEST_M = 1e12  # farther than any path, and small enough for finite sums of squares
 REASON_LETTERS = 500
 NAME_LETTERS = 80
@@ -83,6 +85,8 @@ def _covariance(covariance: Any) -> Array:
     least_variance = np.linalg.eigvalsh(P)[0]
     if not is_symmetric or least_variance <= 0:
         raise InvalidOutputError("the covariance is not symmetric and positive definite")
+    if least_variance < LEAST_VARIANCE or np.abs(P).max() > MOST_VARIANCE:
+        raise InvalidOutputError(f"the covariance has a variance below {LEAST_VARIANCE:g} or above {MOST_VARIANCE:g}")
     return P
 
 

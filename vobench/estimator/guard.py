@@ -31,6 +31,8 @@ PR_SET_CHILD_SUBREAPER = 36
 LOOK_S = 0.5  # period at which the guard checks that vobench is alive; another process may hold its socket open
 KILL_S = 0.002  # pause between two rounds of kills
 CANNOT_START = 127
+# A limit of 0 would still pipe a whole core to a program that the kernel is told to start; 1 prevents that: core(5).
+CORE_BYTES = 1
 PLAN_BYTES = 1 << 20
 
 
@@ -50,7 +52,7 @@ def guard(line: _socket.socket, plan: "dict[str, Any]") -> "NoReturn":
     """
     os.set_inheritable(line.fileno(), False)
     parent = os.getppid()
-    for limit, value in ((resource.RLIMIT_FSIZE, plan["file_bytes"]), (resource.RLIMIT_CORE, 0)):
+    for limit, value in ((resource.RLIMIT_FSIZE, plan["file_bytes"]), (resource.RLIMIT_CORE, CORE_BYTES)):
         with suppress(ValueError):  # the limit of the guard itself is lower
             resource.setrlimit(limit, (value, value))
     _prctl(PR_SET_CHILD_SUBREAPER, 1)  # orphaned descendants become children of the guard

@@ -90,6 +90,25 @@ DEVICES = ("/dev/null", "/dev/zero", "/dev/full", "/dev/random", "/dev/urandom")
 GRAPHICS = ("/dev/dri", "/dev/kfd", "/dev/dxg")
 GRAPHICS_PREFIX = "nvidia"
 PROCESSORS = ("/sys/devices/system/cpu", "/sys/devices/system/node")
+# Files of /proc that show the machine instead of the processes of the namespace. Root needs no capability to read them.
+MASKED = (
+    "allocinfo",
+    "iomem",
+    "ioports",
+    "kcore",
+    "key-users",
+    "keys",
+    "kmsg",
+    "kpagecgroup",
+    "kpagecount",
+    "kpageflags",
+    "locks",
+    "pagetypeinfo",
+    "sched_debug",
+    "slabinfo",
+    "timer_list",
+    "vmallocinfo",
+)
 LINKS_OF_DEV = (
     ("/dev/fd", "/proc/self/fd"),
     ("/dev/stdin", "/proc/self/fd/0"),
@@ -244,6 +263,11 @@ class _Tree:
         except OSError:
             self.has_own_proc = False
             self._bind("/proc", "/proc")
+            return
+        for name in MASKED:
+            place = f"{self.root}/proc/{name}"
+            if os.path.exists(place):
+                _mount("/dev/null", place, None, MS_BIND)
 
     def _bind_devices(self, has_graphics: bool) -> None:
         devices = list(DEVICES)
@@ -521,6 +545,7 @@ REFUSED = {
     "name_to_handle_at": (303, 264),
     "open_by_handle_at": (304, 265),
     "open_tree": (428, 428),
+    "open_tree_attr": (467, 467),
     "perf_event_open": (298, 241),
     "pidfd_getfd": (438, 438),
     "pivot_root": (155, 41),
@@ -549,9 +574,16 @@ CLONE3 = (435, 435)
 SOCKET = (41, 198)
 IOCTL = (16, 29)
 KILL = (62, 129)
+FALLOCATE = (285, 47)
+# System V memory and messages outlive their process and count as nobody's, so that no limit holds for them.
+UNCOUNTED = {"msgget": (68, 186), "shmget": (29, 194)}
+FALLOC_FL_KEEP_SIZE = 1  # linux/falloc.h
+FALLOC_FL_PUNCH_HOLE = 2
 SECCOMP = (317, 277)
 FAMILIES = (1, 2, 10, 16)  # AF_UNIX, AF_INET, AF_INET6, AF_NETLINK
-TYPED_INTO_TERMINALS = (0x5412, 0x541C)  # TIOCSTI, TIOCLINUX
+# linux/falloc.h: three ioctls that reserve disk space beyond the end of a file, as fallocate(2) does.
+RESERVES = (0x40305828, 0x4030582A, 0x40305839)  # FS_IOC_RESVSP, FS_IOC_RESVSP64, FS_IOC_ZERO_RANGE
+TYPES_INTO_TERMINAL = (0x5412, 0x541C)  # TIOCSTI, TIOCLINUX
 MACHINES = {"x86_64": (0, 0xC000003E), "aarch64": (1, 0xC00000B7)}  # column of the numbers above, linux/audit.h
 X32_BIT = 0x40000000
 # linux/bpf_common.h, linux/seccomp.h: offsets of struct seccomp_data, little-endian
@@ -593,13 +625,23 @@ def system_call_filter(machine: str, *, kills_all: bool) -> list[Instruction]:
             program += [(JUMP_IF_EQUAL, 0, 1, numbers[column]), (RETURN, 0, 0, fails)]
     # Libraries fall back to clone, whose flags a filter can check, unlike those of clone3.
     program += [(JUMP_IF_EQUAL, 0, 1, CLONE3[column]), (RETURN, 0, 0, FAIL | errno.ENOSYS)]
+    for numbers in UNCOUNTED.values():
+        program += [(JUMP_IF_EQUAL, 0, 1, numbers[column]), (RETURN, 0, 0, FAIL | errno.ENOSYS)]
+    # Space beyond the end of a file is exempt from the limit of file sizes. The log is on the user's disk.
+    beyond_end = [
+        (JUMP_IF_ANY_BIT, 2, 0, FALLOC_FL_PUNCH_HOLE),
+        (JUMP_IF_ANY_BIT, 0, 1, FALLOC_FL_KEEP_SIZE),
+        (RETURN, 0, 0, FAIL | errno.EOPNOTSUPP),
+    ]
+    program += _of_call(FALLOCATE[column], SECOND_ARGUMENT, beyond_end)
     new_namespace = [(JUMP_IF_ANY_BIT, 0, 1, CLONE_ANY_NEW & ~0xFF), (RETURN, 0, 0, fails)]
     program += _of_call(CLONE[column], FIRST_ARGUMENT, new_namespace)
     family = [(JUMP_IF_EQUAL, len(FAMILIES) - place, 0, known) for place, known in enumerate(FAMILIES)]
     program += _of_call(SOCKET[column], FIRST_ARGUMENT, [*family, (RETURN, 0, 0, FAIL | errno.EAFNOSUPPORT)])
-    typed = [(JUMP_IF_EQUAL, 0, 1, TYPED_INTO_TERMINALS[0]), (RETURN, 0, 0, fails)]
-    typed += [(JUMP_IF_EQUAL, 0, 1, TYPED_INTO_TERMINALS[1]), (RETURN, 0, 0, fails)]
-    program += _of_call(IOCTL[column], SECOND_ARGUMENT, typed)
+    refused_requests: list[Instruction] = []
+    for request in (*TYPES_INTO_TERMINAL, *RESERVES):
+        refused_requests += [(JUMP_IF_EQUAL, 0, 1, request), (RETURN, 0, 0, fails)]
+    program += _of_call(IOCTL[column], SECOND_ARGUMENT, refused_requests)
     if not kills_all:
         everybody = [(JUMP_IF_EQUAL, 0, 1, 0xFFFFFFFF), (RETURN, 0, 0, fails)]
         program += _of_call(KILL[column], FIRST_ARGUMENT, everybody)

@@ -40,6 +40,7 @@ KEPT_ENVIRONMENT = (
     *VARIABLES,
 )
 LOG_BYTES = 1 << 20
+LOG_SPACE_BYTES = 2 * LOG_BYTES  # more disk space than a log of LOG_BYTES needs
 LAST_LINES_BYTES = 4096  # the end of a log that is searched for the last line
 LOOK_S = 0.1  # period at which memory and time of a running program are measured
 WEIGH_S = 1.0  # period at which the disk space of its files is measured
@@ -339,11 +340,16 @@ class Program:
             raise self._files_failure()
 
     def _cut_log(self) -> None:
-        """Cut the log to LOG_BYTES, and count the bytes that were removed."""
-        size = os.fstat(self._log).st_size
-        if size > LOG_BYTES:
-            self._printed += size - LOG_BYTES
-            os.ftruncate(self._log, LOG_BYTES)
+        """Cut the log to LOG_BYTES, and count the bytes that were removed.
+
+        Disk space that the program reserved beyond the end of the log is freed.
+        """
+        facts = os.fstat(self._log)
+        size = facts.st_size
+        kept = min(size, LOG_BYTES)
+        self._printed += size - kept
+        if size > kept or facts.st_blocks * STAT_BLOCK_BYTES > LOG_SPACE_BYTES:
+            os.ftruncate(self._log, kept)
 
     def wait(self) -> None:
         """Wait until the program ends. Raises EstimatorFailure unless its exit code is 0."""

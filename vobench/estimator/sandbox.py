@@ -103,6 +103,18 @@ def _is_never_read(path: str) -> bool:
     return os.path.realpath(path) in NEVER_READ
 
 
+def readable() -> list[Path]:
+    """The real paths of the folders that every estimator may read: all of them if it is not isolated."""
+    if is_switched_off() or sys.platform != "linux":
+        return [Path("/")]
+    return _allowed()
+
+
+def _allowed() -> list[Path]:
+    """The real paths of the folders that every isolated estimator may read."""
+    return [Path(path).resolve() for path in (*isolation.SYSTEM, *libraries(), *opened())]
+
+
 def libraries() -> list[str]:
     """The folders of Python: its prefixes, the user's site-packages, and the package vobench."""
     folders = [sys.prefix, sys.base_prefix, sys.exec_prefix, str(Path(__file__).parents[1])]
@@ -179,10 +191,9 @@ def hint_on_modules(folder: Path | None) -> str:
 
 def _unreadable(paths: Sequence[str], folder: Path | None) -> list[str]:
     """The paths that exist, but not in a folder that an estimator may read."""
-    readable = [*isolation.SYSTEM, *libraries(), *opened()]
+    readable_folders = _allowed()
     if folder is not None:
-        readable.append(str(folder))
-    readable_folders = [Path(name).resolve() for name in readable]
+        readable_folders.append(folder.resolve())
 
     unreadable = []
     for path in paths:

@@ -320,7 +320,8 @@ class _Keeper:
                 R_odom_frame = result.T_odom_frame[:3, :3]
                 self.covariances[index] = self._covariance_of_left(R_odom_frame, result.covariance)
         if result.points is not None:
-            points = se3.apply(se3.inverse(self.T_frame_left), result.points)
+            with np.errstate(invalid="ignore", over="ignore"):  # points may be infinite
+                points = se3.apply(se3.inverse(self.T_frame_left), result.points)
             self.tracks.writestr(_member(index, POINTS), _npy(points))
 
         stats = {name: float(f"{value:.6g}") for name, value in sorted(result.stats.items())}
@@ -397,5 +398,6 @@ def _member(index: int, of: str = "") -> zipfile.ZipInfo:
 def _npy(table: Array) -> bytes:
     """A table as the bytes of a .npy file in float32."""
     buffer = io.BytesIO()
-    np.save(buffer, table.astype(np.float32))
+    with np.errstate(over="ignore"):  # a number beyond float32 becomes infinite
+        np.save(buffer, table.astype(np.float32))
     return buffer.getvalue()

@@ -20,11 +20,14 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from vobench import __version__
+from vobench.estimator import sandbox
+from vobench.regular_file import open_regular
 
 PACKAGE = Path(__file__).resolve().parents[1]
 PLUGIN = "vobench.plugin"
 # The digest of a module depends on the version of Python and on this file.
 READER = hashlib.sha256(sys.version.encode() + Path(__file__).read_bytes()).digest()
+READ_BYTES = 1 << 20
 NOT_DATA = {".py", ".pyc"}
 # Imports for type checkers only, on which no result depends.
 TYPES_ONLY = re.compile(rb"^if TYPE_CHECKING:\n(?:(?: .*)?\n)+", re.MULTILINE)
@@ -52,14 +55,52 @@ def folder_digest(folder: Path) -> str:
     state = hashlib.sha256()
     for path in sorted(_files(folder)):
         state.update(f"{path.relative_to(folder)}\0".encode())
-        state.update(hashlib.sha256(path.read_bytes()).digest())
+        state.update(_content_digest(path))
     return state.hexdigest()[:32]
 
 
+def _content_digest(path: Path) -> bytes:
+    content = hashlib.sha256()
+    with open_regular(path) as file:
+        while part := file.read(READ_BYTES):
+            content.update(part)
+    return content.digest()
+
+
 def _files(folder: Path) -> Iterator[Path]:
+    """The files below a folder, except compiled Python.
+
+    A link is followed only to a place that estimators may read, and only one of the links to a folder is followed.
+    """
+    readable = [folder.resolve(), *sandbox.readable()]
+    seen = set[str]()  # the targets of links to folders
     for place, folders, names in os.walk(folder, followlinks=True):
-        folders[:] = [name for name in folders if name != "__pycache__"]
-        yield from (path for name in names if (path := Path(place, name)).is_file())
+        folders[:] = [name for name in sorted(folders) if _leads_on(Path(place, name), readable, seen)]
+        for name in names:
+            path = Path(place, name)
+            if _is_readable(path, readable) and path.is_file():
+                yield path
+
+
+def _leads_on(folder: Path, readable: Iterable[Path], seen: set[str]) -> bool:
+    """Whether a folder is searched for files. The target of a link is added to `seen`."""
+    if folder.name == "__pycache__":
+        return False
+    if not folder.is_symlink():
+        return True
+    target = os.path.realpath(folder)
+    if target in seen or not _is_readable(folder, readable):
+        return False
+    seen.add(target)
+    return True
+
+
+def _is_readable(path: Path, readable: Iterable[Path]) -> bool:
+    """Whether a path is no link, or is one to a place in a readable folder."""
+    if not path.is_symlink():
+        return True
+    target = Path(os.path.realpath(path))
+    return any(target.is_relative_to(folder) for folder in readable)
 
 
 def versions(*libraries: str) -> dict[str, str]:

@@ -22,7 +22,8 @@ from pathlib import Path
 
 from vobench.asset import MODEL_SUFFIXES
 from vobench.errors import UnknownNameError, unknown_name_sentence
-from vobench.suite.file_kind import Kind, display_path, kind_in
+from vobench.regular_file import read_regular
+from vobench.suite.file_kind import MOST_BYTES, Kind, display_path, kind_in
 
 KINDS: tuple[Kind, ...] = ("suite", "scenario", "scene", "estimator")
 # The possible paths of an entry in a folder of its kind; {} is the name.
@@ -186,7 +187,13 @@ def _beside(kind: Kind, folder: Path, name: str | None) -> Iterator[CatalogEntry
 
 
 def _is_suite_or_scenario(path: Path) -> bool:
-    return path.is_file() and OTHER_KEY.search(path.read_bytes()) is not None
+    if not path.is_file():
+        return False
+    try:
+        content = read_regular(path, most_bytes=MOST_BYTES)
+    except OSError:  # whoever uses the file reports that
+        return False
+    return OTHER_KEY.search(content) is not None
 
 
 def _installed(kind: Kind) -> Iterator[CatalogEntry]:

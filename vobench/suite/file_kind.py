@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from vobench.asset import MODEL_SUFFIXES
+from vobench.regular_file import read_regular
 
 Kind = Literal["scene", "suite", "scenario", "estimator"]
 # Top-level keys that only files of one kind have.
@@ -26,6 +27,7 @@ NOUNS: dict[Kind, str] = {
     "scene": "a scene",
     "estimator": "an estimator's manifest",
 }
+MOST_BYTES = 2 << 20  # the largest YAML file that is read
 TOP_LEVEL_KEY = re.compile(r"^(\w+)\s*:", re.MULTILINE)
 
 
@@ -42,7 +44,7 @@ def kind_in(path: Path) -> Kind | None:
     The file is not parsed. None if it cannot be read, or if no kind has any of its keys.
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_regular(path, most_bytes=MOST_BYTES).decode("utf-8")
     except (OSError, UnicodeDecodeError):
         return None
     return kind_of(TOP_LEVEL_KEY.findall(text))

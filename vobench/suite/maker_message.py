@@ -43,6 +43,17 @@ LEVELS = (Steady, Flicker, Dimmer, Switched, Scaled)
 TEXTURES = (Picture, Procedural)
 CLASSES: dict[str, type] = {each.__name__: each for each in (MeshArrays, Thing, Material, *LIGHTS, *LEVELS, *TEXTURES)}
 DTYPES = ("float64", "float32", "int64", "int32", "uint8", "bool")
+# What reading bytes that do not describe a scene raises.
+UNREADABLE = (
+    ValueError,
+    KeyError,
+    IndexError,
+    TypeError,
+    AttributeError,
+    OverflowError,
+    RecursionError,
+    struct.error,
+)
 OBJECT = "object"
 ARRAY = "array"
 LENGTH = struct.Struct("<Q")  # the length of the header
@@ -224,7 +235,7 @@ def decode(content: bytes) -> MakerScene:
         raise SuiteError(f"make() returns a {error.title} with a wrong {place}: {mistake['msg']}") from None
     except VobenchError:
         raise
-    except (ValueError, KeyError, IndexError, TypeError, AttributeError, RecursionError, struct.error) as error:
+    except UNREADABLE as error:
         raise SuiteError(f"what the maker handed back cannot be read ({type(error).__name__}: {error})") from None
     return checked((things, materials, lights))
 

@@ -11,9 +11,10 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
 
 from vobench.errors import FilePlace, Mistake, SuiteError
+from vobench.regular_file import read_regular
+from vobench.suite.file_kind import MOST_BYTES
 
 # The limits are far above what a person writes. A file that exceeds one of them is reported in one line.
-MOST_BYTES = 2 << 20
 MOST_NODES = 100_000
 MOST_DEPTH = 100
 MOST_DIGITS = 400  # the largest number of characters of a number; every float is shorter
@@ -42,8 +43,7 @@ def parse_file(path: Path) -> ParsedYaml:
 def _read_text(path: Path) -> str:
     """The text of a file. Raises SuiteError if it is too long or not text."""
     try:
-        with path.open("rb") as file:
-            content = file.read(MOST_BYTES + 1)
+        content = read_regular(path, most_bytes=MOST_BYTES + 1)
     except OSError as error:
         raise SuiteError(f"cannot read {path}: {error.strerror}") from None
     if len(content) > MOST_BYTES:
