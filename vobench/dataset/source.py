@@ -26,8 +26,8 @@ from vobench.sequence import (
     read_twist,
     truth_channels,
 )
-from vobench.sequence.messages import CASE_ATTACHMENT, TRUTH_FILE
 from vobench.sequence.picture import Image, decode, encode
+from vobench.sequence.topic import CASE_ATTACHMENT, TRUTH_FILE
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
