@@ -302,6 +302,11 @@ def read_true_rig(folder: Path) -> Rig:
     return read_rig(_truth_bag(folder), TRUE_INFO_TOPICS)
 
 
+def has_case(folder: Path) -> bool:
+    """Whether a recording was made from a case. Raises SequenceError if the file with the truth is damaged."""
+    return _truth_bag(folder).has_attachment(CASE_ATTACHMENT)
+
+
 def read_case(folder: Path) -> bytes:
     """The case that a recording was made from, as its writer gave it. Raises SequenceError where it was imported."""
     return _truth_bag(folder).attachment(CASE_ATTACHMENT)
