@@ -1,108 +1,23 @@
 """Models are read as their makers meant them, to the last corner, or refused in a sentence that helps."""
 
-import io
 import json
-import re
 import struct
 import tracemalloc
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import trimesh
 from PIL import Image
-from trimesh import Trimesh
 
+from tests.asset.glb import CORNERS, Glb, Json, Reader, only, triangle, z_up
 from vobench.asset import gltf_material
-from vobench.asset.model import Model, read_model
+from vobench.asset.model import read_model
 from vobench.errors import ModelError
 from vobench.scene.light import PointLight, SpotLight, Sun
 from vobench.scene.material import linear
 from vobench.scene.mesh import face_normals
-
-Json = dict[str, Any]
-WIDTHS = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4", 16: "MAT4"}
-KINDS = {"float32": 5126, "uint8": 5121, "int8": 5120, "uint16": 5123, "int16": 5122, "uint32": 5125}
-# A triangle in glTF's axes, whose front looks along +z: to the south, -y, of the house.
-CORNERS = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-
-
-class Glb:
-    """A .glb in the making: numbers and pictures are appended, all else is a dictionary."""
-
-    def __init__(self, **tree: Any) -> None:
-        self.blob = b""
-        self.tree: Json = {"asset": {"version": "2.0"}, "bufferViews": [], "accessors": [], "images": [], **tree}
-
-    def view(self, data: bytes, **more: Any) -> int:
-        self.blob += bytes(-len(self.blob) % 4)
-        self.tree["bufferViews"].append({"buffer": 0, "byteOffset": len(self.blob), "byteLength": len(data), **more})
-        self.blob += data
-        return len(self.tree["bufferViews"]) - 1
-
-    def numbers(self, values: Any, kind: str = "float32", **more: Any) -> int:
-        array = np.atleast_2d(np.asarray(values, kind))
-        array = array.T if np.ndim(values) == 1 else array
-        entry = {"bufferView": self.view(array.tobytes()), "componentType": KINDS[kind], "count": len(array)}
-        self.tree["accessors"].append({**entry, "type": WIDTHS[array.shape[1]], **more})
-        return len(self.tree["accessors"]) - 1
-
-    def texture(self, pixels: Any, form: str = "PNG") -> Json:
-        file = io.BytesIO()
-        Image.fromarray(np.asarray(pixels, np.uint8)).save(file, form)
-        self.tree["images"].append({"bufferView": self.view(file.getvalue()), "name": "grain"})
-        self.tree.setdefault("textures", []).append({"source": len(self.tree["images"]) - 1})
-        return {"index": len(self.tree["textures"]) - 1}
-
-    def primitive(self, corners: Any = CORNERS, faces: Any = None, **more: Any) -> Json:
-        """More: material, mode, or the accessors of further attributes by their names in capitals."""
-        at = {"POSITION": self.numbers(corners), **{k: v for k, v in more.items() if k.isupper() or "_" in k}}
-        index = {} if faces is None else {"indices": self.numbers(np.ravel(faces), "uint16")}
-        return {"attributes": at, **index, **{k: v for k, v in more.items() if k not in at}}
-
-    def bytes(self) -> bytes:
-        self.tree["buffers"] = [{"byteLength": len(self.blob)}]
-        chunks = [(json.dumps(self.tree).encode(), b"JSON", b" "), (self.blob, b"BIN\0", b"\0")]
-        body = b"".join(
-            struct.pack("<I4s", len(data) + -len(data) % 4, kind) + data + pad * (-len(data) % 4)
-            for data, kind, pad in chunks
-        )
-        return b"glTF" + struct.pack("<II", 2, 12 + len(body)) + body
-
-
-def triangle(*, nodes: Sequence[Json] = ({},), material: Json | None = None, **more: Any) -> Glb:
-    """One triangle at every node, of one material."""
-    glb = Glb(**more)
-    glb.tree["materials"] = [material or {"name": "default"}]
-    glb.tree["meshes"] = [{"primitives": [glb.primitive(material=0)]}]
-    glb.tree["nodes"] = [{"name": "tile", "mesh": 0, **node} for node in nodes]
-    return glb
-
-
-Reader = Callable[..., Model]
-
-
-@pytest.fixture
-def read(tmp_path: Path) -> Reader:
-    def reading(glb: Glb | bytes, name: str = "thing.glb", **settings: Any) -> Model:
-        path = tmp_path / name
-        path.write_bytes(glb.bytes() if isinstance(glb, Glb) else glb)
-        return read_model(path, **settings)
-
-    return reading
-
-
-def z_up(points: Any) -> Any:
-    x, y, z = np.moveaxis(np.asarray(points, float), -1, 0)
-    return np.stack([x, -z, y], -1)
-
-
-def only(model: Model) -> Trimesh:
-    assert len(model.things) == 1
-    return model.things[0].mesh
-
 
 # Nodes and faces
 
@@ -339,30 +254,6 @@ def test_transmission_makes_a_pane_in_its_tone(read: Reader) -> None:
     assert (glass.kind, glass.eta, glass.tint) == ("pane", 1.5, pytest.approx(0.5))
 
 
-def cube(size: float) -> tuple[Any, Any]:
-    """Corners and outward faces."""
-    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * size
-    sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    return corners, [face for a, b, c, d in sides for face in ([a, b, c], [a, c, d])]
-
-
-@pytest.mark.parametrize(("size", "inward", "faces"), [(0.5, False, 12), (2.0, False, 24), (0.5, True, 24)])
-def test_two_sided_faces_have_backs_but_for_small_closed_bodies(
-    read: Reader, size: float, inward: bool, faces: int
-) -> None:
-    corners, sides = cube(size)
-    glb = Glb(nodes=[{"mesh": 0}], materials=[{"doubleSided": True}])
-    order = np.array(sides)[:, ::-1] if inward else sides
-    glb.tree["meshes"] = [{"primitives": [glb.primitive(corners, order, material=0)]}]
-    assert len(only(read(glb)).faces) == faces
-
-
-def test_a_two_sided_sheet_shows_the_same_picture_from_behind(read: Reader) -> None:
-    mesh = only(read(triangle(material={"doubleSided": True})))
-    np.testing.assert_array_equal(face_normals(mesh.triangles), [[0, -1, 0], [0, 1, 0]])
-    np.testing.assert_array_equal(mesh.triangles[1], mesh.triangles[0][::-1])
-
-
 # Colours by vertex
 
 
@@ -408,24 +299,6 @@ def test_many_faces_of_many_colours_each_show_their_own(read: Reader) -> None:
 
 
 # Roles and lights
-
-
-def test_roles_come_from_extras_and_globs_and_hold_for_what_is_below(read: Reader) -> None:
-    glb = triangle(nodes=[{"name": "glass"}, {"name": "panel", "extras": {"vobench": "mirror"}}, {"name": "junk"}])
-    glb.tree["nodes"].append({"name": "Window", "children": [0], "extras": {"other": 1}})
-    model = read(glb, roles={"Win*": "pane", "junk": "ignored"})
-    kinds = {thing.name: model.materials[thing.material].kind for thing in model.things}
-    assert kinds == {"glass": "pane", "panel": "mirror"}
-    assert model.materials["default_mirror"].tint == 0.9
-    assert read(glb, roles={"panel": "ignored"}).things[0].name == "glass"  # a glob goes before the extras
-    nearest = read(glb, roles={"Window": "mirror", "glass": "pane", "junk": "ignored"})
-    assert {nearest.materials[thing.material].kind for thing in nearest.things if thing.name == "glass"} == {"pane"}
-
-
-def test_a_mirror_of_metal_is_in_the_tone_of_the_metal(read: Reader) -> None:
-    surface = {"baseColorFactor": [0.5, 0.5, 0.5, 1], "roughnessFactor": 0.1}
-    model = read(triangle(material={"name": "steel", "pbrMetallicRoughness": surface}), roles={"*": "mirror"})
-    assert model.materials["steel_mirror"].tint == pytest.approx(0.5)
 
 
 def test_a_mover_has_its_things_about_its_own_origin(read: Reader) -> None:
@@ -488,94 +361,6 @@ def test_lights_keep_their_candela_and_lux_and_shine_along_their_minus_z(read: R
     np.testing.assert_allclose(level.direction(0), [0, -1, 0], atol=1e-12)  # its light goes north
 
 
-# Doubts
-
-
-def test_faces_without_area_are_dropped_and_counted(read: Reader) -> None:
-    glb = Glb(nodes=[{"mesh": 0}])
-    points = [*CORNERS, [2, 0, 0], [0.5, 0, 0]]
-    glb.tree["meshes"] = [{"primitives": [glb.primitive(points, [[0, 1, 2], [0, 0, 1], [0, 1, 3], [4, 1, 2]])]}]
-    model = read(glb)
-    assert (len(only(model).faces), model.dropped) == (2, 2)
-
-
-@pytest.mark.parametrize(("scale", "note"), [(4300, "spans 4,300 m: in millimetres? scale: 0.001"), (0.004, "0.004 m")])
-def test_a_model_of_an_unlikely_size_is_doubted_aloud(read: Reader, scale: float, note: str) -> None:
-    assert note in read(triangle(), scale=scale).notes[-1]
-    assert read(triangle()).notes == ()
-
-
-def test_a_place_that_lies_on_its_side_is_doubted_aloud(read: Reader) -> None:
-    floor = triangle(nodes=[{"scale": [20, 20, 20]}])  # its corners are of one height only where z is up
-    (note,) = read(floor).notes
-    assert re.fullmatch(
-        r"stands on its side\? It is read with y up; if z is up, say so in a scene's YAML: "
-        r"meshes: \[\{file: \S+\.gl(b|tf), up: z\}\]",
-        note,
-    )
-    assert read(floor, up="z").notes == ()
-
-
-HALL_M = (8.0, 7.66, 2.5)
-
-
-def box(size_m: Sequence[float], center_m: Sequence[float]) -> trimesh.Trimesh:
-    return trimesh.creation.box(size_m, trimesh.transformations.translation_matrix(center_m))
-
-
-def furnished_hall(*, with_walls: bool) -> trimesh.Scene:
-    """A floor, maybe four walls, tables, and cupboards up to the ceiling, with z up as in CAD."""
-    length, width, height = HALL_M
-    parts = [box((length, width, 0.02), (0, 0, -0.01))]
-    if with_walls:
-        parts += [box((length, 0.02, height), (0, side * (width / 2 - 0.01), height / 2)) for side in (-1, 1)]
-        parts += [box((0.02, width, height), (side * (length / 2 - 0.01), 0, height / 2)) for side in (-1, 1)]
-    for x in (-2.0, 0.0, 2.0):
-        parts.append(box((1.6, 0.8, 0.04), (x, 1, 0.73)))
-        parts += [box((0.05, 0.05, 0.71), (x + dx, 1 + dy, 0.355)) for dx in (-0.7, 0.7) for dy in (-0.35, 0.35)]
-        parts += [box((0.8, 0.5, height), (x, y, height / 2)) for y in (-3, -1, 3)]
-    return trimesh.Scene(parts)
-
-
-@pytest.mark.parametrize("with_walls", [True, False])
-@pytest.mark.parametrize("suffix", [".glb", ".stl"])
-def test_a_hall_that_was_exported_with_the_wrong_axis_up_is_doubted_and_one_with_the_right_is_not(
-    tmp_path: Path, suffix: str, with_walls: bool
-) -> None:
-    axis_by_format = {".glb": "y", ".stl": "z"}
-    read_as_up = axis_by_format[suffix]
-    hall = furnished_hall(with_walls=with_walls)
-    lying = hall.copy()
-    to_y_up = trimesh.transformations.rotation_matrix(-np.pi / 2, [1, 0, 0])
-    (hall if read_as_up == "y" else lying).apply_transform(to_y_up)
-    path = tmp_path / f"hall{suffix}"
-
-    hall.export(path)
-    upright = read_model(path)
-    np.testing.assert_allclose(np.ptp(points_of(upright), axis=0), (8, 7.66, 2.52), atol=1e-6)
-    assert "side?" not in " ".join(upright.notes)
-
-    lying.export(path)
-    other = "z" if read_as_up == "y" else "y"
-    doubt = f"if {other} is up, say so in a scene's YAML: meshes: [{{file: hall{suffix}, up: {other}}}]"
-    assert doubt in " ".join(read_model(path).notes)
-
-    mended = read_model(path, up=other)
-    np.testing.assert_allclose(np.ptp(points_of(mended), axis=0), (8, 7.66, 2.52), atol=1e-6)
-    assert "side?" not in " ".join(mended.notes)
-
-
-def points_of(model: Model) -> np.ndarray:
-    return np.concatenate([thing.mesh.vertices for thing in model.everything])
-
-
-def test_a_corridor_that_is_higher_than_wide_is_not_doubted(tmp_path: Path) -> None:
-    corridor = box((24.0, 2.8, 2.6), (0, 1.4, 0))  # y up: 24 m long, 2.8 m high
-    path = tmp_path / "corridor.glb"
-    trimesh.Scene([corridor]).export(path)
-    assert "side?" not in " ".join(read_model(path).notes)
-
-
 # Faults
 
 
@@ -635,7 +420,7 @@ FAULTS: dict[str, tuple[Callable[[], Glb | bytes], str]] = {
         lambda: changed("bufferView", None, of="accessors") and no_data(),
         "accessor 0 has no data; if it is",
     ),
-    "no faces": (lambda: changed("nodes", []), "has no faces to see"),
+    "no faces": (lambda: changed("nodes", []), "has no visible faces"),
     "NaN": (with_nan, "node 'tile': has vertices at NaN or infinity; repair it where it was made"),
     "an index too large": (lambda: of_index(3), "node 'tile': a face has vertex 3 of 3"),
     "a mesh too many": (lambda: changed("mesh", 4, of="nodes"), "number 4 of 1 meshes is requested"),
@@ -828,7 +613,7 @@ def test_a_ply_has_the_colours_of_its_vertices(read: Reader) -> None:
     assert next(iter(model.materials.values())).colour == pytest.approx((float(linear(np.uint8(9))),) * 3, abs=1e-6)
     with pytest.raises(ModelError, match="has 2,500,000 faces, more than 1,000,000"):
         read(head.replace("vertex 3", "vertex 5000000").encode(), "thing.ply")
-    with pytest.raises(ModelError, match="has no faces to see"):
+    with pytest.raises(ModelError, match="has no visible faces"):
         read((head + body)[:-20].encode(), "thing.ply")
 
 

@@ -39,7 +39,7 @@ def test_a_hall_with_z_up_is_doubted_until_its_scene_says_so(vobench, here):
     trimesh.Scene([hall]).export(here / "hall.glb")
     lying = vobench("scene", "hall.glb").out
     assert "size: 8.00 x 2.50 x 7.66 m" in lying
-    doubt = "hall.glb: stands on its side? It is read with y up; if z is up, say so in a scene's YAML: "
+    doubt = "hall.glb: probably lies on its side. It is read with y up; if z is up, say so in a scene's YAML: "
     assert f"{doubt}meshes: [{{file: hall.glb, up: z}}]" in lying.splitlines()
 
     said = "name: hall\nwhite_cd_m2: 100\nmeshes: [{file: hall.glb, up: z}]\nsky: {illuminance_lx: 8000}\n"

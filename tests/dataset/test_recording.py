@@ -12,7 +12,7 @@ from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.sensor.imu import ImuReadings
-from vobench.sequence.messages import END_OF_STAMPS_NS
+from vobench.sequence.message import END_OF_STAMPS_NS
 from vobench.trajectory.trajectory import Trajectory
 
 GREY = np.random.default_rng(1).integers(0, 256, (48, 64), np.uint8)

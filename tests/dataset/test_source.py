@@ -10,6 +10,7 @@ from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.geometry.camera import pixel_grid
 from vobench.geometry.rig import PRESETS, Rig, mounted_rig
+from vobench.sequence.topic import TRUTH_FILE
 
 Make = Callable[..., Any]
 
@@ -86,6 +87,16 @@ def test_a_source_has_what_was_recorded_and_none_for_the_rest(make_sequence: Mak
     assert plain.bias is None
     assert plain.twist is None
     assert plain.case is None
+
+
+def test_a_case_whose_bytes_changed_on_the_disk_is_refused_and_not_taken_for_none(make_sequence: Make) -> None:
+    made = make_sequence(case_json=b'{"seed": 123456789}')
+    path = made.folder / TRUTH_FILE
+    data = path.read_bytes()
+    assert data.count(b"123456789") == 1
+    path.write_bytes(data.replace(b"123456789", b"123456780"))
+    with pytest.raises(SequenceError, match=r"checksum of the attachment 'case\.json' differs from its content"):
+        open_source(made.folder)
 
 
 @pytest.mark.parametrize("case_json", [b'{"seed": ', b"", b'{"\xff": 7}'])

@@ -15,14 +15,15 @@ from rosbags.interfaces import QosDurability
 
 from vobench.errors import SequenceError
 from vobench.geometry import se3
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
 from vobench.sequence.bag_writer import BagWriter
+from vobench.sequence.cdr import serialise
 from vobench.sequence.mcap_file import (
     HEAD,
     MAGIC,
 )
-from vobench.sequence.messages import serialise
+from vobench.sequence.message import image_message, stamped_message
+from vobench.sequence.topic import BODY, ENCODERS, IMAGE_TOPICS, SENSOR_TOPICS, TRUTH_TOPICS, Topic
 
 FOOTER = struct.Struct("<QQI")
 
@@ -147,10 +148,10 @@ def test_counts_and_stamps_are_those_of_the_messages_that_another_reader_finds(l
     with (long_folder / name).open("rb") as stream:
         for schema, channel, message in make_reader(stream).iter_messages():
             found[channel.topic].append(message.log_time)
-            assert bag.has(ros.Topic(channel.topic, schema.name))
+            assert bag.has(Topic(channel.topic, schema.name))
     assert len(bag.counts) > 3
     assert counts(bag.path) == {topic: len(stamps) for topic, stamps in found.items()}
-    for topic in (*ros.SENSOR_TOPICS, *ros.TRUTH_TOPICS):
+    for topic in (*SENSOR_TOPICS, *TRUTH_TOPICS):
         assert bag.stamps(topic).tolist() == found.get(topic.name, [])
 
 
@@ -162,10 +163,10 @@ def test_what_has_one_stamp_is_in_one_chunk_and_a_chunk_lasts_no_longer_than_a_s
 
 
 def test_a_chunk_ends_at_the_first_new_stamp_after_a_mebibyte(tmp_path):
-    with BagWriter(tmp_path / "a", ros.IMAGE_TOPICS, encoded=True) as bag:
+    with BagWriter(tmp_path / "a", IMAGE_TOPICS, encoded=True) as bag:
         for t_ns in range(10):
-            for topic in ros.IMAGE_TOPICS:
-                bag.write(topic, t_ns, serialise(ros.image(t_ns, "cam_left", bytes(400_000), "png")))
+            for topic in IMAGE_TOPICS:
+                bag.write(topic, t_ns, serialise(image_message(t_ns, "cam_left", bytes(400_000), "png")))
     chunks = Bag.open(tmp_path / "a").summary.chunk_indexes
     assert [chunk.message_start_time for chunk in chunks] == [0, 2, 4, 6, 8]
 
@@ -175,11 +176,11 @@ def write_foreign(path, count=30, **options):
     with path.open("wb") as stream:
         writer = Writer(stream, chunk_size=200, **options)
         writer.start(profile="ros2")
-        schema = writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
-        channels = [writer.register_channel(name, "cdr", schema) for name in (ros.ENCODERS.name, "/other")]
+        schema = writer.register_schema(ENCODERS.type_name, "ros2msg", b"")
+        channels = [writer.register_channel(name, "cdr", schema) for name in (ENCODERS.name, "/other")]
         for t_ns in range(count):
             writer.add_message(
-                channels[t_ns % 2], t_ns, serialise(ros.message(ros.ENCODERS, t_ns, ros.BODY, t_ns, -t_ns)), t_ns
+                channels[t_ns % 2], t_ns, serialise(stamped_message(ENCODERS, t_ns, BODY, left=t_ns, right=-t_ns)), t_ns
             )
         writer.finish()
     return path
@@ -188,9 +189,9 @@ def write_foreign(path, count=30, **options):
 @pytest.mark.parametrize("packing", CompressionType)
 def test_every_packing_is_read(tmp_path, packing):
     bag = Bag.open(write_foreign(tmp_path / "a", compression=packing))
-    assert [m.left for _, m in bag.messages([ros.ENCODERS])] == list(range(0, 30, 2))
-    messages = [serialise(ros.message(ros.ENCODERS, 2 * n, ros.BODY, 2 * n, -2 * n)) for n in range(15)]
-    assert [bytes(bag.nth([ros.ENCODERS], n)[0][1]) for n in (0, 7, 14)] == [messages[n] for n in (0, 7, 14)]
+    assert [m.left for _, m in bag.messages([ENCODERS])] == list(range(0, 30, 2))
+    messages = [serialise(stamped_message(ENCODERS, 2 * n, BODY, left=2 * n, right=-2 * n)) for n in range(15)]
+    assert [bytes(bag.nth([ENCODERS], n)[0][1]) for n in (0, 7, 14)] == [messages[n] for n in (0, 7, 14)]
 
 
 @pytest.mark.parametrize(
@@ -207,12 +208,12 @@ def test_messages_that_fall_back_in_time_are_refused_when_they_come(tmp_path):
         writer = Writer(stream)
         writer.start()
         channel = writer.register_channel(
-            ros.ENCODERS.name, "cdr", writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
+            ENCODERS.name, "cdr", writer.register_schema(ENCODERS.type_name, "ros2msg", b"")
         )
         for t_ns in (5, 4):
-            writer.add_message(channel, t_ns, serialise(ros.message(ros.ENCODERS, t_ns, ros.BODY, 0, 0)), t_ns)
+            writer.add_message(channel, t_ns, serialise(stamped_message(ENCODERS, t_ns, BODY, left=0, right=0)), t_ns)
         writer.finish()
-    messages = Bag.open(tmp_path / "a").raw([ros.ENCODERS])
+    messages = Bag.open(tmp_path / "a").raw([ENCODERS])
     next(messages)
     with pytest.raises(SequenceError, match="after 5 ns comes 4 ns"):
         next(messages)
@@ -223,11 +224,11 @@ def test_two_senders_of_a_topic_are_refused(tmp_path):
         writer = Writer(stream)
         writer.start()
         for _ in range(2):
-            schema = writer.register_schema(ros.ENCODERS.type_name, "ros2msg", b"")
-            writer.register_channel(ros.ENCODERS.name, "cdr", schema)
+            schema = writer.register_schema(ENCODERS.type_name, "ros2msg", b"")
+            writer.register_channel(ENCODERS.name, "cdr", schema)
         writer.finish()
     with pytest.raises(SequenceError, match=r"^/encoders should be vobench_msgs/msg/WheelTicks but is 2 channels in"):
-        Bag.open(tmp_path / "a").has(ros.ENCODERS)
+        Bag.open(tmp_path / "a").has(ENCODERS)
 
 
 def record_places(data, begin):
@@ -246,7 +247,7 @@ def summary(tmp_path):
     footer_at = len(data) - len(MAGIC) - FOOTER.size
     data[footer_at + FOOTER.size - 4 : footer_at + FOOTER.size] = bytes(4)
     path.write_bytes(data)
-    assert Bag.open(path).count(ros.ENCODERS) == 15
+    assert Bag.open(path).count(ENCODERS) == 15
     places = list(record_places(data, FOOTER.unpack_from(data, footer_at)[0]))
 
     def change(opcode, number, at, form, change_by):

@@ -3,12 +3,11 @@
 import pytest
 
 from vobench.errors import SequenceError
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
 from vobench.sequence.bag_writer import CHUNK_BYTES, CHUNK_NS, BagWriter, note_checksum, replacing
-from vobench.sequence.messages import Topic
+from vobench.sequence.topic import EXPOSURE, IMU, Topic
 
-ONE, TWO = Topic("/one", ros.EXPOSURE.type_name), Topic("/two", ros.EXPOSURE.type_name)
+ONE, TWO = Topic("/one", EXPOSURE.type_name), Topic("/two", EXPOSURE.type_name)
 
 
 def chunks(path, messages, *, encoded=True):
@@ -54,7 +53,7 @@ def test_stamps_rise_per_topic_and_never_fall(tmp_path, topic):
                 bag.write(topic, t_ns, b"")
         bag.write(topic, 6, b"")
         with pytest.raises(SequenceError, match="the rig of this recording has no sensor for /imu: "):
-            bag.write(ros.IMU, 7, b"")
+            bag.write(IMU, 7, b"")
 
 
 def test_the_first_stamp_may_be_0(tmp_path):

@@ -11,12 +11,13 @@ from vobench.geometry import se3
 from vobench.geometry.rig import ImuCalibration
 from vobench.sensor.imu import ImuBias, ImuReadings
 from vobench.sequence import Sequence, SequenceWriter, read_imu_bias, read_true_rig
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
 from vobench.sequence.bag_writer import BagWriter
 from vobench.sequence.calibration import read_rig, write_mounts
-from vobench.sequence.messages import serialise
+from vobench.sequence.camera_info import camera_info_message
+from vobench.sequence.cdr import serialise
 from vobench.sequence.recording import topic_facts
+from vobench.sequence.topic import LEFT_INFO, TF_STATIC
 
 T_BODY_IMU = se3.transform(se3.from_quaternion(np.array([0.5, -0.5, 0.5, -0.5])), [0.1, -0.2, 0.3])
 IMU = ImuCalibration(T_BODY_IMU, 200.0, 1.7e-4, 2e-3, 2e-5, 3e-3)
@@ -110,19 +111,19 @@ def test_a_note_with_a_flipped_bit_is_refused_and_one_without_a_checksum_is_read
 
 
 def bag_with(path, rig, *, mounts=True, info=True, notes=()):
-    with BagWriter(path, (ros.TF_STATIC, ros.LEFT_INFO), encoded=True) as bag:
+    with BagWriter(path, (TF_STATIC, LEFT_INFO), encoded=True) as bag:
         if mounts:
             write_mounts(bag, rig, 0)
         for name, entries in notes:
             bag.note(name, entries)
         if info:
-            bag.write(ros.LEFT_INFO, 0, serialise(ros.camera_info(0, "cam_left", rig.left)))
+            bag.write(LEFT_INFO, 0, serialise(camera_info_message(0, "cam_left", rig.left)))
     return Bag.open(path)
 
 
 def test_a_calibration_with_a_hole_is_refused_by_name(recording, tmp_path):
     rig = replace(one_camera(recording.rig), wheels=None)
-    there = (ros.LEFT_INFO,)
+    there = (LEFT_INFO,)
     assert read_rig(bag_with(tmp_path / "good", rig), there).imu is None
     with pytest.raises(SequenceError, match=r"^/tf_static has no message in"):
         read_rig(bag_with(tmp_path / "a", rig, mounts=False), there)

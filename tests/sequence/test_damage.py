@@ -9,13 +9,15 @@ import pytest
 
 from vobench.errors import SequenceError
 from vobench.sequence import Sequence, SequenceWriter, has_truth, read_case, read_truth
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
 from vobench.sequence.bag_writer import BagWriter
 from vobench.sequence.calibration import write_mounts
+from vobench.sequence.camera_info import camera_info_messages
+from vobench.sequence.cdr import serialise
 from vobench.sequence.mcap_file import HEAD, MESSAGE_INDEX_ENTRY, MESSAGE_INDEX_HEAD
-from vobench.sequence.messages import serialise
+from vobench.sequence.message import image_message
 from vobench.sequence.picture import encode
+from vobench.sequence.topic import INFO_TOPICS, LEFT_IMAGE, RIGHT_IMAGE, sensor_topics
 
 
 def read_all(folder: Path) -> None:
@@ -79,7 +81,7 @@ def test_a_flipped_bit_in_the_index_of_stamps_is_refused(folder, tmp_path):
     """A stamp that its chunk has not, and one that only the calibration's own index denies."""
     bad = Path(shutil.copytree(folder, tmp_path / "bad"))
     bag, whole = Bag.open(folder / "sensors.mcap"), (folder / "sensors.mcap").read_bytes()
-    channel = next(c.id for c in bag.summary.channels.values() if c.topic == ros.LEFT_IMAGE.name)
+    channel = next(c.id for c in bag.summary.channels.values() if c.topic == LEFT_IMAGE.name)
     at = bag.summary.chunk_indexes[-1].message_index_offsets[channel] + MESSAGE_INDEX_HEAD
     for byte, said in (
         (7, "has stamps that its chunk does not have"),
@@ -108,13 +110,15 @@ def test_a_truth_that_was_never_finished_is_not_taken_for_none(folder, tmp_path)
 )
 def test_pictures_that_are_no_pairs_are_refused(recording, tmp_path, right_ns, said):
     rig = recording.rig
-    shots = [(5, ros.LEFT_IMAGE), (6, ros.LEFT_IMAGE), *((t_ns, ros.RIGHT_IMAGE) for t_ns in right_ns)]
-    with BagWriter(tmp_path / "sensors.mcap", ros.sensor_topics(rig), encoded=True) as bag:
+    shots = [(5, LEFT_IMAGE), (6, LEFT_IMAGE), *((t_ns, RIGHT_IMAGE) for t_ns in right_ns)]
+    with BagWriter(tmp_path / "sensors.mcap", sensor_topics(rig), encoded=True) as bag:
         write_mounts(bag, rig, 0)
-        for topic, info in zip(ros.INFO_TOPICS, ros.camera_infos(0, rig), strict=True):
+        for topic, info in zip(INFO_TOPICS, camera_info_messages(0, rig), strict=True):
             bag.write(topic, 0, serialise(info))
         for t_ns, topic in sorted(shots, key=lambda shot: shot[0]):
-            bag.write(topic, t_ns, serialise(ros.image(t_ns, "cam", encode(recording.left[0], rig.left, "a"), "png")))
+            bag.write(
+                topic, t_ns, serialise(image_message(t_ns, "cam", encode(recording.left[0], rig.left, "a"), "png"))
+            )
     with pytest.raises(SequenceError, match=said):
         list(Sequence.open(tmp_path).frames())
 
@@ -127,7 +131,7 @@ def test_a_chunk_with_fewer_frames_than_the_summary_says_is_refused(recording, t
             writer.write_frame(t_ns, recording.left[0], None)
     path = tmp_path / "sensors.mcap"
     bag, data = Bag.open(path), bytearray(path.read_bytes())
-    channel = next(c.id for c in bag.summary.channels.values() if c.topic == ros.LEFT_IMAGE.name)
+    channel = next(c.id for c in bag.summary.channels.values() if c.topic == LEFT_IMAGE.name)
     chunk = bag.summary.chunk_indexes[-1].chunk_start_offset + HEAD.size
     entry = bag.summary.chunk_indexes[-1].message_index_offsets[channel] + MESSAGE_INDEX_HEAD + MESSAGE_INDEX_ENTRY
     message = int(np.frombuffer(data, "<u8", 2, entry)[1])

@@ -31,10 +31,10 @@ from vobench.sequence import (
     read_truth_frames,
     read_twist,
 )
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
 from vobench.sequence.mcap_file import MAGIC, MAX_BYTES
 from vobench.sequence.recording import read_poses
+from vobench.sequence.topic import TF_STATIC
 
 COUNT, LIMIT_S = 1000, 5
 HEADROOM_BYTES = 1_200_000_000  # four times what a record may hold
@@ -67,7 +67,7 @@ def bomb(mebibytes, stated):
     """A recording whose one chunk unpacks to so much, though it may state another size."""
     packer = zstandard.ZstdCompressor(level=1, write_content_size=False).compressobj()
     packed = b"".join([*(packer.compress(bytes(1 << 20)) for _ in range(mebibytes)), packer.flush()])
-    file, topic = RecordBuilder(), ros.TF_STATIC
+    file, topic = RecordBuilder(), TF_STATIC
     file.write(MAGIC)
     begin = file.count
     Chunk("zstd", packed, 0, 0, uncompressed_crc=0, uncompressed_size=stated).write(file)
@@ -236,7 +236,7 @@ def only(folder):
     be_bounded()
     signal.alarm(LIMIT_S)
     try:
-        print(len(list(Bag.open(folder / "sensors.mcap").raw((ros.TF_STATIC,)))))
+        print(len(list(Bag.open(folder / "sensors.mcap").raw((TF_STATIC,)))))
     except VobenchError as error:
         print(error)
 

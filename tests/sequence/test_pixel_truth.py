@@ -12,9 +12,9 @@ from vobench.sequence.pixel_truth import (
     check_truth,
     names_from_json,
     names_to_json,
+    pixel_truth_topics,
     truth_image,
     truth_topic,
-    truth_topics,
     truth_values,
 )
 
@@ -73,15 +73,15 @@ def test_a_frame_has_the_channels_of_the_recording_in_the_size_of_the_camera():
 
 
 def test_topics_are_those_of_the_left_camera_first():
-    names = [topic.name for topic in truth_topics(("depth", "flow"))]
+    names = [topic.name for topic in pixel_truth_topics(("depth", "flow"))]
     assert names == [
         "/ground_truth/cam_left/depth",
         "/ground_truth/cam_left/flow",
         "/ground_truth/cam_right/depth",
         "/ground_truth/cam_right/flow",
     ]
-    assert truth_topics(("depth",), ("right",)) == (truth_topic("right", "depth"),)
-    assert len(truth_topics()) == 2 * len(CHANNELS)
+    assert pixel_truth_topics(("depth",), ("right",)) == (truth_topic("right", "depth"),)
+    assert len(pixel_truth_topics()) == 2 * len(CHANNELS)
 
 
 def test_names_come_back_and_other_files_are_refused():

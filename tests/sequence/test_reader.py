@@ -45,12 +45,14 @@ from vobench.sequence import (
     read_twist,
     truth_channels,
 )
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
 from vobench.sequence.bag_writer import BagWriter
 from vobench.sequence.calibration import write_mounts
-from vobench.sequence.messages import serialise
+from vobench.sequence.camera_info import camera_info_messages
+from vobench.sequence.cdr import serialise
+from vobench.sequence.message import image_message, odometry_message
 from vobench.sequence.picture import encode
+from vobench.sequence.topic import IMAGE_TOPICS, INFO_TOPICS, ODOMETRY, TF_STATIC, TRUTH_TOPICS
 
 
 def test_pixels_and_stamps_come_back_exactly(recording, folder):
@@ -226,7 +228,7 @@ def test_an_imported_recording_keeps_its_stamps_its_notes_and_says_what_is_not_k
     assert (read_import_notes(tmp_path), read_provenance(tmp_path)) == (notes, versions)
     with pytest.raises(SequenceError, match=r"^no attachment 'case\.json' in"):
         read_case(tmp_path)
-    (first, _) = (m for _, m in Bag.open(tmp_path / "truth.mcap").messages((ros.ODOMETRY,)))
+    (first, _) = (m for _, m in Bag.open(tmp_path / "truth.mcap").messages((ODOMETRY,)))
     assert (first.twist.covariance[0], first.twist.twist.linear.x, first.pose.covariance[0]) == (-1, 0, 0)
 
 
@@ -243,18 +245,16 @@ def test_twist_comes_back_and_truth_is_there_or_not(recording, folder, tmp_path)
 
 
 def test_a_recording_of_the_time_before_exposure_imu_and_true_rig_still_reads(recording, tmp_path):
-    rig, infos = recording.rig, [serialise(info) for info in ros.camera_infos(0, recording.rig)]
-    with BagWriter(
-        tmp_path / "sensors.mcap", (ros.TF_STATIC, *ros.INFO_TOPICS, *ros.IMAGE_TOPICS), encoded=False
-    ) as bag:
+    rig, infos = recording.rig, [serialise(info) for info in camera_info_messages(0, recording.rig)]
+    with BagWriter(tmp_path / "sensors.mcap", (TF_STATIC, *INFO_TOPICS, *IMAGE_TOPICS), encoded=False) as bag:
         write_mounts(bag, rig, 0)
-        for topic, info in zip(ros.INFO_TOPICS, infos, strict=True):
+        for topic, info in zip(INFO_TOPICS, infos, strict=True):
             bag.write(topic, 0, info)
-        for topic, picture in zip(ros.IMAGE_TOPICS, (recording.left[0], recording.right[0]), strict=True):
-            bag.write(topic, 0, serialise(ros.image(0, "cam_left", encode(picture, rig.left, "a"), "png")))
-    with BagWriter(tmp_path / "truth.mcap", ros.TRUTH_TOPICS, encoded=False) as bag:
+        for topic, picture in zip(IMAGE_TOPICS, (recording.left[0], recording.right[0]), strict=True):
+            bag.write(topic, 0, serialise(image_message(0, "cam_left", encode(picture, rig.left, "a"), "png")))
+    with BagWriter(tmp_path / "truth.mcap", TRUTH_TOPICS, encoded=False) as bag:
         write_mounts(bag, rig, 0)
-        bag.write(ros.ODOMETRY, 0, serialise(ros.odometry(0, np.eye(4), np.zeros(6))))
+        bag.write(ODOMETRY, 0, serialise(odometry_message(0, np.eye(4), np.zeros(6))))
     sequence = Sequence.open(tmp_path)
     (frame,) = sequence.frames()
     np.testing.assert_array_equal(frame.right, recording.right[0])

@@ -15,10 +15,11 @@ from rosbags.typesys import Stores, get_typestore
 
 from vobench.errors import SequenceError
 from vobench.geometry import se3
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
 from vobench.sequence.mcap_file import MAGIC
+from vobench.sequence.message_type import TYPES
 from vobench.sequence.recording import TopicFacts, is_recording, read_poses, topic_facts
+from vobench.sequence.topic import Topic
 from vobench.trajectory.trajectory import Trajectory
 
 
@@ -28,7 +29,7 @@ def test_the_summary_and_the_messages_say_the_same(folder: Path, name: str) -> N
     facts = topic_facts(folder / name)
     assert len(facts) > 5
     for each in facts:
-        stamps = bag.stamps(ros.Topic(each.name, each.type_name))
+        stamps = bag.stamps(Topic(each.name, each.type_name))
         assert (each.count, each.start_ns, each.end_ns) == (len(stamps), stamps[0], stamps[-1])
 
 
@@ -81,9 +82,9 @@ def write_ros1(path: Path, trajectory: Trajectory) -> Path:
 
 def write_ros2(folder: Path, trajectory: Trajectory, storage: StoragePlugin) -> Path:
     with Writer2(folder, version=9, storage_plugin=storage) as bag:
-        channel = bag.add_connection("/pose", POSE, typestore=ros.TYPES)
+        channel = bag.add_connection("/pose", POSE, typestore=TYPES)
         for t_ns, T in zip(trajectory.t_ns.tolist(), trajectory.T_world_frame, strict=True):
-            bag.write(channel, t_ns, ros.TYPES.serialize_cdr(stamped(ros.TYPES, t_ns, T), POSE))
+            bag.write(channel, t_ns, TYPES.serialize_cdr(stamped(TYPES, t_ns, T), POSE))
     return folder
 
 

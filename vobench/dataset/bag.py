@@ -32,9 +32,10 @@ from vobench.dataset.recording import (
 from vobench.errors import InputError
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
-from vobench.sequence import messages as ros
 from vobench.sequence.mcap_file import MAGIC
+from vobench.sequence.message import stamp_ns
 from vobench.sequence.recording import MAGICS, METADATA, open_bag, read_first_poses
+from vobench.sequence.topic import IMU, LEFT_IMAGE, RIGHT_IMAGE, SENSORS_FILE, TF_STATIC
 from vobench.trajectory.trajectory import Stamps
 
 BASE = "base_link"
@@ -86,7 +87,7 @@ def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
         notes.append(f"The colour mosaic ({encoding}) was converted to grey by OpenCV's bilinear interpolation.")
     if repeats:
         notes.append(f"{repeats} poses of {chosen.truth} repeat a stamp; the first pose of each stamp was kept.")
-    unread = types.keys() - {*chosen.sensors, ros.TF_STATIC.name, chosen.truth_topic}
+    unread = types.keys() - {*chosen.sensors, TF_STATIC.name, chosen.truth_topic}
     if unread:
         notes.append(f"Topics that were not read: {', '.join(sorted(unread))}.")
     return assemble(
@@ -152,7 +153,7 @@ class _Messages(NamedTuple):
 
 def _read_once(reader: Any, chosen: Chosen) -> _Messages:
     """Read the messages of the chosen topics in order. Of the truth and the calibrations, only the first is read."""
-    wanted = {*chosen.sensors, ros.TF_STATIC.name, chosen.truth_topic}
+    wanted = {*chosen.sensors, TF_STATIC.name, chosen.truth_topic}
     first_only = (chosen.truth_topic, chosen.left_info, chosen.right_info)
     messages = _Messages({}, {}, [], [])
     connections = [connection for connection in reader.connections if connection.topic in wanted]
@@ -161,13 +162,13 @@ def _read_once(reader: Any, chosen: Chosen) -> _Messages:
         if topic in messages.first and topic in first_only:
             continue
         message = reader.deserialize(raw, connection.msgtype)
-        if topic == ros.TF_STATIC.name:
+        if topic == TF_STATIC.name:
             messages.static.append(message)
             continue
         if topic not in messages.first:
             messages.first[topic] = _without_pixels(message)
         if hasattr(message, "header"):
-            messages.stamps_ns.setdefault(topic, []).append(ros.stamp_ns(message))
+            messages.stamps_ns.setdefault(topic, []).append(stamp_ns(message))
         if topic == chosen.imu:
             messages.readings.append(_imu_fields(message))
     return messages
@@ -263,7 +264,7 @@ def _read_pictures(
         for connection, _, raw in reader.messages(connections):
             topic = connection.topic
             message: Any = reader.deserialize(raw, connection.msgtype)
-            index = indices[topic].get(ros.stamp_ns(message))
+            index = indices[topic].get(stamp_ns(message))
             if index is None:
                 continue
             name = f"picture {index} of {topic} in {path}"
@@ -366,7 +367,7 @@ def _imu(
 def _begins(path: Path, suffix: str) -> bool:
     """Whether a file begins like files with a suffix. A sensors.mcap, which is part of a sequence, does not count."""
     magic = next(magic for magic, known in MAGICS.items() if known == suffix)
-    return path.name != ros.SENSORS_FILE and head(path).startswith(magic)
+    return path.name != SENSORS_FILE and head(path).startswith(magic)
 
 
 def _is_ros2(path: Path) -> bool:
@@ -374,7 +375,7 @@ def _is_ros2(path: Path) -> bool:
 
 
 HEEDS = frozenset({"calibration", "imu", "within_ns", "topics"})
-ROS2_TOPICS = (ros.LEFT_IMAGE.name, ros.RIGHT_IMAGE.name, ros.IMU.name)
+ROS2_TOPICS = (LEFT_IMAGE.name, RIGHT_IMAGE.name, IMU.name)
 LAYOUTS = (
     Layout(
         "ros2",

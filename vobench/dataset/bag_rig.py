@@ -12,10 +12,10 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
-from vobench.sequence import messages as ros
-from vobench.sequence.messages import ALL_AROUND, DOUBLE_SPHERE
+from vobench.sequence.camera_info import DOUBLE_SPHERE, EQUIRECTANGULAR, parse_camera
+from vobench.sequence.message import pose_fields, poses_from_fields
 
-VOBENCH_MODELS = (DOUBLE_SPHERE, ALL_AROUND)  # the camera models for which ROS has no name
+VOBENCH_MODELS = (DOUBLE_SPHERE, EQUIRECTANGULAR)  # the camera models for which ROS has no name
 UNIT_TOLERANCE = 1e-3  # the tolerance for the norm of a quaternion
 ROTATION_TOLERANCE = 1e-3
 
@@ -54,12 +54,12 @@ def tree_of(messages: list[Any], path: str) -> Tree:
         for stamped in message.transforms:
             parent = plain(stamped.header.frame_id)
             child = plain(stamped.child_frame_id)
-            fields = np.array(ros.pose_fields(stamped.transform), float)  # x, y, z, qx, qy, qz, qw
+            fields = np.array(pose_fields(stamped.transform), float)  # x, y, z, qx, qy, qz, qw
             norm = float(np.linalg.norm(fields[3:])) if np.isfinite(fields).all() else 0.0
             if abs(norm - 1) > UNIT_TOLERANCE:
                 raise InputError(f"/tf_static: {parent} to {child} should be finite with a unit quaternion in {path}")
             fields[3:] /= norm
-            tree[parent, child] = ros.poses(fields)
+            tree[parent, child] = poses_from_fields(fields)
     return tree
 
 
@@ -109,7 +109,7 @@ class Info:
         if self.rectified:
             return focal_camera(size_px, _focal_px(self.matrix("p", 3, 4)), "none", [], place=self.topic)
         if message.distortion_model in VOBENCH_MODELS:
-            return ros.camera(message)
+            return parse_camera(message)
         focal_px = _focal_px(self.matrix("k", 3, 3))
         coefficients = [float(value) for value in self._field("d")]
         if not np.isfinite(coefficients).all():

@@ -10,20 +10,30 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, ReaderError, Sto
 
 from vobench.dataset.source import ExportSource, Views
 from vobench.errors import SequenceError
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
-from vobench.sequence.messages import TYPES
+from vobench.sequence.message_type import TYPES
+from vobench.sequence.topic import (
+    CASE_ATTACHMENT,
+    IMPORT_NOTE,
+    IMU_NOTE,
+    NAMES_ATTACHMENT,
+    PROVENANCE_NOTE,
+    SENSORS_FILE,
+    TF_STATIC,
+    TRUTH_FILE,
+    WHEELS_NOTE,
+)
 
-TRUE_TF_STATIC = f"/ground_truth{ros.TF_STATIC.name}"
+TRUE_TF_STATIC = f"/ground_truth{TF_STATIC.name}"
 VERSION: Final = 8  # the version of rosbag2's metadata, which ROS 2 Iron and later can read
-NOTE_NAMES = (ros.WHEELS_NOTE, ros.IMU_NOTE, ros.PROVENANCE_NOTE, ros.IMPORT_NOTE)
-ATTACHMENT_NAMES = (ros.CASE_ATTACHMENT, ros.NAMES_ATTACHMENT)
+NOTE_NAMES = (WHEELS_NOTE, IMU_NOTE, PROVENANCE_NOTE, IMPORT_NOTE)
+ATTACHMENT_NAMES = (CASE_ATTACHMENT, NAMES_ATTACHMENT)
 
 
 def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
     """Write every message of a sequence's two files unchanged, and return notes on what was converted."""
     del views  # a bag contains the pictures as recorded
-    paths = [source.folder / name for name in (ros.SENSORS_FILE, ros.TRUTH_FILE)]
+    paths = [source.folder / name for name in (SENSORS_FILE, TRUTH_FILE)]
     paths = [path for path in paths if path.is_file()]
     true_mounts_differ = len({_mounts(path) for path in paths}) > 1
 
@@ -46,7 +56,7 @@ def write_ros2(source: ExportSource, views: Views, folder: Path) -> list[str]:
 
 def _mounts(path: Path) -> tuple[bytes, ...]:
     """The messages on /tf_static, as bytes."""
-    return tuple(bytes(data) for _, data in Bag.open(path).raw((ros.TF_STATIC,)))
+    return tuple(bytes(data) for _, data in Bag.open(path).raw((TF_STATIC,)))
 
 
 def _custom_data(paths: list[Path]) -> dict[str, str]:
@@ -91,6 +101,6 @@ def _copied_name(
 ) -> str | None:
     """The name of a topic in the new bag; None for the truth's /tf_static if it equals that of the sensors."""
     is_of_sensors = connection.owner is reader.connections[0].owner  # the sensor file is the first one
-    if connection.topic != ros.TF_STATIC.name or is_of_sensors:
+    if connection.topic != TF_STATIC.name or is_of_sensors:
         return connection.topic
     return TRUE_TF_STATIC if true_mounts_differ else None

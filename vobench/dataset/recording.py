@@ -14,7 +14,7 @@ from vobench.geometry.rig import SIDES, ImuCalibration, Rig, rectification
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import EncodedFrame, StereoFrame
-from vobench.sequence.messages import END_OF_STAMPS_NS
+from vobench.sequence.message import END_OF_STAMPS_NS
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 

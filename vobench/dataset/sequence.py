@@ -12,7 +12,7 @@ from vobench.errors import InputError
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import Sequence, SequenceWriter, has_truth, read_truth
 from vobench.sequence.mcap_file import part_of
-from vobench.sequence.messages import SENSORS_FILE
+from vobench.sequence.topic import SENSORS_FILE
 
 LEFT_OUT = "The sequence's case, true rig, true velocities and per-pixel ground truth were not carried over."
 

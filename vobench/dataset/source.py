@@ -18,6 +18,7 @@ from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuBias, ImuReadings
 from vobench.sequence import (
     Sequence,
+    has_case,
     has_truth,
     read_case,
     read_imu_bias,
@@ -26,8 +27,8 @@ from vobench.sequence import (
     read_twist,
     truth_channels,
 )
-from vobench.sequence.messages import CASE_ATTACHMENT, TRUTH_FILE
 from vobench.sequence.picture import Image, decode, encode
+from vobench.sequence.topic import CASE_ATTACHMENT, TRUTH_FILE
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
@@ -177,11 +178,13 @@ def open_source(folder: Path) -> ExportSource:
 
 
 def _case(folder: Path) -> Mapping[str, Any] | None:
-    """The description of the simulated case; None if the sequence has none. Raises SequenceError if it is not JSON."""
-    try:
-        text = read_case(folder)
-    except SequenceError:
+    """The description of the simulated case; None if the sequence has none.
+
+    Raises SequenceError if the attachment is damaged or is not JSON.
+    """
+    if not has_case(folder):
         return None
+    text = read_case(folder)
     try:
         case = json.loads(text)
     except ValueError as error:  # the text is not JSON, or not UTF-8

@@ -4,6 +4,7 @@ from vobench.sequence.reader import EncodedFrame as EncodedFrame
 from vobench.sequence.reader import Sequence as Sequence
 from vobench.sequence.reader import StereoFrame as StereoFrame
 from vobench.sequence.reader import StereoTruth as StereoTruth
+from vobench.sequence.reader import has_case as has_case
 from vobench.sequence.reader import has_truth as has_truth
 from vobench.sequence.reader import payload_hash as payload_hash
 from vobench.sequence.reader import read_case as read_case

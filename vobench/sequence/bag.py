@@ -25,7 +25,8 @@ from vobench.sequence.mcap_file import (
     read_record,
     read_summary,
 )
-from vobench.sequence.messages import TYPES, Topic
+from vobench.sequence.message_type import TYPES
+from vobench.sequence.topic import Topic
 
 Numbers = NDArray[np.int64]
 

@@ -13,7 +13,8 @@ from mcap.writer import CompressionType, Writer
 from vobench import stop
 from vobench.errors import SequenceError
 from vobench.sequence.mcap_file import NO_CHANNEL, part_of
-from vobench.sequence.messages import TYPES, Topic
+from vobench.sequence.message_type import TYPES
+from vobench.sequence.topic import Topic
 from vobench.trajectory.nanoseconds import NS_PER_S
 
 PROFILE = "ros2"

@@ -7,10 +7,12 @@ from typing import Any
 from vobench.errors import InputError, SequenceError
 from vobench.geometry.rig import ImuCalibration, Rig, WheelGeometry
 from vobench.geometry.se3 import Array
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
 from vobench.sequence.bag_writer import BagWriter
-from vobench.sequence.messages import serialise
+from vobench.sequence.camera_info import parse_camera
+from vobench.sequence.cdr import serialise
+from vobench.sequence.message import pose_fields, poses_from_fields, tf_message
+from vobench.sequence.topic import BODY, IMU_FRAME, IMU_NOTE, LEFT, RIGHT, TF_STATIC, WHEELS_NOTE, Topic
 
 IMU_NUMBERS = tuple(field.name for field in fields(ImuCalibration) if field.name != "T_body_imu")
 
@@ -23,39 +25,39 @@ def write_mounts(bag: BagWriter, rig: Rig, t_ns: int) -> None:
             "track_m": repr(float(wheels.track_m)),
             "ticks_per_revolution": str(wheels.ticks_per_revolution),
         }
-        bag.note(ros.WHEELS_NOTE, entries)
+        bag.note(WHEELS_NOTE, entries)
     if rig.imu:
         numbers = {name: repr(float(getattr(rig.imu, name))) for name in IMU_NUMBERS}
-        bag.note(ros.IMU_NOTE, numbers)
+        bag.note(IMU_NOTE, numbers)
 
-    T_body = {ros.LEFT: rig.T_body_left}  # by the name of the child frame
+    T_body = {LEFT: rig.T_body_left}  # by the name of the child frame
     if rig.T_body_right is not None:
-        T_body[ros.RIGHT] = rig.T_body_right
+        T_body[RIGHT] = rig.T_body_right
     if rig.imu:
-        T_body[ros.IMU_FRAME] = rig.imu.T_body_imu
-    transforms = ros.transforms(t_ns, ros.BODY, T_body)
-    bag.write(ros.TF_STATIC, t_ns, serialise(transforms))
+        T_body[IMU_FRAME] = rig.imu.T_body_imu
+    transforms = tf_message(t_ns, BODY, T_body)
+    bag.write(TF_STATIC, t_ns, serialise(transforms))
 
 
-def read_rig(bag: Bag, info_topics: Sequence[ros.Topic]) -> Rig:
+def read_rig(bag: Bag, info_topics: Sequence[Topic]) -> Rig:
     """The rig of a bag, by the topics of its left and right camera. Raises SequenceError where that is wrong."""
-    bag.require((ros.TF_STATIC, info_topics[0]))
+    bag.require((TF_STATIC, info_topics[0]))
     existing = [topic for topic in info_topics if bag.has(topic)]
-    cameras = [ros.camera(_first(bag, topic)) for topic in existing]
+    cameras = [parse_camera(_first(bag, topic)) for topic in existing]
     T_body = {}
-    for stamped in _first(bag, ros.TF_STATIC).transforms:
-        T_body[stamped.child_frame_id] = ros.poses(ros.pose_fields(stamped.transform))
+    for stamped in _first(bag, TF_STATIC).transforms:
+        T_body[stamped.child_frame_id] = poses_from_fields(pose_fields(stamped.transform))
 
     right = None
     T_body_right = None
     if len(cameras) > 1:
         right = cameras[1]
-        T_body_right = _mount(bag, T_body, ros.RIGHT)
-    T_body_left = _mount(bag, T_body, ros.LEFT)
+        T_body_right = _mount(bag, T_body, RIGHT)
+    T_body_left = _mount(bag, T_body, LEFT)
     return Rig(cameras[0], right, T_body_left, T_body_right, _read_wheels(bag), _read_imu(bag, T_body))
 
 
-def _first(bag: Bag, topic: ros.Topic) -> Any:
+def _first(bag: Bag, topic: Topic) -> Any:
     for _, message in bag.messages((topic,)):
         return message
     raise SequenceError(f"{topic.name} has no message in {bag.path}")
@@ -67,12 +69,12 @@ def _mount(
     frame: str,
 ) -> Array:
     if frame not in T_body:
-        raise SequenceError(f"{ros.TF_STATIC.name} does not say where {frame} is mounted in {bag.path}")
+        raise SequenceError(f"{TF_STATIC.name} does not say where {frame} is mounted in {bag.path}")
     return T_body[frame]
 
 
 def _read_wheels(bag: Bag) -> WheelGeometry | None:
-    entries = bag.note(ros.WHEELS_NOTE)
+    entries = bag.note(WHEELS_NOTE)
     if not entries:
         return None
     try:
@@ -86,7 +88,7 @@ def _read_wheels(bag: Bag) -> WheelGeometry | None:
 
 
 def _read_imu(bag: Bag, T_body: dict[str, Array]) -> ImuCalibration | None:
-    entries = bag.note(ros.IMU_NOTE)
+    entries = bag.note(IMU_NOTE)
     if not entries:
         return None
     try:
@@ -94,4 +96,4 @@ def _read_imu(bag: Bag, T_body: dict[str, Array]) -> ImuCalibration | None:
     except (KeyError, ValueError) as error:
         wanted = ", ".join(IMU_NUMBERS)
         raise SequenceError(f"the IMU is not described as {wanted} ({error!r}) in {bag.path}") from error
-    return ImuCalibration(_mount(bag, T_body, ros.IMU_FRAME), *numbers)
+    return ImuCalibration(_mount(bag, T_body, IMU_FRAME), *numbers)

@@ -12,7 +12,9 @@ from vobench.errors import SequenceError
 from vobench.geometry.camera import Camera
 from vobench.geometry.rig import SIDES, Side
 from vobench.sensor.pixel_truth import CHANNELS, Channel, TruthFrame, TruthNames
-from vobench.sequence.messages import LEFT, RIGHT, TYPES, Topic, header
+from vobench.sequence.message import header_message
+from vobench.sequence.message_type import new_message
+from vobench.sequence.topic import LEFT, RIGHT, Topic
 
 FRAME_IDS: dict[Side, str] = {"left": LEFT, "right": RIGHT}
 
@@ -25,7 +27,7 @@ def truth_topic(side: Side, channel: str) -> Topic:
     return Topic(f"/ground_truth/{FRAME_IDS[side]}/{channel}", IMAGE)
 
 
-def truth_topics(channels: Iterable[str] = tuple(CHANNELS), sides: Iterable[Side] = SIDES) -> tuple[Topic, ...]:
+def pixel_truth_topics(channels: Iterable[str] = tuple(CHANNELS), sides: Iterable[Side] = SIDES) -> tuple[Topic, ...]:
     """The topics of channels of cameras, those of the left camera first."""
     channels = tuple(channels)
     return tuple(truth_topic(side, channel) for side in sides for channel in channels)
@@ -43,9 +45,16 @@ def truth_image(
     pixels = values.astype(np.uint8) * np.uint8(MASK_IS_SET) if is_mask else values
     data = np.ascontiguousarray(pixels).reshape(-1).view(np.uint8)
     encoding = _encoding(CHANNELS[channel])
-    step = data.size // height
-    make: Any = TYPES.types[IMAGE]
-    return make(header(t_ns, FRAME_IDS[side]), height, width, encoding, 0, step, data)
+    return new_message(
+        IMAGE,
+        header=header_message(t_ns, FRAME_IDS[side]),
+        height=height,
+        width=width,
+        encoding=encoding,
+        is_bigendian=0,
+        step=data.size // height,
+        data=data,
+    )
 
 
 def truth_values(channel: str, message: Any) -> NDArray[np.generic]:

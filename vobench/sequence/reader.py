@@ -17,13 +17,37 @@ from vobench.geometry.rig import SIDES, Rig, Side
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuBias, ImuReadings
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
-from vobench.sequence import messages as ros
 from vobench.sequence.bag import Bag
 from vobench.sequence.calibration import read_rig
+from vobench.sequence.cdr import parse_picture
 from vobench.sequence.mcap_file import parsing, part_of
-from vobench.sequence.messages import picture_in
+from vobench.sequence.message import UNKNOWN_COVARIANCE, pose_fields, poses_from_fields, stamp_ns
 from vobench.sequence.picture import MONO, Image, decode
-from vobench.sequence.pixel_truth import names_from_json, truth_topic, truth_topics, truth_values
+from vobench.sequence.pixel_truth import names_from_json, pixel_truth_topics, truth_topic, truth_values
+from vobench.sequence.topic import (
+    CASE_ATTACHMENT,
+    DISTURBANCE,
+    ENCODERS,
+    EXPOSURE,
+    IMAGE_TOPICS,
+    IMPORT_NOTE,
+    IMU,
+    IMU_BIAS,
+    IMU_NOTE,
+    INFO_TOPICS,
+    LEFT_IMAGE,
+    LEFT_INFO,
+    NAMES_ATTACHMENT,
+    ODOMETRY,
+    PROVENANCE_NOTE,
+    SENSOR_TOPICS,
+    SENSORS_FILE,
+    TRUE_INFO_TOPICS,
+    TRUTH_FILE,
+    TRUTH_TOPICS,
+    WHEELS_NOTE,
+    Topic,
+)
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 DISTURBANCE_FIELDS = ("left_slip", "right_slip", "side_slip_rad", "push_mps2", "turn_push_radps2")
@@ -65,10 +89,10 @@ class Sequence:
     @classmethod
     def open(cls, folder: Path) -> "Sequence":
         """Check the sensors of a recording and read its calibration. Raises SequenceError."""
-        bag = Bag.open(Path(folder) / ros.SENSORS_FILE)
-        bag.require((ros.LEFT_INFO, ros.LEFT_IMAGE))
-        rig = read_rig(bag, ros.INFO_TOPICS)
-        counts = [bag.count(topic) for topic in ros.IMAGE_TOPICS[: len(rig.sides)]]
+        bag = Bag.open(Path(folder) / SENSORS_FILE)
+        bag.require((LEFT_INFO, LEFT_IMAGE))
+        rig = read_rig(bag, INFO_TOPICS)
+        counts = [bag.count(topic) for topic in IMAGE_TOPICS[: len(rig.sides)]]
         if len(set(counts)) > 1 or not counts[0]:
             got = " and ".join(map(str, counts))
             raise SequenceError(
@@ -97,8 +121,8 @@ class Sequence:
         return f"Sequence({path}, {self.frame_count} frames of {cameras})"
 
     @property
-    def _image_topics(self) -> tuple[ros.Topic, ...]:
-        return ros.IMAGE_TOPICS[: len(self.rig.sides)]
+    def _image_topics(self) -> tuple[Topic, ...]:
+        return IMAGE_TOPICS[: len(self.rig.sides)]
 
     def encoded_frames(self) -> Iterator[EncodedFrame]:
         """The frames in order, undecoded."""
@@ -115,7 +139,7 @@ class Sequence:
     def _encoded(
         self,
         index: int,
-        messages: Iterable[tuple[ros.Topic, memoryview]],
+        messages: Iterable[tuple[Topic, memoryview]],
     ) -> EncodedFrame:
         """The frame of one message of each camera. Raises SequenceError where they are not of one instant."""
         topics = []
@@ -123,13 +147,13 @@ class Sequence:
         with parsing(self.path):
             for topic, data in messages:
                 topics.append(topic)
-                pictures.append(picture_in(data))
+                pictures.append(parse_picture(data))
         stamps = {picture.t_ns for picture in pictures}
         if tuple(topics) != self._image_topics or len(stamps) > 1:
             raise SequenceError(f"frame {index} is not a left and a right picture of one stamp in {self.path}")
         left = pictures[0]
         right = bytes(pictures[1].encoded) if len(pictures) > 1 else None
-        return EncodedFrame(index, left.t_ns, left.form, bytes(left.encoded), right, left.colour)
+        return EncodedFrame(index, left.t_ns, left.codec, bytes(left.encoded), right, left.colour)
 
     def frames(self, *, right: bool = True) -> Iterator[StereoFrame]:
         """The frames in order, one in memory at a time; without `right`, the right pictures are not decoded."""
@@ -151,7 +175,7 @@ class Sequence:
 
     def frame_at(self, t_ns: int) -> StereoFrame:
         """The last frame at or before an instant. Raises SequenceError where there is none yet."""
-        stamps = self.bag.stamps(ros.LEFT_IMAGE)
+        stamps = self.bag.stamps(LEFT_IMAGE)
         not_later = int(np.searchsorted(stamps, t_ns, side="right"))
         if not not_later:
             raise SequenceError(f"there is no frame at or before {t_ns} ns in {self.path}")
@@ -162,8 +186,8 @@ class Sequence:
 
         An index has no checksum, but the calibration of each frame has one of its own.
         """
-        stamps = self.bag.stamps(ros.LEFT_IMAGE)
-        info_stamps = self.bag.stamps(ros.LEFT_INFO)
+        stamps = self.bag.stamps(LEFT_IMAGE)
+        info_stamps = self.bag.stamps(LEFT_INFO)
         if len(stamps) == len(info_stamps) and not np.array_equal(stamps, info_stamps):
             raise SequenceError(f"pictures and calibration should have the same stamps, but do not in {self.path}")
         return stamps
@@ -171,18 +195,18 @@ class Sequence:
     def encoders(self) -> tuple[Stamps, NDArray[np.int64]]:
         """Stamps (M,) and counts (M, 2) of all encoder readings, left and right; empty where there are no encoders."""
         readings = []
-        for _, message in self.bag.messages((ros.ENCODERS,)):
-            readings.append((ros.stamp_ns(message), message.left, message.right))
+        for _, message in self.bag.messages((ENCODERS,)):
+            readings.append((stamp_ns(message), message.left, message.right))
         table = np.array(readings, np.int64).reshape(-1, 3)
         return table[:, 0].copy(), table[:, 1:].copy()
 
     def exposures(self) -> tuple[Stamps, Array]:
         """Stamps (N,) of all frames, and their exposure times in s and gains in dB (N, 2); empty where not known."""
-        return _table(self.bag, ros.EXPOSURE, _exposure_fields, 2)
+        return _table(self.bag, EXPOSURE, _exposure_fields, 2)
 
     def imu(self) -> ImuReadings:
         """All readings of the IMU, in its own axes; empty where there is none."""
-        stamps, rows = _table(self.bag, ros.IMU, _imu_fields, 6)
+        stamps, rows = _table(self.bag, IMU, _imu_fields, 6)
         return ImuReadings(stamps, rows[:, :3].copy(), rows[:, 3:].copy())
 
 
@@ -203,7 +227,7 @@ def _bias_fields(message: Any) -> tuple[float, ...]:
 
 
 def _pose_fields(message: Any) -> tuple[float, ...]:
-    return ros.pose_fields(message.pose.pose)
+    return pose_fields(message.pose.pose)
 
 
 def _disturbance_fields(message: Any) -> list[float]:
@@ -212,7 +236,7 @@ def _disturbance_fields(message: Any) -> list[float]:
 
 def _table(
     bag: Bag,
-    topic: ros.Topic,
+    topic: Topic,
     row: Callable[[Any], Iterable[float]],
     width: int,
 ) -> tuple[Stamps, Array]:
@@ -220,34 +244,34 @@ def _table(
     stamps = array("q")
     values = array("d")
     for _, message in bag.messages((topic,)):
-        stamps.append(ros.stamp_ns(message))
+        stamps.append(stamp_ns(message))
         values.extend(row(message))
     return np.array(stamps, np.int64), np.array(values, float).reshape(-1, width)
 
 
 def _truth_bag(folder: Path) -> Bag:
-    return Bag.open(Path(folder) / ros.TRUTH_FILE)
+    return Bag.open(Path(folder) / TRUTH_FILE)
 
 
 def read_truth(folder: Path) -> Trajectory:
     """The true path of base_link in map. Raises SequenceError where the file is not whole."""
     bag = _truth_bag(folder)
-    bag.require(ros.TRUTH_TOPICS)
-    stamps, fields = _table(bag, ros.ODOMETRY, _pose_fields, 7)
-    return Trajectory(stamps, ros.poses(fields))
+    bag.require(TRUTH_TOPICS)
+    stamps, fields = _table(bag, ODOMETRY, _pose_fields, 7)
+    return Trajectory(stamps, poses_from_fields(fields))
 
 
 def has_truth(folder: Path) -> bool:
     """Whether the true path is known; imported recordings may lack it. Raises SequenceError where its file is torn."""
-    path = Path(folder) / ros.TRUTH_FILE
+    path = Path(folder) / TRUTH_FILE
     has_file = path.exists() or part_of(path).exists()
-    return has_file and Bag.open(path).count(ros.ODOMETRY) > 0
+    return has_file and Bag.open(path).count(ODOMETRY) > 0
 
 
 def read_twist(folder: Path) -> Array | None:
     """The true twist (N, 6) at the poses of `read_truth`, m/s then rad/s, in body axes; None where it is not known."""
-    _, rows = _table(_truth_bag(folder), ros.ODOMETRY, _twist_fields, 7)
-    is_unknown = rows[:, 6] == ros.UNKNOWN
+    _, rows = _table(_truth_bag(folder), ODOMETRY, _twist_fields, 7)
+    is_unknown = rows[:, 6] == UNKNOWN_COVARIANCE
     if not len(rows) or is_unknown.any():
         return None
     return rows[:, :6].copy()
@@ -261,7 +285,7 @@ def _twist_fields(message: Any) -> tuple[float, ...]:
 
 def read_imu_bias(folder: Path) -> ImuBias:
     """The biases in the IMU's readings; empty where there is no IMU."""
-    stamps, rows = _table(_truth_bag(folder), ros.IMU_BIAS, _bias_fields, 6)
+    stamps, rows = _table(_truth_bag(folder), IMU_BIAS, _bias_fields, 6)
     return ImuBias(stamps, rows[:, :3].copy(), rows[:, 3:].copy())
 
 
@@ -270,52 +294,57 @@ def read_disturbances(folder: Path) -> tuple[Stamps, Array]:
 
     Both are empty where no disturbances were recorded.
     """
-    return _table(_truth_bag(folder), ros.DISTURBANCE, _disturbance_fields, len(DISTURBANCE_FIELDS))
+    return _table(_truth_bag(folder), DISTURBANCE, _disturbance_fields, len(DISTURBANCE_FIELDS))
 
 
 def read_true_rig(folder: Path) -> Rig:
     """The rig that the pictures were made with; `Sequence.rig` is the nominal one. Raises SequenceError."""
-    return read_rig(_truth_bag(folder), ros.TRUE_INFO_TOPICS)
+    return read_rig(_truth_bag(folder), TRUE_INFO_TOPICS)
+
+
+def has_case(folder: Path) -> bool:
+    """Whether a recording was made from a case. Raises SequenceError if the file with the truth is damaged."""
+    return _truth_bag(folder).has_attachment(CASE_ATTACHMENT)
 
 
 def read_case(folder: Path) -> bytes:
     """The case that a recording was made from, as its writer gave it. Raises SequenceError where it was imported."""
-    return _truth_bag(folder).attachment(ros.CASE_ATTACHMENT)
+    return _truth_bag(folder).attachment(CASE_ATTACHMENT)
 
 
 def read_provenance(folder: Path) -> dict[str, str]:
     """The versions of the software that made a recording, by name; empty where they were not noted."""
-    return _truth_bag(folder).note(ros.PROVENANCE_NOTE)
+    return _truth_bag(folder).note(PROVENANCE_NOTE)
 
 
 def read_import_notes(folder: Path) -> dict[str, str]:
     """The notes on the import of a recording, by name; empty for a recording that was not imported."""
-    return _truth_bag(folder).note(ros.IMPORT_NOTE)
+    return _truth_bag(folder).note(IMPORT_NOTE)
 
 
 def payload_hash(folder: Path) -> str:
     """SHA-256 over everything that was recorded: pixels instead of encoded bytes, which change with libpng."""
-    sensors = Bag.open(Path(folder) / ros.SENSORS_FILE)
+    sensors = Bag.open(Path(folder) / SENSORS_FILE)
     truth = _truth_bag(folder)
-    optional_topics = (*ros.TRUE_INFO_TOPICS, ros.IMU_BIAS, ros.DISTURBANCE, *truth_topics())
+    optional_topics = (*TRUE_INFO_TOPICS, IMU_BIAS, DISTURBANCE, *pixel_truth_topics())
     digest = hashlib.sha256()
-    for topic, data in sensors.raw(ros.SENSOR_TOPICS):
-        payload = _pixels(data, sensors.path) if topic in ros.IMAGE_TOPICS else data
+    for topic, data in sensors.raw(SENSOR_TOPICS):
+        payload = _pixels(data, sensors.path) if topic in IMAGE_TOPICS else data
         digest.update(_length_line(topic, payload))
         digest.update(payload)
-    for topic, data in truth.raw((*ros.TRUTH_TOPICS, *optional_topics)):
+    for topic, data in truth.raw((*TRUTH_TOPICS, *optional_topics)):
         digest.update(_length_line(topic, data))
         digest.update(data)
 
-    wheels = sensors.note(ros.WHEELS_NOTE)
+    wheels = sensors.note(WHEELS_NOTE)
     digest.update(_sorted_entries(wheels))
-    imu = sensors.note(ros.IMU_NOTE)
+    imu = sensors.note(IMU_NOTE)
     if imu:
         digest.update(_sorted_entries(imu))
     return digest.hexdigest()
 
 
-def _length_line(topic: ros.Topic, payload: bytes | memoryview) -> bytes:
+def _length_line(topic: Topic, payload: bytes | memoryview) -> bytes:
     return f"{topic.name} {len(payload)}\n".encode()
 
 
@@ -326,7 +355,7 @@ def _sorted_entries(note: dict[str, str]) -> bytes:
 
 def _pixels(data: memoryview, path: Path) -> bytes:
     with parsing(path):
-        picture = picture_in(data)
+        picture = parse_picture(data)
     image = decode(picture.encoded, None, f"a picture of {path}", colour=picture.colour)
     return f"{picture.t_ns} {image.shape}\n".encode() + image.tobytes()
 
@@ -349,7 +378,7 @@ def truth_channels(folder: Path) -> tuple[str, ...]:
 
 def read_truth_names(folder: Path) -> TruthNames:
     """The names of the ids of `instance` and `material`. Raises SequenceError where no channels were recorded."""
-    return names_from_json(_truth_bag(folder).attachment(ros.NAMES_ATTACHMENT))
+    return names_from_json(_truth_bag(folder).attachment(NAMES_ATTACHMENT))
 
 
 def read_truth_frames(folder: Path, channels: Iterable[str] | None = None) -> Iterator[StereoTruth]:
@@ -367,9 +396,9 @@ def read_truth_frames(folder: Path, channels: Iterable[str] | None = None) -> It
     return _truth_frames(bag, wanted)
 
 
-def _channel_topics(bag: Bag, channels: tuple[str, ...]) -> dict[ros.Topic, tuple[Side, str]]:
+def _channel_topics(bag: Bag, channels: tuple[str, ...]) -> dict[Topic, tuple[Side, str]]:
     """Side and channel by topic, of the cameras that have channels."""
-    channel_of: dict[ros.Topic, tuple[Side, str]] = {}
+    channel_of: dict[Topic, tuple[Side, str]] = {}
     for side in SIDES:
         topics = {truth_topic(side, name): (side, name) for name in channels}
         if any(bag.has(topic) for topic in topics):
@@ -393,6 +422,6 @@ def _truth_frames(bag: Bag, channels: tuple[str, ...]) -> Iterator[StereoTruth]:
         yield StereoTruth(index, t_ns, TruthFrame(**values["left"]), right)
 
 
-def _stamp_of(entry: tuple[ros.Topic, Any]) -> int:
+def _stamp_of(entry: tuple[Topic, Any]) -> int:
     _, message = entry
-    return ros.stamp_ns(message)
+    return stamp_ns(message)

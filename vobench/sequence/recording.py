@@ -13,8 +13,10 @@ from rosbags.rosbag2.storage_mcap import DECOMPRESSORS
 
 from vobench.errors import SequenceError, VobenchError
 from vobench.geometry.se3 import Array
-from vobench.sequence import messages as ros
 from vobench.sequence.mcap_file import decompressed
+from vobench.sequence.message import pose_fields, poses_from_fields, stamp_ns
+from vobench.sequence.message_type import TYPES
+from vobench.sequence.topic import TF_STATIC
 from vobench.temporary import temporary_folder
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -85,7 +87,7 @@ def _trajectory(t_ns: Stamps, fields: Array, path: Path) -> Trajectory:
     _require_valid(t_ns, fields, path)
     norm = np.linalg.norm(fields[:, 3:], axis=1, keepdims=True)
     fields[:, 3:] /= norm
-    return Trajectory(t_ns, ros.poses(fields))
+    return Trajectory(t_ns, poses_from_fields(fields))
 
 
 def _suffix(path: Path) -> str | None:
@@ -112,7 +114,7 @@ def open_bag(path: Path) -> Iterator[AnyReader]:
             link = folder / f"recording{_suffix(path)}"
             link.symlink_to(path.resolve())
         try:
-            with AnyReader([link], default_typestore=ros.TYPES) as reader:
+            with AnyReader([link], default_typestore=TYPES) as reader:
                 yield reader
         except VobenchError:
             raise
@@ -143,7 +145,7 @@ def _rows(
     for connection, _, raw in reader.messages(connections):
         message: Any = reader.deserialize(raw, connection.msgtype)
         pose = POSES[connection.msgtype](message)
-        yield ros.stamp_ns(message), ros.pose_fields(pose)
+        yield stamp_ns(message), pose_fields(pose)
 
 
 def _transforms(
@@ -159,7 +161,7 @@ def _transforms(
         for stamped in message.transforms:
             parent = stamped.header.frame_id.lstrip("/")
             child = stamped.child_frame_id.lstrip("/")
-            row = (ros.stamp_ns(stamped), ros.pose_fields(stamped.transform))
+            row = (stamp_ns(stamped), pose_fields(stamped.transform))
             by_frames.setdefault(f"{parent}.{child}", []).append(row)
     if not frames and len(by_frames) == 1:
         frames = next(iter(by_frames))
@@ -179,7 +181,7 @@ def _only_topic(reader: AnyReader, path: Path) -> str:
             poses.add(connection.topic)
         if connection.msgtype in TRANSFORMS:
             moving.add(connection.topic)
-    moving.discard(ros.TF_STATIC.name)
+    moving.discard(TF_STATIC.name)
     candidates = poses or moving
     if len(candidates) != 1:
         raise SequenceError(f"name the topic with the poses of {path}: {_listed_topics(reader)}")

@@ -16,14 +16,47 @@ from vobench.geometry.rig import Rig, Side
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sensor.pixel_truth import TruthFrame, TruthNames, check_channels
-from vobench.sequence import messages as ros
 from vobench.sequence.bag_writer import BagWriter
 from vobench.sequence.calibration import write_mounts
-from vobench.sequence.messages import serialise, with_picture, with_stamp
+from vobench.sequence.camera_info import camera_info_messages
+from vobench.sequence.cdr import serialise, with_picture, with_stamp
+from vobench.sequence.message import (
+    image_message,
+    imu_message,
+    odometry_message,
+    stamped_message,
+    tf_message,
+    vector_message,
+)
 from vobench.sequence.picture import MONO, Image, encode, require_picture
-from vobench.sequence.pixel_truth import check_truth, names_to_json, truth_image, truth_topic, truth_topics
+from vobench.sequence.pixel_truth import check_truth, names_to_json, pixel_truth_topics, truth_image, truth_topic
+from vobench.sequence.topic import (
+    BODY,
+    CASE_ATTACHMENT,
+    DISTURBANCE,
+    ENCODERS,
+    EXPOSURE,
+    IMAGE_TOPICS,
+    IMPORT_NOTE,
+    IMU,
+    IMU_BIAS,
+    IMU_FRAME,
+    INFO_TOPICS,
+    LEFT,
+    NAMES_ATTACHMENT,
+    ODOMETRY,
+    PROVENANCE_NOTE,
+    RIGHT,
+    SENSORS_FILE,
+    TF,
+    TRUE_INFO_TOPICS,
+    TRUTH_FILE,
+    WORLD,
+    sensor_topics,
+    truth_topics,
+)
 
-NAMES = (ros.LEFT, ros.RIGHT)
+NAMES = (LEFT, RIGHT)
 
 T = TypeVar("T")
 
@@ -59,35 +92,35 @@ class SequenceWriter:
         self._channels = check_channels(truth_channels)
         self._jpeg_quality = jpeg_quality
         self._colour = colour
-        self._info = [serialise(info) for info in ros.camera_infos(0, rig)]
+        self._info = [serialise(info) for info in camera_info_messages(0, rig)]
         self._form = ""
         self._blank = [b""]  # messages of pictures without a picture, by camera
         folder.mkdir(parents=True, exist_ok=True)
-        pixel_topics = truth_topics(self._channels, self._true_rig.sides)
-        topics = (*ros.truth_topics(self._true_rig), *pixel_topics)
-        sensors = BagWriter(folder / ros.SENSORS_FILE, ros.sensor_topics(rig), encoded=True)
+        pixel_topics = pixel_truth_topics(self._channels, self._true_rig.sides)
+        topics = (*truth_topics(self._true_rig), *pixel_topics)
+        sensors = BagWriter(folder / SENSORS_FILE, sensor_topics(rig), encoded=True)
         with ExitStack() as stack:
             # Contexts end in reverse order: where there is a file of the sensors, the truth is whole.
             self._sensors = stack.enter_context(sensors)
-            truth = BagWriter(folder / ros.TRUTH_FILE, topics, encoded=False)
+            truth = BagWriter(folder / TRUTH_FILE, topics, encoded=False)
             self._truth = stack.enter_context(truth)
             if case_json is not None:
-                self._truth.attach(ros.CASE_ATTACHMENT, "application/json", case_json)
+                self._truth.attach(CASE_ATTACHMENT, "application/json", case_json)
             if self._channels:
                 names = names_to_json(truth_names or TruthNames())
-                self._truth.attach(ros.NAMES_ATTACHMENT, "application/json", names)
+                self._truth.attach(NAMES_ATTACHMENT, "application/json", names)
             if provenance:
-                self._truth.note(ros.PROVENANCE_NOTE, provenance)
+                self._truth.note(PROVENANCE_NOTE, provenance)
             if notes:
-                self._truth.note(ros.IMPORT_NOTE, notes)
+                self._truth.note(IMPORT_NOTE, notes)
             self._write_rigs(start_ns)
             self._stack = stack.pop_all()
 
     def _write_rigs(self, start_ns: int) -> None:
         write_mounts(self._sensors, self._rig, start_ns)
         write_mounts(self._truth, self._true_rig, start_ns)
-        infos = ros.camera_infos(start_ns, self._true_rig)
-        for topic, info in zip(ros.TRUE_INFO_TOPICS, infos, strict=False):
+        infos = camera_info_messages(start_ns, self._true_rig)
+        for topic, info in zip(TRUE_INFO_TOPICS, infos, strict=False):
             self._truth.write(topic, start_ns, serialise(info))
         for bag in (self._sensors, self._truth):
             bag.flush()
@@ -141,45 +174,49 @@ class SequenceWriter:
         t_ns = int(t_ns)
         if form != self._form:
             self._form = form
-            blanks = [ros.image(0, name, b"", form, self._colour) for name in NAMES]
+            blanks = [image_message(0, name, b"", form, self._colour) for name in NAMES]
             self._blank = [serialise(blank) for blank in blanks]
-        for topic, info in zip(ros.INFO_TOPICS, self._info, strict=False):
+        for topic, info in zip(INFO_TOPICS, self._info, strict=False):
             self._sensors.write(topic, t_ns, with_stamp(info, t_ns))
-        for topic, blank, picture in zip(ros.IMAGE_TOPICS, self._blank, encoded, strict=False):
+        for topic, blank, picture in zip(IMAGE_TOPICS, self._blank, encoded, strict=False):
             self._sensors.write(topic, t_ns, with_picture(blank, t_ns, picture))
 
     def write_exposure(self, t_ns: int, time_s: float, gain_db: float) -> None:
         """Add the exposure time and the gain of the pictures of a stamp."""
-        message = ros.message(ros.EXPOSURE, t_ns, ros.LEFT, float(time_s), float(gain_db))
-        self._sensors.write(ros.EXPOSURE, int(t_ns), serialise(message))
+        message = stamped_message(EXPOSURE, t_ns, LEFT, time_s=float(time_s), gain_db=float(gain_db))
+        self._sensors.write(EXPOSURE, int(t_ns), serialise(message))
 
     def write_encoders(self, t_ns: ArrayLike, ticks: ArrayLike) -> None:
         """Add encoder readings: stamps (M,) and counts (M, 2) int64, left and right."""
         stamps = np.asarray(t_ns, np.int64).tolist()
         counts = np.asarray(ticks, np.int64).reshape(-1, 2).tolist()
         for t, (left, right) in zip(stamps, counts, strict=True):
-            message = ros.message(ros.ENCODERS, t, ros.BODY, left, right)
-            self._sensors.write(ros.ENCODERS, t, serialise(message))
+            message = stamped_message(ENCODERS, t, BODY, left=left, right=right)
+            self._sensors.write(ENCODERS, t, serialise(message))
 
     def write_imu(self, readings: ImuReadings) -> None:
         """Add readings of the IMU. Raises SequenceError where the rig has none."""
-        variances = (0.0, 0.0)
+        gyro_variance = 0.0
+        accel_variance = 0.0
         if imu := self._rig.imu:
             # The variance of white noise of a density that is sampled at a rate.
             gyro_variance = imu.gyro_noise**2 * imu.rate_hz
             accel_variance = imu.accel_noise**2 * imu.rate_hz
-            variances = (gyro_variance, accel_variance)
         rows = zip(readings.t_ns.tolist(), readings.gyro_radps, readings.accel_mps2, strict=True)
         for t, gyro_radps, accel_mps2 in rows:
-            message = ros.imu(t, gyro_radps, accel_mps2, variances)
-            self._sensors.write(ros.IMU, t, serialise(message))
+            message = imu_message(t, gyro_radps, accel_mps2, gyro_variance=gyro_variance, accel_variance=accel_variance)
+            self._sensors.write(IMU, t, serialise(message))
 
     def write_imu_bias(self, t_ns: int, gyro_radps: ArrayLike, accel_mps2: ArrayLike) -> None:
         """Add the biases in the IMU's readings, (3,) each, which vary slowly."""
-        gyro = ros.vector(gyro_radps)
-        accel = ros.vector(accel_mps2)
-        message = ros.message(ros.IMU_BIAS, t_ns, ros.IMU_FRAME, gyro, accel)
-        self._truth.write(ros.IMU_BIAS, int(t_ns), serialise(message))
+        message = stamped_message(
+            IMU_BIAS,
+            t_ns,
+            IMU_FRAME,
+            gyro=vector_message(gyro_radps),
+            accel=vector_message(accel_mps2),
+        )
+        self._truth.write(IMU_BIAS, int(t_ns), serialise(message))
 
     def write_disturbance(self, t_ns: int, slip: ArrayLike, push: ArrayLike) -> None:
         """Add the disturbances of the robot's motion.
@@ -187,9 +224,19 @@ class SequenceWriter:
         `slip` (3,) is that of the left and the right wheel, and the side slip in rad; `push` (2,) is on the speed in
         m/s² and on the yaw rate in rad/s².
         """
-        fields = [*np.asarray(slip, float).tolist(), *np.asarray(push, float).tolist()]
-        message = ros.message(ros.DISTURBANCE, t_ns, ros.BODY, *fields)
-        self._truth.write(ros.DISTURBANCE, int(t_ns), serialise(message))
+        left_slip, right_slip, side_slip_rad = np.asarray(slip, float).tolist()
+        push_mps2, turn_push_radps2 = np.asarray(push, float).tolist()
+        message = stamped_message(
+            DISTURBANCE,
+            t_ns,
+            BODY,
+            left_slip=left_slip,
+            right_slip=right_slip,
+            side_slip_rad=side_slip_rad,
+            push_mps2=push_mps2,
+            turn_push_radps2=turn_push_radps2,
+        )
+        self._truth.write(DISTURBANCE, int(t_ns), serialise(message))
 
     def write_truth(
         self,
@@ -202,10 +249,10 @@ class SequenceWriter:
         if not is_rigid:
             raise SequenceError(f"the true pose at {t_ns} ns is no rigid transform: {T_world_body.tolist()}")
         t_ns = int(t_ns)
-        transform = ros.transforms(t_ns, ros.WORLD, {ros.BODY: T_world_body})
-        odometry = ros.odometry(t_ns, T_world_body, twist_body)
-        self._truth.write(ros.TF, t_ns, serialise(transform))
-        self._truth.write(ros.ODOMETRY, t_ns, serialise(odometry))
+        transform = tf_message(t_ns, WORLD, {BODY: T_world_body})
+        odometry = odometry_message(t_ns, T_world_body, twist_body)
+        self._truth.write(TF, t_ns, serialise(transform))
+        self._truth.write(ODOMETRY, t_ns, serialise(odometry))
 
     def write_truth_frame(self, t_ns: int, side: Side, frame: TruthFrame) -> None:
         """Add the per-pixel ground truth of one camera's picture: the channels that the writer was opened for."""

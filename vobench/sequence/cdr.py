@@ -1,0 +1,87 @@
+"""The serialisation of ROS 2 messages as CDR, and changes to serialised messages without parsing them."""
+
+import struct
+from typing import Any, NamedTuple
+
+from vobench.sequence.message import split_stamp
+from vobench.sequence.message_type import TYPES
+from vobench.sequence.picture import CHANNELS, MONO
+from vobench.trajectory.nanoseconds import NS_PER_S
+
+# A serialised message starts with four bytes for its byte order. If it has a header, the stamp follows.
+STAMP = struct.Struct("<iI")
+STAMP_START = 4
+STAMP_END = STAMP_START + STAMP.size
+LENGTH = struct.Struct("<I")
+LITTLE_ENDIAN = b"\x00\x01"
+
+
+def serialise(message: Any) -> bytes:
+    """A message as CDR bytes, in little-endian order."""
+    return bytes(TYPES.serialize_cdr(message, message.__msgtype__, little_endian=True))
+
+
+def with_stamp(template: bytes, t_ns: int) -> bytes:
+    """A copy of the serialised message `template` with another stamp. The message must begin with a header."""
+    stamp = STAMP.pack(*split_stamp(t_ns))
+    return b"".join((template[:STAMP_START], stamp, template[STAMP_END:]))
+
+
+def with_picture(template: bytes, t_ns: int, encoded: bytes) -> bytes:
+    """A copy of the serialised CompressedImage `template` with another stamp, and with a picture.
+
+    The template must have an empty picture, which is the last field of the message.
+    """
+    stamp = STAMP.pack(*split_stamp(t_ns))
+    frame_and_format = template[STAMP_END : -LENGTH.size]
+    length = LENGTH.pack(len(encoded))
+    return b"".join((template[:STAMP_START], stamp, frame_and_format, length, encoded))
+
+
+class StampedPicture(NamedTuple):
+    """The content of a serialised CompressedImage."""
+
+    t_ns: int
+    codec: str
+    colour: str
+    encoded: memoryview
+
+
+def parse_picture(data: memoryview) -> StampedPicture:
+    """The content of a serialised CompressedImage. Raises ValueError or struct.error if the data is damaged."""
+    if data[: len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
+        raise ValueError("a picture's message is not in little-endian CDR")
+    sec, nanosec = STAMP.unpack_from(data, STAMP_START)
+    _, offset = _read_string(data, STAMP_END)  # the name of the frame
+    format_name, offset = _read_string(data, offset)
+
+    # The format is "png", or for instance "rgb8; png compressed bgr8".
+    stated_colour, _, codec_and_more = format_name.rpartition("; ")
+    colour = stated_colour or MONO
+    codec, _, _ = codec_and_more.partition(" ")
+    if colour not in CHANNELS:
+        raise ValueError(f"a picture has the unknown format {format_name!r}")
+    start, end = _sequence_bounds(data, offset)
+    return StampedPicture(sec * NS_PER_S + nanosec, codec, colour, data[start:end])
+
+
+def _read_string(data: memoryview, offset: int) -> tuple[str, int]:
+    """The string at an offset, and the offset after the zero byte that ends it."""
+    start, end = _sequence_bounds(data, offset)
+    text_end = max(start, end - 1)
+    return bytes(data[start:text_end]).decode(), end
+
+
+def _sequence_bounds(data: memoryview, offset: int) -> tuple[int, int]:
+    """The offsets of the start and end of a sequence of bytes.
+
+    Its length is stored before it, at the first multiple of four that is not less than `offset`.
+    Raises ValueError if the data ends before the sequence.
+    """
+    length_offset = offset + -offset % LENGTH.size
+    (length,) = LENGTH.unpack_from(data, length_offset)
+    start = length_offset + LENGTH.size
+    end: int = start + length
+    if end > len(data):
+        raise ValueError(f"a message of {len(data)} bytes states {length} more at {length_offset}")
+    return start, end
