@@ -20,11 +20,15 @@ import sys
 import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("vobench", "tests", "scenes", "estimators", "suites", "docs", "examples", "benchmarks")
 TEST_TIME_LIMIT_S = 900.0  # a mutant that makes the tests hang counts as noticed
+# A changed line may kill the wrong processes, so the tests run in a process namespace that holds no others (unshare(1)).
+# Its first process is a shell, which reaps orphans.
+NAMESPACE = ("unshare", "--pid", "--fork", "--mount-proc", "--kill-child", "sh", "-c", '"$@"; exit $?', "sh")
 
 COMPARISONS = {
     ast.Lt: "<=",
@@ -202,7 +206,7 @@ def is_noticed(copy: Path, room: str, mutant: Mutant) -> str:
 
 def _first_failure(copy: Path, arguments: list[str]) -> str:
     options = ["-x", "-q", "-n", "0", "-m", "", "-p", "no:cacheprovider", "--no-header", "--tb=no"]
-    command = [sys.executable, "-m", "pytest", *options, *arguments]
+    command = [*_namespace(), sys.executable, "-m", "pytest", *options, *arguments]
     environment = {**os.environ, "PYTHONPATH": str(copy), "PYTHONDONTWRITEBYTECODE": "1"}
     try:
         result = subprocess.run(
@@ -222,6 +226,16 @@ def _first_failure(copy: Path, arguments: list[str]) -> str:
         if line.startswith(("FAILED", "ERROR")):
             return line
     return (result.stdout + result.stderr).strip().splitlines()[-1]
+
+
+@cache
+def _namespace() -> tuple[str, ...]:
+    """The start of a command that runs in its own process namespace; empty if this user may not create one."""
+    try:
+        result = subprocess.run([*NAMESPACE, "true"], check=False, capture_output=True)
+    except FileNotFoundError:
+        return ()
+    return NAMESPACE if result.returncode == 0 else ()
 
 
 def main() -> int:
