@@ -26,7 +26,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 COPIED = ("vobench", "tests", "scenes", "estimators", "suites", "docs", "examples", "benchmarks")
 TEST_TIME_LIMIT_S = 900.0  # a mutant that makes the tests hang counts as noticed
-# A changed line may kill the wrong processes, so the tests run in a process namespace that holds no others (unshare(1)).
+# A changed line may kill the wrong processes, so the tests run in a process namespace of their own (unshare(1)).
 # Its first process is a shell, which reaps orphans.
 NAMESPACE = ("unshare", "--pid", "--fork", "--mount-proc", "--kill-child", "sh", "-c", '"$@"; exit $?', "sh")
 
