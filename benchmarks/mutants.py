@@ -14,6 +14,7 @@ import ast
 import json
 import os
 import random
+import re
 import shutil
 import subprocess
 import sys
@@ -191,17 +192,42 @@ def copy_of_the_repository(folder: Path) -> Path:
 
 
 def is_noticed(copy: Path, room: str, mutant: Mutant) -> str:
-    """The first failing test (or ``timeout``); empty if every test of the room passes."""
+    """The first failing test (or ``timeout``); empty if every test of the room passes.
+
+    A test that also fails without the mutant, or that passes when it is repeated, does not count.
+    """
     room_tests = Path("tests") / room
     module_tests = room_tests / f"test_{mutant.path.stem}.py"
     stages = [[str(room_tests)]]
     if (copy / module_tests).exists():
         stages = [[str(module_tests)], [str(room_tests), f"--ignore={module_tests}"]]
     for stage in stages:
-        failure = _first_failure(copy, stage)
-        if failure:
-            return failure
+        unreliable: list[str] = []
+        while failure := _first_failure(copy, [*stage, *unreliable]):
+            test = _failed_test(failure)
+            if not test or _is_caused_by(mutant, copy, test):
+                return failure
+            unreliable.append(f"--deselect={test}")
     return ""
+
+
+def _failed_test(failure: str) -> str:
+    """The id of the failing test; empty if the failure is not of one test."""
+    match = re.match(r"(?:FAILED|ERROR) (\S+::.*?)(?: - |$)", failure)
+    return match[1] if match else ""
+
+
+def _is_caused_by(mutant: Mutant, copy: Path, test: str) -> bool:
+    """Whether a test fails again with the mutant, which is in the copy, and passes without it."""
+    if not _first_failure(copy, [test]):
+        return False
+    file = copy / mutant.path
+    original = (ROOT / mutant.path).read_bytes()
+    changed = file.read_bytes()
+    file.write_bytes(original)
+    fails_without = bool(_first_failure(copy, [test]))
+    file.write_bytes(changed)
+    return not fails_without
 
 
 def _first_failure(copy: Path, arguments: list[str]) -> str:
