@@ -1,6 +1,9 @@
 """The filter of system calls, checked by an interpreter of seccomp programs against the numbers of the kernel."""
 
 import errno
+import os
+import subprocess
+import sys
 
 import pytest
 
@@ -236,3 +239,22 @@ def test_x32_calls_are_refused_on_x86_64():
     program = system_call_filter("x86_64", kills_all=False)
     x32_read = 0x40000000
     assert verdict(program, {0: x32_read, 4: AUDIT_ARCHITECTURE["x86_64"]}) == EPERM
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="capabilities are those of Linux")
+def test_a_process_that_is_not_the_first_of_a_namespace_loses_its_capabilities_as_well():
+    code = (
+        "from vobench.estimator import isolation\n"
+        "isolation._drop_capabilities()\n"
+        "print(open('/proc/self/status').read())\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    sets = {}
+    for line in done.stdout.splitlines():
+        name, _, value = line.partition(":")
+        if name.startswith("Cap"):
+            sets[name] = int(value, 16)
+    assert len(sets) == 5
+    if os.getuid() != 0:
+        sets.pop("CapBnd")  # only root may reduce it
+    assert set(sets.values()) == {0}
