@@ -472,11 +472,34 @@ class Stripes:
         return np.repeat(srgb(np.float32(grey)[..., None]), 3, axis=-1) if self.colours else grey
 
 
+@dataclass(frozen=True, slots=True)
+class Grey:
+    """A texture of two equal parts that reflect half as much and one and a half times as much as the mean."""
+
+    mean: float
+
+    def pixels(self) -> np.ndarray:
+        halves = np.repeat([0.5, 1.5], 32)
+        return np.tile(self.mean * halves, (64, 1))
+
+
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("colours", [False, True])
 def test_stripes_of_two_pixels_are_seen_in_both_directions(axis: int, colours: bool) -> None:
     contrast = _contrast(Material(texture=Stripes(axis, colours)))
     assert contrast == pytest.approx(0.2 / 0.4, rel=0.02)
+
+
+@pytest.mark.parametrize("reflectance", [0.4, 0.02, 0.0015])
+def test_a_dark_texture_has_the_contrast_of_a_bright_one_down_to_a_reflectance_of_a_tenth_of_a_percent(
+    reflectance: float,
+) -> None:
+    assert _contrast(Material(texture=Grey(reflectance))) == pytest.approx(0.5, rel=0.01)
+
+
+def test_what_reflects_nothing_has_no_contrast() -> None:
+    assert _contrast(Material(texture=Grey(0.0))) == 0
+    assert _contrast(Material(texture=Grey(1e-5))) < 0.01
 
 
 def test_bodies_without_a_texture_have_no_contrast_and_mirrors_none_that_is_known() -> None:

@@ -125,6 +125,17 @@ def test_the_interval_widens_with_what_differs_between_stretches_and_has_95_perc
     assert wide.low < 0.5
 
 
+def test_an_interval_is_the_same_each_time_and_another_seed_changes_only_the_interval() -> None:
+    means = {name: 1.0 + 0.02 * nth for nth, name in enumerate("abcdefghijklmnop")}
+    first = errors_of(means, spread=0.6)
+    second = errors_of(means, spread=0.6, seed=1)
+    default = agreement(first, second)
+    assert agreement(first, second, seed=0) == default
+    others = [agreement(first, second, seed=seed) for seed in (1, 2, 3, 4, 5)]
+    assert {other.tau for other in others} == {default.tau}
+    assert any((other.low, other.high) != (default.low, default.high) for other in others)
+
+
 def test_only_estimators_that_ran_on_both_are_compared() -> None:
     found = agreement(errors_of({**MEANS, "only_here": 0.1}), errors_of({"only_there": 9.0, **MEANS}))
     assert list(found.errors) == list(MEANS)

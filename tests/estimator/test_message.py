@@ -125,6 +125,13 @@ def test_an_answer_beyond_its_limit_is_refused():
         answered(Result(POSE, points=np.zeros((rows, 3))), 0)
 
 
+def test_an_answer_at_its_limit_is_sent():
+    reason = "x" * (ANSWER_BYTES - ANSWER.size)
+    assert len(answered(Result(None, Status.LOST, reason), 0)) == ANSWER_BYTES
+    with pytest.raises(InvalidOutputError, match=f"an answer of {ANSWER_BYTES + 1} bytes"):
+        answered(Result(None, Status.LOST, reason + "x"), 0)
+
+
 def test_a_reason_is_cut_at_its_limit():
     payload = answered(Result(None, Status.LOST), 0) + b"x" * (2 * REASON_BYTES)
     assert set(read_answer(payload, 0).reason) == {"x"}

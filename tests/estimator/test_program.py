@@ -9,8 +9,10 @@ from types import SimpleNamespace
 import pytest
 
 from vobench.estimator import program
+from vobench.estimator.home import Home
 from vobench.estimator.manifest import Limits
 from vobench.estimator.program import EstimatorFailure, Program, _cpu_s, _nameless, _proportional_bytes, _used_bytes
+from vobench.estimator.sandbox import SWITCH
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="what /proc says")
 
@@ -46,6 +48,31 @@ def test_an_end_before_its_time_has_its_cause_and_the_last_line(tmp_path, code, 
     found = failure(tmp_path, code)
     assert found[0] == kind
     assert sentence in found[1]
+
+
+def test_a_long_last_line_is_cut_to_what_fits_on_one_line_of_a_board(tmp_path):
+    _, reason = failure(tmp_path, "print('first'); print('y' * 5000); raise SystemExit(3)")
+    last_line = reason.removeprefix("the process ended with exit code 3: ")
+    assert set(last_line) == {"y"}
+    assert 80 <= len(last_line) <= 200
+
+
+@pytest.mark.parametrize(("file_count", "is_too_much"), [(1, False), (3, True)])
+def test_files_that_were_in_its_folder_before_do_not_count(tmp_path, monkeypatch, file_count, is_too_much):
+    """Without a private file system, the size of the folder is measured before and after."""
+    monkeypatch.setenv(SWITCH, "off")
+    monkeypatch.setattr(program, "WEIGH_S", 0.1)
+    code = f"for name in 'abc'[:{file_count}]: open(name, 'wb').write(bytes(2 << 20))\nimport time; time.sleep(0.8)"
+    log = tmp_path / "log"
+    with Home(log) as home:
+        (home.path / "given").write_bytes(bytes(20 << 20))
+        outcome = "it ended well"
+        try:
+            with Program([sys.executable, "-c", code], log=log, limits=Limits(disk_mib=4), home=home) as running:
+                running.wait()
+        except EstimatorFailure as error:
+            outcome = error.reason
+    assert outcome == ("its files hold more than the limit of 4 MiB" if is_too_much else "it ended well")
 
 
 def test_a_program_that_takes_too_long_or_too_much_is_ended(tmp_path):

@@ -686,7 +686,8 @@ def test_an_estimator_of_the_house_is_found_and_runs_where_the_kernel_refuses(re
     search = {"PYTHONPATH": ""}  # what finds vobench is its installation
     tried = [sys.executable, "-m", "vobench", "try", "stand_still"]
     argv = [sys.executable, "-I", "-S", "-c", WITHOUT, folder, refused, *tried]
-    done = subprocess.run(argv, env={**os.environ, **search}, capture_output=True, text=True, check=False)
+    environment = {**os.environ, **search}
+    done = subprocess.run(argv, env=environment, cwd="/", capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     assert "BROKEN" not in done.stdout
 

@@ -80,6 +80,23 @@ def test_local_contrast_does_not_see_gain_nor_bias(gain, bias):
     assert np.abs(local_contrast(dim).astype(float) - one).max() == 0
 
 
+def test_local_contrast_uses_most_grey_values_and_saturates_almost_nowhere():
+    """Three standard deviations on either side of the mean fit into a byte, as large noise shows."""
+    noise = np.clip(np.random.default_rng(3).normal(128, 40, (240, 360)), 0, 255).astype(np.uint8)
+    contrast = local_contrast(noise)
+    is_saturated = (contrast == 0) | (contrast == 255)
+    assert is_saturated.mean() < 0.01
+    assert np.std(contrast) > 30
+    assert np.mean(contrast) == pytest.approx(128, abs=1)
+
+
+def test_local_contrast_of_an_even_picture_is_the_middle_grey_and_shows_little_of_its_noise():
+    even = np.full((240, 360), 200, np.uint8)
+    assert set(local_contrast(even).ravel()) == {128}
+    noisy = (even + np.random.default_rng(4).integers(0, 2, even.shape)).astype(np.uint8)  # deviation 0.5
+    assert np.std(local_contrast(noisy)) < 10
+
+
 def test_tracks_in_an_eye_of_another_gain_are_as_many_and_as_good():
     points, later = grid(15), shifted(texture(), 1.4, 0.3)
     equal, found = follow(*comparable(texture(), later), points)

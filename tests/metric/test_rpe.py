@@ -417,6 +417,17 @@ def test_where_the_truth_stands_there_is_no_percentage():
     np.testing.assert_allclose(point_m, 0.1)
 
 
+def test_of_many_poses_as_many_pairs_are_drawn_as_the_most_that_are_all_taken(monkeypatch):
+    monkeypatch.setattr(pairs_module, "MAX_POSES", 30)
+    every = as_list(pairs_module.every_pair(30))
+    assert sorted(every) == [(first, last) for first in range(30) for last in range(30)]
+    first, last = pairs_module.every_pair(31)
+    assert len(first) == len(last) == len(every)
+    assert set(first) | set(last) == set(range(31))
+    assert np.corrcoef(first, last)[0, 1] == pytest.approx(0, abs=0.15)
+    assert as_list(pairs_module.every_pair(31)) == as_list((first, last))
+
+
 def test_one_pose_has_no_relative_error():
     assert len(errors_between(straight(1), straight(1), *frames_apart(straight(1), 1))) == 0
 

@@ -39,6 +39,12 @@ def test_given_segments_stay():
     assert settled(ScoreSettings(segment_step_frames=7), 1000.0).segment_lengths_m == KITTI_LENGTHS_M
 
 
+def test_a_relative_error_is_by_default_that_of_consecutive_frames():
+    settings = ScoreSettings()
+
+    assert (settings.rpe_delta, settings.rpe_unit, settings.rpe_all_pairs) == (1, "f", False)
+
+
 def test_completing_settings_changes_nothing_else_and_nothing_the_second_time():
     settings = ScoreSettings(alignment="yaw", fail_ratio=0.3)
     once = settled(settings, 50.0)
