@@ -7,8 +7,8 @@ from vobench.dataset.export import export, export_trajectory
 from vobench.dataset.layout import writable
 from vobench.dataset.picture import read_text
 from vobench.errors import InputError
-from vobench.sequence.topic import SENSORS_FILE
 from vobench.sequence.recording import is_recording, read_poses
+from vobench.sequence.topic import SENSORS_FILE
 from vobench.trajectory.formats import parse_any
 from vobench.trajectory.trajectory import Trajectory
 
