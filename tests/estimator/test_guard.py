@@ -76,10 +76,10 @@ def test_a_program_is_started_by_its_path_and_named_by_its_first_argument():
         assert guard.stdout.read() == b"one two\n"
 
 
-def test_a_program_has_limits_of_its_files_and_leaves_no_core():
+def test_a_program_has_limits_of_its_files_and_of_a_core():
     code = "import resource as r; print(r.getrlimit(r.RLIMIT_FSIZE), r.getrlimit(r.RLIMIT_CORE))"
     with python(code, file_bytes=12345) as (guard, _):
-        assert guard.stdout.read() == b"(12345, 12345) (0, 0)\n"
+        assert guard.stdout.read() == b"(12345, 12345) (1, 1)\n"
 
 
 def test_a_program_has_none_of_the_guards_descriptors_and_handlers_of_signals():

@@ -42,7 +42,7 @@ def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) ->
     from rich import box
     from rich.table import Table
 
-    cells = [[printable(cell) for cell in row] for row in rows]
+    cells = [list(map(printable, row)) for row in rows]
     result = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE, pad_edge=False)
     for column, heading in enumerate(headings):
         has_numbers = all(NUMBER.match(row[column]) for row in cells)
