@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.analysis.diagnose import diagnose
+from vobench.analysis.diagnose import _is_clear_gain, _unrelated, _wrong_scale, diagnose
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.trajectory.formats import TrajectoryReading, parse_any, parse_times
@@ -526,3 +526,29 @@ def test_noise_is_a_sign_only_where_it_is_more_than_motion(sigma_m, is_sign):
     assert faults(noisy, smoother) == (["swapped_inputs"] if is_sign else [])
     few = Trajectory(smoother.trajectory.t_ns[:-1], smoother.trajectory.T_world_frame[:-1])
     assert faults(noisy, replace(smoother, trajectory=few)) == []
+
+
+def test_an_offset_is_a_clear_gain_if_a_quarter_of_the_missing_correlation_or_more_is_gone():
+    assert _is_clear_gain(0.9, 0.93)
+    assert not _is_clear_gain(0.9, 0.92)
+    assert not _is_clear_gain(0.9, 0.9)
+    assert not _is_clear_gain(1.0, 1.0)
+    assert not _is_clear_gain(0.9999, 1.0)  # a gain too small to mean anything
+    assert _is_clear_gain(None, 0.5)  # without the offset there was no overlap
+
+
+def test_what_is_left_of_unrelated_positions_is_in_percent_before_and_after():
+    (positions,) = _unrelated(0.8, 0.5, None).evidence
+    assert (positions.unit, positions.before, positions.after) == ("%", 80, 50)
+    positions, motions = _unrelated(0.8, 0.5, 0.9).evidence
+    assert (motions.unit, motions.before, motions.after) == ("1", None, 0.9)
+
+
+def test_positions_that_do_not_correlate_have_no_scale():
+    along = np.array([1.0, -1.0, -1.0, 1.0])
+    at_other_times = np.array([1.0, 1.0, -1.0, -1.0])
+    T_gt, T_est = (se3.transform(np.eye(3), np.stack([x, 0 * x, 0 * x], axis=-1)) for x in (along, 10 * at_other_times))
+    assert list(_wrong_scale(T_gt, T_est)) == []
+    tenfold = T_gt.copy()
+    tenfold[:, :3, 3] *= 10
+    assert [finding.fault for finding in _wrong_scale(T_gt, tenfold)] == ["scale"]

@@ -5,8 +5,11 @@ import pytest
 
 from vobench.analysis import path_placement
 from vobench.analysis.path_placement import (
+    CELLS,
+    RAYS_PER_CELL,
     _Place,
     _Start,
+    _view_rays,
     cell_disparities,
     levelled,
     place_path,
@@ -192,7 +195,29 @@ def test_a_straight_climb_is_levelled_along_its_way_alone() -> None:
     assert found[-1, 0, 3] == pytest.approx(5 * np.hypot(1, 0.2), rel=1e-3)
 
 
+def test_a_slope_across_that_a_nearly_straight_path_hardly_shows_is_levelled_in_part() -> None:
+    """The damping halves the slope where the spread across is a thousandth of the spread along and across."""
+    along = np.tile(np.linspace(-5, 5, 40), 2)
+    across = np.repeat([-1.0, 1.0], 40) * np.sqrt(1e-3 * np.mean(along**2))
+    path = se3.transform(np.eye(3), np.stack([along, across, 0.5 * across], -1))
+    left, right = levelled(path)[[0, 40]]
+    slope = (right[2, 3] - left[2, 3]) / (right[1, 3] - left[1, 3])
+    assert slope == pytest.approx(np.tan(np.arctan(0.5) - np.arctan(0.25)), rel=0.01)
+
+
 # --- Disparities in a scene ---
+
+
+def test_the_rays_of_a_view_are_centred_in_its_cells_and_point_ahead() -> None:
+    rays = _view_rays(PAIR)
+    rows_and_columns = CELLS * RAYS_PER_CELL
+    assert rays.shape == (rows_and_columns**2, 3)
+    pixels = PAIR.left.camera.project(rays)
+    width_px, height_px = LENS.width_px, LENS.height_px
+    np.testing.assert_allclose(pixels.mean(axis=0), [width_px / 2, height_px / 2])
+    borders_px = np.array([width_px, height_px]) / rows_and_columns / 2
+    np.testing.assert_allclose(pixels[0], borders_px)
+    np.testing.assert_allclose(pixels[-1], [width_px, height_px] - borders_px)
 
 
 def test_disparities_of_a_wall_follow_from_its_distance_in_every_cell_and_with_the_scale() -> None:
