@@ -30,6 +30,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from py_compile import PycInvalidationMode
 from typing import Any, Literal
@@ -373,6 +374,7 @@ def try_room(copy: Path, room: str, numbered: Iterable[tuple[int, Mutant]]) -> l
     return rows
 
 
+@cache
 def _namespace() -> tuple[str, ...]:
     """The start of a command that runs in its own process namespace; empty if this user may not create one."""
     try:

@@ -2,7 +2,6 @@
 
 import os
 import re
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -10,9 +9,7 @@ from pathlib import Path
 import pytest
 
 from vobench import __version__
-from vobench.cli import command_group, main
-from vobench.cli.command_group import CommandGroup
-from vobench.errors import UnknownNameError
+from vobench.cli import command_group
 
 # ruff: noqa: E501 - a sentence stands in one line
 
@@ -35,40 +32,6 @@ def test_help_imports_no_heavy_library():
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1].strip() == "heavy:"
     assert "Usage: vobench" in done.stdout
-
-
-def install(site, entry_points):
-    """Make a distribution with these commands findable in a folder."""
-    information = site / "outside-1.dist-info"
-    information.mkdir(parents=True)
-    (information / "METADATA").write_text("Metadata-Version: 2.1\nName: outside\nVersion: 1\n")
-    (information / "entry_points.txt").write_text(f"[vobench.commands]\n{entry_points}")
-
-
-def test_installed_commands_come_after_vobench_s_in_the_help_and_in_lists(vobench, tmp_path, monkeypatch):
-    install(tmp_path / "site", "zebra = vobench.cli.list:list_command\napple = vobench.cli.list:list_command\n")
-    monkeypatch.syspath_prepend(str(tmp_path / "site"))
-    names = [*COMMANDS, "apple", "zebra"]
-    assert CommandGroup().list_commands(None) == names
-    _, _, commands = vobench("--help").out.partition("Commands:\n")
-    assert re.findall(r"^  (\w+)", commands, re.MULTILINE) == names
-
-
-def test_the_help_says_which_installed_commands_cannot_be_imported(vobench, tmp_path, monkeypatch):
-    site = tmp_path / "site"
-    broken = site / "broken_package"
-    broken.mkdir(parents=True)
-    (broken / "__init__.py").write_text("raise RuntimeError('no licence')\n")
-    install(site, "top = no_package:go\ninner = no_package.cli:go\nraising = broken_package.cli:go\n")
-    monkeypatch.syspath_prepend(str(site))
-    said = vobench("--help")
-    assert (said.code, said.err) == (0, "")
-    lines = [line.split(maxsplit=1) for line in said.out.splitlines()[-3:]]
-    assert lines == [
-        ["inner", "cannot be imported: No module named 'no_package'"],
-        ["raising", "cannot be imported: no licence"],
-        ["top", "cannot be imported: No module named 'no_package'"],
-    ]
 
 
 OUTSIDE = """
@@ -104,13 +67,6 @@ def test_a_verb_and_a_metric_from_outside_are_there_once_they_are_installed(vobe
 
 def test_every_command_is_in_the_readmes_table_and_the_table_has_no_other():
     assert sorted(re.findall(r"^\| `vobench (\w+)", README, re.MULTILINE)) == sorted(COMMANDS)
-
-
-@pytest.mark.parametrize("command", COMMANDS)
-def test_every_command_has_json_and_help(vobench, command):
-    said = vobench(command, "--help")
-    assert said.code == 0
-    assert "--json" in said.out
 
 
 JSON = [
@@ -207,14 +163,6 @@ def test_what_cannot_be_read_or_written_is_one_line(vobench, ran, words, sentenc
     assert (said.code, said.err) == (1, f"vobench: {sentence}\n")
 
 
-@pytest.mark.parametrize("words", [("--debug", "run", "nope"), ("run", "nope", "--debug"), ("run", "--debug", "nope")])
-def test_debug_lets_the_error_through_wherever_it_stands(here, monkeypatch, words):
-    monkeypatch.setattr(sys, "argv", ["vobench", *words])
-    monkeypatch.setattr(signal, "signal", lambda *_: None)
-    with pytest.raises(UnknownNameError, match="no suite named 'nope'"):
-        main()
-
-
 def test_version_needs_no_command(vobench):
     assert vobench("--version").out == f"{__version__}\n"
 
@@ -235,39 +183,6 @@ def test_a_reader_that_has_seen_enough_is_no_failure_and_gets_no_traceback(ran, 
     environment = os.environ | {"PYTHONUNBUFFERED": unbuffered}
     command = ["bash", "-c", pipe, sys.executable, script]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
-    assert (done.returncode, done.stderr) == (0, "")
-
-
-def run_in_bash(redirection, words, **variables):
-    """vobench as a process whose output bash redirects."""
-    script = f"import sys; from vobench.cli import main; sys.argv = ['vobench', *{words!r}]; main()"
-    command = ["bash", "-c", f'"$0" -c "$1" {redirection}', sys.executable, script]
-    return subprocess.run(command, capture_output=True, text=True, check=False, env=os.environ | variables)
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full")
-@pytest.mark.parametrize("words", [("list", "--json"), ("metrics",), ("--version",), ("--help",)], ids=" ".join)
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_output_that_a_full_disk_does_not_take_is_one_line_and_exit_code_1(words, unbuffered):
-    done = run_in_bash("> /dev/full", words, PYTHONUNBUFFERED=unbuffered)
-    assert done.returncode == 1
-    assert done.stderr.startswith("vobench: ")
-    assert done.stderr.endswith("No space left on device\n")
-    assert done.stderr.count("\n") == 1
-
-
-@pytest.mark.parametrize("redirection", ["> /dev/full", ">&-"])
-@pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_a_mistake_is_one_line_though_its_json_cannot_be_written(redirection, unbuffered):
-    done = run_in_bash(redirection, ("run", "nope", "--json"), PYTHONUNBUFFERED=unbuffered)
-    assert done.returncode == 1
-    assert done.stderr.startswith("vobench: no suite named 'nope'")
-    assert done.stderr.count("\n") == 1
-
-
-@pytest.mark.parametrize("words", [("list", "--json"), ("metrics",), ("--version",), ("--help",)], ids=" ".join)
-def test_a_command_without_a_standard_output_ends_well(words):
-    done = run_in_bash(">&-", words)
     assert (done.returncode, done.stderr) == (0, "")
 
 

@@ -28,7 +28,6 @@ class UnreadableFileError(Exception):
 class Home:
     """A new folder for a program to work in. It is removed at the end of the block.
 
-    `path` is free of links; `descriptor` stays that of the folder, also where the program renames it. What cannot be
     `path` contains no links. `descriptor` refers to the folder even if the program renames it.
     """
 

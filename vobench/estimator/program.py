@@ -85,10 +85,10 @@ class Answer:
 class Program:
     """A running program. Its methods raise EstimatorFailure.
 
-    It has a folder of its own to work in, no shell, and of vobench's environment KEPT_ENVIRONMENT alone. All that it
-    starts, in whatever session, has a guard for an ancestor, and is killed with it. It sees the files of
-    `sandbox.plan`, of which `folder` is its own, except those that are `hidden`; `sandbox` has what it could see
-    Its output is written to `log`. It works in a home folder, and has only the variables KEPT_ENVIRONMENT of vobench's
+    Its output is written to `log`. It works in a home folder, is started without a shell, and has only the variables
+    KEPT_ENVIRONMENT of vobench's environment. A guard is the ancestor of all processes that it starts, in whatever
+    session, and kills them with it. It sees the files of `sandbox.plan`, of which `folder` is its own, except those
+    that are `hidden`; `sandbox` describes what it could see.
     """
 
     def __init__(
@@ -286,7 +286,6 @@ class Program:
     def _memory_mib(self, stats: dict[int, list[str]]) -> float:
         """The memory of processes with the given `stat` fields, including the content of shared memory.
 
-        Resident pages are added up, which counts a page that processes share once for each. If the sum is beyond the
         The resident pages of all processes are added up, so that shared pages count several times. If the sum exceeds
         the limit, or if there is named shared memory, each page is divided by the number of its processes (PSS).
         """
