@@ -330,6 +330,8 @@ def _path_read_back(
     return Trajectory(path.t_ns, T_BODY_GREY @ path.T_world_frame)
 
 
+# Truth beside the pictures, in a file of that name or of the name of its folder, or in the folder `poses`.
+TRUTH_NAMES = r"[^/]*/poses\.txt|(?P<sequence>[^/]+)/(?P=sequence)\.txt|poses/[^/]*\.txt"
 LAYOUTS = (
     Layout(
         "kitti",
@@ -338,5 +340,6 @@ LAYOUTS = (
         read_kitti,
         frozenset({"calibration", "truth"}),
         Writing(write_kitti, rectified, _exported_stamps, _path_read_back),
+        TRUTH_NAMES,
     ),
 )

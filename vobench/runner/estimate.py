@@ -29,6 +29,7 @@ from vobench.geometry.se3 import Array
 from vobench.runner.consistency import COVARIANCE, format_covariances
 from vobench.runner.folder import NOT_APPLICABLE, read_tum
 from vobench.runner.frames import ANSWER_COLUMNS, ANSWERS, COST_COLUMNS, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
+from vobench.runner.visible_truth import visible_truth
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import EncodedFrame, Sequence, StereoFrame
 from vobench.sequence.picture import grey, rgb
@@ -158,15 +159,14 @@ def _running(trial: "Trial", recording: Path, log: Path) -> Running:
 
 
 def _hidden(trial: "Trial", recording: Path) -> list[Path]:
-    """The folders that are hidden from an estimator, even inside of folders that it may read.
+    """The files and folders that are hidden from an estimator, even inside of folders that it may read.
 
-    They are the store with the sequence, the original recording, and earlier runs.
+    They are the store with the sequence, the runs and recordings that the plan knows, and other ground truth. Raises
+    EstimatorFailure if the folders are too large to be searched for ground truth.
     """
-    hidden = [recording.resolve().parents[1], Path("runs").absolute()]
-    source = getattr(trial.case, "source", None)
-    if source:
-        hidden.append(Path(source.path).resolve())
-    return hidden
+    store = recording.resolve().parents[1]
+    known = [store, Path("runs").resolve(), *trial.hidden]
+    return [*known, *visible_truth(trial.estimator_entry.folder, known)]
 
 
 def _write_blind(recording: Path, manifest: Manifest, folder: Path) -> None:
