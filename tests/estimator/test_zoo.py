@@ -185,6 +185,7 @@ ZOO = {
     # It does well, and more.
     "20 MB of a reason": Animal(FINISHED, "return Result(I, reason='x' * 20_000_000)"),
     "a reason of surrogates, ESC and NUL": Animal(FINISHED, "return Result(I, Status.DEGRADED, '\\ud800\\x1b[2J\\0dark\\u202e', stats={'\\x1b\\ud800n': 1})"),
+    "a reason that is a formula": Animal(FINISHED, "return Result(I, reason='=cmd|calc')"),
     "stats that are no numbers": Animal(FINISHED, "return Result(I, stats={'a': float('nan'), 'b': float('inf')})"),
     "prints 30 MB": Animal(FINISHED, f"print('\\x1b[2J' + 'y' * 10_000_000)\n{OK}"),
     "prints secrets": Animal(FINISHED, f"print(sorted(os.environ.items()))\n{OK}"),
@@ -303,6 +304,7 @@ def test_a_bad_plugin_is_a_row_with_a_reason_and_nothing_is_left_of_it(run, tmp_
     assert not list(Path("/dev/shm").glob(f"{str(tmp_path).replace(os.sep, '_')}*"))
     said = (tmp_path / "estimate" / ANSWERS).read_text()
     assert not {"\x1b", "\0", "\ud800", "\u202e"} & set(said)
+    assert ",=" not in said
     if outcome.kind == FINISHED:
         assert [len(row["reason"]) <= 500 for row in read_table(tmp_path / "estimate" / ANSWERS)] == [True] * 3
 

@@ -1,6 +1,5 @@
 """Runs an estimator on a sequence, frame by frame, and writes its poses, statuses and tracks to files."""
 
-import csv
 import io
 import json
 import zipfile
@@ -28,7 +27,16 @@ from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.runner.consistency import COVARIANCE, format_covariances
 from vobench.runner.folder import NOT_APPLICABLE, read_tum
-from vobench.runner.frames import ANSWER_COLUMNS, ANSWERS, COST_COLUMNS, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
+from vobench.runner.frames import (
+    ANSWER_COLUMNS,
+    ANSWERS,
+    COST_COLUMNS,
+    GROUND_TRUTH,
+    TIME_COLUMNS,
+    TIMES,
+    TableWriter,
+    new_table,
+)
 from vobench.runner.visible_truth import visible_truth
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import EncodedFrame, Sequence, StereoFrame
@@ -300,8 +308,8 @@ def _between(readings: Readings | None, last_ns: int, now_ns: int) -> Readings |
 class _Keeper:
     """Writes each answer of an estimator immediately, so that memory does not grow with the length of the sequence."""
 
-    answers: "csv.DictWriter[str]"
-    times: "csv.DictWriter[str]"
+    answers: TableWriter
+    times: TableWriter
     tracks: zipfile.ZipFile
     T_frame_left: Array = field(default_factory=lambda: np.eye(4))
     stamps: dict[int, int] = field(default_factory=dict)
