@@ -12,6 +12,7 @@ from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import (
     FAR_M,
     RAY_OFFSET_M,
+    SHORT_OF_END,
     PlanarPatch,
     RayCaster,
     face_materials,
@@ -102,13 +103,15 @@ class Visibility:
             return np.zeros(len(origins_m), bool)
         return self._sky_panes.stops(origins_m, segments_m)
 
-    def first_panes(self, origins_m: Floats, segments_m: Floats) -> tuple[Rows, Hits]:
-        """Which rays from origins along segments (R, 3) cross a pane (K,), and where they meet their first."""
-        crosses = np.zeros(len(origins_m), bool)
-        if self._has_panes:
-            crosses = self._glass.stops(origins_m, segments_m)
-        rays = np.flatnonzero(crosses)
-        return rays, self._glass.hits(origins_m[rays], segments_m[rays])
+    def first_panes(self, origins_m: Floats, directions: Floats, reach_m: Floats) -> tuple[Rows, Hits]:
+        """Which rays (R, 3) cross a pane (K,) before their reach (R,), and where they meet their first."""
+        if not self._has_panes:
+            none = np.zeros(0, np.int64)
+            no_values = np.zeros(0, np.float32)
+            return none, Hits(none.astype(np.int32), no_values, no_values, no_values)
+        hits = self._glass.one_sided_hits(origins_m, directions, SHORT_OF_END * reach_m)
+        rays = np.flatnonzero(hits.face >= 0)
+        return rays, self._glass.facing(hits.take(rays), directions[rays])
 
     def pane_mirrors(self, panes: Indices, cosine: Floats) -> Floats:
         """Share (R,) that panes, given by their faces (R,), reflect at cosines (R,)."""
