@@ -21,7 +21,17 @@ from vobench.rendering.direct_light import direct_light, mirror_images
 from vobench.rendering.emitter import emitters
 from vobench.rendering.gathering import Rounds, Smoothing
 from vobench.rendering.geometry import FAR_M, RayCaster, are_panes, face_materials, offset_from_surface
-from vobench.rendering.indirect_light import MOST_RAYS, Gatherer, Surfels, albedo, blend, bounced, evenly_dithered, response, surfels
+from vobench.rendering.indirect_light import (
+    MOST_RAYS,
+    Gatherer,
+    Surfels,
+    albedo,
+    blend,
+    bounced,
+    evenly_dithered,
+    response,
+    surfels,
+)
 from vobench.rendering.photons import Reflectors
 from vobench.rendering.texel import Texels, texel_areas_m2, texels
 from vobench.rendering.texel_layout import TexelLayout
