@@ -375,8 +375,9 @@ def _bounces(
         return np.zeros(received.shape, np.float32), np.zeros(len(reflectance), np.float32)
 
     # All bounces but the last, by the rays of the first round, whose noise averages out over all that the last finds.
+    # The last of these is smoothed as light is shown.
     first_lx = by_mirrors_lx + lights.of_skies(rounds.sky_lx())
-    pilot = bounced(received, reflectance, rounds.table(), first_lx, bounces=settings.bounces - 1)
+    pilot = bounced(received, reflectance, rounds.table(), first_lx, bounces=max(settings.bounces - 2, 0))
     if settings.bounces > 1:
         light_lx = rounds.first_light(smoothing, _as_columns(received + reflectance * pilot))
         pilot = _by_light(light_lx, received.shape) + first_lx[..., None]
@@ -426,7 +427,7 @@ class _Lights:
 
     def channel_luminances(self, channels: int) -> Floats:
         """The luminance (K * C,) of each channel of each light."""
-        return self._weights[:, :channels].ravel()
+        return np.asarray(self._weights[:, :channels].ravel())
 
     def of_skies(self, sky_lx: Floats) -> Floats:
         """What each sky gives (N, S) as what each light does (K, S)."""

@@ -4,7 +4,7 @@ import os
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar, cast
 
 import numba
 
@@ -22,7 +22,7 @@ def _is_cached() -> bool:
             pass
     except OSError:
         return False
-    numba.config.CACHE_DIR = str(folder)
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
     return True
 
 
@@ -34,5 +34,5 @@ def compiled(function: Function) -> Function:
 
     Where the cache folder cannot be written, each process compiles the function anew.
     """
-    result: Function = numba.njit(nogil=True, cache=IS_CACHED, error_model="numpy")(function)
-    return result
+    kernel: Any = numba.njit(nogil=True, cache=IS_CACHED, error_model="numpy")(function)
+    return cast("Function", kernel)

@@ -214,9 +214,9 @@ def end_rays(
         mirrored = weight[ray] * (row.tint * coat + (ONE - coat) * row.metal)
         if mirrored <= FAINT:
             continue
-        facet_x = normal[0]
-        facet_y = normal[1]
-        facet_z = normal[2]
+        facet_x = float(normal[0])
+        facet_y = float(normal[1])
+        facet_z = float(normal[2])
         if row.roughness > 0:
             facet_x, facet_y, facet_z = facet_of(normal, row.roughness, dither[point[ray]], ray)
         along_facet = facet_x * x + facet_y * y + facet_z * z
@@ -254,7 +254,7 @@ def facet_of(normal: Floats, roughness: float, dither: Floats, turn: int) -> tup
     y = normal[1] + along_u * u_y + along_v * v_y
     z = normal[2] + along_u * u_z + along_v * v_z
     length = math.sqrt(x * x + y * y + z * z)
-    return np.float32(x / length), np.float32(y / length), np.float32(z / length)
+    return x / length, y / length, z / length
 
 
 @compiled

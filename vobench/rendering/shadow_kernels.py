@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from vobench.rendering.array_types import Floats, Indices, Mask
+from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.compiled import compiled
 from vobench.rendering.ray_kernels import ONE, STEP_U, STEP_V, fresnel_of
 
@@ -165,7 +165,7 @@ def aim_at_area(
 
 
 @compiled
-def ahead_of(points_m: Floats, normals: Floats, rows: Indices, centre_m: Floats, radius_m: float, chosen: Mask) -> None:
+def ahead_of(points_m: Floats, normals: Floats, rows: Rows, centre_m: Floats, radius_m: float, chosen: Mask) -> None:
     """Write which of the points at rows (N,) have any of a ball before them."""
     for place in range(len(rows)):
         point = rows[place]
@@ -173,3 +173,29 @@ def ahead_of(points_m: Floats, normals: Floats, rows: Indices, centre_m: Floats,
         for axis in range(3):
             ahead_m += (centre_m[axis] - points_m[point, axis]) * normals[point, axis]
         chosen[place] = ahead_m > -radius_m
+
+
+@compiled
+def meet_boxes(origins_m: Floats, segments_m: Floats, boxes_m: Floats, is_met: Mask) -> None:
+    """Write which segments (R, 3) from origins meet any of the boxes (K, 2, 3), given by lower and upper corners."""
+    for ray in range(len(origins_m)):
+        is_met[ray] = False
+        for box in range(len(boxes_m)):
+            enters = np.float32(0)
+            leaves = ONE
+            for axis in range(3):
+                start_m = origins_m[ray, axis]
+                step_m = segments_m[ray, axis]
+                low_m = boxes_m[box, 0, axis] - start_m
+                high_m = boxes_m[box, 1, axis] - start_m
+                if step_m == 0:
+                    if low_m > 0 or high_m < 0:
+                        leaves = np.float32(-1)
+                    continue
+                first = low_m / step_m
+                second = high_m / step_m
+                enters = max(enters, min(first, second))
+                leaves = min(leaves, max(first, second))
+            if enters <= leaves:
+                is_met[ray] = True
+                break

@@ -128,7 +128,8 @@ def _lowest(seen: Floats, normal: tuple[float, float, float]) -> float:
     """The height of the lowest corner over the plane through the point that has a normal."""
     along_x = min(normal[0] * seen[X0], normal[0] * seen[X1])
     along_y = min(normal[1] * seen[Y0], normal[1] * seen[Y1])
-    return along_x + along_y + normal[2] * seen[DEPTH]
+    lowest: float = along_x + along_y + normal[2] * seen[DEPTH]
+    return lowest
 
 
 @compiled
@@ -163,7 +164,8 @@ def _whole_sr(seen: Floats, normal: tuple[float, float, float]) -> float:
     along_x = depth * (near_x - far_x)
     along_y = depth * (near_y - far_y)
     across = seen[X1] * far_x - seen[X0] * near_x + seen[Y1] * far_y - seen[Y0] * near_y
-    return (along_x * normal[0] + along_y * normal[1] + across * normal[2]) / 2
+    doubled_sr: float = along_x * normal[0] + along_y * normal[1] + across * normal[2]
+    return doubled_sr / 2
 
 
 @compiled
