@@ -31,10 +31,11 @@ LARGE = 2000  # cells of a shadow that is drawn alone
 # Cells are computed once a plane was shown by so many pixels, and by some more per cell: then rays cost as much.
 WORTH_PIXELS = 300_000
 WORTH_PIXELS_PER_CELL = 6
+FEWEST_LAMPS = 2  # for a single one, to look into the cells takes as long as the rays
 
 
 @dataclass(frozen=True, slots=True)
-class Plane:
+class ReceiverPlane:
     """A rectangle of H x W cells in a plane that contains faces of the scene.
 
     `origin_m` is the corner of the first cell; `u_axis` and `v_axis` are the unit vectors along columns and rows.
@@ -73,7 +74,9 @@ class Plane:
         return np.asarray((points_m - self.origin_m) @ axes)
 
 
-def large_planes(corners_m: Array, normals: Array, selected: Mask, lift_m: float) -> tuple[list[Plane], Indices]:
+def large_planes(
+    corners_m: Array, normals: Array, selected: Mask, lift_m: float
+) -> tuple[list[ReceiverPlane], Indices]:
     """The planes with a large area of selected faces (F,), and the index (F + 1,) of each face's plane, -1 for none.
 
     `corners_m` (F, 3, 3) and `normals` (F, 3) are those of all faces.
@@ -86,7 +89,7 @@ def large_planes(corners_m: Array, normals: Array, selected: Mask, lift_m: float
     key = np.round(np.column_stack([normals[faces], offsets_m]), DIGITS) + 0.0  # no negative zeros
     _, plane_of = np.unique(key, axis=0, return_inverse=True)
     plane_of = plane_of.reshape(-1)
-    planes: list[Plane] = []
+    planes: list[ReceiverPlane] = []
     for index in np.flatnonzero(np.bincount(plane_of, areas_m2) >= LEAST_AREA_M2):
         members = faces[plane_of == index]
         plane = _plane(corners_m[members], normals[members[0]], lift_m)
@@ -96,7 +99,7 @@ def large_planes(corners_m: Array, normals: Array, selected: Mask, lift_m: float
     return planes, face_plane
 
 
-def _plane(corners_m: Array, normal: Array, lift_m: float) -> Plane:
+def _plane(corners_m: Array, normal: Array, lift_m: float) -> ReceiverPlane:
     """The rectangle around faces (F, 3, 3) that lie in one plane."""
     u_axes, v_axes = tangents(normal[None])
     u_axis = u_axes[0]
@@ -109,7 +112,7 @@ def _plane(corners_m: Array, normal: Array, lift_m: float) -> Plane:
     width, height = (np.ceil(size_m / cell_m).astype(int) + 1).tolist()
     above_m = normal @ points_m[0] + lift_m
     origin_m = low_m[0] * u_axis + low_m[1] * v_axis + above_m * normal
-    return Plane(origin_m, u_axis, v_axis, normal, cell_m, height, width)
+    return ReceiverPlane(origin_m, u_axis, v_axis, normal, cell_m, height, width)
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,12 +122,12 @@ class ShadowCells:
     The last cell stands for all points outside the grid, where nothing is decided.
     """
 
-    plane: Plane
+    plane: ReceiverPlane
     decided: Bits
     hidden: Bits
 
 
-def shadow_cells(plane: Plane, lamps: tuple[Lamp, ...], occluders: Occluders) -> ShadowCells:
+def shadow_cells(plane: ReceiverPlane, lamps: tuple[Lamp, ...], occluders: Occluders) -> ShadowCells:
     """What can be proven for the cells of a plane about stationary lamps, given all stationary occluders."""
     largest_m = max(1.0, float(np.abs(occluders.corners_m).max(initial=0.0)))
     error_m = RAY_ERROR * largest_m
@@ -171,7 +174,7 @@ class _Source:
     end: float
 
 
-def _source(plane: Plane, lamp: Lamp) -> _Source | None:
+def _source(plane: ReceiverPlane, lamp: Lamp) -> _Source | None:
     """The projection from a lamp onto a plane; None if the lamp is behind the plane, or too flat above it."""
     if lamp.center_m is None:
         sun_u = float(plane.u_axis @ lamp.axis)
@@ -190,7 +193,7 @@ def _source(plane: Plane, lamp: Lamp) -> _Source | None:
     return _Source(float(u / h), float(v / h), 1 / h, sine, end) if is_clear else None
 
 
-def _cone(plane: Plane, lamp: Lamp) -> tuple[Mask, Mask]:
+def _cone(plane: ReceiverPlane, lamp: Lamp) -> tuple[Mask, Mask]:
     """The cells (H·W,) in which a lamp shines everywhere, and those in which it shines nowhere."""
     count = plane.height * plane.width
     if lamp.center_m is None or lamp.min_cosine < -1:
@@ -212,7 +215,7 @@ def _cone(plane: Plane, lamp: Lamp) -> tuple[Mask, Mask]:
 class _Projected:
     """Triangles (T, 3) in the coordinates of a plane: (T, 3, 2) along it and heights (T, 3) above it."""
 
-    plane: Plane
+    plane: ReceiverPlane
     along_m: Array
     heights_m: Array
 
@@ -302,19 +305,19 @@ class _Shadows:
             self.is_solid[rows],
         )
 
-    def _ranges(self, plane: Plane) -> tuple[Rows, Rows]:
+    def _ranges(self, plane: ReceiverPlane) -> tuple[Rows, Rows]:
         """The first cell and the number of cells (T, 2) of the bounding boxes, along columns and rows."""
         shape = np.array([plane.width, plane.height])
         first = np.clip(np.floor(self.low_m / plane.cell_m), 0, shape).astype(np.int64)
         last = np.clip(np.floor(self.high_m / plane.cell_m), -1, shape - 1).astype(np.int64)
         return first, np.maximum(last - first + 1, 0)
 
-    def cell_counts(self, plane: Plane) -> Rows:
+    def cell_counts(self, plane: ReceiverPlane) -> Rows:
         """The number of cells (T,) of each bounding box."""
         _, count = self._ranges(plane)
         return np.asarray(count.prod(1))
 
-    def draw(self, plane: Plane, touched: Mask, covered: Mask) -> None:
+    def draw(self, plane: ReceiverPlane, touched: Mask, covered: Mask) -> None:
         """Mark the cells (H·W,) that shadows touch, and those that one of them covers."""
         first, count = self._ranges(plane)
         cells = count.prod(1)
@@ -330,7 +333,7 @@ class _Shadows:
         touched[cell[is_touched]] = True
         covered[cell[is_covered]] = True
 
-    def draw_large(self, plane: Plane, touched: Mask, covered: Mask) -> None:
+    def draw_large(self, plane: ReceiverPlane, touched: Mask, covered: Mask) -> None:
         """The same as `draw`, shadow by shadow, which costs less where each has many cells."""
         touched_grid = touched.reshape(plane.height, plane.width)
         covered_grid = covered.reshape(plane.height, plane.width)
@@ -389,7 +392,7 @@ class KnownShadows:
 
     def __init__(
         self,
-        planes: Sequence[Plane],
+        planes: Sequence[ReceiverPlane],
         face_plane: Indices,
         lamps: Sequence[Lamp],
         occluders: Occluders,
@@ -410,6 +413,8 @@ class KnownShadows:
 
     def learn(self, shown: Rows) -> None:
         """Count the pixels (P,) that have shown each plane, and compute the cells of those shown often."""
+        if len(self._lamps) < FEWEST_LAMPS:
+            return
         self._shown += shown
         for index in np.flatnonzero(self._shown >= self._worth).tolist():
             if index not in self._cells:
