@@ -12,7 +12,7 @@ Makers       Thing make_mesh joined moved copies flipped two_sided textured: mes
              quad at block card cards cushion extrusion lathe pierced reveal sheet spline tube: shapes
              Material Picture Procedural coated matt wood picture STEEL CHROME WHITE DARK BLACK: materials, textures
              BRICK INK INKS NAVY OCHRE PAPER PLUM SAND TEAL: colours
-             Part Piece put stood things mm bars bulb: furniture
+             Part Piece put stood things mm bars bulb kitchen: furniture
              Opening shell FINISHES OUTWARD: rooms
              AreaLight PointLight SpotLight Sun Sky Steady Flicker Dimmer Switched: lights
 Layouts      Layout Writing ReadOptions Topics: the definition of a layout, and the options of its reader
@@ -34,7 +34,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vobench.asset import picture
+    from vobench.asset import kitchen, picture
     from vobench.asset.fitting import bars
     from vobench.asset.furniture import (
         BLACK,
@@ -167,6 +167,7 @@ HOMES = {
     "SAND": "vobench.asset.picture",
     "TEAL": "vobench.asset.picture",
     "picture": "vobench.asset.picture",
+    "kitchen": "vobench.asset.kitchen",
     "FINISHES": "vobench.asset.room",
     "OUTWARD": "vobench.asset.room",
     "Opening": "vobench.asset.room",
@@ -395,6 +396,7 @@ __all__ = [
     "follow_predicted",
     "inside",
     "joined",
+    "kitchen",
     "lathe",
     "local_contrast",
     "looking",
