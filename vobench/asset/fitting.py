@@ -187,6 +187,27 @@ def radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]
     ]
 
 
+def panel_radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]:
+    """A radiator of two steel panels with a grille between them, a valve and a pipe into the floor."""
+    bottom = 0.12
+    panel = block((0.02, width_m, height_m), bevel_m=0.006)
+    count = max(2, round(width_m / 0.09))
+    ribs_y = (np.arange(count) + 0.5) * width_m / count - width_m / 2
+    rib = block((0.006, 0.03, height_m - 0.08), bevel_m=0.003)
+    ribs = [moved(rib, at(0.126, y, bottom + height_m / 2)) for y in ribs_y.tolist()]
+    grille = block((0.1, width_m - 0.004, 0.012), bevel_m=0.002)
+    panels = [moved(panel, at(x, 0, bottom + height_m / 2)) for x in (0.05, 0.114)]
+    feed = tube(mm("80 0 0, 80 0 150"), 0.009, sections=6)
+    valve = lathe(mm("0 0, 20 0, 22 50, 14 56, 0 56"), sections=12)
+    enamel = coated("#e4e2dc", roughness=0.25)
+    return [
+        Part(joined([*panels, *ribs]), enamel),
+        put(grille, GREY, 0.082, 0, bottom + height_m - 0.006),
+        put(feed, WHITE, 0, width_m / 2 - 0.03),
+        put(valve, WHITE, 0.08, width_m / 2 + 0.02, bottom + height_m - 0.1, roll=-90),
+    ]
+
+
 def socket(_: Rng, count: int = 2) -> list[Part]:
     """A plate with `count` socket outlets side by side."""
     well = lathe(mm("0 0, 21 0, 21 2, 0 2"), sections=20)

@@ -228,6 +228,14 @@ def pendant(
     ]
 
 
+def ceiling_dome(width_m: float = 0.4) -> tuple[list[Part], "Trimesh"]:
+    """A round ceiling lamp below z = 0: its base, and the dome that shines."""
+    scale = width_m / 0.4
+    dome = lathe(mm("0 -85, 80 -80, 140 -62, 180 -34, 190 -12, 0 -11") * [scale, 1], sections=24)
+    base = lathe(mm("0 -12, 200 -12, 200 0, 0 0") * [scale, 1], sections=24)
+    return [put(base, STEEL)], dome
+
+
 def fruit_bowl(rng: Rng) -> list[Part]:
     """A bowl of apples and oranges."""
     bowl = lathe(mm("0 0, 50 0, 55 8, 120 50, 150 95, 146 96, 112 56, 50 16, 0 14"), sections=32)
