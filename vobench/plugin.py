@@ -15,6 +15,7 @@ Makers       Thing make_mesh joined moved copies flipped two_sided textured: mes
              Part Piece put stood things mm bars bulb kitchen: furniture
              Opening shell FINISHES OUTWARD: rooms
              AreaLight PointLight SpotLight Sun Sky Steady Flicker Dimmer Switched: lights
+             Surroundings GeneratedPlace: the panorama of a sky, and what a generator returns
 Layouts      Layout Writing ReadOptions Topics: the definition of a layout, and the options of its reader
              Recording RecordedFrame RecordedPicture PictureStream assemble picture_files numbered truth_file unread
              chain_rig: reading
@@ -51,6 +52,7 @@ if TYPE_CHECKING:
         wood,
     )
     from vobench.asset.household import bulb
+    from vobench.asset.panorama import Surroundings
     from vobench.asset.picture import BRICK, INK, INKS, NAVY, OCHRE, PAPER, PLUM, SAND, TEAL
     from vobench.asset.room import FINISHES, OUTWARD, Opening, Piece, shell, things
     from vobench.asset.shape import (
@@ -123,6 +125,7 @@ if TYPE_CHECKING:
     from vobench.metric.comparison import POSES, Comparison, MetricDefinition, OverLengths
     from vobench.metric.settings import ScoreSettings
     from vobench.report.contract import assert_contract
+    from vobench.scene.generated_place import GeneratedPlace
     from vobench.scene.light import (
         AreaLight,
         Dimmer,
@@ -157,6 +160,7 @@ HOMES = {
     "stood": "vobench.asset.furniture",
     "wood": "vobench.asset.furniture",
     "bulb": "vobench.asset.household",
+    "Surroundings": "vobench.asset.panorama",
     "BRICK": "vobench.asset.picture",
     "INK": "vobench.asset.picture",
     "INKS": "vobench.asset.picture",
@@ -263,6 +267,7 @@ HOMES = {
     "POSES": "vobench.metric.comparison",
     "ScoreSettings": "vobench.metric.settings",
     "assert_contract": "vobench.report.contract",
+    "GeneratedPlace": "vobench.scene.generated_place",
     "AreaLight": "vobench.scene.light",
     "Dimmer": "vobench.scene.light",
     "Flicker": "vobench.scene.light",
@@ -324,6 +329,7 @@ __all__ = [
     "Flicker",
     "Followed",
     "Frame",
+    "GeneratedPlace",
     "Image",
     "ImuCalibration",
     "ImuReadings",
@@ -362,6 +368,7 @@ __all__ = [
     "StereoPair",
     "StereoTracker",
     "Sun",
+    "Surroundings",
     "Switched",
     "Thing",
     "Topics",

@@ -12,6 +12,7 @@ from vobench.suite import scene_file, scene_lighting
 from vobench.suite.case import Case
 from vobench.suite.lookup import Lookup
 from vobench.suite.scenario import Scenario, Setup, read_scenario
+from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_case import check_buildable, scene_lights, shared_settings
 from vobench.suite.suite_spec import Suite
@@ -89,8 +90,9 @@ class ScenarioCases:
         """The scene in a file with a scenario's changes. Raises SuiteError."""
         key = f"{path} {changes}"
         if key not in self.scenes:
-            self.scenes[key], scene_mistakes = scene_file.read_scene_with_mistakes(path, changes)
+            scene, scene_mistakes = scene_file.read_scene_with_mistakes(path, changes)
             scene_mistakes.require_none()
+            self.scenes[key] = described_scene(scene)
         return self.scenes[key]
 
 

@@ -13,6 +13,7 @@ from vobench.errors import SuiteError
 from vobench.suite import yaml_file
 from vobench.suite.bare_model import bare_model_scene
 from vobench.suite.scene_check import check_scene
+from vobench.suite.scene_entry import generated_scene
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile
 from vobench.suite.yaml_source import Mistakes, YamlFile
 
@@ -42,7 +43,10 @@ def read_scene_with_mistakes(
     check_scene(reading.model, mistakes)
     if reading.mistakes:
         return reading.model, mistakes
-    return _with_absolute_paths(reading.model, path.parent, mistakes), mistakes
+    spec = _with_absolute_paths(reading.model, path.parent, mistakes)
+    if spec.generated:
+        spec = generated_scene(spec, spec.generated.seed, spec.generated.lighting)
+    return spec, mistakes
 
 
 def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> SceneFile:
@@ -63,12 +67,21 @@ def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> S
         file = mover.file and absolute(mover.file, "movers", index, "file")
         movers.append(replace(mover, file=file))
     maker = spec.maker and absolute(spec.maker, "maker")
-    return replace(spec, meshes=tuple(meshes), movers=tuple(movers), maker=maker)
+    generator = spec.generator and absolute(spec.generator, "generator")
+    return replace(spec, meshes=tuple(meshes), movers=tuple(movers), maker=maker, generator=generator)
 
 
 def scene_content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
-    """The scene as plain JSON values. Files are identified by their name and content, not by their path."""
+    """The scene as plain JSON values. Files are identified by their name and content, not by their path.
+
+    A scene that is described without a generator does not depend on it.
+    """
     scene: dict[str, Any] = yaml_file.plain(spec, exclude=exclude)
+    if spec.generated is None:
+        scene.pop("generator", None)
+        scene.pop("generated", None)
+    elif spec.generator:
+        scene["generator"] = _file_identity(Path(spec.generator))
     for part in (*scene.get("meshes", ()), *scene.get("movers", ())):
         if part.get("file"):
             part["file"] = _file_identity(Path(part["file"]))

@@ -14,6 +14,7 @@ from vobench.suite import scene_file, scene_lighting
 from vobench.suite.axis import RigSettings
 from vobench.suite.case import AXES, Case
 from vobench.suite.lookup import Lookup
+from vobench.suite.scene_entry import places
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_spec import Suite
 from vobench.suite.trajectory import read_replayed, read_times
@@ -47,18 +48,24 @@ class AxisReader:
         return self.mistakes.source.path.parent
 
     def scenes(self) -> dict[str, SceneFile]:
-        """The scenes by the names of their files. The lightings of the suite are checked against each scene."""
+        """The scenes by name. The lightings of the suite are checked against each scene that its file describes.
+
+        No generator is run.
+        """
+        files = dict[Path, tuple[SceneFile, Mistakes]]()
         scenes = dict[str, SceneFile]()
-        for index, name in enumerate(self.suite.scenes or ()):
+        for index, entry in enumerate(self.suite.scenes or ()):
             with self.mistakes.at("scenes", index):
-                entry = self.lookup.find("scene", name)
-                if entry.name in scenes:
-                    raise SuiteError(
-                        f"two scenes are called '{entry.name}'; list each once, from files with different names"
-                    )
-                scenes[entry.name], scene_mistakes = scene_file.read_scene_with_mistakes(entry.path)
-                self._check_lightings(scenes[entry.name], scene_mistakes)
+                found = self.lookup.find("scene", entry.name)
+                if found.path not in files:
+                    files[found.path] = scene_file.read_scene_with_mistakes(found.path)
+                scene, scene_mistakes = files[found.path]
+                if scene.is_described and not entry.has_seeds:
+                    self._check_lightings(scene, scene_mistakes)
                 scene_mistakes.require_none()
+                for place in places(entry, found.name, scene):
+                    _require_new(place.name, scenes)
+                    scenes[place.name] = place.scene
         return scenes
 
     def _check_lightings(self, scene: SceneFile, scene_mistakes: Mistakes) -> None:
@@ -148,6 +155,12 @@ class AxisReader:
             replayed=replayed.get(variant.by_axis["trajectory"]),
             **shared_settings(self.suite),
         )
+
+
+def _require_new(name: str, scenes: Collection[str]) -> None:
+    """Raise SuiteError if another scene has this name."""
+    if name in scenes:
+        raise SuiteError(f"two scenes are called '{name}'; list each once, from files with different names")
 
 
 def _default_trajectory_name(scene: str, scenes: Collection[str]) -> str:

@@ -14,6 +14,7 @@ from vobench.sensor.pixel_truth import CHANNELS
 from vobench.setting import Name, OneOf, ShortForm, hints, settings
 from vobench.suite.axis import Camera, RigSettings
 from vobench.suite.scenario import MOST_SEVERE
+from vobench.suite.scene_entry import NamedScene
 from vobench.suite.scene_lighting import Lighting
 from vobench.suite.source import SOURCES, Source
 from vobench.suite.trajectory import TrajectorySpec
@@ -125,7 +126,7 @@ class Suite:
     source: Annotated[tuple[Source, ...], SOURCES] = ()
     scenarios: Annotated[dict[str, Severities], MinLen(1)] | None = None
     calibrations: Calibrations | None = None
-    scenes: Annotated[tuple[str, ...], MinLen(1)] | None = None
+    scenes: Annotated[tuple[NamedScene, ...], MinLen(1)] | None = None
     lightings: Annotated[dict[Name, Lighting], MinLen(1)] = field(default_factory=lambda: {"as_built": {}})
     rigs: Annotated[dict[Name, RigSettings], MinLen(1)] | None = None
     trajectories: Annotated[dict[Name, TrajectorySpec], MinLen(1)] | None = None
