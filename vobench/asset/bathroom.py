@@ -135,17 +135,19 @@ def paper_holder(_: Rng) -> list[Part]:
 
 
 def towel_rail(_: Rng, width_m: float = 0.5, height_m: float = 1.1, colour: str = "#8fb3c7") -> list[Part]:
-    """A heated rail whose lowest bar is at z = 0, with a towel over one of its bars."""
-    bars_z = np.arange(0, height_m, 0.12)
+    """A heated rail on a wall, centred at z = 0, with a towel over one of its bars."""
+    low = -height_m / 2
+    high = height_m / 2
+    bars_z = np.arange(low, high, 0.12)
     rungs = [tube([[0.07, -width_m / 2, z], [0.07, width_m / 2, z]], 0.01, sections=6) for z in bars_z]
     posts = [
-        tube([[0.07, side * width_m / 2, -0.04], [0.07, side * width_m / 2, height_m]], 0.016, sections=8)
+        tube([[0.07, side * width_m / 2, low - 0.04], [0.07, side * width_m / 2, high]], 0.016, sections=8)
         for side in (-1, 1)
     ]
     feet = [
         tube([[0, side * width_m / 2, z], [0.07, side * width_m / 2, z]], 0.01, sections=6)
         for side in (-1, 1)
-        for z in (0.06, height_m - 0.06)
+        for z in (low + 0.06, high - 0.06)
     ]
     top = float(bars_z[-2])
     drape = mm("52 0 -420, 54 0 -200, 58 0 0, 71 0 14, 84 0 0, 88 0 -250, 86 0 -520")
