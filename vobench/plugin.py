@@ -15,7 +15,7 @@ Makers       Thing make_mesh joined moved copies flipped two_sided textured: mes
              Part Piece put stood things mm bars bulb kitchen: furniture
              Opening shell FINISHES OUTWARD: rooms
              AreaLight PointLight SpotLight Sun Sky Steady Flicker Dimmer Switched: lights
-             Surroundings GeneratedPlace: the panorama of a sky, and what a generator returns
+             Surroundings GeneratedPlace home: the panorama of a sky, what a generator returns, and furnished flats
 Layouts      Layout Writing ReadOptions Topics: the definition of a layout, and the options of its reader
              Recording RecordedFrame RecordedPicture PictureStream assemble picture_files numbered truth_file unread
              chain_rig: reading
@@ -35,7 +35,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vobench.asset import kitchen, picture
+    from vobench.asset import home, kitchen, picture
     from vobench.asset.fitting import bars
     from vobench.asset.furniture import (
         BLACK,
@@ -171,6 +171,7 @@ HOMES = {
     "SAND": "vobench.asset.picture",
     "TEAL": "vobench.asset.picture",
     "picture": "vobench.asset.picture",
+    "home": "vobench.asset.home",
     "kitchen": "vobench.asset.kitchen",
     "FINISHES": "vobench.asset.room",
     "OUTWARD": "vobench.asset.room",
@@ -401,6 +402,7 @@ __all__ = [
     "flipped",
     "follow",
     "follow_predicted",
+    "home",
     "inside",
     "joined",
     "kitchen",

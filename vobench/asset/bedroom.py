@@ -24,7 +24,9 @@ def bed(
     length = BED_LENGTH_M
     head_m = float(rng.choice([0.85, 1.0, 1.15]))
     parts = [stood((0.05, w + 0.06, head_m), look, 0.035, 0, bevel=0.008, u=rng.uniform(0, 2))]
-    parts += [stood((length - 0.08, 0.03, 0.18), look, length / 2 + 0.02, side * (w / 2 - 0.015), 0.14) for side in (-1, 1)]
+    parts += [
+        stood((length - 0.08, 0.03, 0.18), look, length / 2 + 0.02, side * (w / 2 - 0.015), 0.14) for side in (-1, 1)
+    ]
     parts.append(stood((0.03, w, 0.18), look, length - 0.03, 0, 0.14))
     legs = [(x, side * (w / 2 - 0.06)) for x in (0.12, length - 0.08) for side in (-1, 1)]
     parts += [stood((0.06, 0.06, 0.15), look, x, y) for x, y in legs]
@@ -137,17 +139,19 @@ def coat_rack(rng: Rng, width_m: float = 0.9, tones: str = "oak") -> list[Part]:
     parts.append(put(joined([moved(hook, at(0, y)) for y in hooks_y.tolist()]), CHROME))
     for k, y in enumerate(hooks_y.tolist()):
         if k % 2 == 0 and rng.random() < 0.8:
-            parts.append(put(_coat(rng), cloth(one_of(rng, "#27445c", "#3a3c3e", "#6b4353", "#6a6a4c", "#8f6b4d")), 0, y))
+            parts.append(
+                put(_coat(rng), cloth(one_of(rng, "#27445c", "#3a3c3e", "#6b4353", "#6a6a4c", "#8f6b4d")), 0, y)
+            )
     return parts
 
 
 def _coat(rng: Rng) -> Material:
     """A coat on a hook: a closed surface in folds, narrow at its collar."""
     length_m = rng.uniform(0.75, 1.05)
-    down = np.linspace(0, 1, 9)[:, None]
-    angle = np.linspace(0, 2 * np.pi, 25)[None]
+    down = np.linspace(0, 1, 6)[:, None]
+    angle = np.linspace(0, 2 * np.pi, 19)[None]
     spread = 0.35 + 0.65 * np.minimum(1, 3.2 * down)
-    folds = 1 + 0.16 * down * np.sin(6 * angle + rng.uniform(0, 6))
+    folds = 1 + 0.16 * down * np.sin(5 * angle + rng.uniform(0, 6))
     x = 0.085 + 0.062 * spread * folds * np.cos(angle)
     y = 0.155 * spread * folds * np.sin(angle)
     z = 0.02 - length_m * down + 0 * angle
@@ -162,7 +166,9 @@ def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> lis
     body_m = (depth_m, width_m, 0.83)
     slot = stood((0.012, 0.14, 0.02), BLACK, depth_m + 0.008, 0, 0, bevel=0.002)
     parts = [stood(body_m, paint, depth_m / 2, 0, 0.02, bevel=0.004)]
-    parts.append(stood((depth_m + 0.03, width_m + 0.01, 0.02), wood("oak"), depth_m / 2 + 0.01, 0, 0.85, u=rng.uniform(0, 2)))
+    parts.append(
+        stood((depth_m + 0.03, width_m + 0.01, 0.02), wood("oak"), depth_m / 2 + 0.01, 0, 0.85, u=rng.uniform(0, 2))
+    )
     for z in (0.05, 0.445):
         parts.append(stood((0.018, width_m - 0.02, 0.385), paint, depth_m + 0.002, 0, z, bevel=0.003))
         parts.append(slot.moved(at(0, 0, z + 0.34)))

@@ -4,7 +4,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from vobench.asset import bathroom, bedroom, fitting, floor_plan, furniture, household, kitchen
+from vobench.asset import bathroom, bedroom, fitting, floor_plan, furniture, household, houseplant, kitchen
 from vobench.asset.daylight import daylight, lamp_colour
 from vobench.asset.floor_plan import SIDES, FloorPlan, Rect, Room, Side, Window, along_m
 from vobench.asset.furniture import Part, wood
@@ -30,6 +30,7 @@ from vobench.scene.mesh import moved
 BOOK_SEEDS = 6
 PANORAMAS = ("city", "city", "suburb", "country")
 TABLE_M = 0.74
+POTS = ("", "", "#e6e2d8", "#3a3c3e", "#7f9182", "#46586a", "#c9a271")
 
 
 def furnished_flat(seed: int, lighting: str) -> Interior:
@@ -133,9 +134,7 @@ def _radiator(layout: RoomLayout, style: HomeStyle, spot: Spot, width_m: float, 
     if not layout.fits([body]):
         return
     make = fitting.radiator if style.has_old_radiators else fitting.panel_radiator
-    layout.add(
-        "radiator", make, spot.at(0), yaw_deg=spot.yaw_deg, support=WALL, width_m=length_m, height_m=height_m
-    )
+    layout.add("radiator", make, spot.at(0), yaw_deg=spot.yaw_deg, support=WALL, width_m=length_m, height_m=height_m)
     layout.take(body, height_m + 0.14)
     along = spot.y_m if spot.side in ("east", "west") else spot.x_m
     layout.take_wall(spot.side, along - length_m / 2, along + length_m / 2, 0.0, height_m + 0.14)
@@ -205,7 +204,16 @@ def _on_sill(layout: RoomLayout, spot: Spot, window: Window, width_m: float, dep
     x = 0.05 - depth_m / 2
     if layout.rng.random() < 0.75:
         height_m = float(layout.rng.uniform(0.2, 0.3))
-        layout.add("sill_plant", furniture.plant, spot.at(x, y), z_m, support=SHELL, height_m=height_m, leaves=10)
+        layout.add(
+            "sill_plant",
+            houseplant.houseplant,
+            spot.at(x, y),
+            z_m,
+            support=SHELL,
+            height_m=height_m,
+            habit=one_of(layout.rng, *houseplant.HABITS),
+            pot=one_of(layout.rng, *POTS),
+        )
     else:
         layout.add("sill_mug", furniture.mug, spot.at(x, y), z_m, support=SHELL)
 
@@ -281,7 +289,16 @@ def _items(layout: RoomLayout) -> dict[str, Item]:
             {"count": int(rng.integers(2, 6)), "seed": int(rng.integers(BOOK_SEEDS))},
         ),
         "papers": ("papers", furniture.papers, 0.25, {"count": int(rng.integers(1, 4)), "spread_m": 0.03}),
-        "plant": ("plant", furniture.plant, 0.2, {"height_m": float(rng.uniform(0.28, 0.36)), "leaves": 12}),
+        "plant": (
+            "plant",
+            houseplant.houseplant,
+            0.17,
+            {
+                "height_m": float(rng.uniform(0.26, 0.36)),
+                "habit": one_of(rng, *houseplant.HABITS),
+                "pot": one_of(rng, *POTS),
+            },
+        ),
         "fruit": ("fruit", household.fruit_bowl, 0.16, {}),
         "pens": ("pens", furniture.pens, 0.06, {}),
         "bottle": ("bottle", lambda _: kitchen.bottle(), 0.05, {}),
@@ -290,7 +307,11 @@ def _items(layout: RoomLayout) -> dict[str, Item]:
             "table_lamp",
             household.floor_lamp,
             0.15,
-            {"height_m": float(rng.uniform(0.42, 0.55)), "wide_m": 0.26, "colour": one_of(rng, "#c9b48c", "#d8c3a0", "#a7b3bc")},
+            {
+                "height_m": float(rng.uniform(0.42, 0.55)),
+                "wide_m": 0.26,
+                "colour": one_of(rng, "#c9b48c", "#d8c3a0", "#a7b3bc"),
+            },
         ),
     }
 
@@ -355,21 +376,19 @@ def _pictures(layout: RoomLayout, style: HomeStyle, count: int, above: Sequence[
 
 def _plant(layout: RoomLayout) -> None:
     """A plant on the floor, in a corner if one is free."""
-    height_m = float(layout.rng.uniform(0.8, 1.5))
+    height_m = float(layout.rng.uniform(0.7, 1.6))
     side_m = 0.72 * height_m
     spot = next(layout.spots(side_m, side_m, height_m, front_m=0.0, in_corner=True), None)
     if spot is None:
         return
-    leaves = int(layout.rng.integers(15, 22))
-    turn_deg = float(layout.rng.uniform(0, 360))
-    scale = 0.62  # leaves reach further than the place that is taken
     layout.add(
         "plant",
-        furniture.plant,
+        houseplant.houseplant,
         spot.at(GAP_M + side_m / 2),
-        yaw_deg=turn_deg,
-        height_m=height_m * scale + 0.2,
-        leaves=leaves,
+        yaw_deg=float(layout.rng.uniform(0, 360)),
+        height_m=height_m,
+        habit=one_of(layout.rng, "broad", "upright", "tree"),
+        pot=one_of(layout.rng, *POTS),
     )
     layout.take(spot.body(side_m, side_m, GAP_M), height_m)
 
@@ -445,7 +464,7 @@ def _dining(layout: RoomLayout, style: HomeStyle, seats: int) -> bool:
             turn_deg = (180.0 if sign > 0 else 0.0) + float(rng.normal(0, 4))
             layout.add(
                 "dining_chair",
-                household.dining_chair,
+                household.slat_chair if style.has_slat_chairs else household.dining_chair,
                 spot.at(x, y),
                 0.003,
                 yaw_deg=spot.yaw_deg + turn_deg,
@@ -555,7 +574,7 @@ def _furnish_living(layout: RoomLayout, style: HomeStyle) -> None:
     if wants_table:
         _dining(layout, style, 6 if area_m2 > 26 and rng.random() < 0.6 else 4)
     sideboard = _sideboard(layout, style) if rng.random() < 0.8 else None
-    shelves = [_shelf(layout, style) for _ in range(int(rng.integers(1, 4)))]
+    shelves = [_shelf(layout, style) for _ in range(int(rng.integers(1, 3)))]
     del shelves
     if rng.random() < 0.6:
         _floor_lamp(layout)
@@ -569,7 +588,7 @@ def _furnish_living(layout: RoomLayout, style: HomeStyle) -> None:
     for _ in range(int(rng.integers(1, 4))):
         _plant(layout)
     _pictures(layout, style, int(rng.integers(2, 5)), [sofa_spot, sideboard])
-    _sockets(layout, 3)
+    _sockets(layout, 2)
     del board_spot
 
 
@@ -601,11 +620,13 @@ def _television_corner(layout: RoomLayout, style: HomeStyle) -> tuple[Spot | Non
         _add_television(layout, style, spot, board_m)
         layout.add(
             "sofa",
-            furniture.sofa,
+            household.couch,
             spot.at(back_m - 0.46),
             yaw_deg=spot.yaw_deg + 180,
             width_m=sofa_m,
             colour=style.cloths[0],
+            tones=style.tones,
+            accents=(style.accent_cloths[0], style.accent_cloths[1]),
         )
         if has_table:
             _add_coffee_table(layout, style, spot, table_x, table_m)
@@ -617,7 +638,7 @@ def _television_corner(layout: RoomLayout, style: HomeStyle) -> tuple[Spot | Non
         layout.take_wall(spot.side, along - board_m / 2, along + board_m / 2, 0.0, 1.3)
         return spot, behind if is_at_wall else None
     sofa = layout.stand(
-        "sofa", furniture.sofa, (0.92, 1.8, 0.8), back_m=0.46, front_m=0.7, width_m=1.8, colour=style.cloths[0]
+        "sofa", household.couch, (0.92, 1.8, 0.8), back_m=0.46, front_m=0.7, width_m=1.8, colour=style.cloths[0]
     )
     return None, sofa[1] if sofa else None
 
@@ -715,7 +736,7 @@ def _furnish_kitchen(layout: RoomLayout, style: HomeStyle) -> None:
         seats = 4 if area_m2 > 10.5 else 2
         has_table = _dining(layout, style, seats) or _dining(layout, style, 2)
         del has_table
-    if rng.random() < 0.5:
+    if rng.random() < 0.25:
         layout.stand("bin", furniture.waste_bin, (0.32, 0.32, 0.42), back_m=0.16, front_m=0.0, in_corner=True,
                      width_m=0.28, height_m=0.38)  # fmt: skip
     if rng.random() < 0.35:
@@ -757,7 +778,9 @@ def _fits_row(layout: RoomLayout, spot: Spot, along: float, length_m: float) -> 
     height_m = 0.92 if windows else 2.2
     span = _Span(along - length_m / 2, along + length_m / 2, 0.0, height_m)
     # The fridge and its end of the row must not stand before a window.
-    is_clear = all(first - (along - length_m / 2) > 0.66 and along + length_m / 2 - last > 0.66 for first, last in windows)
+    is_clear = all(
+        first - (along - length_m / 2) > 0.66 and along + length_m / 2 - last > 0.66 for first, last in windows
+    )
     body = spot.body(kitchen.ROW_DEPTH_M, length_m, 0.0)
     front = spot.body(0.7, length_m, kitchen.ROW_DEPTH_M)
     return is_clear and layout.is_wall_free(spot.side, span) and layout.fits([body], [front])
@@ -864,7 +887,7 @@ def _furnish_bedroom(layout: RoomLayout, style: HomeStyle) -> None:
     if rng.random() < 0.4:
         layout.hang("mirror", fitting.framed, (0.5, 1.4), middle_m=1.05, style="mirror", width_m=0.5, height_m=1.4)
     _pictures(layout, style, int(rng.integers(1, 3)), [bed])
-    _sockets(layout, 2)
+    _sockets(layout, 1)
 
 
 def _loose_rug(layout: RoomLayout) -> None:
@@ -893,7 +916,7 @@ def _furnish_study(layout: RoomLayout, style: HomeStyle) -> None:
     if rng.random() < 0.5:
         _armchair(layout, style)
     if rng.random() < 0.35 and layout.room.rect.area_m2 > 8:
-        layout.stand("sofa", furniture.sofa, (0.92, 1.7, 0.8), back_m=0.46, width_m=1.7, colour=style.cloths[1])
+        layout.stand("sofa", household.couch, (0.92, 1.7, 0.8), back_m=0.46, width_m=1.7, colour=style.cloths[1])
     if rng.random() < 0.4:
         _sideboard(layout, style)
     if rng.random() < 0.4:
@@ -902,7 +925,9 @@ def _furnish_study(layout: RoomLayout, style: HomeStyle) -> None:
         _cartons(layout)
     _plant(layout)
     if rng.random() < 0.5:
-        layout.hang("noticeboard", fitting.noticeboard, (0.95, 0.65), above=desk, middle_m=1.62, width_m=0.9, height_m=0.6)
+        layout.hang(
+            "noticeboard", fitting.noticeboard, (0.95, 0.65), above=desk, middle_m=1.62, width_m=0.9, height_m=0.6
+        )
     _pictures(layout, style, int(rng.integers(1, 3)))
     _sockets(layout, 2)
 
@@ -946,9 +971,13 @@ def _furnish_hall(layout: RoomLayout, style: HomeStyle) -> None:
     spot = None
     if cabinet is not None:
         name, spot = cabinet
-        _scatter(layout, name, spot, GAP_M + 0.14, width_m - 0.12, 0.87, ("box", "mug", "plant")[: int(rng.integers(1, 4))])
+        _scatter(
+            layout, name, spot, GAP_M + 0.14, width_m - 0.12, 0.87, ("box", "mug", "plant")[: int(rng.integers(1, 4))]
+        )
     if spot is not None and rng.random() < 0.6:
-        layout.hang("mirror", fitting.framed, (0.55, 0.75), middle_m=1.6, above=spot, style="mirror", width_m=0.5, height_m=0.7)
+        layout.hang(
+            "mirror", fitting.framed, (0.55, 0.75), middle_m=1.6, above=spot, style="mirror", width_m=0.5, height_m=0.7
+        )
     rack_m = float(rng.choice([0.7, 0.9, 1.1]))
     rack = layout.hang("coat_rack", bedroom.coat_rack, (rack_m, 0.2), middle_m=1.72, width_m=rack_m, tones=style.tones)
     if rack is not None:
@@ -1037,7 +1066,7 @@ def _furnish_bath(layout: RoomLayout, style: HomeStyle) -> None:
     spot = layout.open_spot(0.5, 0.8)
     if spot is not None:
         layout.add("bath_mat", bathroom.bath_mat, spot.at(0), yaw_deg=spot.yaw_deg, colour=one_of(rng, *BATH_CLOTHS))
-    if rng.random() < 0.4:
+    if rng.random() < 0.2:
         layout.stand("bin", furniture.waste_bin, (0.26, 0.26, 0.32), back_m=0.12, front_m=0.0, in_corner=True,
                      width_m=0.22, height_m=0.28)  # fmt: skip
 

@@ -31,7 +31,7 @@ from vobench.asset.picture import (
     Rng,
     one_of,
 )
-from vobench.asset.shape import at, card, cushion, lathe, sheet, spline, tube
+from vobench.asset.shape import at, block, card, cushion, lathe, sheet, spline, tube
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import flipped, joined, moved
 
@@ -91,6 +91,63 @@ def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
         stood(seat_m, look, 0, 0, 0.425, bevel=0.01),
         put(pad, cloth(colour), 0, 0, 0.47),
     ]
+
+
+def slat_chair(rng: Rng, colour: str = SAND, tones: str = "oak", *, has_pad: bool = True) -> list[Part]:
+    """A chair of square bars with slats in its back; a person on it looks along x."""
+    look = wood(tones)
+    parts = [stood((0.42, 0.42, 0.028), look, 0, 0, 0.43, bevel=0.008, u=rng.uniform(0, 2))]
+    for side in (-1, 1):
+        parts.append(stood((0.036, 0.036, 0.43), look, 0.18, side * 0.18, bevel=0.003))
+        post = block((0.032, 0.036, 0.9), bevel_m=0.004)
+        parts.append(put(post, look, -0.2, side * 0.18, 0.45, pitch=-5))
+    level = rng.random() < 0.5
+    slats = [((0.016, 0.34, 0.06), 0.0, z) for z in (0.58, 0.7, 0.82)]
+    if not level:
+        slats = [((0.014, 0.03, 0.36), y, 0.68) for y in (-0.1, 0.0, 0.1)]
+        slats.append(((0.02, 0.34, 0.06), 0.0, 0.86))
+    for size_m, y, z in slats:
+        x = -0.2 - 0.0875 * (z - 0.45)
+        parts.append(put(block(size_m, bevel_m=0.003), look, x, y, z, pitch=-5))
+    if has_pad:
+        pad = cushion((0.4, 0.4, 0.045), power=6, cells=4)
+        parts.append(put(pad, cloth(colour), 0.01, 0, 0.477))
+    return parts
+
+
+def couch(
+    rng: Rng,
+    width_m: float = 2.0,
+    colour: str = SAGE,
+    tones: str = "oak",
+    accents: tuple[str, str] = (OCHRE, BRICK),
+) -> list[Part]:
+    """A sofa 0.9 m deep for two or three on wooden legs, with cushions; its middle is at the origin."""
+    cover = cloth(colour)
+    seats = 3 if width_m > 1.95 else 2
+    arm_m = float(rng.choice([0.1, 0.16, 0.2]))
+    seat_m = (width_m - 2 * arm_m) / seats
+    rises = float(rng.choice([0.12, 0.16]))
+    base = cushion((0.86, width_m - 0.02, 0.2), power=14, cells=4)
+    back = cushion((0.2, width_m - 0.04, 0.5), power=9, cells=5)
+    arm = cushion((0.86, arm_m, 0.42 if arm_m > 0.12 else 0.34), power=8, cells=4)
+    parts = [put(base, cover, 0, 0, rises + 0.1), put(back, cover, -0.34, 0, 0.53, pitch=-5)]
+    for side in (-1, 1):
+        parts.append(put(arm, cover, 0, side * (width_m - arm_m) / 2, 0.36))
+        for x in (-0.36, 0.36):
+            parts.append(stood((0.05, 0.05, rises + 0.03), wood(tones), x, side * (width_m / 2 - 0.09), bevel=0.004))
+    seat = cushion((0.68, seat_m - 0.006, 0.16), power=7, cells=5)
+    rest = cushion((0.17, seat_m - 0.012, 0.4), power=5, cells=5)
+    for k in range(seats):
+        y = (k - (seats - 1) / 2) * seat_m
+        parts.append(put(seat, cover, 0.09, y, 0.37))
+        parts.append(put(rest, cover, -0.18, y, 0.6, pitch=-11))
+    loose = cushion((0.12, 0.42, 0.4), power=2.8, cells=5)
+    for side, accent in zip((-1, 1), accents, strict=True):
+        if rng.random() < 0.75:
+            y = side * (width_m / 2 - arm_m - 0.24)
+            parts.append(put(loose, cloth(accent), -0.03, y, 0.61, pitch=-18, yaw=side * 8))
+    return parts
 
 
 @picture.painted

@@ -613,7 +613,11 @@ def skirtings(layout: RoomLayout, height_m: float = 0.08) -> None:
         first_m, last_m = layout.room.span_m(side)
         cuts = list[tuple[float, float]]()
         holes = [passage.rect for passage in plan.passages_of(layout.room) if passage.is_walkable]
-        margins = [CASING_M - 0.02 if passage.kind == "door" else 0.0 for passage in plan.passages_of(layout.room) if passage.is_walkable]
+        margins = [
+            CASING_M - 0.02 if passage.kind == "door" else 0.0
+            for passage in plan.passages_of(layout.room)
+            if passage.is_walkable
+        ]
         if plan.entrance.room == layout.room.name:
             holes.append(plan.entrance.rect)
             margins.append(0.1)

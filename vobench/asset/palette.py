@@ -13,6 +13,7 @@ WHITES = ("#f0ece3", "#efe9dc", "#e9e6df", "#f2efe9", "#e6e2d6")
 PAINTS = ("#b9c4bb", "#a9b5a6", "#b3c0c8", "#c9b29c", "#d6c4a2", "#c8b8b4", "#9fb0b4", "#d8cbb4", "#b7a9a0", "#8fa39a")
 DEEP_PAINTS = ("#5f7468", "#4f6472", "#8a5f4c", "#6d6472", "#7a7350")
 CLOTHS = ("#8f8a80", "#6f7d86", "#8a9a7b", "#b08d64", "#5c6b78", "#a9796a", "#9c9488", "#4f5f5a", "#c2ab8c", "#7b6a78")
+ACCENT_CLOTHS = ("#d39a3c", "#b4533a", "#27445c", "#f1ece0", "#6b4353", "#3d7a7c", "#d8c3a0", "#5f7468")
 CURTAINS = ("#c9b99a", "#b7c0b4", "#d9d2c4", "#a7b3bc", "#c7a890", "#8f9a96", "#e4dfd4")
 LINENS = ("#e6e1d6", "#d9dde0", "#e9e4dc", "#d8cfc4")
 COVERS = ("#8a9a7b", "#6f8597", "#b8a48c", "#c9c2b6", "#a3705c", "#5f6f86", "#d2b58a", "#a5a9a2")
@@ -52,7 +53,9 @@ def wall_tiles(rng: Rng, colours: Sequence[str] = TILE_COLOURS) -> Material:
     """Glazed tiles on a wall, square or long."""
     colour = one_of(rng, *colours)
     rows, columns, bond = ((10, 5, 0.5), (8, 4, 0.0), (6, 6, 0.0))[int(rng.integers(3))]
-    tiles = picture.masonry("tile", int(rng.integers(3)), 1024, 0.8 if rows > 6 else 1.2, rows=rows, columns=columns, bond=bond)
+    tiles = picture.masonry(
+        "tile", int(rng.integers(3)), 1024, 0.8 if rows > 6 else 1.2, rows=rows, columns=columns, bond=bond
+    )
     return coated(colour, tiles, roughness=0.12)
 
 
@@ -61,7 +64,9 @@ def worktop(rng: Rng) -> Material:
     kind = one_of(rng, "beech", "oak", "walnut", "stone", "stone")
     if kind != "stone":
         return wood(kind)
-    return coated(one_of(rng, "#d9d6cf", "#8d8c89", "#55565a"), picture.ground("concrete", 0, 1024, 2.0), roughness=0.15)
+    return coated(
+        one_of(rng, "#d9d6cf", "#8d8c89", "#55565a"), picture.ground("concrete", 0, 1024, 2.0), roughness=0.15
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,8 @@ class HomeStyle:
     bath_tiles: Material
     kitchen: KitchenStyle
     cloths: tuple[str, ...]
+    accent_cloths: tuple[str, ...]
+    has_slat_chairs: bool
     curtain: str
     linen: str
     cover: str
@@ -115,6 +122,8 @@ def home_style(rng: Rng) -> HomeStyle:
             wall_tiles(rng),
         ),
         cloths=tuple(cloths[:4]),
+        accent_cloths=tuple(rng.permutation(ACCENT_CLOTHS).tolist()[:2]),
+        has_slat_chairs=bool(rng.random() < 0.8),
         curtain=one_of(rng, *CURTAINS),
         linen=one_of(rng, *LINENS),
         cover=one_of(rng, *COVERS),
