@@ -114,7 +114,7 @@ def washbasin(
 
 def toilet(_: Rng) -> list[Part]:
     """A toilet that hangs on the wall, with its lid closed and a flush plate above it."""
-    bowl = moved(cushion((0.5, 0.36, 0.3), power=2.6, cells=8), at(0.3, 0, 0.26))
+    bowl = moved(cushion((0.5, 0.36, 0.3), power=2.6, cells=5), at(0.3, 0, 0.26))
     neck = block((0.24, 0.3, 0.24), bevel_m=0.05, transform=at(0.12, 0, 0.28))
     lid = extrusion(_ring(0.225, 0.185, power=2.5), 0.03)
     plate = block((0.012, 0.24, 0.16), bevel_m=0.004)

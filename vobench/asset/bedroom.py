@@ -9,6 +9,7 @@ from vobench.scene.material import Material
 from vobench.scene.mesh import joined, moved, two_sided
 
 BED_LENGTH_M = 2.08
+RACK_M = 0.5  # of the board of a coat rack above the middle of what hangs on it
 
 
 def bed(
@@ -30,11 +31,11 @@ def bed(
     parts.append(stood((0.03, w, 0.18), look, length - 0.03, 0, 0.14))
     legs = [(x, side * (w / 2 - 0.06)) for x in (0.12, length - 0.08) for side in (-1, 1)]
     parts += [stood((0.06, 0.06, 0.15), look, x, y) for x, y in legs]
-    mattress = cushion((length - 0.1, w - 0.06, 0.22), power=9)
+    mattress = cushion((length - 0.1, w - 0.06, 0.22), power=9, cells=4)
     parts.append(put(mattress, cloth(linen), length / 2 + 0.01, 0, 0.4))
 
     count = 1 if w < 1.2 else 2
-    pillow = cushion((0.42, 0.68 if w > 1.3 else 0.55, 0.16), power=2.8, cells=5)
+    pillow = cushion((0.42, 0.68 if w > 1.3 else 0.55, 0.16), power=2.8, cells=4)
     for k in range(count):
         y = (k - (count - 1) / 2) * 0.5 * w
         lean = rng.uniform(-24, -14)
@@ -49,7 +50,7 @@ def bed(
 
 def _duvet(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2.07, rise_m: float = 0.0) -> Material:
     """A quilt over a mattress: it lies on top, and hangs down at both sides."""
-    along = np.linspace(first_m, last_m, 22)
+    along = np.linspace(first_m, last_m, 15)
     half = width_m / 2
     profile = np.array([-half - 0.035, -half - 0.03, -half + 0.02, -0.6 * half, -0.2 * half, 0.2 * half, 0.6 * half])
     profile = np.append(profile, [half - 0.02, half + 0.03, half + 0.035])
@@ -117,8 +118,8 @@ def armchair(rng: Rng, colour: str = "#8a9a7b", tones: str = "oak") -> list[Part
     """An armchair on wooden legs; its middle is at the origin."""
     cover = cloth(colour)
     parts = [
-        put(cushion((0.66, 0.6, 0.18), power=6), cover, 0.04, 0, 0.36),
-        put(cushion((0.16, 0.62, 0.62), power=5), cover, -0.3, 0, 0.64, pitch=-12),
+        put(cushion((0.66, 0.6, 0.18), power=6, cells=4), cover, 0.04, 0, 0.36),
+        put(cushion((0.16, 0.62, 0.62), power=5, cells=4), cover, -0.3, 0, 0.64, pitch=-12),
     ]
     rest = cushion((0.64, 0.11, 0.3), power=6, cells=4)
     parts += [put(rest, cover, 0.02, side * 0.34, 0.47) for side in (-1, 1)]
@@ -131,16 +132,16 @@ def armchair(rng: Rng, colour: str = "#8a9a7b", tones: str = "oak") -> list[Part
 
 
 def coat_rack(rng: Rng, width_m: float = 0.9, tones: str = "oak") -> list[Part]:
-    """A board with hooks on a wall, centred at z = 0, with coats and bags on most of the hooks."""
-    parts = [stood((0.02, width_m, 0.1), wood(tones), 0.011, 0, -0.05, bevel=0.004)]
+    """A board with hooks and coats on a wall; with the coats, it reaches from -0.65 m to 0.65 m about z = 0."""
+    parts = [stood((0.02, width_m, 0.1), wood(tones), 0.011, 0, RACK_M - 0.05, bevel=0.004)]
     count = max(3, round(width_m / 0.18))
     hook = tube(spline(mm("15 0 20, 60 0 10, 70 0 40"), 6), 0.006, sections=6)
     hooks_y = (np.arange(count) + 0.5) * width_m / count - width_m / 2
-    parts.append(put(joined([moved(hook, at(0, y)) for y in hooks_y.tolist()]), CHROME))
+    parts.append(put(joined([moved(hook, at(0, y, RACK_M)) for y in hooks_y.tolist()]), CHROME))
     for k, y in enumerate(hooks_y.tolist()):
         if k % 2 == 0 and rng.random() < 0.8:
             parts.append(
-                put(_coat(rng), cloth(one_of(rng, "#27445c", "#3a3c3e", "#6b4353", "#6a6a4c", "#8f6b4d")), 0, y)
+                put(_coat(rng), cloth(one_of(rng, "#27445c", "#3a3c3e", "#6b4353", "#6a6a4c", "#8f6b4d")), 0, y, RACK_M)
             )
     return parts
 
@@ -163,9 +164,9 @@ def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> lis
     """A narrow cupboard with two tilting fronts, 0.28 m deep and 0.85 m high."""
     paint = coated(colour, roughness=0.35)
     depth_m = 0.26
-    body_m = (depth_m, width_m, 0.83)
+    body_m = (depth_m, width_m, 0.85)
     slot = stood((0.012, 0.14, 0.02), BLACK, depth_m + 0.008, 0, 0, bevel=0.002)
-    parts = [stood(body_m, paint, depth_m / 2, 0, 0.02, bevel=0.004)]
+    parts = [stood(body_m, paint, depth_m / 2, 0, bevel=0.004)]
     parts.append(
         stood((depth_m + 0.03, width_m + 0.01, 0.02), wood("oak"), depth_m / 2 + 0.01, 0, 0.85, u=rng.uniform(0, 2))
     )

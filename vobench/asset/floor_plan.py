@@ -570,4 +570,30 @@ def _flat_passages(rng: Rng, rooms: Sequence[Room], height_m: float) -> list[Pas
             passage = door_between(rng, room, living)
         if passage is not None:
             passages.append(passage)
-    return passages
+    return without_obstructing_leaves(rooms, passages)
+
+
+def without_obstructing_leaves(rooms: Sequence[Room], passages: Sequence[Passage]) -> list[Passage]:
+    """The passages, where doors have no leaf if it would stand open before another passage."""
+    result = []
+    for passage in passages:
+        room = next((room for room in rooms if room.name == passage.opens_into), None)
+        others = [other for other in passages if other is not passage and passage.opens_into in other.rooms]
+        if room is not None and any(_is_near(room, passage.rect, other.rect) for other in others):
+            passage = replace(passage, has_leaf=False)
+        result.append(passage)
+    return result
+
+
+def _is_near(room: Room, hole: Rect, other: Rect) -> bool:
+    """Whether what swings open at one hole of a room gets in the way of another one."""
+    width_m = max(hole.width_m, hole.depth_m)
+    return _before(room, hole, width_m + 0.1).overlaps(_before(room, other, 0.8))
+
+
+def _before(room: Room, hole: Rect, depth_m: float) -> Rect:
+    """The floor of a room in front of a hole."""
+    side = room.side_at(hole)
+    first_m, last_m = along_m(side, hole)
+    inside = hole_outwards(room, side, first_m, last_m, -depth_m)
+    return inside.grown(0.1)

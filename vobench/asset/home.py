@@ -57,7 +57,8 @@ def furnished_flat(seed: int, lighting: str) -> Interior:
         _dress_windows(layout, style)
         FURNISH[layout.room.use](layout, style)
         is_main = layout.room.use == "living"
-        is_on = bool(lamp_rng.random() < outside.lamp_share) or (is_main and outside.lamp_share > 0.8)
+        share = outside.lamp_share if any(plan.windows_of(layout.room)) else max(outside.lamp_share, 0.75)
+        is_on = bool(lamp_rng.random() < share) or (is_main and outside.lamp_share > 0.8)
         _ceiling_lamp(layout, style, is_on=is_on)
         _small_lamps(layout, style, is_on=is_on and bool(lamp_rng.random() < 0.8))
         if layout.room.use != "bath":
@@ -130,14 +131,14 @@ def _dress_windows(layout: RoomLayout, style: HomeStyle) -> None:
 def _radiator(layout: RoomLayout, style: HomeStyle, spot: Spot, width_m: float, sill_m: float) -> None:
     height_m = float(np.clip(sill_m - 0.28, 0.4, 0.55))
     length_m = width_m - 0.12
-    body = spot.body(0.16, length_m)
+    body = spot.body(0.16, length_m + 0.2)
     if not layout.fits([body]):
         return
     make = fitting.radiator if style.has_old_radiators else fitting.panel_radiator
     layout.add("radiator", make, spot.at(0), yaw_deg=spot.yaw_deg, support=WALL, width_m=length_m, height_m=height_m)
     layout.take(body, height_m + 0.14)
     along = spot.y_m if spot.side in ("east", "west") else spot.x_m
-    layout.take_wall(spot.side, along - length_m / 2, along + length_m / 2, 0.0, height_m + 0.14)
+    layout.take_wall(spot.side, along - length_m / 2 - 0.1, along + length_m / 2 + 0.1, 0.0, height_m + 0.14)
 
 
 def _curtains(layout: RoomLayout, style: HomeStyle, spot: Spot, window: Window, width_m: float) -> None:
@@ -162,6 +163,7 @@ def _curtains(layout: RoomLayout, style: HomeStyle, spot: Spot, window: Window, 
                 width_m=curtain_m,
                 height_m=height_m,
                 colour=style.curtain,
+                columns=25,
             )
         layout.add(
             "rod",
@@ -472,7 +474,9 @@ def _dining(layout: RoomLayout, style: HomeStyle, seats: int) -> bool:
                 colour=style.cloths[2],
                 tones=style.tones,
             )
-    names = ("fruit", "mug", "papers", "bottle", "plant")
+    names = ("mug", "papers", "bottle", "plant", "books")
+    if rng.random() < 0.3:
+        names = (*names[:4], "fruit")
     chosen = [names[k] for k in rng.permutation(len(names)).tolist()][: int(rng.integers(1, 4))]
     _scatter(layout, name, spot, 0.0, width_m - 0.2, TABLE_M, chosen)
     return True
@@ -481,7 +485,7 @@ def _dining(layout: RoomLayout, style: HomeStyle, seats: int) -> bool:
 def _desk(layout: RoomLayout, style: HomeStyle) -> Spot | None:
     """A desk at a wall with a chair, a computer or books, and a lamp."""
     rng = layout.rng
-    width_m = float(rng.choice([1.2, 1.4, 1.6]))
+    width_m = float(rng.choice([1.4, 1.6]))
     depth_m = 0.7
     chair_m = 0.62
     stood = layout.stand(
@@ -505,7 +509,7 @@ def _desk(layout: RoomLayout, style: HomeStyle) -> Spot | None:
         beside=(name,),
         colour=style.cloths[3],
     )
-    y = float(rng.uniform(-0.1, 0.1))
+    y = float(rng.uniform(-0.08, 0.02))
     layout.add(
         "monitor",
         furniture.monitor,
@@ -513,7 +517,7 @@ def _desk(layout: RoomLayout, style: HomeStyle) -> Spot | None:
         TABLE_M,
         yaw_deg=spot.yaw_deg + float(rng.normal(0, 5)),
         support=name,
-        width_m=0.56,
+        width_m=0.5,
         seed=int(rng.integers(6)),
     )
     layout.add(
@@ -528,13 +532,13 @@ def _desk(layout: RoomLayout, style: HomeStyle) -> Spot | None:
         layout.add(
             "desk_lamp",
             furniture.desk_lamp,
-            spot.at(GAP_M + 0.14, width_m / 2 - 0.14),
+            spot.at(GAP_M + 0.14, width_m / 2 - 0.12),
             TABLE_M,
-            yaw_deg=spot.yaw_deg - 45,
+            yaw_deg=spot.yaw_deg,
             support=name,
             colour=one_of(rng, "#3d7a7c", "#d39a3c", "#b4533a", "#262b30"),
         )
-    left = one_of(rng, "mug", "pens", "books")
+    left = one_of(rng, "mug", "pens", "books" if width_m > 1.5 else "mug")
     kind, make, half_m, size = _items(layout)[left]
     layout.add(
         kind, make, spot.at(GAP_M + 0.3, -width_m / 2 + half_m + 0.04), TABLE_M,
@@ -574,8 +578,9 @@ def _furnish_living(layout: RoomLayout, style: HomeStyle) -> None:
     if wants_table:
         _dining(layout, style, 6 if area_m2 > 26 and rng.random() < 0.6 else 4)
     sideboard = _sideboard(layout, style) if rng.random() < 0.8 else None
-    shelves = [_shelf(layout, style) for _ in range(int(rng.integers(1, 3)))]
-    del shelves
+    _shelf(layout, style)
+    if rng.random() < 0.3:
+        _shelf(layout, style)
     if rng.random() < 0.6:
         _floor_lamp(layout)
     has_bed = not any(room.use == "bedroom" for room in layout.plan.rooms)
@@ -588,7 +593,7 @@ def _furnish_living(layout: RoomLayout, style: HomeStyle) -> None:
     for _ in range(int(rng.integers(1, 4))):
         _plant(layout)
     _pictures(layout, style, int(rng.integers(2, 5)), [sofa_spot, sideboard])
-    _sockets(layout, 2)
+    _sockets(layout, 1)
     del board_spot
 
 
@@ -709,10 +714,10 @@ def _add_coffee_table(
 
 
 def _armchair(layout: RoomLayout, style: HomeStyle) -> None:
-    spot = next(layout.spots(0.85, 0.85, 0.9, front_m=0.5, in_corner=True), None)
+    spot = next(layout.spots(0.96, 0.96, 0.9, front_m=0.5, in_corner=True), None)
     if spot is None:
         return
-    x_m, y_m = spot.at(GAP_M + 0.42)
+    x_m, y_m = spot.at(GAP_M + 0.47)
     middle_x, middle_y = layout.room.rect.center_m
     towards_deg = float(np.rad2deg(np.arctan2(middle_y - y_m, middle_x - x_m)))
     difference = (towards_deg - spot.yaw_deg + 180) % 360 - 180
@@ -725,7 +730,7 @@ def _armchair(layout: RoomLayout, style: HomeStyle) -> None:
         colour=style.cloths[1],
         tones=style.tones,
     )
-    layout.take(spot.body(0.85, 0.85, GAP_M), 0.9)
+    layout.take(spot.body(0.96, 0.96, GAP_M), 0.9)
 
 
 def _furnish_kitchen(layout: RoomLayout, style: HomeStyle) -> None:
@@ -911,7 +916,7 @@ def _loose_rug(layout: RoomLayout) -> None:
 def _furnish_study(layout: RoomLayout, style: HomeStyle) -> None:
     rng = layout.rng
     desk = _desk(layout, style)
-    for _ in range(int(rng.integers(1, 4))):
+    for _ in range(int(rng.integers(1, 3))):
         _shelf(layout, style)
     if rng.random() < 0.5:
         _armchair(layout, style)
@@ -929,7 +934,7 @@ def _furnish_study(layout: RoomLayout, style: HomeStyle) -> None:
             "noticeboard", fitting.noticeboard, (0.95, 0.65), above=desk, middle_m=1.62, width_m=0.9, height_m=0.6
         )
     _pictures(layout, style, int(rng.integers(1, 3)))
-    _sockets(layout, 2)
+    _sockets(layout, 1)
 
 
 def _cartons(layout: RoomLayout) -> None:
@@ -979,9 +984,10 @@ def _furnish_hall(layout: RoomLayout, style: HomeStyle) -> None:
             "mirror", fitting.framed, (0.55, 0.75), middle_m=1.6, above=spot, style="mirror", width_m=0.5, height_m=0.7
         )
     rack_m = float(rng.choice([0.7, 0.9, 1.1]))
-    rack = layout.hang("coat_rack", bedroom.coat_rack, (rack_m, 0.2), middle_m=1.72, width_m=rack_m, tones=style.tones)
+    rack = layout.hang(
+        "coat_rack", bedroom.coat_rack, (rack_m + 0.24, 1.3), middle_m=1.22, width_m=rack_m, tones=style.tones
+    )
     if rack is not None:
-        layout.take_wall(rack.side, *_around(rack, rack_m), 0.5, 1.8)
         for _ in range(int(rng.integers(0, 3))):
             y = float(rng.uniform(-0.3, 0.3)) * rack_m
             body = rack.rect(0.02, 0.36, y - 0.13, y + 0.13)
@@ -1003,12 +1009,6 @@ def _furnish_hall(layout: RoomLayout, style: HomeStyle) -> None:
             _plant(layout)
     _pictures(layout, style, int(rng.integers(1, 4)))
     _sockets(layout, 1)
-
-
-def _around(spot: Spot, width_m: float) -> tuple[float, float]:
-    """The part of a wall around a spot."""
-    along = spot.y_m if spot.side in ("east", "west") else spot.x_m
-    return along - width_m / 2, along + width_m / 2
 
 
 def _runner(layout: RoomLayout) -> None:
@@ -1051,10 +1051,11 @@ def _furnish_bath(layout: RoomLayout, style: HomeStyle) -> None:
             colour=one_of(rng, "#d8d6d0", "#5b6b5d", "#46586a"),
             tones=style.tones if rng.random() < 0.5 else "",
             mirror_m=(width_m, 0.75),
+            support=WALL,
         )
         if basin is not None:
             break
-    toilet = layout.stand("toilet", bathroom.toilet, (0.62, 0.5, 1.15), front_m=0.4, first_m=0.0)
+    toilet = layout.stand("toilet", bathroom.toilet, (0.62, 0.5, 1.15), front_m=0.4, first_m=0.0, support=WALL)
     if toilet is not None:
         _, spot = toilet
         sign = 1 if rng.random() < 0.5 else -1

@@ -129,20 +129,20 @@ def couch(
     seat_m = (width_m - 2 * arm_m) / seats
     rises = float(rng.choice([0.12, 0.16]))
     base = cushion((0.86, width_m - 0.02, 0.2), power=14, cells=4)
-    back = cushion((0.2, width_m - 0.04, 0.5), power=9, cells=5)
+    back = cushion((0.2, width_m - 0.04, 0.5), power=9, cells=4)
     arm = cushion((0.86, arm_m, 0.42 if arm_m > 0.12 else 0.34), power=8, cells=4)
     parts = [put(base, cover, 0, 0, rises + 0.1), put(back, cover, -0.34, 0, 0.53, pitch=-5)]
     for side in (-1, 1):
         parts.append(put(arm, cover, 0, side * (width_m - arm_m) / 2, 0.36))
         for x in (-0.36, 0.36):
             parts.append(stood((0.05, 0.05, rises + 0.03), wood(tones), x, side * (width_m / 2 - 0.09), bevel=0.004))
-    seat = cushion((0.68, seat_m - 0.006, 0.16), power=7, cells=5)
-    rest = cushion((0.17, seat_m - 0.012, 0.4), power=5, cells=5)
+    seat = cushion((0.68, seat_m - 0.006, 0.16), power=7, cells=4)
+    rest = cushion((0.17, seat_m - 0.012, 0.4), power=5, cells=4)
     for k in range(seats):
         y = (k - (seats - 1) / 2) * seat_m
         parts.append(put(seat, cover, 0.09, y, 0.37))
         parts.append(put(rest, cover, -0.18, y, 0.6, pitch=-11))
-    loose = cushion((0.12, 0.42, 0.4), power=2.8, cells=5)
+    loose = cushion((0.12, 0.42, 0.4), power=2.8, cells=4)
     for side, accent in zip((-1, 1), accents, strict=True):
         if rng.random() < 0.75:
             y = side * (width_m / 2 - arm_m - 0.24)

@@ -47,14 +47,14 @@ def _pot(rng: Rng, pot_m: float, colour: str) -> list[Part]:
     glaze: Material = matt(texture=picture.ground("clay", 0, 512, 0.6))
     if colour:
         glaze = coated(colour, roughness=0.15)
-    body = lathe(mm(shapes[int(rng.integers(3))]) * pot_m, sections=18)
+    body = lathe(mm(shapes[int(rng.integers(3))]) * pot_m, sections=16)
     soil = lathe(mm("0 800, 380 868, 0 900") * pot_m, sections=12)
     return [put(body, glaze), put(soil, matt("#3a2c22"))]
 
 
 def _blade(length_m: float, width_m: float, drop: float, fold: float) -> MeshArrays:
     """A leaf from the origin along x, which bends down."""
-    t = np.linspace(0, 1, 6)[:, None]
+    t = np.linspace(0, 1, 5)[:, None]
     half_width = width_m / 2 * np.sin(np.pi * t**0.7) + 0.0006
     y = half_width * np.array([1, 0, -1])
     x = length_m * t + 0 * y
@@ -80,7 +80,7 @@ def _leaves(rng: Rng, height_m: float, pot_m: float, *, hangs: bool) -> tuple[li
     """Leaves on bent stems, which hang over the pot where the plant trails."""
     stems = []
     blades = []
-    count = int(rng.integers(16, 24))
+    count = int(rng.integers(13, 18))
     for k in range(count):
         T_pot_leaf = at(yaw=137.5 * k + rng.uniform(-15, 15))
         rise_m = rng.uniform(0.4, 0.9) * height_m
@@ -92,7 +92,7 @@ def _leaves(rng: Rng, height_m: float, pot_m: float, *, hangs: bool) -> tuple[li
         start = [0.0, 0.0, 0.85 * pot_m]
         middle = [0.35 * reach_m, 0.0, 0.6 * rise_m + 0.4 * 0.85 * pot_m]
         end = [reach_m, 0.0, rise_m]
-        stem = tube_arrays([start, middle, end], 0.003 * height_m + 0.0006, sections=4)
+        stem = tube_arrays([start, middle, end], 0.003 * height_m + 0.0006, sections=3)
         blade = _blade(length_m, rng.uniform(0.4, 0.6) * length_m, rng.uniform(0.1, 0.8), 0.25)
         stems.append(stem.moved(T_pot_leaf))
         blades.append(blade.moved(T_pot_leaf @ at(*end)))
@@ -102,17 +102,17 @@ def _leaves(rng: Rng, height_m: float, pot_m: float, *, hangs: bool) -> tuple[li
 def _tree(rng: Rng, height_m: float, pot_m: float) -> tuple[list[MeshArrays], list[MeshArrays]]:
     """A trunk with a crown of small leaves on twigs."""
     top_m = 0.78 * height_m
-    bend = rng.normal(0, 0.03, 2) * height_m
+    bend = rng.uniform(-0.03, 0.03, 2) * height_m
     trunk_path = [[0, 0, 0.8 * pot_m], [*bend, 0.5 * height_m], [*(1.4 * bend), top_m]]
     stems = [tube_arrays(trunk_path, 0.012 * height_m + 0.004, sections=6)]
     blades = []
     for k in range(11):
         turn_deg = 137.5 * k + rng.uniform(-20, 20)
         start_m = rng.uniform(0.48, 0.76) * height_m
-        reach_m = rng.uniform(0.1, 0.22) * height_m
+        reach_m = rng.uniform(0.1, 0.19) * height_m
         rise_m = rng.uniform(0.02, 0.16) * height_m
         T_pot_twig = at(float(bend[0]), float(bend[1]), start_m, yaw=turn_deg)
-        twig = tube_arrays([[0, 0, 0], [reach_m, 0, rise_m]], 0.004 * height_m + 0.001, sections=4)
+        twig = tube_arrays([[0, 0, 0], [reach_m, 0, rise_m]], 0.004 * height_m + 0.001, sections=3)
         stems.append(twig.moved(T_pot_twig))
         for share in (0.45, 0.75, 1.0):
             length_m = rng.uniform(0.09, 0.13) * height_m

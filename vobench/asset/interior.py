@@ -482,6 +482,7 @@ class RoomLayout:
         first_m: float = GAP_M,
         sides: Sequence[Side] = tuple(SIDES),
         in_corner: bool = False,
+        support: str = FLOOR,
         **size: Any,
     ) -> tuple[str, Spot] | None:
         """Stand a piece at a wall; None if there is no place.
@@ -495,7 +496,7 @@ class RoomLayout:
         spot = next(places, None)
         if spot is None:
             return None
-        name = self.add(kind, make, spot.at(first_m + back_m), yaw_deg=spot.yaw_deg, **size)
+        name = self.add(kind, make, spot.at(first_m + back_m), yaw_deg=spot.yaw_deg, support=support, **size)
         self.take(spot.body(depth_m, width_m, first_m), height_m)
         return name, spot
 

@@ -123,7 +123,7 @@ def home_style(rng: Rng) -> HomeStyle:
         ),
         cloths=tuple(cloths[:4]),
         accent_cloths=tuple(rng.permutation(ACCENT_CLOTHS).tolist()[:2]),
-        has_slat_chairs=bool(rng.random() < 0.8),
+        has_slat_chairs=bool(rng.random() < 0.88),
         curtain=one_of(rng, *CURTAINS),
         linen=one_of(rng, *LINENS),
         cover=one_of(rng, *COVERS),

@@ -133,9 +133,7 @@ def _outside(interior: Interior, boxes: Sequence[_Box]) -> Iterator[str]:
         if box.piece.support == SHELL and ".leaf_" not in box.piece.name:
             continue
         rect = interior.plan.room(box.piece.room).rect
-        beyond_m = max(
-            rect.x0 - box.low_m[0], box.high_m[0] - rect.x1, rect.y0 - box.low_m[1], box.high_m[1] - rect.y1
-        )
+        beyond_m = max(rect.x0 - box.low_m[0], box.high_m[0] - rect.x1, rect.y0 - box.low_m[1], box.high_m[1] - rect.y1)
         if beyond_m > TOLERANCE_M:
             yield f"{box.piece.name} reaches {beyond_m:.3f} m into a wall"
         if box.high_m[2] > interior.plan.height_m + TOLERANCE_M:
