@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.runner.exposure_doubt import doubts_of_plan
 from vobench.runner.key import cache_folder
-from vobench.runner.motion import BodyMotion, body_motions
+from vobench.runner.motion import BodyMotion, body_motions, motion_name
 from vobench.runner.task import is_done, plan, sequence_tasks
 from vobench.suite.case import Case
 from vobench.suite.plan import Plan
@@ -159,7 +159,7 @@ def _case_summary(case: Case | RecordedCase, checked: Preflight) -> CaseSummary:
         to_make = f"to import from {case.source.path}"
         notes = tuple(recording.notes)
     else:
-        t_ns = checked.motions[case.variant["trajectory"]].t_ns
+        t_ns = checked.motions[motion_name(case)].t_ns
         to_make = TO_SIMULATE
     return CaseSummary(
         case=case.name,
