@@ -14,7 +14,7 @@ import scipy
 from annotated_types import Ge, Gt, Le
 from numpy.typing import NDArray
 
-from vobench.errors import MotionError, SettingError
+from vobench.errors import MotionError
 from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS, ackermann
@@ -79,7 +79,7 @@ STARTS = 12  # of which the one with the longest way ahead is taken
 LOOK_AHEAD_M = 6.0
 GOAL_M = 0.8  # a goal is reached at this distance, or at a turn radius
 NEAREST_GOAL_M = 2.0
-NOISE_M = 0.25  # of the choice among bends, per metre of a step
+NOISE_M = 0.15  # of the choice among bends, per metre of a step
 OPEN_M = 1.0  # more clearance is not preferred
 ROOM_SHARE = 0.3  # of a metre on the way to the goal, which a metre of clearance is worth
 LEVEL_STEPS = 3  # of the path, at least, between changes of speed
@@ -117,8 +117,9 @@ class Clearance:
 class Wander:
     """A drive at random through the free space of its place; another seed is another drive.
 
-    `seeds` is the number of drives, with seeds from 1 on. A hand holds the body at about 1.45 m, and its rig should
-    have height_m 0; a quadrotor flies 0.7 to 1.5 m above the floor. The wheels of pioneer and car roll without slip.
+    `seeds` is the number of drives, with seeds from `seed` on, plus the base seed of the suite. A hand holds the body
+    at about 1.45 m, and its rig should have height_m 0; a quadrotor flies 0.7 to 1.5 m above the floor. The wheels of
+    pioneer and car roll without slip.
     """
 
     kind: Literal["wander"] = "wander"
@@ -129,10 +130,6 @@ class Wander:
     speed_mps: Speed | None = None
     rate_hz: Rate = 30.0
     encoders: Literal["exact", "nominal"] = "nominal"
-
-    def __post_init__(self) -> None:
-        if self.seeds is not None and self.seed != 1:
-            raise SettingError("is the number of drives, and seed names one; remove one of them", "seeds")
 
     @property
     def habits(self) -> BodyHabits:

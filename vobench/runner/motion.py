@@ -263,11 +263,7 @@ def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotio
 def check_cases(cases: Sequence[Case], motion: BodyMotion, mistakes: Mistakes) -> None:
     """Collect the mistakes because of which cases with this trajectory cannot be simulated."""
     with mistakes.at(*_place_in_suite(cases[0], "trajectory")):
-        if len(motion.t_ns) < 2:
-            raise MotionError(
-                f"the trajectory ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows "
-                "no motion; go further, more slowly or with a higher rate_hz"
-            )
+        _check_moves(cases[0], motion)
     for case, *_ in _by(cases, "scene", "rig").values():
         with mistakes.at(*_place_in_suite(case, "trajectory")):
             _check_clear(case, motion)
@@ -276,6 +272,23 @@ def check_cases(cases: Sequence[Case], motion: BodyMotion, mistakes: Mistakes) -
         with mistakes.at(*_place_in_suite(case, "camera")):
             _check_fits_frame(case)
             _check_imu_delay(case)
+
+
+def require_possible(case: Case, motion: BodyMotion) -> None:
+    """Raise MotionError if a case cannot be simulated, for the reasons that `check_cases` collects."""
+    _check_moves(case, motion)
+    _check_clear(case, motion)
+    _check_smooth(case)
+    _check_fits_frame(case)
+    _check_imu_delay(case)
+
+
+def _check_moves(case: Case, motion: BodyMotion) -> None:
+    if len(motion.t_ns) < 2:
+        raise MotionError(
+            f"the trajectory ends within its first frame at {case.trajectory.rate_hz:g} Hz: one picture shows "
+            "no motion; go further, more slowly or with a higher rate_hz"
+        )
 
 
 AXIS_KEYS = {"trajectory": "trajectories", "camera": "cameras"}
