@@ -111,8 +111,8 @@ def _recordings(case: Case | RecordedCase) -> "dict[str, Recording]":
 def render(scene: str, **options: Unpack[RenderOptions]) -> "NDArray[np.uint8]":
     """An RGB picture (H, W, 3) of a scene, the same that `vobench render` draws.
 
-    `options` are the keywords of `RenderOptions`: seed, lighting, camera, at_m, yaw_deg, pitch_deg, time_s, sensor, gain, engine,
-    samples. Raises UnknownNameError, InputError and MissingDependencyError.
+    `options` are the keywords of `RenderOptions`: seed, lighting, camera, at_m, yaw_deg, pitch_deg, time_s, sensor,
+    gain, engine, samples. Raises UnknownNameError, InputError and MissingDependencyError.
     """
     from vobench.runner.scene_picture import render_scene
 

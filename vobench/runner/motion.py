@@ -252,7 +252,7 @@ def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotio
     mistakes = plan.mistakes()
     for name, cases in _grouped(plan.simulated, motion_name).items():
         stop.check()
-        with mistakes.at(*_place_in_suite(cases[0], "trajectory")):
+        with mistakes.at(*place_in_suite(cases[0], "trajectory")):
             motions[name] = body_motion(cases[0])
             if are_checked:
                 check_cases(cases, motions[name], mistakes)
@@ -262,14 +262,14 @@ def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotio
 
 def check_cases(cases: Sequence[Case], motion: BodyMotion, mistakes: Mistakes) -> None:
     """Collect the mistakes because of which cases with this trajectory cannot be simulated."""
-    with mistakes.at(*_place_in_suite(cases[0], "trajectory")):
+    with mistakes.at(*place_in_suite(cases[0], "trajectory")):
         _check_moves(cases[0], motion)
     for case, *_ in _by(cases, "scene", "rig").values():
-        with mistakes.at(*_place_in_suite(case, "trajectory")):
+        with mistakes.at(*place_in_suite(case, "trajectory")):
             _check_clear(case, motion)
             _check_smooth(case)
     for case, *_ in _by(cases, "rig", "camera").values():
-        with mistakes.at(*_place_in_suite(case, "camera")):
+        with mistakes.at(*place_in_suite(case, "camera")):
             _check_fits_frame(case)
             _check_imu_delay(case)
 
@@ -294,7 +294,7 @@ def _check_moves(case: Case, motion: BodyMotion) -> None:
 AXIS_KEYS = {"trajectory": "trajectories", "camera": "cameras"}
 
 
-def _place_in_suite(case: Case, axis: str) -> tuple[str, str]:
+def place_in_suite(case: Case, axis: str) -> tuple[str, str]:
     """The key and the name of the variant of a case on an axis, as they are in the suite."""
     if case.scenario:
         return "scenarios", case.scenario

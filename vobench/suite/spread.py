@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from annotated_types import Ge, Le, MinLen
@@ -112,3 +112,19 @@ class Dealer:
             places[unit.place] += 1
             self._dealt[unit.name] += runs
         return sorted(chosen, key=self.units.index)
+
+
+def changes_for_units(suite: Mapping[str, Any], count: int) -> dict[str, str]:
+    """The changes of a suite, as plain YAML, that give its design a number of units: more seeds of its places.
+
+    Raises SuiteError if the suite has no design.
+    """
+    spread = suite.get("spread")
+    if not isinstance(spread, Mapping) or not isinstance(spread.get("units"), int):
+        raise SuiteError("--units is for suites with `spread`, and this suite has none")
+    changes = {"spread.units": str(count)}
+    factor = -(-count // spread["units"])
+    for index, scene in enumerate(suite.get("scenes") or ()):
+        if factor > 1 and isinstance(scene, Mapping) and isinstance(scene.get("seeds"), int):
+            changes[f"scenes.{index}.seeds"] = str(scene["seeds"] * factor)
+    return changes
