@@ -78,7 +78,7 @@ def _scene(spec: SceneFile) -> Scene:
     emissive = {name for name, material in whole.materials.items() if emitted_cd_m2(material).max() > 0}
     luminous_things = [thing for thing in whole.things if thing.material in emissive]
     scene = Scene(
-        spec.name,
+        spec.place_name,
         tuple(thing for thing in whole.things if thing.material not in emissive),
         dict(whole.materials),
         (*whole.lights, *_area_lights(luminous_things, whole.materials)),

@@ -9,7 +9,7 @@ from annotated_types import Ge, Le, MinLen
 
 from vobench.errors import SettingError, SuiteError
 from vobench.setting import OneOf, ShortForm, settings
-from vobench.suite.scene_spec import LIGHTINGS, MOST_SEED, GeneratedSpec, SceneFile, Seed
+from vobench.suite.scene_spec import LIGHTINGS, GeneratedSpec, SceneFile, Seed
 
 DRAWN = "drawn"
 MOST_PLACES = 10_000
@@ -20,37 +20,32 @@ LIGHTING_STREAM = 4_409  # separates the draw of lightings from the other random
 class SceneEntry:
     """A scene of a suite, by its name or path. With a seed, it is the place that the scene's generator creates.
 
-    `seed` names one place, and `seeds` is the number of places whose seeds begin at `first_seed`.
-    `lighting` is that of the places. By default it is drawn: of the places 4k + 1 to 4k + 4, each has another one.
+    `seed` names one place, and `seeds` is the number of places, whose seeds are 1, 2, 3 and so on, plus the base seed
+    of the suite. `lighting` is that of the places. By default it is drawn: of the places 4k + 1 to 4k + 4, each has
+    another one.
     """
 
     name: Annotated[str, MinLen(1)]
     seed: Seed | None = None
     seeds: Annotated[int, Ge(1), Le(MOST_PLACES)] | None = None
-    first_seed: Seed = 1
     lighting: Annotated[str, OneOf("lighting", (*LIGHTINGS, DRAWN))] = DRAWN
 
     def __post_init__(self) -> None:
         if self.seed is not None and self.seeds is not None:
             raise SettingError("is the number of places, and seed names one; remove one of them", "seeds")
-        if self.first_seed != 1 and self.seeds is None:
-            raise SettingError("is for a number of places, seeds; use seed for one place", "first_seed")
         if self.lighting != DRAWN and not self.has_seeds:
             raise SettingError("is for the places of a generator; add a seed, or use lightings", "lighting")
-        if self.seeds is not None and self.first_seed + self.seeds - 1 > MOST_SEED:
-            raise SettingError(f"should leave the last seed at {MOST_SEED} or less", "first_seed")
 
     @property
     def has_seeds(self) -> bool:
         """Whether the entry stands for places of a generator."""
         return self.seed is not None or self.seeds is not None
 
-    @property
-    def place_seeds(self) -> range:
+    def place_seeds(self, base_seed: int = 0) -> range:
         """The seeds of the places; empty for a scene as its file describes it."""
         if self.seed is not None:
             return range(self.seed, self.seed + 1)
-        return range(self.first_seed, self.first_seed + (self.seeds or 0))
+        return range(base_seed + 1, base_seed + 1 + (self.seeds or 0))
 
 
 def _named(value: Any) -> Any:
@@ -102,7 +97,7 @@ def described_scene(scene: SceneFile) -> SceneFile:
     return replace(scene, generator=None)
 
 
-def places(entry: SceneEntry, name: str, scene: SceneFile) -> Iterator[Place]:
+def places(entry: SceneEntry, name: str, scene: SceneFile, *, base_seed: int = 0) -> Iterator[Place]:
     """The places of an entry. `name` is the name of the scene in the catalog, and `scene` what its file describes.
 
     Raises SuiteError if the scene cannot be had without, or with, a seed.
@@ -111,5 +106,5 @@ def places(entry: SceneEntry, name: str, scene: SceneFile) -> Iterator[Place]:
         yield Place(name, described_scene(scene))
         return
     suffix = "" if entry.lighting == DRAWN else f".{entry.lighting}"
-    for seed in entry.place_seeds:
+    for seed in entry.place_seeds(base_seed):
         yield Place(f"{name}.{seed}{suffix}", generated_scene(scene, seed, entry.lighting))

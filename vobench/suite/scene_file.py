@@ -10,10 +10,10 @@ from typing import Any
 
 from vobench.asset import MODEL_SUFFIXES
 from vobench.errors import SuiteError
-from vobench.suite import yaml_file
+from vobench.suite import catalog, yaml_file
 from vobench.suite.bare_model import bare_model_scene
 from vobench.suite.scene_check import check_scene
-from vobench.suite.scene_entry import generated_scene
+from vobench.suite.scene_entry import DRAWN, described_scene, generated_scene
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile
 from vobench.suite.yaml_source import Mistakes, YamlFile
 
@@ -23,6 +23,18 @@ def read_scene(path: Path) -> SceneFile:
     spec, mistakes = read_scene_with_mistakes(path)
     mistakes.require_none()
     return spec
+
+
+def read_place(scene: str, *, seed: int | None = None, lighting: str = DRAWN) -> SceneFile:
+    """A scene by its name or path: as its file describes it or, with a seed, as its generator creates it.
+
+    Raises UnknownNameError if there is no such scene, and SuiteError if its file is wrong, or if it cannot be had so.
+    """
+    entry = catalog.find("scene", scene)
+    spec = read_scene(entry.path)
+    if seed is None:
+        return described_scene(spec)
+    return generated_scene(spec, seed, lighting)
 
 
 def read_scene_with_mistakes(

@@ -488,6 +488,13 @@ class SceneFile:
             )
 
     @property
+    def place_name(self) -> str:
+        """The name of the scene, with the seed and the lighting of a place of its generator."""
+        if self.generated is None:
+            return self.name
+        return f"{self.name}.{self.generated.seed}.{self.generated.lighting}"
+
+    @property
     def is_described(self) -> bool:
         """Whether the file describes a place without a seed, rather than only where its generator is."""
         has_objects = any((self.boxes, self.boards, self.furniture, self.meshes))
