@@ -64,7 +64,7 @@ def daylight(rng: Rng, lighting: str, *, towards_deg: float, height_m: float, ki
     sun_colour = unit_luminance((1.0, 0.93 - 0.35 * redness, 0.82 - 0.62 * redness))
     sky_lx = {
         "day": 9000 + 9000 * sine,
-        "evening": 900 + 14000 * sine,
+        "evening": 150 + 5000 * sine,
         "night": 10 ** float(rng.uniform(-1.2, 0.4)),
         "overcast": float(rng.uniform(5000, 15000)),
     }[lighting]

@@ -20,8 +20,8 @@ def lining(width_m: float, height_m: float, wall_m: float, material: Material, *
     jamb_m = (wall_m + 0.002, LINING_M, height_m)
     lintel_m = (wall_m + 0.002, width_m - 2 * LINING_M, LINING_M)
     jamb_y = (width_m - LINING_M) / 2
-    parts = [stood(jamb_m, material, 0, side * jamb_y, bevel=0.002) for side in (-1, 1)]
-    parts.append(stood(lintel_m, material, 0, 0, height_m - LINING_M, bevel=0.002))
+    parts = [stood(jamb_m, material, 0, side * jamb_y, bevel=0) for side in (-1, 1)]
+    parts.append(stood(lintel_m, material, 0, 0, height_m - LINING_M, bevel=0))
     if not is_cased:
         return parts
     for face in (-1, 1):
@@ -30,8 +30,8 @@ def lining(width_m: float, height_m: float, wall_m: float, material: Material, *
         head_m = (CASING_DEPTH_M, width_m - 0.02, CASING_M)
         for side in (-1, 1):
             y = side * (width_m / 2 + CASING_M / 2 - 0.01)
-            parts.append(stood(upright_m, material, x, y, bevel=0.004))
-        parts.append(stood(head_m, material, x, 0, height_m - 0.01, bevel=0.004))
+            parts.append(stood(upright_m, material, x, y, bevel=0))
+        parts.append(stood(head_m, material, x, 0, height_m - 0.01, bevel=0))
     return parts
 
 
@@ -57,7 +57,7 @@ def leaf(rng: Rng, width_m: float, height_m: float, material: Material, *, has_p
             frames.append(block(panel_m, bevel_m=0.006, transform=at(0, width_m / 2, (low_m + high_m) / 2)))
         parts.append(Part(joined(frames), material))
     for z in (0.25, height_m - 0.3):
-        parts.append(stood((LEAF_M + 0.004, 0.014, 0.1), DARK, 0, 0, z, bevel=0.002))
+        parts.append(stood((LEAF_M + 0.004, 0.014, 0.1), DARK, 0, 0, z, bevel=0))
     return parts
 
 

@@ -19,9 +19,10 @@ from vobench.asset.interior import (
     Spot,
     door_fittings,
     shell,
+    without_excess,
     skirtings,
 )
-from vobench.asset.palette import PRINTS, HomeStyle, home_style
+from vobench.asset.palette import HomeStyle, home_style
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.shape import at
 from vobench.scene.light import AreaLight
@@ -30,6 +31,8 @@ from vobench.scene.mesh import moved
 BOOK_SEEDS = 6
 PANORAMAS = ("city", "city", "suburb", "country")
 TABLE_M = 0.74
+PIECE_FACES_PER_M2 = 740.0
+OPTIONAL = ("sill_mug", "fruit", "bin", "socket", "mug", "sill_plant", "shoes", "keyboard", "plant", "picture")
 POTS = ("", "", "#e6e2d8", "#3a3c3e", "#7f9182", "#46586a", "#c9a271")
 
 
@@ -64,7 +67,8 @@ def furnished_flat(seed: int, lighting: str) -> Interior:
         if layout.room.use != "bath":
             skirtings(layout)
     instances = tuple(shell(plan, finishes, thresholds=wood(style.tones)))
-    pieces = tuple(piece for layout in layouts.values() for piece in layout.placed)
+    placed = [piece for layout in layouts.values() for piece in layout.placed]
+    pieces = without_excess(placed, round(PIECE_FACES_PER_M2 * plan.area_m2), OPTIONAL)
     lamps = [light for layout in layouts.values() for light in layout.lights]
     return Interior(plan, instances, pieces, (*lamps, *outside.lights))
 
@@ -134,8 +138,7 @@ def _radiator(layout: RoomLayout, style: HomeStyle, spot: Spot, width_m: float, 
     body = spot.body(0.16, length_m + 0.2)
     if not layout.fits([body]):
         return
-    make = fitting.radiator if style.has_old_radiators else fitting.panel_radiator
-    layout.add("radiator", make, spot.at(0), yaw_deg=spot.yaw_deg, support=WALL, width_m=length_m, height_m=height_m)
+    layout.add("radiator", fitting.panel_radiator, spot.at(0), yaw_deg=spot.yaw_deg, support=WALL, width_m=length_m, height_m=height_m)
     layout.take(body, height_m + 0.14)
     along = spot.y_m if spot.side in ("east", "west") else spot.x_m
     layout.take_wall(spot.side, along - length_m / 2 - 0.1, along + length_m / 2 + 0.1, 0.0, height_m + 0.14)
@@ -163,7 +166,7 @@ def _curtains(layout: RoomLayout, style: HomeStyle, spot: Spot, window: Window, 
                 width_m=curtain_m,
                 height_m=height_m,
                 colour=style.curtain,
-                columns=25,
+                columns=19,
             )
         layout.add(
             "rod",
@@ -199,7 +202,7 @@ def _curtains(layout: RoomLayout, style: HomeStyle, spot: Spot, window: Window, 
 
 def _on_sill(layout: RoomLayout, spot: Spot, window: Window, width_m: float, depth_m: float) -> None:
     """Mostly a plant or a few books on a window sill."""
-    if window.sill_m < 0.6 or layout.rng.random() < 0.45:
+    if window.sill_m < 0.6 or layout.rng.random() < 0.6:
         return
     z_m = window.sill_m + 0.002
     y = float(layout.rng.uniform(-0.32, 0.32)) * width_m
@@ -246,6 +249,7 @@ def _ceiling_lamp(layout: RoomLayout, style: HomeStyle, *, is_on: bool) -> None:
             drop_m=height_m - low_m,
             colour=shade,
             wide_m=wide_m,
+            sections=22,
         )
         bulb = household.bulb(x_m, y_m, low_m + 0.07, 0.12)
         layout.lamp("lamp", bulb, power_lm, is_on=is_on, colour=colour)
@@ -288,7 +292,7 @@ def _items(layout: RoomLayout) -> dict[str, Item]:
             "books",
             furniture.book_stack,
             0.19,
-            {"count": int(rng.integers(2, 6)), "seed": int(rng.integers(BOOK_SEEDS))},
+            {"count": int(rng.integers(2, 6)), "seed": layout.seed % BOOK_SEEDS},
         ),
         "papers": ("papers", furniture.papers, 0.25, {"count": int(rng.integers(1, 4)), "spread_m": 0.03}),
         "plant": (
@@ -369,7 +373,7 @@ def _pictures(layout: RoomLayout, style: HomeStyle, count: int, above: Sequence[
             middle_m=middle_m,
             above=spot,
             style=one_of(rng, "hills", "circles"),
-            seed=int(rng.integers(PRINTS)),
+            seed=style.prints[int(rng.integers(len(style.prints)))],
             width_m=width_m,
             height_m=height_m,
             frame=style.frame,
@@ -407,7 +411,7 @@ def _shelf(layout: RoomLayout, style: HomeStyle, widths_m: Sequence[float] = (0.
         width_m=width_m,
         height_m=height_m,
         tones=style.second_tones,
-        seed=int(layout.rng.integers(BOOK_SEEDS)),
+        seed=layout.seed % BOOK_SEEDS,
     )
     if stood is None:
         return None
@@ -590,9 +594,9 @@ def _furnish_living(layout: RoomLayout, style: HomeStyle) -> None:
         _desk(layout, style)
     if rng.random() < 0.5:
         _armchair(layout, style)
-    for _ in range(int(rng.integers(1, 4))):
+    for _ in range(int(rng.integers(1, 3))):
         _plant(layout)
-    _pictures(layout, style, int(rng.integers(2, 5)), [sofa_spot, sideboard])
+    _pictures(layout, style, int(rng.integers(1, 4)), [sofa_spot, sideboard])
     _sockets(layout, 1)
     del board_spot
 
@@ -677,7 +681,7 @@ def _add_television(layout: RoomLayout, style: HomeStyle, spot: Spot, board_m: f
         yaw_deg=spot.yaw_deg,
         support=board,
         width_m=screen_m,
-        seed=int(rng.integers(8)),
+        seed=style.rugs[0],
     )
 
 
@@ -694,7 +698,7 @@ def _add_coffee_table(
             yaw_deg=spot.yaw_deg,
             width_m=float(rng.uniform(1.9, 2.4)),
             depth_m=float(rng.uniform(1.3, 1.6)),
-            seed=int(rng.integers(8)),
+            seed=style.rugs[0],
         )
     table = layout.add(
         "coffee_table",
@@ -886,7 +890,7 @@ def _furnish_bedroom(layout: RoomLayout, style: HomeStyle) -> None:
     if rng.random() < 0.3:
         _armchair(layout, style)
     if rng.random() < 0.5:
-        _loose_rug(layout)
+        _loose_rug(layout, style)
     if rng.random() < 0.6:
         _plant(layout)
     if rng.random() < 0.4:
@@ -895,7 +899,7 @@ def _furnish_bedroom(layout: RoomLayout, style: HomeStyle) -> None:
     _sockets(layout, 1)
 
 
-def _loose_rug(layout: RoomLayout) -> None:
+def _loose_rug(layout: RoomLayout, style: HomeStyle) -> None:
     """A rug where the floor is free."""
     rng = layout.rng
     width_m = float(rng.uniform(1.2, 1.7))
@@ -909,7 +913,7 @@ def _loose_rug(layout: RoomLayout) -> None:
             yaw_deg=spot.yaw_deg,
             width_m=width_m,
             depth_m=depth_m,
-            seed=int(rng.integers(8)),
+            seed=style.rugs[1],
         )
 
 
@@ -996,7 +1000,7 @@ def _furnish_hall(layout: RoomLayout, style: HomeStyle) -> None:
                 layout.add("shoes", bedroom.shoes, rack.at(0.05, y), yaw_deg=turn_deg)
                 layout.take(body, 0.12)
     if rng.random() < 0.45:
-        _runner(layout)
+        _runner(layout, style)
     if layout.room.rect.depth_m > 1.7 and layout.room.rect.width_m > 1.7:
         if rng.random() < 0.6:
             layout.stand(
@@ -1007,11 +1011,11 @@ def _furnish_hall(layout: RoomLayout, style: HomeStyle) -> None:
             _shelf(layout, style, (0.8, 1.0))
         if rng.random() < 0.5:
             _plant(layout)
-    _pictures(layout, style, int(rng.integers(1, 4)))
+    _pictures(layout, style, int(rng.integers(1, 3)))
     _sockets(layout, 1)
 
 
-def _runner(layout: RoomLayout) -> None:
+def _runner(layout: RoomLayout, style: HomeStyle) -> None:
     """A long rug in the middle of a hall."""
     rect = layout.room.rect
     is_along_x = rect.width_m > rect.depth_m
@@ -1025,7 +1029,7 @@ def _runner(layout: RoomLayout) -> None:
         yaw_deg=90.0 if is_along_x else 0.0,
         width_m=length_m,
         depth_m=0.68,
-        seed=int(layout.rng.integers(8)),
+        seed=style.rugs[1],
     )
 
 

@@ -268,11 +268,12 @@ def pendant(
     drop_m: float = 1.0,
     colour: str = "",
     wide_m: float = 0.4,
+    sections: int = 36,
 ) -> list[Part]:
     """A pendant lamp. Its shade ends `drop_m` below z = 0, and the bulb belongs 0.08 m above that."""
     scale = wide_m / 0.4
     profile = mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232") * [scale, scale]
-    shade = lathe(profile, sections=36)
+    shade = lathe(profile, sections=sections)
     inner = moved(flipped(shade), np.diag([0.985, 0.985, 0.985, 1]))
     paint = coated(colour or one_of(rng, NAVY, INK, "#5c6b5a"), roughness=0.3)
     cord = tube(np.array([[0, 0, 0.2 - drop_m], [0, 0, 0]]), 0.004, sections=6)

@@ -13,6 +13,7 @@ from vobench.scene.mesh import MeshArrays, joined_arrays
 
 Habit = Literal["broad", "upright", "tree", "trailing"]
 HABITS: tuple[Habit, ...] = ("broad", "upright", "tree", "trailing")
+REACH = 0.36
 GREENS = ("#e8f0d8", "#cfe0c0", "#dfe8b8", "#c0d0b8")
 
 
@@ -35,7 +36,14 @@ def houseplant(rng: Rng, height_m: float = 1.0, habit: Habit = "broad", pot: str
     if stems:
         bark = "#6a5238" if habit == "tree" else "#4b5a2e"
         parts.append(Part(joined_arrays(stems), matt(bark)))
-    return parts
+    return _within(parts, height_m, 0.5 if habit == "trailing" else REACH)
+
+
+def _within(parts: list[Part], height_m: float, reach: float) -> list[Part]:
+    """The parts, made narrower if leaves reach further from the middle than a share of the height."""
+    farthest_m = max(float(np.abs(part.arrays.vertices_m[:, :2]).max()) for part in parts)
+    narrower = min(1.0, reach * height_m / farthest_m)
+    return [part.moved(np.diag([narrower, narrower, 1.0, 1.0])) for part in parts]
 
 
 def _pot(rng: Rng, pot_m: float, colour: str) -> list[Part]:

@@ -548,6 +548,22 @@ class RoomLayout:
             self.placed.append(Placed(name, self.room.name, (Part(mesh, WHITE),), SHELL))
 
 
+def without_excess(pieces: Sequence[Placed], faces: int, optional: Sequence[str]) -> tuple[Placed, ...]:
+    """The pieces without as many of some optional kinds, the last ones first, as leave at most a number of faces.
+
+    Nothing may lie on pieces of these kinds.
+    """
+    counts = [sum(len(part.arrays.faces) for part in piece.parts) for piece in pieces]
+    excess = sum(counts) - faces
+    dropped = set[int]()
+    for kind in optional:
+        for index in reversed(range(len(pieces))):
+            if excess > 0 and f".{kind}_" in pieces[index].name:
+                dropped.add(index)
+                excess -= counts[index]
+    return tuple(piece for index, piece in enumerate(pieces) if index not in dropped)
+
+
 # --- Fittings of every room ---
 
 
@@ -635,10 +651,12 @@ def skirtings(layout: RoomLayout, height_m: float = 0.08) -> None:
             if end_m - start_m > 0.03:
                 spot = layout.spot(side, (start_m + end_m) / 2)
                 size = {"length_m": end_m - start_m, "height_m": height_m}
-                layout.add("skirting", furniture_skirting, spot.at(0), yaw_deg=spot.yaw_deg, support=SHELL, **size)
+                layout.add("skirting", _skirting, spot.at(0), yaw_deg=spot.yaw_deg, support=SHELL, **size)
 
 
-furniture_skirting = fitting.skirting
+def _skirting(_: Rng, length_m: float, height_m: float) -> list[Part]:
+    """A plain skirting board."""
+    return [furniture.stood((0.014, length_m, height_m), WHITE, 0.007, bevel=0)]
 
 
 def corners_of(parts: Sequence[Part]) -> Array:

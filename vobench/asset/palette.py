@@ -23,14 +23,9 @@ FLOOR_TILE_COLOURS = ("#e8e2d6", "#c2bdb4", "#8f8d89", "#b08a70", "#d9d4ca", "#6
 PRINTS = 24  # pictures of each style from which those on walls are drawn
 
 
-def plaster(colour: str, rng: Rng) -> Material:
+def plaster(colour: str, seed: int = 0) -> Material:
     """Painted plaster."""
-    return matt(colour, picture.ground("plaster", int(rng.integers(3)), 1280, 1.6))
-
-
-def ceiling(rng: Rng) -> Material:
-    """White plaster of a ceiling."""
-    return matt("#f4f1ea", picture.ground("plaster", 2 + int(rng.integers(2)), 640, 1.6))
+    return matt(colour, picture.ground("plaster", seed % 3, 1280, 1.6))
 
 
 def plank_floor(rng: Rng, tones: Sequence[str] = ("oak", "walnut", "beech")) -> Material:
@@ -91,7 +86,8 @@ class HomeStyle:
     cover: str
     frame: str
     window_dressing: str
-    has_old_radiators: bool
+    prints: tuple[int, ...]  # seeds of pictures on walls
+    rugs: tuple[int, ...]
     lamp_k: float
     is_painted: bool  # wardrobes and chests are painted, not of wood
 
@@ -103,15 +99,16 @@ def home_style(rng: Rng) -> HomeStyle:
     white_doors = rng.random() < 0.65
     fronts = one_of(rng, *FRONTS)
     two_colours = rng.random() < 0.5
+    plaster_seed = int(rng.integers(3))
     paints = rng.permutation([*PAINTS, *DEEP_PAINTS[: int(rng.integers(6))]]).tolist()
     cloths = rng.permutation(CLOTHS).tolist()
     return HomeStyle(
         tones=tones,
         second_tones=second_tones,
         doors=coated("#e4e2dc", roughness=0.3) if white_doors else wood(one_of(rng, "oak", "beech", "walnut")),
-        plain=plaster(one_of(rng, *WHITES), rng),
-        accents=tuple(plaster(colour, rng) for colour in paints[:3]),
-        ceiling=ceiling(rng),
+        plain=plaster(one_of(rng, *WHITES), plaster_seed),
+        accents=tuple(plaster(colour, plaster_seed) for colour in paints[:3]),
+        ceiling=plaster("#f4f1ea", plaster_seed),
         planks=plank_floor(rng),
         floor_tiles=tile_floor(rng),
         bath_tiles=wall_tiles(rng),
@@ -129,7 +126,8 @@ def home_style(rng: Rng) -> HomeStyle:
         cover=one_of(rng, *COVERS),
         frame=one_of(rng, picture.INK, "#c9a271", "#e6e2d8", "#6b4a2c"),
         window_dressing=one_of(rng, "curtains", "curtains", "blinds", "bare"),
-        has_old_radiators=bool(rng.random() < 0.15),
+        prints=tuple(rng.permutation(PRINTS).tolist()[:4]),
+        rugs=tuple(rng.permutation(8).tolist()[:2]),
         lamp_k=float(rng.uniform(2700, 3600)),
         is_painted=bool(rng.random() < 0.5),
     )

@@ -19,7 +19,7 @@ CHAIR_SEAT_M = 0.62  # above which a chair must not reach into its table
 CELL_M = 0.05
 BODY_RADIUS_M = 0.25
 BODY_HEIGHT_M = 1.0
-FACES_PER_M2 = 900.0
+FACES_PER_M2 = 800.0
 FREE_ROOM_M2 = 0.4
 
 
