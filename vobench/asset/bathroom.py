@@ -1,12 +1,18 @@
 """Bathrooms: tubs, showers, basins, toilets and towels. They stand at a wall at x = 0 and face x."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from vobench.asset.fitting import MIRROR, PANE, bars
 from vobench.asset.furniture import BLACK, CHROME, STEEL, WHITE, Part, cloth, coated, mm, put, stood, wood
 from vobench.asset.picture import Rng
 from vobench.asset.shape import at, block, card, cushion, extrusion, lathe, sheet, spline, tube
+from vobench.geometry.se3 import Array
 from vobench.scene.mesh import flipped, joined, moved, quad, two_sided
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 CERAMIC = coated("#e9e8e3", roughness=0.08)
 
@@ -18,7 +24,7 @@ def _tap(height_m: float = 0.14) -> list[Part]:
     return [put(joined([tube(spout, 0.014), tube(lever, 0.006)]), CHROME)]
 
 
-def _ring(x_m: float, y_m: float, *, sections: int = 28, power: float = 4.0) -> np.ndarray:
+def _ring(x_m: float, y_m: float, *, sections: int = 28, power: float = 4.0) -> Array:
     """An outline (N, 2) between an ellipse and a rectangle, with half axes x_m and y_m."""
     angle = 2 * np.pi * np.arange(sections) / sections
     cosine = np.cos(angle)
@@ -27,7 +33,7 @@ def _ring(x_m: float, y_m: float, *, sections: int = 28, power: float = 4.0) -> 
     return np.stack([x_m * radius * cosine, y_m * radius * sine], axis=-1)
 
 
-def _bowl(rings_m: list[tuple[np.ndarray, float]]) -> "object":
+def _bowl(rings_m: list[tuple[Array, float]]) -> "Trimesh":
     """The inside of a basin: rings (N, 2) with their heights, from the rim down, closed by the last one."""
     closed = [np.concatenate([ring, ring[:1]]) for ring, _ in rings_m]
     heights = [height for _, height in rings_m]
@@ -92,9 +98,10 @@ def washbasin(
     x = depth_m / 2
     y = width_m / 2
     outer = _ring(x, y, power=9.0)
-    inner = _ring(x - 0.06, min(y - 0.06, 0.3), power=3.5) - [0.0, 0.0]
-    top = extrusion(outer, 0.05, holes_m=[inner + [0.03, 0]])
-    inside = _bowl([(inner + [0.03, 0], 0.05), (inner * 0.85 + [0.03, 0], -0.02), (inner * 0.5 + [0.03, 0], -0.06)])
+    inner = _ring(x - 0.06, min(y - 0.06, 0.3), power=3.5)
+    forward_m = np.array([0.03, 0.0])
+    top = extrusion(outer, 0.05, holes_m=[inner + forward_m])
+    inside = _bowl([(share * inner + forward_m, z) for share, z in ((1.0, 0.05), (0.85, -0.02), (0.5, -0.06))])
     body_m = (depth_m - 0.04, width_m - 0.03, 0.44)
     front_m = (0.018, width_m - 0.036, 0.21)
     parts = [

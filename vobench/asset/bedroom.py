@@ -1,12 +1,16 @@
 """Bedrooms and halls of homes: beds, bedside tables, wardrobes, coats. They stand with their backs at x = 0, face x."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from vobench.asset.furniture import BLACK, CHROME, DARK, STEEL, Part, cloth, coated, mm, put, stood, wood
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.shape import at, block, cushion, lathe, sheet, spline, tube
-from vobench.scene.material import Material
 from vobench.scene.mesh import joined, moved, two_sided
+
+if TYPE_CHECKING:
+    from trimesh import Trimesh
 
 BED_LENGTH_M = 2.08
 RACK_M = 0.5  # of the board of a coat rack above the middle of what hangs on it
@@ -48,7 +52,7 @@ def bed(
     return parts
 
 
-def _duvet(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2.07, rise_m: float = 0.0) -> Material:
+def _duvet(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2.07, rise_m: float = 0.0) -> "Trimesh":
     """A quilt over a mattress: it lies on top, and hangs down at both sides."""
     along = np.linspace(first_m, last_m, 15)
     half = width_m / 2
@@ -146,7 +150,7 @@ def coat_rack(rng: Rng, width_m: float = 0.9, tones: str = "oak") -> list[Part]:
     return parts
 
 
-def _coat(rng: Rng) -> Material:
+def _coat(rng: Rng) -> "Trimesh":
     """A coat on a hook: a closed surface in folds, narrow at its collar."""
     length_m = rng.uniform(0.75, 1.05)
     down = np.linspace(0, 1, 6)[:, None]

@@ -56,9 +56,8 @@ def leaf(rng: Rng, width_m: float, height_m: float, material: Material, *, has_p
             panel_m = (LEAF_M + 0.012, width_m - 0.28, high_m - low_m)
             frames.append(block(panel_m, bevel_m=0.006, transform=at(0, width_m / 2, (low_m + high_m) / 2)))
         parts.append(Part(joined(frames), material))
-    for z in (0.25, height_m - 0.3):
-        parts.append(stood((LEAF_M + 0.004, 0.014, 0.1), DARK, 0, 0, z, bevel=0))
-    return parts
+    hinge_m = (LEAF_M + 0.004, 0.014, 0.1)
+    return [*parts, *(stood(hinge_m, DARK, 0, 0, z, bevel=0) for z in (0.25, height_m - 0.3))]
 
 
 def entrance(rng: Rng, width_m: float, height_m: float, material: Material) -> list[Part]:

@@ -579,9 +579,8 @@ def without_obstructing_leaves(rooms: Sequence[Room], passages: Sequence[Passage
     for passage in passages:
         room = next((room for room in rooms if room.name == passage.opens_into), None)
         others = [other for other in passages if other is not passage and passage.opens_into in other.rooms]
-        if room is not None and any(_is_near(room, passage.rect, other.rect) for other in others):
-            passage = replace(passage, has_leaf=False)
-        result.append(passage)
+        is_obstructing = room is not None and any(_is_near(room, passage.rect, other.rect) for other in others)
+        result.append(replace(passage, has_leaf=passage.has_leaf and not is_obstructing))
     return result
 
 

@@ -134,8 +134,8 @@ def couch(
     parts = [put(base, cover, 0, 0, rises + 0.1), put(back, cover, -0.34, 0, 0.53, pitch=-5)]
     for side in (-1, 1):
         parts.append(put(arm, cover, 0, side * (width_m - arm_m) / 2, 0.36))
-        for x in (-0.36, 0.36):
-            parts.append(stood((0.05, 0.05, rises + 0.03), wood(tones), x, side * (width_m / 2 - 0.09), bevel=0.004))
+        leg_y = side * (width_m / 2 - 0.09)
+        parts += [stood((0.05, 0.05, rises + 0.03), wood(tones), x, leg_y, bevel=0.004) for x in (-0.36, 0.36)]
     seat = cushion((0.68, seat_m - 0.006, 0.16), power=7, cells=4)
     rest = cushion((0.17, seat_m - 0.012, 0.4), power=5, cells=4)
     for k in range(seats):

@@ -13,14 +13,14 @@ from vobench.scene.mesh import MeshArrays, joined_arrays
 
 Habit = Literal["broad", "upright", "tree", "trailing"]
 HABITS: tuple[Habit, ...] = ("broad", "upright", "tree", "trailing")
-REACH = 0.36
+REACH = 0.36  # of its height
 GREENS = ("#e8f0d8", "#cfe0c0", "#dfe8b8", "#c0d0b8")
 
 
 def houseplant(rng: Rng, height_m: float = 1.0, habit: Habit = "broad", pot: str = "") -> list[Part]:
     """A plant `height_m` high in a pot of clay, or glazed in a colour.
 
-    It reaches no further than 0.36 of its height from its middle, and a trailing one 0.5 of it.
+    It reaches no further than REACH from its middle.
     """
     pot_m = min(0.3 * height_m, 0.34)
     leaf = coated(one_of(rng, *GREENS), picture.ground("leaf", 0, 512, 0.4), roughness=0.35)
@@ -36,13 +36,13 @@ def houseplant(rng: Rng, height_m: float = 1.0, habit: Habit = "broad", pot: str
     if stems:
         bark = "#6a5238" if habit == "tree" else "#4b5a2e"
         parts.append(Part(joined_arrays(stems), matt(bark)))
-    return _within(parts, height_m, 0.5 if habit == "trailing" else REACH)
+    return _within(parts, height_m)
 
 
-def _within(parts: list[Part], height_m: float, reach: float) -> list[Part]:
-    """The parts, made narrower if leaves reach further from the middle than a share of the height."""
+def _within(parts: list[Part], height_m: float) -> list[Part]:
+    """The parts, made narrower if leaves reach further from the middle than REACH."""
     farthest_m = max(float(np.abs(part.arrays.vertices_m[:, :2]).max()) for part in parts)
-    narrower = min(1.0, reach * height_m / farthest_m)
+    narrower = min(1.0, REACH * height_m / farthest_m)
     return [part.moved(np.diag([narrower, narrower, 1.0, 1.0])) for part in parts]
 
 
@@ -112,7 +112,7 @@ def _tree(rng: Rng, height_m: float, pot_m: float) -> tuple[list[MeshArrays], li
     top_m = 0.78 * height_m
     bend = rng.uniform(-0.03, 0.03, 2) * height_m
     trunk_path = [[0, 0, 0.8 * pot_m], [*bend, 0.5 * height_m], [*(1.4 * bend), top_m]]
-    stems = [tube_arrays(trunk_path, 0.012 * height_m + 0.004, sections=6)]
+    stems = [tube_arrays(np.array(trunk_path, float), 0.012 * height_m + 0.004, sections=6)]
     blades = []
     for k in range(11):
         turn_deg = 137.5 * k + rng.uniform(-20, 20)

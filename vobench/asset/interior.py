@@ -135,11 +135,12 @@ def _floor(rect: Rect, material: Material, seed: int) -> "Trimesh":
     texture = material.texture
     if not (isinstance(texture, LazyTexture) and texture.planks):
         return pierced((rect.x0, rect.y0, 0), (rect.width_m, 0, 0), (0, rect.depth_m, 0))
+    planks = texture.planks
     if rect.width_m >= rect.depth_m:
-        edges = ((rect.x0, rect.y0, 0), (rect.width_m, 0, 0), (0, rect.depth_m, 0))
-    else:
-        edges = ((rect.x1, rect.y0, 0), (0, rect.depth_m, 0), (-rect.width_m, 0, 0))
-    return planked(*edges, texture.planks, texture.tile_m, seed=seed)
+        corner_m = (rect.x0, rect.y0, 0)
+        return planked(corner_m, (rect.width_m, 0, 0), (0, rect.depth_m, 0), planks, texture.tile_m, seed=seed)
+    corner_m = (rect.x1, rect.y0, 0)
+    return planked(corner_m, (0, rect.depth_m, 0), (-rect.width_m, 0, 0), planks, texture.tile_m, seed=seed)
 
 
 class _WallFrame:
@@ -232,7 +233,7 @@ class Spot:
 
 
 @dataclass(frozen=True, slots=True)
-class _Span:
+class Span:
     """A part of a wall that is taken, from the first to the last coordinate along it, and from the floor upwards."""
 
     first_m: float
@@ -265,7 +266,7 @@ class RoomLayout:
     _bodies: list[_Body] = field(default_factory=list)
     _kept_free: list[Rect] = field(default_factory=list)
     _landings: list[tuple[float, float]] = field(default_factory=list)
-    _walls: dict[Side, list[_Span]] = field(default_factory=dict)
+    _walls: dict[Side, list[Span]] = field(default_factory=dict)
     _counts: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -278,7 +279,7 @@ class RoomLayout:
         for window in self.plan.windows_of(self.room):
             side = self.room.side_at(window.rect)
             first_m, last_m = along_m(side, window.rect)
-            self._walls[side].append(_Span(first_m - 0.08, last_m + 0.08, window.sill_m - 0.08, window.head_m + 0.1))
+            self._walls[side].append(Span(first_m - 0.08, last_m + 0.08, window.sill_m - 0.08, window.head_m + 0.1))
 
     # What must stay free
 
@@ -286,7 +287,7 @@ class RoomLayout:
         if not passage.is_walkable:
             side = self.room.side_at(passage.rect)
             first_m, last_m = along_m(side, passage.rect)
-            span = _Span(first_m - CASING_M, last_m + CASING_M, passage.sill_m - CASING_M, passage.head_m + CASING_M)
+            span = Span(first_m - CASING_M, last_m + CASING_M, passage.sill_m - CASING_M, passage.head_m + CASING_M)
             self._walls[side].append(span)
             return
         self._keep_doorway_free(passage.rect, passage.head_m)
@@ -302,7 +303,7 @@ class RoomLayout:
     def _keep_doorway_free(self, rect: Rect, head_m: float) -> None:
         side = self.room.side_at(rect)
         first_m, last_m = along_m(side, rect)
-        self._walls[side].append(_Span(first_m - CASING_M, last_m + CASING_M, 0.0, head_m + CASING_M))
+        self._walls[side].append(Span(first_m - CASING_M, last_m + CASING_M, 0.0, head_m + CASING_M))
         spot = self._spot_at(rect)
         half_m = self._half_width_m(rect)
         self._kept_free.append(spot.rect(0, LANDING_M, -half_m - CASING_M, half_m + CASING_M))
@@ -340,7 +341,7 @@ class RoomLayout:
         return self.room.rect.width_m if side in ("east", "west") else self.room.rect.depth_m
 
     def fits(self, bodies: Sequence[Rect], fronts: Sequence[Rect] = ()) -> bool:
-        """Whether bodies can stand there: in the room, apart from others, with free floor at their fronts and a path."""
+        """Whether bodies can stand there: in the room, apart from others, free at their fronts, with a path left."""
         for body in bodies:
             if not self.room.rect.contains(body):
                 return False
@@ -406,11 +407,11 @@ class RoomLayout:
                 spot = self.spot(side, along)
                 body = spot.body(depth_m, width_m, first_m)
                 front = spot.body(front_m, width_m, first_m + depth_m)
-                span = _Span(along - width_m / 2, along + width_m / 2, 0.0, height_m)
+                span = Span(along - width_m / 2, along + width_m / 2, 0.0, height_m)
                 if self.is_wall_free(side, span) and self.fits([body], [front] if front_m else []):
                     yield spot
 
-    def is_wall_free(self, side: Side, span: _Span) -> bool:
+    def is_wall_free(self, side: Side, span: Span) -> bool:
         """Whether nothing is on that part of a wall."""
         for taken in self._walls[side]:
             is_apart = taken.last_m <= span.first_m or span.last_m <= taken.first_m
@@ -469,7 +470,7 @@ class RoomLayout:
 
     def take_wall(self, side: Side, first_m: float, last_m: float, low_m: float, high_m: float) -> None:
         """Note that something is on a wall."""
-        self._walls[side].append(_Span(first_m, last_m, low_m, high_m))
+        self._walls[side].append(Span(first_m, last_m, low_m, high_m))
 
     def stand(
         self,
@@ -530,7 +531,7 @@ class RoomLayout:
                 candidates += [(sides[index], place) for place in places]
         for side, along in candidates:
             spot = self.spot(side, along)
-            span = _Span(along - width_m / 2 - 0.06, along + width_m / 2 + 0.06, low_m - 0.06, high_m + 0.06)
+            span = Span(along - width_m / 2 - 0.06, along + width_m / 2 + 0.06, low_m - 0.06, high_m + 0.06)
             before = spot.body(0.45, width_m)
             is_hidden = any(body.height_m > low_m - 0.04 and body.rect.overlaps(before) for body in self._bodies)
             if not is_hidden and self.is_wall_free(side, span):
@@ -650,8 +651,15 @@ def skirtings(layout: RoomLayout, height_m: float = 0.08) -> None:
         for start_m, end_m in list(pairwise(ends))[::2]:
             if end_m - start_m > 0.03:
                 spot = layout.spot(side, (start_m + end_m) / 2)
-                size = {"length_m": end_m - start_m, "height_m": height_m}
-                layout.add("skirting", _skirting, spot.at(0), yaw_deg=spot.yaw_deg, support=SHELL, **size)
+                layout.add(
+                    "skirting",
+                    _skirting,
+                    spot.at(0),
+                    yaw_deg=spot.yaw_deg,
+                    support=SHELL,
+                    length_m=end_m - start_m,
+                    height_m=height_m,
+                )
 
 
 def _skirting(_: Rng, length_m: float, height_m: float) -> list[Part]:

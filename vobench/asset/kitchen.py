@@ -113,7 +113,7 @@ def fridge() -> list[Part]:
 def hob() -> list[Part]:
     """A glass hob with three rings."""
     places = ((-0.14, -0.12, 0.1), (0.14, -0.12, 0.08), (0.14, 0.13, 0.11))
-    rings = [moved(lathe([[0, 0], [r, 0], [r, 0.001], [0, 0.001]]), at(x, y, 0.008)) for x, y, r in places]
+    rings = [moved(lathe(np.array([[0, 0], [r, 0], [r, 0.001], [0, 0.001]])), at(x, y, 0.008)) for x, y, r in places]
     plate = put(block((0.58, 0.51, 0.008), bevel_m=0.002), coated("#0e0f10", roughness=0.04), z=0.004)
     return [plate, put(joined(rings), coated("#3a3c3e", roughness=0.2))]
 

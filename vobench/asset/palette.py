@@ -65,8 +65,8 @@ def worktop(rng: Rng) -> Material:
 
 
 @dataclass(frozen=True, slots=True)
-class HomeStyle:
-    """The surfaces of a flat. Colours are #rrggbb; `tones` and `second_tones` are woods of furniture."""
+class Style:
+    """The surfaces of a flat or an office. Colours are #rrggbb; `tones` and `second_tones` are woods of furniture."""
 
     tones: str
     second_tones: str
@@ -92,7 +92,7 @@ class HomeStyle:
     is_painted: bool  # wardrobes and chests are painted, not of wood
 
 
-def home_style(rng: Rng) -> HomeStyle:
+def home_style(rng: Rng) -> Style:
     """The style of a flat."""
     tones = one_of(rng, "oak", "oak", "walnut", "beech")
     second_tones = tones if rng.random() < 0.6 else one_of(rng, "oak", "walnut", "beech")
@@ -102,7 +102,7 @@ def home_style(rng: Rng) -> HomeStyle:
     plaster_seed = int(rng.integers(3))
     paints = rng.permutation([*PAINTS, *DEEP_PAINTS[: int(rng.integers(6))]]).tolist()
     cloths = rng.permutation(CLOTHS).tolist()
-    return HomeStyle(
+    return Style(
         tones=tones,
         second_tones=second_tones,
         doors=coated("#e4e2dc", roughness=0.3) if white_doors else wood(one_of(rng, "oak", "beech", "walnut")),

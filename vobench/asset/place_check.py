@@ -88,7 +88,7 @@ def _enters(inner: _Box, outer: _Box) -> bool:
     vertices = np.concatenate([part.arrays.vertices_m for part in inner.piece.parts])
     high = vertices[vertices[:, 2] > outer.high_m[2] - 0.02]
     is_within = (high[:, :2] > outer.low_m[:2] + OVERLAP_M) & (high[:, :2] < outer.high_m[:2] - OVERLAP_M)
-    return bool(is_within.all(axis=1).any())
+    return bool(np.all(is_within, axis=1).any())
 
 
 def _loose(interior: Interior, boxes: Sequence[_Box]) -> Iterator[str]:
