@@ -15,7 +15,8 @@ Makers       Thing make_mesh joined moved copies flipped two_sided textured: mes
              Part Piece put stood things mm bars bulb kitchen: furniture
              Opening shell FINISHES OUTWARD: rooms
              AreaLight PointLight SpotLight Sun Sky Steady Flicker Dimmer Switched: lights
-             Surroundings GeneratedPlace home: the panorama of a sky, what a generator returns, and furnished flats
+             Surroundings GeneratedPlace home workplace: the panorama of a sky, what a generator returns,
+             furnished flats and offices
 Layouts      Layout Writing ReadOptions Topics: the definition of a layout, and the options of its reader
              Recording RecordedFrame RecordedPicture PictureStream assemble picture_files numbered truth_file unread
              chain_rig: reading
@@ -35,7 +36,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vobench.asset import home, kitchen, picture
+    from vobench.asset import home, kitchen, picture, workplace
     from vobench.asset.fitting import bars
     from vobench.asset.furniture import (
         BLACK,
@@ -173,6 +174,7 @@ HOMES = {
     "picture": "vobench.asset.picture",
     "home": "vobench.asset.home",
     "kitchen": "vobench.asset.kitchen",
+    "workplace": "vobench.asset.workplace",
     "FINISHES": "vobench.asset.room",
     "OUTWARD": "vobench.asset.room",
     "Opening": "vobench.asset.room",
@@ -443,6 +445,7 @@ __all__ = [
     "unit",
     "unread",
     "wood",
+    "workplace",
 ]
 
 if not TYPE_CHECKING:  # otherwise a type checker would accept every misspelt name

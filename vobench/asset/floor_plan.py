@@ -425,6 +425,115 @@ def _turned_at_random(rng: Rng, plan: FloorPlan) -> FloorPlan:
     return shifted(turned, -x_m, -y_m)
 
 
+Layout = tuple[list[Cell], list[Side]]  # the rooms of a storey, and its sides without windows
+
+# --- Offices ---
+
+
+def office_plan(rng: Rng) -> FloorPlan:
+    """The plan of an office: a large room or a corridor, and cells, meeting rooms and a pantry along it."""
+    layouts = (_office_with_row, _office_along_corridor, _office_with_end)
+    cells, closed_sides = layouts[int(rng.choice(len(layouts), p=[0.4, 0.3, 0.3]))](rng)
+    height_m = round(float(rng.uniform(2.7, 3.2)), 2)
+    rooms = rooms_of(cells)
+    hub = next((room for room in rooms if room.use == "hall"), None)
+    hub = hub or next(room for room in rooms if room.use == "open")
+    has_glass = bool(rng.random() < 0.7)
+    passages = list[Passage]()
+    for room in rooms:
+        if room is hub:
+            continue
+        door = door_between(rng, room, hub, leaf_share=0.45)
+        if door is None:
+            raise ValueError(f"the wall between {room.name} and {hub.name} is too short for a door")
+        passages.append(door)
+        if has_glass and room.use in ("meeting", "cell"):
+            passages += _glass_beside(room, hub, door)
+    passages = without_obstructing_leaves(rooms, passages)
+
+    entrance = _entrance(hub)
+    outer = FloorPlan(tuple(rooms), (), (), entrance, height_m).outer
+    style = WindowStyle(
+        width_m=round(float(rng.uniform(1.3, 2.3)), 2),
+        sill_m=round(float(rng.uniform(0.75, 0.95)), 2),
+        head_m=round(min(height_m - 0.25, float(rng.uniform(2.3, 2.6))), 2),
+        depth_m=round(float(rng.uniform(0.14, 0.24)), 2),
+        every_m=float(rng.uniform(2.4, 3.2)),
+    )
+    windows = list[Window]()
+    for room in rooms:
+        for side in outer_sides(room, outer):
+            if side not in closed_sides and room.use != "hall":
+                windows += windows_along(rng, room, side, style)
+    plan = FloorPlan(tuple(rooms), tuple(passages), tuple(windows), entrance, height_m)
+    return _turned_at_random(rng, plan)
+
+
+def _glass_beside(room: Room, hub: Room, door: Passage) -> Iterator[Passage]:
+    """A pane beside a door, in the rest of the wall between a room and what it opens to."""
+    wall = shared_wall(room, hub)
+    if wall is None:
+        return
+    side = room.side_at(wall)
+    first_m, last_m = along_m(side, wall)
+    door_first_m, door_last_m = along_m(side, door.rect)
+    before = (first_m + 0.2, door_first_m - 0.25)
+    after = (door_last_m + 0.25, last_m - 0.2)
+    start_m, end_m = max((before, after), key=lambda span: span[1] - span[0])
+    end_m = min(end_m, start_m + 2.6)
+    if end_m - start_m > 0.8:
+        hole = _hole(wall, start_m - first_m, end_m - start_m)
+        yield Passage((room.name, hub.name), hole, "glass", sill_m=0.12)
+
+
+def _office_with_row(rng: Rng) -> Layout:
+    """A large room with a row of smaller ones along one side."""
+    south_m = rng.uniform(5.8, 7.4)
+    north_m = rng.uniform(3.2, 4.2)
+    length_m = rng.uniform(11.0, 16.0)
+    choices = [["meeting", "cell", "pantry"], ["cell", "cell", "pantry"], ["pantry", "meeting", "cell", "cell"]]
+    choices += [["cell", "meeting", "cell", "pantry"], ["meeting", "cell", "cell"]]
+    row = longest_that_fits(rng, length_m, choices)
+    cells = [
+        Cell("open", Rect(0, 0, length_m, south_m)),
+        *divided(rng, Rect(0, south_m, length_m, south_m + north_m), row),
+    ]
+    return cells, _ends(rng)
+
+
+def _office_along_corridor(rng: Rng) -> Layout:
+    """Cells on both sides of a corridor, and a larger room among them."""
+    south_m = rng.uniform(4.4, 5.6)
+    hall_m = rng.uniform(1.9, 2.4)
+    north_m = rng.uniform(3.4, 4.4)
+    length_m = rng.uniform(11.0, 14.5)
+    south = longest_that_fits(rng, length_m, [["open", "cell"], ["open", "meeting"], ["cell", "open"]])
+    north_choices = [["cell", "meeting", "pantry"], ["pantry", "cell", "cell"], ["cell", "cell", "meeting"]]
+    north = longest_that_fits(rng, length_m, north_choices)
+    depth_m = south_m + hall_m + north_m
+    cells = [
+        Cell("hall", Rect(0, south_m, length_m, south_m + hall_m)),
+        *divided(rng, Rect(0, 0, length_m, south_m), south),
+        *divided(rng, Rect(0, south_m + hall_m, length_m, depth_m), north),
+    ]
+    return cells, _ends(rng)
+
+
+def _office_with_end(rng: Rng) -> Layout:
+    """A large room, and two or three smaller ones at its end."""
+    depth_m = rng.uniform(8.6, 10.4)
+    length_m = rng.uniform(8.5, 11.5)
+    end_m = rng.uniform(3.2, 4.4)
+    choices = [["meeting", "pantry"], ["cell", "meeting"], ["cell", "pantry", "cell"]]
+    column = longest_that_fits(rng, depth_m, choices)
+    transposed = divided(rng, Rect(0, length_m, depth_m, length_m + end_m), column)
+    cells = [Cell("open", Rect(0, 0, length_m, depth_m))]
+    for cell in transposed:
+        rect = cell.rect
+        cells.append(Cell(cell.use, Rect(rect.y0, rect.x0, rect.y1, rect.x1)))
+    return cells, _ends(rng)
+
+
 # --- Flats ---
 
 
@@ -436,7 +545,8 @@ def flat_plan(rng: Rng) -> FloorPlan:
     height_m = round(float(rng.choice([2.5, 2.6, 2.75, 3.05])), 2)
     rooms = rooms_of(cells)
     passages = _flat_passages(rng, rooms, height_m)
-    outer = FloorPlan(tuple(rooms), (), (), _entrance(rooms), height_m).outer
+    entrance = _entrance(next(room for room in rooms if room.use == "hall"))
+    outer = FloorPlan(tuple(rooms), (), (), entrance, height_m).outer
 
     style = WindowStyle(
         width_m=round(float(rng.uniform(1.0, 1.75)), 2),
@@ -453,11 +563,8 @@ def flat_plan(rng: Rng) -> FloorPlan:
             is_wanted = k == 0 or rng.random() < 0.6
             if is_wanted:
                 windows += windows_along(rng, room, side, style)
-    plan = FloorPlan(tuple(rooms), tuple(passages), tuple(windows), _entrance(rooms), height_m)
+    plan = FloorPlan(tuple(rooms), tuple(passages), tuple(windows), entrance, height_m)
     return _turned_at_random(rng, plan)
-
-
-Layout = tuple[list[Cell], list[Side]]
 
 
 def _ends(rng: Rng) -> list[Side]:
@@ -534,9 +641,8 @@ def _flat_of_one_room(rng: Rng) -> Layout:
     return cells, ["north", *_ends(rng)]
 
 
-def _entrance(rooms: Sequence[Room]) -> Window:
+def _entrance(hall: Room) -> Window:
     """The closed front door, in the west wall of the hall."""
-    hall = next(room for room in rooms if room.use == "hall")
     middle_m = hall.rect.center_m[1]
     rect = hole_outwards(hall, "west", middle_m - 0.46, middle_m + 0.46, WALL_M)
     return Window(hall.name, rect, 0.0, 2.05)

@@ -526,9 +526,11 @@ def _furnish_bath(layout: RoomLayout, style: Style) -> None:
             layout.add("brush", bathroom.toilet_brush, spot.at(0.08, sign * 0.32), yaw_deg=spot.yaw_deg)
             layout.take(body, 0.4)
     layout.hang("towel_rail", bathroom.towel_rail, (0.56, 1.2), middle_m=0.95, colour=one_of(rng, *BATH_CLOTHS))
-    spot = layout.open_spot(0.5, 0.8)
-    if spot is not None:
-        layout.add("bath_mat", bathroom.bath_mat, spot.at(0), yaw_deg=spot.yaw_deg, colour=one_of(rng, *BATH_CLOTHS))
+    middle = layout.open_spot(0.5, 0.8)
+    if middle is not None:
+        layout.add(
+            "bath_mat", bathroom.bath_mat, middle.at(0), yaw_deg=middle.yaw_deg, colour=one_of(rng, *BATH_CLOTHS)
+        )
     if rng.random() < 0.2:
         layout.stand("bin", furniture.waste_bin, (0.26, 0.26, 0.32), back_m=0.12, front_m=0.0, in_corner=True,
                      width_m=0.22, height_m=0.28)  # fmt: skip

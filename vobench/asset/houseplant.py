@@ -41,7 +41,7 @@ def houseplant(rng: Rng, height_m: float = 1.0, habit: Habit = "broad", pot: str
 
 def _within(parts: list[Part], height_m: float) -> list[Part]:
     """The parts, made narrower if leaves reach further from the middle than REACH."""
-    farthest_m = max(float(np.abs(part.arrays.vertices_m[:, :2]).max()) for part in parts)
+    farthest_m = max(float(np.linalg.norm(part.arrays.vertices_m[:, :2], axis=1).max()) for part in parts)
     narrower = min(1.0, REACH * height_m / farthest_m)
     return [part.moved(np.diag([narrower, narrower, 1.0, 1.0])) for part in parts]
 
@@ -100,7 +100,7 @@ def _leaves(rng: Rng, height_m: float, pot_m: float, *, hangs: bool) -> tuple[li
         start = [0.0, 0.0, 0.85 * pot_m]
         middle = [0.35 * reach_m, 0.0, 0.6 * rise_m + 0.4 * 0.85 * pot_m]
         end = [reach_m, 0.0, rise_m]
-        stem = tube_arrays([start, middle, end], 0.003 * height_m + 0.0006, sections=3)
+        stem = tube_arrays(np.array([start, middle, end]), 0.003 * height_m + 0.0006, sections=3)
         blade = _blade(length_m, rng.uniform(0.4, 0.6) * length_m, rng.uniform(0.1, 0.8), 0.25)
         stems.append(stem.moved(T_pot_leaf))
         blades.append(blade.moved(T_pot_leaf @ at(*end)))
@@ -120,7 +120,7 @@ def _tree(rng: Rng, height_m: float, pot_m: float) -> tuple[list[MeshArrays], li
         reach_m = rng.uniform(0.1, 0.19) * height_m
         rise_m = rng.uniform(0.02, 0.16) * height_m
         T_pot_twig = at(float(bend[0]), float(bend[1]), start_m, yaw=turn_deg)
-        twig = tube_arrays([[0, 0, 0], [reach_m, 0, rise_m]], 0.004 * height_m + 0.001, sections=3)
+        twig = tube_arrays(np.array([[0, 0, 0], [reach_m, 0, rise_m]]), 0.004 * height_m + 0.001, sections=3)
         stems.append(twig.moved(T_pot_twig))
         for share in (0.45, 0.75, 1.0):
             length_m = rng.uniform(0.09, 0.13) * height_m

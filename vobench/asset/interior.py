@@ -9,7 +9,7 @@ from zlib import crc32
 import numpy as np
 import scipy
 
-from vobench.asset import doorway, fitting, furniture
+from vobench.asset import doorway, fitting, furniture, office
 from vobench.asset.floor_plan import (
     SIDES,
     FloorPlan,
@@ -126,6 +126,8 @@ def shell(
         yield f"passage_{number}", [Part(sides, finish.walls[room.side_at(passage.rect)])]
         if passage.is_walkable:
             yield f"threshold_{number}", [_threshold(passage, thresholds)]
+        else:
+            yield f"glazing_{number}", _glazing(passage)
     for number, window in enumerate(plan.windows):
         yield f"window_{number}", _window(plan, window, reveals)
 
@@ -180,6 +182,17 @@ def _wall(plan: FloorPlan, room: Room, side: Side) -> "Trimesh":
         if room.side_at(window.rect) == side:
             holes.append(frame.hole(window.rect, window.sill_m, window.head_m))
     return pierced(frame.corner_m, frame.edge_m, frame.up_m, holes, doors=doors)
+
+
+def _glazing(passage: Passage) -> list[Part]:
+    """The pane of a hole between two rooms."""
+    x, y = passage.rect.center_m
+    width_m = max(passage.rect.width_m, passage.rect.depth_m)
+    height_m = passage.head_m - passage.sill_m
+    yaw_deg = 0.0 if is_along_y(passage.rect) else 90.0
+    T_place_pane = at(x, y, passage.sill_m + height_m / 2, yaw=yaw_deg)
+    pane = office.glazing(np.random.default_rng(0), width_m, height_m)
+    return [part.moved(T_place_pane) for part in pane]
 
 
 def _threshold(passage: Passage, material: Material) -> Part:

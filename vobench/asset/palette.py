@@ -131,3 +131,52 @@ def home_style(rng: Rng) -> Style:
         lamp_k=float(rng.uniform(2700, 3600)),
         is_painted=bool(rng.random() < 0.5),
     )
+
+
+OFFICE_FRONTS = ("#e6e3da", "#46586a", "#c9c4b8", "#8d9aa3", "#5b6b5d")
+CHAIRS = ("#27445c", "#3a3c3e", "#3d7a7c", "#6b4353", "#8f8a80", "#7a3a2c", "#5f7468")
+
+
+def office_style(rng: Rng) -> Style:
+    """The style of an office: hard floors or carpet, white or muted walls, light desks."""
+    tones = one_of(rng, "oak", "beech", "beech", "walnut")
+    fronts = one_of(rng, *OFFICE_FRONTS)
+    plaster_seed = int(rng.integers(3))
+    paints = rng.permutation([*PAINTS, *DEEP_PAINTS]).tolist()
+    cloths = rng.permutation(CHAIRS).tolist()
+    kind = one_of(rng, "carpet", "carpet", "carpet", "planks", "terrazzo", "concrete")
+    if kind == "carpet":
+        tint = one_of(rng, "#ffffff", "#f0d8c4", "#d8e8d8", "#e8dce8", "#fff0d8")
+        floor = matt(tint, picture.ground("carpet", int(rng.integers(2))))
+    elif kind == "terrazzo":
+        floor = Material(texture=picture.terrazzo(), eta=1.5)
+    elif kind == "concrete":
+        floor = coated("#e6e4e0", picture.ground("concrete"), roughness=0.3)
+    else:
+        floor = plank_floor(rng, ("oak", "beech"))
+    has_tiled_ceiling = rng.random() < 0.6
+    tiled = matt(texture=picture.masonry("tile", tile_m=1.2, rows=2, columns=2, bond=0.0))
+    return Style(
+        tones=tones,
+        second_tones=one_of(rng, "oak", "beech", "walnut"),
+        doors=wood(one_of(rng, "beech", "oak", "walnut")) if rng.random() < 0.6 else coated("#dcdbd6"),
+        plain=plaster(one_of(rng, *WHITES), plaster_seed),
+        accents=tuple(plaster(colour, plaster_seed) for colour in paints[:3]),
+        ceiling=tiled if has_tiled_ceiling else plaster("#f4f1ea", plaster_seed),
+        planks=floor,
+        floor_tiles=tile_floor(rng),
+        bath_tiles=wall_tiles(rng),
+        kitchen=KitchenStyle(fronts, fronts, worktop(rng), wall_tiles(rng)),
+        cloths=tuple(cloths[:4]),
+        accent_cloths=tuple(rng.permutation(ACCENT_CLOTHS).tolist()[:2]),
+        has_slat_chairs=True,
+        curtain=one_of(rng, *CURTAINS),
+        linen=one_of(rng, *LINENS),
+        cover=one_of(rng, *CLOTHS),
+        frame=one_of(rng, picture.INK, "#c9a271", "#a4a7a6"),
+        window_dressing=one_of(rng, "blinds", "blinds", "bare"),
+        prints=tuple(rng.permutation(PRINTS).tolist()[:4]),
+        rugs=tuple(rng.permutation(8).tolist()[:2]),
+        lamp_k=float(rng.uniform(3800, 5200)),
+        is_painted=bool(rng.random() < 0.5),
+    )

@@ -87,8 +87,9 @@ def _enters(inner: _Box, outer: _Box) -> bool:
     """Whether what is high of a chair lies within the box of its table."""
     vertices = np.concatenate([part.arrays.vertices_m for part in inner.piece.parts])
     high = vertices[vertices[:, 2] > outer.high_m[2] - 0.02]
-    is_within = (high[:, :2] > outer.low_m[:2] + OVERLAP_M) & (high[:, :2] < outer.high_m[:2] - OVERLAP_M)
-    return bool(np.all(is_within, axis=1).any())
+    is_above_low = np.all(high[:, :2] > outer.low_m[:2] + OVERLAP_M, axis=1)
+    is_below_high = np.all(high[:, :2] < outer.high_m[:2] - OVERLAP_M, axis=1)
+    return bool((is_above_low & is_below_high).any())
 
 
 def _loose(interior: Interior, boxes: Sequence[_Box]) -> Iterator[str]:
