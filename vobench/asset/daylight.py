@@ -16,7 +16,7 @@ SEEDS = 1 << 16  # of panoramas
 # Linear RGB of black bodies at some temperatures.
 BLACK_BODIES_K = (2700.0, 3000.0, 4000.0, 5000.0, 6500.0)
 BLACK_BODIES_RGB = ((1.0, 0.43, 0.13), (1.0, 0.48, 0.18), (1.0, 0.65, 0.39), (1.0, 0.78, 0.62), (1.0, 0.93, 1.0))
-ADAPTED = 0.55  # the share of a lamp's tint that remains after the eye, or white balance, adapted to it
+ADAPTED = 0.35  # the share of a lamp's tint that remains after the eye, or white balance, adapted to it
 
 
 @dataclass(frozen=True, slots=True)

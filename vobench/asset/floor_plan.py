@@ -192,7 +192,7 @@ class Cell:
 
 LEAST_WIDTH_M = {
     "bath": 1.9,
-    "kitchen": 2.5,
+    "kitchen": 2.6,
     "bedroom": 3.0,
     "living": 4.0,
     "study": 2.6,

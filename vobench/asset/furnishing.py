@@ -1,6 +1,7 @@
 """Furniture that many rooms have, placed by rules: what belongs to windows, desks, tables, shelves, kitchens."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -8,8 +9,8 @@ import numpy as np
 from vobench.asset import bedroom, fitting, furniture, household, houseplant, kitchen
 from vobench.asset.daylight import lamp_colour
 from vobench.asset.floor_plan import SIDES, FloorPlan, Side, Window, along_m
-from vobench.asset.furniture import Part
-from vobench.asset.interior import GAP_M, SHELL, WALL, RoomLayout, Span, Spot
+from vobench.asset.furniture import Part, cloth, coated, stood
+from vobench.asset.interior import GAP_M, SHELL, WALL, RoomLayout, Span, Spot, corners_of
 from vobench.asset.palette import Style
 from vobench.asset.picture import Rng, one_of
 
@@ -167,7 +168,7 @@ def small_lamps(layout: RoomLayout, style: Style, *, is_on: bool) -> None:
         is_lamp = ".floor_lamp_" in piece.name or ".table_lamp_" in piece.name
         if not is_lamp:
             continue
-        corners = np.concatenate([part.arrays.vertices_m for part in piece.parts])
+        corners = corners_of(piece.parts)
         low_m = corners.min(axis=0)
         high_m = corners.max(axis=0)
         x_m, y_m = ((low_m + high_m) / 2)[:2].tolist()
@@ -415,13 +416,14 @@ def desk(layout: RoomLayout, style: Style) -> Spot | None:
     y = float(rng.uniform(-0.08, 0.02))
     layout.add(
         "monitor",
-        furniture.monitor,
+        monitor,
         spot.at(GAP_M + 0.2, y),
         TABLE_M,
         yaw_deg=spot.yaw_deg + float(rng.normal(0, 5)),
         support=name,
         width_m=0.5,
         seed=int(rng.integers(6)),
+        is_on=bool(rng.random() < 0.4),
     )
     layout.add(
         "keyboard",
@@ -494,7 +496,7 @@ def armchair(layout: RoomLayout, style: Style) -> None:
 
 def kitchen_row(layout: RoomLayout, style: Style) -> Spot | None:
     """A row of units along the wall where the longest one fits; the worktop may pass below a window."""
-    for length_m in (3.6, 3.3, 3.0, 2.7, 2.4):
+    for length_m in (3.6, 3.3, 3.0, 2.7, 2.4, 2.1, 1.8):
         for side_index in layout.rng.permutation(4).tolist():
             side: Side = tuple(SIDES)[side_index]
             first_m, last_m = layout.room.span_m(side)
@@ -527,7 +529,7 @@ def _fits_row(layout: RoomLayout, spot: Spot, along: float, length_m: float) -> 
         first - (along - length_m / 2) > 0.66 and along + length_m / 2 - last > 0.66 for first, last in windows
     )
     body = spot.body(kitchen.ROW_DEPTH_M, length_m, 0.0)
-    front = spot.body(0.7, length_m, kitchen.ROW_DEPTH_M)
+    front = spot.body(0.6, length_m, kitchen.ROW_DEPTH_M)
     return is_clear and layout.is_wall_free(spot.side, span) and layout.fits([body], [front])
 
 
@@ -584,3 +586,44 @@ def cartons(layout: RoomLayout) -> None:
             size_m=(0.28, 0.36, 0.22),
             seed=int(layout.rng.integers(4)),
         )
+
+
+def television(rng: Rng, width_m: float, seed: int) -> list[Part]:
+    """A television, mostly switched off."""
+    parts = household.television(rng, width_m=width_m, seed=seed)
+    return parts if rng.random() < 0.35 else switched_off(parts)
+
+
+def switched_off(parts: Sequence[Part]) -> list[Part]:
+    """The parts of a display, dark. Each display that shines is a lamp, and costs time when light is computed."""
+    glass = coated("#141618", roughness=0.08)
+    return [replace(part, material=glass) if part.material.emission_texture else part for part in parts]
+
+
+def monitor(rng: Rng, width_m: float, seed: int, *, is_on: bool) -> list[Part]:
+    """A display on a foot."""
+    parts = furniture.monitor(rng, width_m=width_m, seed=seed)
+    return parts if is_on else switched_off(parts)
+
+
+RUG_COLOURS = ("#8f8a80", "#b9a88a", "#5c6b78", "#7a5a4c", "#6f7d6a", "#c2b8a4", "#3f4a55", "#9a6a5a")
+
+
+def rug(rng: Rng, width_m: float, depth_m: float, seed: int) -> list[Part]:
+    """A rug: woven in lozenges, striped, with a border, or plain, by its seed."""
+    if seed % 4 == 0:
+        return household.rug(rng, width_m=width_m, depth_m=depth_m, seed=seed)
+    colours = np.random.default_rng(seed).permutation(RUG_COLOURS).tolist()
+    parts = [stood((depth_m, width_m, 0.008), cloth(colours[0]), bevel=0.003)]
+    if seed % 4 == 1:
+        count = 2 * int(width_m / 0.22) + 1
+        stripe_m = width_m / count
+        for k in range(1, count, 2):
+            y = (k + 0.5) * stripe_m - width_m / 2
+            colour = colours[1 + k // 2 % 2]
+            parts.append(stood((depth_m - 0.01, stripe_m, 0.0006), cloth(colour), 0, y, 0.008, bevel=0))
+    elif seed % 4 == 2:
+        inner_m = (depth_m - 0.24, width_m - 0.24, 0.0006)
+        parts.append(stood((depth_m - 0.12, width_m - 0.12, 0.0003), cloth(colours[1]), 0, 0, 0.008, bevel=0))
+        parts.append(stood(inner_m, cloth(colours[2]), 0, 0, 0.008, bevel=0))
+    return parts

@@ -17,6 +17,7 @@ from vobench.asset.interior import (
     RoomLayout,
     Span,
     Spot,
+    corners_of,
     door_fittings,
     shell,
     skirtings,
@@ -28,7 +29,7 @@ from vobench.asset.shape import at
 from vobench.scene.mesh import moved
 
 PANORAMAS = ("city", "city", "suburb", "country")
-PIECE_FACES_PER_M2 = 725.0
+PIECE_FACES_PER_M2 = 715.0
 OPTIONAL = ("sill_mug", "fruit", "bin", "socket", "mug", "sill_plant", "shoes", "keyboard", "plant", "picture")
 
 
@@ -58,7 +59,7 @@ def furnished_flat(seed: int, lighting: str) -> Interior:
         is_main = layout.room.use == "living"
         share = outside.lamp_share if any(plan.windows_of(layout.room)) else max(outside.lamp_share, 0.75)
         is_on = bool(lamp_rng.random() < share) or (is_main and outside.lamp_share > 0.8)
-        _ceiling_lamp(layout, style, is_on=is_on)
+        _ceiling_lamps(layout, style, is_on=is_on)
         furnishing.small_lamps(layout, style, is_on=is_on and bool(lamp_rng.random() < 0.8))
         if layout.room.use != "bath":
             skirtings(layout)
@@ -88,43 +89,48 @@ def _finish(rng: Rng, room: Room, style: Style) -> RoomFinish:
 # --- Windows and lamps ---
 
 
-def _ceiling_lamp(layout: RoomLayout, style: Style, *, is_on: bool) -> None:
-    """A pendant over the dining table, else a dome or a pendant at the middle of the ceiling."""
+def _ceiling_lamps(layout: RoomLayout, style: Style, *, is_on: bool) -> None:
+    """A pendant over the dining table, and a dome or a pendant near the middle of the ceiling."""
     rng = layout.rng
-    colour = lamp_colour(style.lamp_k)
-    height_m = layout.plan.height_m
     area_m2 = layout.room.rect.area_m2
-    power_lm = float(np.clip(95 * area_m2, 700, 3000)) * float(rng.uniform(0.85, 1.2))
+    power_lm = float(np.clip(150 * area_m2, 1000, 4200)) * float(rng.uniform(0.85, 1.2))
     x_m, y_m = layout.room.rect.center_m
     table = next((piece for piece in layout.placed if ".dining_table_" in piece.name), None)
     if table is not None:
-        corners = np.concatenate([part.arrays.vertices_m for part in table.parts])
-        x_m, y_m = ((corners.min(axis=0) + corners.max(axis=0)) / 2)[:2].tolist()
-    hangs = table is not None or (layout.room.use in ("living", "bedroom", "study") and rng.random() < 0.45)
+        corners = corners_of(table.parts)
+        table_x, table_y = ((corners.min(axis=0) + corners.max(axis=0)) / 2)[:2].tolist()
+        _pendant(layout, style, (table_x, table_y), 1.55, 800.0, is_on=is_on)
+        if np.hypot(table_x - x_m, table_y - y_m) < 0.7:
+            x_m += 0.9 * float(np.sign(x_m - table_x) or 1.0)
+    hangs = table is None and layout.room.use in ("living", "bedroom", "study") and rng.random() < 0.45
     if hangs:
-        low_m = 1.55 if table is not None else 2.05
-        wide_m = float(rng.choice([0.36, 0.46, 0.56]))
-        shade = one_of(rng, "#2c4a4a", "#27445c", "#262b30", "#c9c4b8", "#b4533a", "#5c6b5a", "#d8c3a0")
-        layout.add(
-            "pendant",
-            household.pendant,
-            (x_m, y_m),
-            height_m,
-            support=CEILING,
-            drop_m=height_m - low_m,
-            colour=shade,
-            wide_m=wide_m,
-            sections=22,
-        )
-        bulb = household.bulb(x_m, y_m, low_m + 0.07, 0.12)
-        layout.lamp("lamp", bulb, power_lm, is_on=is_on, colour=colour)
+        _pendant(layout, style, (x_m, y_m), 2.05, power_lm, is_on=is_on)
         return
     base, dome = household.ceiling_dome(float(rng.choice([0.3, 0.4, 0.5])))
-    layout.add("lamp_base", lambda _: base, (x_m, y_m), height_m, support=CEILING)
-    layout.lamp("lamp", moved(dome, at(x_m, y_m, height_m)), power_lm, is_on=is_on, colour=colour)
+    layout.add("lamp_base", lambda _: base, (x_m, y_m), layout.plan.height_m, support=CEILING)
+    T_place_dome = at(x_m, y_m, layout.plan.height_m)
+    layout.lamp("lamp", moved(dome, T_place_dome), power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
 
 
-# --- What many rooms have ---
+def _pendant(
+    layout: RoomLayout, style: Style, xy_m: tuple[float, float], low_m: float, power_lm: float, *, is_on: bool
+) -> None:
+    """A pendant whose shade ends at a height above the floor, and its bulb."""
+    rng = layout.rng
+    height_m = layout.plan.height_m
+    layout.add(
+        "pendant",
+        household.pendant,
+        xy_m,
+        height_m,
+        support=CEILING,
+        drop_m=height_m - low_m,
+        colour=one_of(rng, "#2c4a4a", "#27445c", "#262b30", "#c9c4b8", "#b4533a", "#5c6b5a", "#d8c3a0"),
+        wide_m=float(rng.choice([0.36, 0.46, 0.56])),
+        sections=22,
+    )
+    bulb = household.bulb(*xy_m, low_m + 0.07, 0.12)
+    layout.lamp("lamp", bulb, power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
 
 
 # --- Rooms by use ---
@@ -229,7 +235,7 @@ def _add_television(layout: RoomLayout, style: Style, spot: Spot, board_m: float
     screen_m = min(1.25, board_m - 0.3)
     layout.add(
         "television",
-        household.television,
+        furnishing.television,
         spot.at(GAP_M + 0.2),
         0.46,
         yaw_deg=spot.yaw_deg,
@@ -247,7 +253,7 @@ def _add_coffee_table(layout: RoomLayout, style: Style, spot: Spot, x_m: float, 
     if has_rug:
         layout.add(
             "rug",
-            household.rug,
+            furnishing.rug,
             spot.at(x_m),
             yaw_deg=spot.yaw_deg,
             width_m=rug_m[0],
@@ -379,7 +385,7 @@ def _loose_rug(layout: RoomLayout, style: Style) -> None:
     if spot is not None:
         layout.add(
             "rug",
-            household.rug,
+            furnishing.rug,
             spot.at(0),
             yaw_deg=spot.yaw_deg,
             width_m=width_m,
@@ -482,7 +488,7 @@ def _runner(layout: RoomLayout, style: Style) -> None:
         return
     layout.add(
         "rug",
-        household.rug,
+        furnishing.rug,
         rect.center_m,
         yaw_deg=90.0 if is_along_x else 0.0,
         width_m=length_m,
@@ -517,7 +523,11 @@ def _furnish_bath(layout: RoomLayout, style: Style) -> None:
         )
         if basin is not None:
             break
-    toilet = layout.stand("toilet", bathroom.toilet, (0.62, 0.5, 1.15), front_m=0.4, first_m=0.0, support=WALL)
+    toilet = None
+    for width_m, front_m in ((0.5, 0.4), (0.42, 0.25)):
+        toilet = toilet or layout.stand(
+            "toilet", bathroom.toilet, (0.58, width_m, 1.15), front_m=front_m, first_m=0.0, support=WALL
+        )
     if toilet is not None:
         _, spot = toilet
         sign = 1 if rng.random() < 0.5 else -1

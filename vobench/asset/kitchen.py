@@ -167,7 +167,6 @@ def jar(
 
 ROW_DEPTH_M = 0.62  # from the wall to the edge of the worktop
 UNIT_M = 0.6  # width of an appliance
-LEAST_ROW_M = 2.4  # fridge, sink, oven and a unit
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Sky, Sun
 
 TOLERANCE_M = 0.012  # of contacts
+ON_WALL_M = 0.05  # from the wall at most
 OVERLAP_M = 0.03  # that bounding boxes may share, since pieces are turned and not boxes
 LOW_M = 0.02  # lower pieces lie on the floor under others, such as rugs
 CHAIR_SEAT_M = 0.62  # above which a chair must not reach into its table
@@ -89,7 +90,7 @@ def _enters(inner: _Box, outer: _Box) -> bool:
     high = vertices[vertices[:, 2] > outer.high_m[2] - 0.02]
     is_above_low = np.all(high[:, :2] > outer.low_m[:2] + OVERLAP_M, axis=1)
     is_below_high = np.all(high[:, :2] < outer.high_m[:2] - OVERLAP_M, axis=1)
-    return bool((is_above_low & is_below_high).any())
+    return bool(np.any(is_above_low & is_below_high))
 
 
 def _loose(interior: Interior, boxes: Sequence[_Box]) -> Iterator[str]:
@@ -109,13 +110,13 @@ def _loose(interior: Interior, boxes: Sequence[_Box]) -> Iterator[str]:
 
 
 def _touches_wall(room: Room, box: _Box) -> bool:
-    gaps = [
+    gaps: list[float] = [
         box.low_m[0] - room.rect.x0,
         room.rect.x1 - box.high_m[0],
         box.low_m[1] - room.rect.y0,
         room.rect.y1 - box.high_m[1],
     ]
-    return min(gaps) < 0.05
+    return bool(min(gaps) < ON_WALL_M)
 
 
 def _not_on(box: _Box, parent: _Box) -> Iterator[str]:

@@ -8,7 +8,7 @@ from vobench.asset import bedroom, fitting, floor_plan, furnishing, furniture, h
 from vobench.asset.daylight import daylight, lamp_colour
 from vobench.asset.floor_plan import SIDES, Room, Side
 from vobench.asset.furnishing import TABLE_M
-from vobench.asset.furniture import STEEL, coated, wood
+from vobench.asset.furniture import STEEL, Part, coated, wood
 from vobench.asset.interior import (
     CEILING,
     GAP_M,
@@ -27,7 +27,7 @@ from vobench.scene.material import Material
 from vobench.scene.mesh import quad
 
 PANORAMAS = ("city", "city", "city", "suburb")
-PIECE_FACES_PER_M2 = 725.0
+PIECE_FACES_PER_M2 = 715.0
 OPTIONAL = ("sill_mug", "socket", "mug", "keyboard", "sill_plant", "plant", "picture")
 DESK_M = 0.8  # depth
 SEAT_M = 0.72  # of floor behind a desk for its chair
@@ -59,7 +59,7 @@ def furnished_office(seed: int, lighting: str) -> Interior:
     desk_tops = one_of(rng, "wood", "wood", "#dedcd6", "#c9cac6", "#5b5f62")
     top = wood(style.tones) if desk_tops == "wood" else coated(desk_tops, roughness=0.35)
     kind = one_of(rng, "bars", "squares", "hanging")
-    is_lit = bool(lamp_rng.random() < share)
+    is_lit = share > 0.8 or bool(lamp_rng.random() < share)
     door_fittings(plan, layouts, style.doors, panels=False)
     for layout in layouts.values():
         furnishing.dress_windows(layout, style)
@@ -88,12 +88,12 @@ def _finish(rng: np.random.Generator, room: Room, style: Style) -> RoomFinish:
 def _ceiling_lamps(layout: RoomLayout, style: Style, kind: str, *, is_on: bool) -> None:
     """Panels below the ceiling, in a grid."""
     rect = layout.room.rect
-    size_m = {"bars": (1.5, 0.2), "squares": (0.6, 0.6), "hanging": (1.6, 0.12)}[kind]
+    size_m = {"bars": (1.5, 0.28), "squares": (0.9, 0.9), "hanging": (2.2, 0.16)}[kind]
     is_along_x = rect.width_m >= rect.depth_m
     length_m = max(rect.width_m, rect.depth_m)
     across_m = min(rect.width_m, rect.depth_m)
-    columns = max(1, round(length_m / 3.6))
-    rows = max(1, round(across_m / 3.8))
+    columns = max(1, round(length_m / 4.4))
+    rows = max(1, round(across_m / 4.6))
     height_m = layout.plan.height_m
     drop_m = 0.55 if kind == "hanging" else 0.06
     power_lm = 230 * rect.area_m2 / (columns * rows)
@@ -155,18 +155,20 @@ def _workplace(layout: RoomLayout, style: Style, spot: Spot, width_m: float, top
             beside=(desk,),
         )
     screen_seed = int(rng.integers(SCREENS))
+    is_first = not any(".monitor_" in piece.name for piece in layout.placed)
     y = float(rng.uniform(-0.06, 0.06))
     has_display = rng.random() < 0.75
     if has_display:
         layout.add(
             "monitor",
-            furniture.monitor,
+            furnishing.monitor,
             spot.at(0.26, y),
             TABLE_M,
             yaw_deg=spot.yaw_deg + float(rng.normal(0, 6)),
             support=desk,
             width_m=float(rng.choice([0.52, 0.6])),
             seed=screen_seed,
+            is_on=is_first and bool(rng.random() < 0.6),
         )
         if rng.random() < 0.5:
             layout.add(
@@ -180,7 +182,7 @@ def _workplace(layout: RoomLayout, style: Style, spot: Spot, width_m: float, top
     else:
         layout.add(
             "laptop",
-            office.laptop,
+            _laptop,
             spot.at(0.42, y),
             TABLE_M,
             yaw_deg=spot.yaw_deg + float(rng.normal(0, 10)),
@@ -202,6 +204,11 @@ def _workplace(layout: RoomLayout, style: Style, spot: Spot, width_m: float, top
                 support=desk,
                 **size,
             )
+
+
+def _laptop(rng: np.random.Generator, seed: int) -> list[Part]:
+    """A laptop that is asleep."""
+    return furnishing.switched_off(office.laptop(rng, seed))
 
 
 def _clusters(layout: RoomLayout, style: Style, top: Material) -> int:
@@ -468,7 +475,7 @@ def _furnish_meeting(layout: RoomLayout, style: Style, top: Material) -> None:
         name, spot = board
         layout.add(
             "television",
-            household.television,
+            furnishing.television,
             spot.at(GAP_M + 0.2),
             0.7,
             yaw_deg=spot.yaw_deg,
