@@ -6,13 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from vobench.asset import bedroom, fitting, furniture, household, houseplant, kitchen
+from vobench.asset import bedroom, fitting, furniture, household, houseplant, kitchen, office
 from vobench.asset.daylight import lamp_colour
 from vobench.asset.floor_plan import SIDES, FloorPlan, Side, Window, along_m
-from vobench.asset.furniture import Part, cloth, coated, stood
+from vobench.asset.furniture import DARK, Part, cloth, coated, put, stood
 from vobench.asset.interior import GAP_M, SHELL, WALL, RoomLayout, Span, Spot, corners_of
 from vobench.asset.palette import Style
 from vobench.asset.picture import Rng, one_of
+from vobench.asset.shape import tube
 
 BOOK_SEEDS = 6
 TABLE_M = 0.74
@@ -107,14 +108,12 @@ def _curtains(layout: RoomLayout, style: Style, spot: Spot, window: Window, widt
             )
         layout.add(
             "rod",
-            fitting.pipe,
-            spot.at(-0.02),
+            _rod,
+            spot.at(0.06),
             rod_m,
             yaw_deg=spot.yaw_deg,
             support=SHELL,
             length_m=2 * reach_m + 0.1,
-            radius_m=0.012,
-            colour="#3d4144",
         )
         low_m = 0.02 if is_long else window.sill_m - 0.16
         layout.take_wall(spot.side, along - reach_m - 0.06, along + reach_m + 0.06, low_m, rod_m + 0.06)
@@ -265,7 +264,7 @@ def pictures(layout: RoomLayout, style: Style, count: int, above: Sequence[Spot 
             middle_m = max(middle_m, 1.02 + height_m / 2)
         layout.hang(
             "picture",
-            fitting.framed,
+            framed_print,
             (width_m, height_m),
             middle_m=middle_m,
             above=spot,
@@ -370,13 +369,12 @@ def dining_table(layout: RoomLayout, style: Style, seats: int) -> bool:
             turn_deg = (180.0 if sign > 0 else 0.0) + float(rng.normal(0, 4))
             layout.add(
                 "dining_chair",
-                household.slat_chair if style.has_slat_chairs else household.dining_chair,
+                _dining_chair,
                 spot.at(x, y),
                 0.003,
                 yaw_deg=spot.yaw_deg + turn_deg,
                 beside=(name,),
-                colour=style.cloths[2],
-                tones=style.tones,
+                style=style,
             )
     names = ("mug", "papers", "bottle", "plant", "books")
     if rng.random() < 0.3:
@@ -384,6 +382,13 @@ def dining_table(layout: RoomLayout, style: Style, seats: int) -> bool:
     chosen = [names[k] for k in rng.permutation(len(names)).tolist()][: int(rng.integers(1, 4))]
     scatter(layout, name, spot, chosen, x_m=0.0, width_m=width_m - 0.2, z_m=TABLE_M)
     return True
+
+
+def _dining_chair(rng: Rng, style: Style) -> list[Part]:
+    """A chair of the kind that a home has."""
+    if style.has_slat_chairs:
+        return household.slat_chair(rng, style.cloths[2], style.tones, has_pad=style.has_pads)
+    return household.dining_chair(rng, style.cloths[2], style.tones)
 
 
 def desk(layout: RoomLayout, style: Style) -> Spot | None:
@@ -407,7 +412,7 @@ def desk(layout: RoomLayout, style: Style) -> Spot | None:
     name, spot = stood
     layout.add(
         "chair",
-        furniture.chair,
+        office.task_chair,
         spot.at(GAP_M + depth_m + 0.24, float(rng.normal(0, 0.06))),
         yaw_deg=spot.yaw_deg + 180 + float(rng.normal(0, 22)),
         beside=(name,),
@@ -627,3 +632,15 @@ def rug(rng: Rng, width_m: float, depth_m: float, seed: int) -> list[Part]:
         parts.append(stood((depth_m - 0.12, width_m - 0.12, 0.0003), cloth(colours[1]), 0, 0, 0.008, bevel=0))
         parts.append(stood(inner_m, cloth(colours[2]), 0, 0, 0.008, bevel=0))
     return parts
+
+
+def framed_print(_: Rng, style: str, width_m: float, height_m: float, seed: int, frame: str) -> list[Part]:
+    """A picture in a plain frame on a wall; it looks like `fitting.framed`, with fewer faces."""
+    face = fitting.framed(_, style, width_m, height_m, seed, frame)[0]
+    return [face, put(fitting.bars(width_m, height_m, 0.025, 0.02, bevel_m=0), coated(frame), 0.011)]
+
+
+def _rod(_: Rng, length_m: float) -> list[Part]:
+    """A rod for curtains, along y."""
+    path_m = np.array([[0.0, -length_m / 2, 0.0], [0.0, length_m / 2, 0.0]])
+    return [Part(tube(path_m, 0.012, sections=8), DARK)]

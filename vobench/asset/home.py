@@ -19,6 +19,7 @@ from vobench.asset.interior import (
     Spot,
     corners_of,
     door_fittings,
+    most_faces,
     shell,
     skirtings,
     without_excess,
@@ -29,7 +30,6 @@ from vobench.asset.shape import at
 from vobench.scene.mesh import moved
 
 PANORAMAS = ("city", "city", "suburb", "country")
-PIECE_FACES_PER_M2 = 715.0
 OPTIONAL = ("sill_mug", "fruit", "bin", "socket", "mug", "sill_plant", "shoes", "keyboard", "plant", "picture")
 
 
@@ -65,7 +65,7 @@ def furnished_flat(seed: int, lighting: str) -> Interior:
             skirtings(layout)
     instances = tuple(shell(plan, finishes, thresholds=wood(style.tones)))
     placed = [piece for layout in layouts.values() for piece in layout.placed]
-    pieces = without_excess(placed, round(PIECE_FACES_PER_M2 * plan.area_m2), OPTIONAL)
+    pieces = without_excess(placed, most_faces(plan), OPTIONAL)
     lamps = [light for layout in layouts.values() for light in layout.lights]
     return Interior(plan, instances, pieces, (*lamps, *outside.lights))
 
@@ -472,7 +472,7 @@ def _coats(layout: RoomLayout, style: Style) -> None:
     if rack is not None:
         for _ in range(int(rng.integers(0, 3))):
             y = float(rng.uniform(-0.3, 0.3)) * rack_m
-            body = rack.rect(0.02, 0.36, y - 0.13, y + 0.13)
+            body = rack.rect(0.02, 0.38, y - 0.17, y + 0.17)
             if layout.fits([body]):
                 turn_deg = rack.yaw_deg + float(rng.normal(0, 8))
                 layout.add("shoes", bedroom.shoes, rack.at(0.05, y), yaw_deg=turn_deg)

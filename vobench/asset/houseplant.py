@@ -114,7 +114,7 @@ def _tree(rng: Rng, height_m: float, pot_m: float) -> tuple[list[MeshArrays], li
     trunk_path = [[0, 0, 0.8 * pot_m], [*bend, 0.5 * height_m], [*(1.4 * bend), top_m]]
     stems = [tube_arrays(np.array(trunk_path, float), 0.012 * height_m + 0.004, sections=6)]
     blades = []
-    for k in range(11):
+    for k in range(8):
         turn_deg = 137.5 * k + rng.uniform(-20, 20)
         start_m = rng.uniform(0.48, 0.76) * height_m
         reach_m = rng.uniform(0.1, 0.19) * height_m

@@ -48,6 +48,8 @@ LANDING_M = 0.75  # in front of a doorway nothing stands
 BODY_RADIUS_M = 0.28  # of what has to get through, with a little room
 CELL_M = 0.1  # of the map of free floor
 CASING_M = 0.08  # beside and above a door
+FACES = 20000  # of the pieces of a place, at most, and so many more per square metre of floor
+FACES_PER_M2 = 410
 TRIES = 7  # places along a wall
 
 
@@ -560,6 +562,11 @@ class RoomLayout:
             self.lights.append(AreaLight(name, mesh, power_lm, colour=colour))
         else:
             self.placed.append(Placed(name, self.room.name, (Part(mesh, WHITE),), SHELL))
+
+
+def most_faces(plan: FloorPlan) -> int:
+    """How many faces the pieces of a place should have at most."""
+    return round(FACES + FACES_PER_M2 * plan.area_m2)
 
 
 def _face_count(piece: Placed) -> int:

@@ -310,7 +310,7 @@ def _worktop_things(rng: Rng, first_m: float, last_m: float, taken_y: Sequence[f
     kinds = rng.permutation(["kettle", "jars", "bottle", "board", "knives", "jar"]).tolist()
     parts = list[Part]()
     for y, kind in zip(free, kinds, strict=False):
-        is_used = rng.random() < 0.75
+        is_used = rng.random() < 0.6
         if is_used:
             T_row_thing = at(0.17 + rng.uniform(0, 0.04), y, WORKTOP_M)
             parts += [part.moved(T_row_thing) for part in _worktop_thing(rng, kind)]

@@ -81,6 +81,7 @@ class Style:
     cloths: tuple[str, ...]
     accent_cloths: tuple[str, ...]
     has_slat_chairs: bool
+    has_pads: bool
     curtain: str
     linen: str
     cover: str
@@ -121,6 +122,7 @@ def home_style(rng: Rng) -> Style:
         cloths=tuple(cloths[:4]),
         accent_cloths=tuple(rng.permutation(ACCENT_CLOTHS).tolist()[:2]),
         has_slat_chairs=bool(rng.random() < 0.88),
+        has_pads=bool(rng.random() < 0.5),
         curtain=one_of(rng, *CURTAINS),
         linen=one_of(rng, *LINENS),
         cover=one_of(rng, *COVERS),
@@ -170,6 +172,7 @@ def office_style(rng: Rng) -> Style:
         cloths=tuple(cloths[:4]),
         accent_cloths=tuple(rng.permutation(ACCENT_CLOTHS).tolist()[:2]),
         has_slat_chairs=True,
+        has_pads=False,
         curtain=one_of(rng, *CURTAINS),
         linen=one_of(rng, *LINENS),
         cover=one_of(rng, *CLOTHS),

@@ -17,6 +17,7 @@ from vobench.asset.interior import (
     RoomLayout,
     Spot,
     door_fittings,
+    most_faces,
     shell,
     skirtings,
     without_excess,
@@ -27,7 +28,6 @@ from vobench.scene.material import Material
 from vobench.scene.mesh import quad
 
 PANORAMAS = ("city", "city", "city", "suburb")
-PIECE_FACES_PER_M2 = 715.0
 OPTIONAL = ("sill_mug", "socket", "mug", "keyboard", "sill_plant", "plant", "picture")
 DESK_M = 0.8  # depth
 SEAT_M = 0.72  # of floor behind a desk for its chair
@@ -55,7 +55,7 @@ def furnished_office(seed: int, lighting: str) -> Interior:
     )
     lamp_rng = np.random.default_rng([seed, 14])
     # Offices are lit by day, too.
-    share = max(outside.lamp_share, 0.5)
+    share = max(outside.lamp_share, 0.75)
     desk_tops = one_of(rng, "wood", "wood", "#dedcd6", "#c9cac6", "#5b5f62")
     top = wood(style.tones) if desk_tops == "wood" else coated(desk_tops, roughness=0.35)
     kind = one_of(rng, "bars", "squares", "hanging")
@@ -70,7 +70,7 @@ def furnished_office(seed: int, lighting: str) -> Interior:
         skirtings(layout, height_m=0.07)
     instances = tuple(shell(plan, finishes, thresholds=STEEL))
     placed = [piece for layout in layouts.values() for piece in layout.placed]
-    pieces = without_excess(placed, round(PIECE_FACES_PER_M2 * plan.area_m2), OPTIONAL)
+    pieces = without_excess(placed, most_faces(plan), OPTIONAL)
     lamps = [light for layout in layouts.values() for light in layout.lights]
     return Interior(plan, instances, pieces, (*lamps, *outside.lights))
 
@@ -95,7 +95,8 @@ def _ceiling_lamps(layout: RoomLayout, style: Style, kind: str, *, is_on: bool) 
     columns = max(1, round(length_m / 4.4))
     rows = max(1, round(across_m / 4.6))
     height_m = layout.plan.height_m
-    drop_m = 0.55 if kind == "hanging" else 0.06
+    hangs = kind == "hanging" and layout.room.use != "pantry"
+    drop_m = 0.55 if hangs else 0.06
     power_lm = 230 * rect.area_m2 / (columns * rows)
     colour = lamp_colour(style.lamp_k)
     for column in range(columns):
@@ -141,7 +142,7 @@ def _workplace(layout: RoomLayout, style: Style, spot: Spot, width_m: float, top
         "chair",
         office.task_chair,
         spot.at(chair_x, float(rng.normal(0, 0.06))),
-        yaw_deg=spot.yaw_deg + 180 + float(rng.normal(0, 25)),
+        yaw_deg=spot.yaw_deg + 180 + float(np.clip(rng.normal(0, 25), -40, 40)),
         beside=(desk,),
         colour=style.cloths[0],
     )
@@ -343,7 +344,7 @@ def _wall_things(layout: RoomLayout, style: Style, posters: int) -> None:
         width_m, height_m = (0.84, 1.18) if kind == "talk" else (0.6, 0.85)
         layout.hang(
             "picture",
-            fitting.framed,
+            furnishing.framed_print,
             (width_m, height_m),
             middle_m=1.6,
             style=kind,
