@@ -8,7 +8,7 @@ import numpy as np
 
 from vobench.asset import bedroom, fitting, furniture, household, houseplant, kitchen, office
 from vobench.asset.daylight import lamp_colour
-from vobench.asset.floor_plan import SIDES, FloorPlan, Side, Window, along_m
+from vobench.asset.floor_plan import SIDES, FloorPlan, Rect, Side, Window, along_m
 from vobench.asset.furniture import DARK, Part, cloth, coated, put, stood
 from vobench.asset.interior import GAP_M, SHELL, WALL, RoomLayout, Span, Spot, corners_of
 from vobench.asset.palette import Style
@@ -159,8 +159,27 @@ def _on_sill(layout: RoomLayout, spot: Spot, window: Window, width_m: float, dep
         layout.add("sill_mug", furniture.mug, spot.at(x, y), z_m, support=SHELL)
 
 
+def middle_of_floor(layout: RoomLayout) -> tuple[float, float]:
+    """The middle (x, y) of a room, or of what a row of kitchen units leaves of it."""
+    rect = layout.room.rect
+    row = next((piece for piece in layout.placed if ".kitchen_row_" in piece.name), None)
+    if row is None:
+        return rect.center_m
+    corners = corners_of(row.parts)
+    low_x, low_y, _ = corners.min(axis=0).tolist()
+    high_x, high_y, _ = corners.max(axis=0).tolist()
+    # What is left is the largest of the four rectangles beside the row.
+    beside = [
+        Rect(rect.x0, rect.y0, low_x, rect.y1),
+        Rect(high_x, rect.y0, rect.x1, rect.y1),
+        Rect(rect.x0, rect.y0, rect.x1, low_y),
+        Rect(rect.x0, high_y, rect.x1, rect.y1),
+    ]
+    return max(beside, key=lambda left: max(left.width_m, 0) * max(left.depth_m, 0)).center_m
+
+
 def small_lamps(layout: RoomLayout, style: Style, *, is_on: bool) -> None:
-    """The bulbs of floor lamps and table lamps, of which at most two shine."""
+    """Light from the shades of at most two floor lamps and table lamps."""
     colour = lamp_colour(style.lamp_k)
     number = 0
     for piece in list(layout.placed):
@@ -171,10 +190,11 @@ def small_lamps(layout: RoomLayout, style: Style, *, is_on: bool) -> None:
         low_m = corners.min(axis=0)
         high_m = corners.max(axis=0)
         x_m, y_m = ((low_m + high_m) / 2)[:2].tolist()
-        is_tall = ".floor_lamp_" in piece.name
-        bulb = household.bulb(x_m, y_m, float(high_m[2]) - 0.15, 0.1)
-        power_lm = 900.0 if is_tall else 420.0
-        layout.lamp("small_lamp", bulb, power_lm, is_on=is_on and number < 2, colour=colour)
+        is_shining = is_on and number < 2
+        if is_shining:
+            shade = household.glowing_shade(x_m, y_m, float(high_m[2]), float(high_m[0] - low_m[0]))
+            power_lm = 550.0 if ".floor_lamp_" in piece.name else 280.0
+            layout.lamp("small_lamp", shade, power_lm, is_on=True, colour=colour)
         number += 1
 
 
@@ -644,3 +664,8 @@ def _rod(_: Rng, length_m: float) -> list[Part]:
     """A rod for curtains, along y."""
     path_m = np.array([[0.0, -length_m / 2, 0.0], [0.0, length_m / 2, 0.0]])
     return [Part(tube(path_m, 0.012, sections=8), DARK)]
+
+
+def pendant(rng: Rng, drop_m: float, colour: str, wide_m: float) -> list[Part]:
+    """A pendant lamp, like that of `household`, with fewer faces."""
+    return household.pendant(rng, drop_m, colour, wide_m, sections=22)

@@ -26,8 +26,7 @@ from vobench.asset.interior import (
 )
 from vobench.asset.palette import Style, home_style
 from vobench.asset.picture import Rng, one_of
-from vobench.asset.shape import at
-from vobench.scene.mesh import moved
+from vobench.scene.mesh import quad
 
 PANORAMAS = ("city", "city", "suburb", "country")
 OPTIONAL = ("sill_mug", "fruit", "bin", "socket", "mug", "sill_plant", "shoes", "keyboard", "plant", "picture")
@@ -90,26 +89,39 @@ def _finish(rng: Rng, room: Room, style: Style) -> RoomFinish:
 
 
 def _ceiling_lamps(layout: RoomLayout, style: Style, *, is_on: bool) -> None:
-    """A pendant over the dining table, and a dome or a pendant near the middle of the ceiling."""
+    """A pendant over the dining table, and a lamp near the middle of the ceiling."""
     rng = layout.rng
     area_m2 = layout.room.rect.area_m2
     power_lm = float(np.clip(150 * area_m2, 1000, 4200)) * float(rng.uniform(0.85, 1.2))
-    x_m, y_m = layout.room.rect.center_m
+    x_m, y_m = furnishing.middle_of_floor(layout)
     table = next((piece for piece in layout.placed if ".dining_table_" in piece.name), None)
     if table is not None:
         corners = corners_of(table.parts)
         table_x, table_y = ((corners.min(axis=0) + corners.max(axis=0)) / 2)[:2].tolist()
         _pendant(layout, style, (table_x, table_y), 1.55, 800.0, is_on=is_on)
         if np.hypot(table_x - x_m, table_y - y_m) < 0.7:
-            x_m += 0.9 * float(np.sign(x_m - table_x) or 1.0)
+            return
     hangs = table is None and layout.room.use in ("living", "bedroom", "study") and rng.random() < 0.45
     if hangs:
         _pendant(layout, style, (x_m, y_m), 2.05, power_lm, is_on=is_on)
         return
-    base, dome = household.ceiling_dome(float(rng.choice([0.3, 0.4, 0.5])))
-    layout.add("lamp_base", lambda _: base, (x_m, y_m), layout.plan.height_m, support=CEILING)
-    T_place_dome = at(x_m, y_m, layout.plan.height_m)
-    layout.lamp("lamp", moved(dome, T_place_dome), power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
+    width_m = float(rng.choice([0.3, 0.4, 0.5]))
+    is_round = rng.random() < 0.55
+    height_m = layout.plan.height_m
+    layout.add(
+        "lamp_body",
+        household.ceiling_lamp,
+        (x_m, y_m),
+        height_m,
+        support=CEILING,
+        width_m=width_m,
+        is_round=bool(is_round),
+    )
+    low_m = height_m - household.CEILING_LAMP_M - 0.002
+    half_m = 0.45 * width_m
+    square = quad((x_m - half_m, y_m - half_m, low_m), (0, 2 * half_m, 0), (2 * half_m, 0, 0))
+    face = household.diffuser(x_m, y_m, low_m, 2 * half_m) if is_round else square
+    layout.lamp("lamp", face, power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
 
 
 def _pendant(
@@ -118,19 +130,19 @@ def _pendant(
     """A pendant whose shade ends at a height above the floor, and its bulb."""
     rng = layout.rng
     height_m = layout.plan.height_m
+    wide_m = float(rng.choice([0.36, 0.46, 0.56]))
     layout.add(
         "pendant",
-        household.pendant,
+        furnishing.pendant,
         xy_m,
         height_m,
         support=CEILING,
         drop_m=height_m - low_m,
         colour=one_of(rng, "#2c4a4a", "#27445c", "#262b30", "#c9c4b8", "#b4533a", "#5c6b5a", "#d8c3a0"),
-        wide_m=float(rng.choice([0.36, 0.46, 0.56])),
-        sections=22,
+        wide_m=wide_m,
     )
-    bulb = household.bulb(*xy_m, low_m + 0.07, 0.12)
-    layout.lamp("lamp", bulb, power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
+    disc = household.diffuser(*xy_m, low_m + 0.035, 0.94 * wide_m)
+    layout.lamp("lamp", disc, power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
 
 
 # --- Rooms by use ---

@@ -226,6 +226,9 @@ def television(
     ]
 
 
+SHADE_M = 0.28  # height of the shade of a floor lamp
+
+
 def _shade(colour: str, width_m: float, height_m: float) -> list[Part]:
     """A conical lampshade of cloth on z = 0, open at both ends and white inside."""
     angle = np.linspace(0, 2 * np.pi, 33)
@@ -258,8 +261,8 @@ def floor_lamp(
     foot_profile = mm("0 0, 130 0, 130 12, 40 22, 12 30, 0 30") * [1, 1]
     foot = lathe(foot_profile * (0.6 + 0.25 * height_m))
     stem = tube(np.array([[0, 0, 0.01], [0, 0, height_m - 0.2]]), 0.011)
-    raised = at(z_m=height_m - 0.28)
-    shade = [part.moved(raised) for part in _shade(colour, wide_m, 0.28)]
+    raised = at(z_m=height_m - SHADE_M)
+    shade = [part.moved(raised) for part in _shade(colour, wide_m, SHADE_M)]
     return [put(foot, BLACK), put(stem, STEEL), *shade]
 
 
@@ -286,12 +289,32 @@ def pendant(
     ]
 
 
-def ceiling_dome(width_m: float = 0.4) -> tuple[list[Part], "Trimesh"]:
-    """A round ceiling lamp below z = 0: its base, and the dome that shines."""
-    scale = width_m / 0.4
-    dome = lathe(mm("0 -85, 80 -80, 140 -62, 180 -34, 190 -12, 0 -11") * [scale, 1], sections=24)
-    base = lathe(mm("0 -12, 200 -12, 200 0, 0 0") * [scale, 1], sections=24)
-    return [put(base, STEEL)], dome
+def diffuser(x_m: float, y_m: float, z_m: float, width_m: float) -> "Trimesh":
+    """A disc that looks down, for the mesh of a lamp in a shade."""
+    angle = np.linspace(0, 2 * np.pi, 17)
+    ring = np.stack([width_m / 2 * np.cos(angle), width_m / 2 * np.sin(angle), 0 * angle], axis=-1)
+    middle = np.zeros_like(ring)
+    disc = sheet(np.stack([middle, ring]))
+    looks_down = disc.face_normals[0, 2] < 0
+    return moved(disc if looks_down else flipped(disc), at(x_m, y_m, z_m))
+
+
+def glowing_shade(x_m: float, y_m: float, top_m: float, width_m: float) -> "Trimesh":
+    """The outside of the shade of a floor lamp whose top is at `top_m`, for the mesh of a lamp."""
+    outer = _shade(SAND, 1.01 * width_m, SHADE_M)[0]
+    return moved(outer.mesh, at(x_m, y_m, top_m - SHADE_M))
+
+
+CEILING_LAMP_M = 0.07  # height of a ceiling lamp
+
+
+def ceiling_lamp(_: Rng, width_m: float = 0.4, *, is_round: bool = True) -> list[Part]:
+    """The body of a flat lamp below z = 0, round or square. What shines is to be at its lower face."""
+    paint = matt("#dcdbd6")
+    if is_round:
+        profile = [[0, -CEILING_LAMP_M], [width_m / 2, -CEILING_LAMP_M], [width_m / 2, 0], [0, 0]]
+        return [put(lathe(np.array(profile), sections=24), paint)]
+    return [stood((width_m, width_m, CEILING_LAMP_M), paint, 0, 0, -CEILING_LAMP_M, bevel=0.006)]
 
 
 def fruit_bowl(rng: Rng) -> list[Part]:

@@ -20,7 +20,7 @@ CHAIR_SEAT_M = 0.62  # above which a chair must not reach into its table
 CELL_M = 0.05
 BODY_RADIUS_M = 0.25
 BODY_HEIGHT_M = 1.0
-FACES = 22000.0  # at most, and so many more per square metre of floor
+FACES = 25000.0  # at most, and so many more per square metre of floor
 FACES_PER_M2 = 450.0
 FREE_ROOM_M2 = 0.4
 
