@@ -94,6 +94,9 @@ def _ceiling_lamps(layout: RoomLayout, style: Style, kind: str, *, is_on: bool) 
     across_m = min(rect.width_m, rect.depth_m)
     columns = max(1, round(length_m / 4.4))
     rows = max(1, round(across_m / 4.6))
+    if layout.room.use == "pantry":
+        columns = 1
+        rows = 1
     height_m = layout.plan.height_m
     hangs = kind == "hanging" and layout.room.use != "pantry"
     drop_m = 0.55 if hangs else 0.06
@@ -105,6 +108,8 @@ def _ceiling_lamps(layout: RoomLayout, style: Style, kind: str, *, is_on: bool) 
             across = (row + 0.5) * across_m / rows
             x_m = rect.x0 + (along if is_along_x else across)
             y_m = rect.y0 + (across if is_along_x else along)
+            if layout.room.use == "pantry":
+                x_m, y_m = furnishing.middle_of_floor(layout)
             z_m = height_m - drop_m
             half_x = size_m[0] / 2 if is_along_x else size_m[1] / 2
             half_y = size_m[1] / 2 if is_along_x else size_m[0] / 2
