@@ -6,7 +6,7 @@ import pytest
 from vobench.asset import furniture, home, workplace
 from vobench.asset.floor_plan import FloorPlan, Passage, Rect, Room, Window
 from vobench.asset.furniture import WHITE
-from vobench.asset.interior import FLOOR, Interior, Placed, RoomFinish, RoomLayout, Spot, shell, without_excess
+from vobench.asset.interior import FLOOR, Interior, PlacedPiece, RoomFinish, RoomLayout, Spot, shell, without_excess
 
 HALL = Room("hall_1", "hall", Rect(0, 0, 4, 2))
 STUDY = Room("study_1", "study", Rect(0, 2.12, 4, 5))
@@ -124,7 +124,7 @@ def test_a_piece_depends_on_its_name_and_the_seed_alone() -> None:
 def test_optional_pieces_are_left_out_until_the_faces_are_few_enough() -> None:
     block = furniture.stood((1, 1, 1), WHITE)
     names = ["a.table_1", "a.mug_1", "a.mug_2", "a.plant_1"]
-    pieces = [Placed(name, "a", (block,), FLOOR) for name in names]
+    pieces = [PlacedPiece(name, "a", (block,), FLOOR) for name in names]
     count = len(block.arrays.faces)
     kept = without_excess(pieces, 2 * count, ("mug", "plant"))
     assert [piece.name for piece in kept] == ["a.table_1", "a.plant_1"]

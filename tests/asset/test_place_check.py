@@ -7,7 +7,7 @@ import pytest
 
 from vobench.asset import home, place_check
 from vobench.asset.furniture import WHITE, stood
-from vobench.asset.interior import FLOOR, Interior, Placed
+from vobench.asset.interior import FLOOR, Interior, PlacedPiece
 from vobench.asset.shape import at
 from vobench.scene.light import AreaLight
 
@@ -19,16 +19,16 @@ def flat() -> Interior:
     return interior
 
 
-def with_piece(interior: Interior, piece: Placed) -> Interior:
+def with_piece(interior: Interior, piece: PlacedPiece) -> Interior:
     others = [each for each in interior.pieces if each.name != piece.name]
     return replace(interior, pieces=(*others, piece))
 
 
-def moved(piece: Placed, x_m: float = 0.0, y_m: float = 0.0, z_m: float = 0.0) -> Placed:
+def moved(piece: PlacedPiece, x_m: float = 0.0, y_m: float = 0.0, z_m: float = 0.0) -> PlacedPiece:
     return replace(piece, parts=tuple(part.moved(at(x_m, y_m, z_m)) for part in piece.parts))
 
 
-def named(interior: Interior, text: str) -> Placed:
+def named(interior: Interior, text: str) -> PlacedPiece:
     return next(piece for piece in interior.pieces if text in piece.name)
 
 
@@ -66,7 +66,7 @@ def test_a_piece_that_stands_in_a_wall_is_reported(flat: Interior) -> None:
 def test_a_room_behind_a_blocked_door_is_reported(flat: Interior) -> None:
     door = next(passage for passage in flat.plan.passages if "bath_1" in passage.rooms)
     x_m, y_m = door.rect.center_m
-    crate = Placed("bath_1.crate_1", "bath_1", (stood((0.9, 0.9, 0.8), WHITE, x_m, y_m),), FLOOR)
+    crate = PlacedPiece("bath_1.crate_1", "bath_1", (stood((0.9, 0.9, 0.8), WHITE, x_m, y_m),), FLOOR)
     found = place_check.complaints(with_piece(flat, crate))
     assert any(complaint.startswith("bath_1 has 0.00 m2") for complaint in found)
 

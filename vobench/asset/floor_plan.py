@@ -183,7 +183,7 @@ class FloorPlan:
 
 
 @dataclass(frozen=True, slots=True)
-class Cell:
+class RoomCell:
     """A part of a storey that becomes a room: its use, and its rectangle to the middle of its walls."""
 
     use: str
@@ -209,7 +209,7 @@ def least_length_m(uses: Sequence[str]) -> float:
     return sum(LEAST_WIDTH_M[use] for use in uses)
 
 
-def divided(rng: Rng, row: Rect, uses: Sequence[str]) -> list[Cell]:
+def divided(rng: Rng, row: Rect, uses: Sequence[str]) -> list[RoomCell]:
     """A row along x divided into rooms: each has its least width, and the rest is shared at random."""
     spare_m = row.width_m - least_length_m(uses)
     least_m = np.array([LEAST_WIDTH_M[use] for use in uses])
@@ -219,7 +219,7 @@ def divided(rng: Rng, row: Rect, uses: Sequence[str]) -> list[Cell]:
     ends_m[-1] = row.x1
     starts_m = np.array([row.x0, *ends_m[:-1]])
     return [
-        Cell(use, Rect(x0, row.y0, x1, row.y1))
+        RoomCell(use, Rect(x0, row.y0, x1, row.y1))
         for use, x0, x1 in zip(uses, starts_m.tolist(), ends_m.tolist(), strict=True)
     ]
 
@@ -232,7 +232,7 @@ def longest_that_fits(rng: Rng, length_m: float, choices: Sequence[Sequence[str]
     return list(best[int(rng.integers(len(best)))])
 
 
-def rooms_of(cells: Sequence[Cell]) -> list[Room]:
+def rooms_of(cells: Sequence[RoomCell]) -> list[Room]:
     """A room for each cell, named after its use and numbered."""
     counts = dict[str, int]()
     rooms = []
@@ -425,7 +425,7 @@ def _turned_at_random(rng: Rng, plan: FloorPlan) -> FloorPlan:
     return shifted(turned, -x_m, -y_m)
 
 
-Layout = tuple[list[Cell], list[Side]]  # the rooms of a storey, and its sides without windows
+Layout = tuple[list[RoomCell], list[Side]]  # the rooms of a storey, and its sides without windows
 
 # --- Offices ---
 
@@ -495,7 +495,7 @@ def _office_with_row(rng: Rng) -> Layout:
     choices += [["cell", "meeting", "cell", "pantry"], ["meeting", "cell", "cell"]]
     row = longest_that_fits(rng, length_m, choices)
     cells = [
-        Cell("open", Rect(0, 0, length_m, south_m)),
+        RoomCell("open", Rect(0, 0, length_m, south_m)),
         *divided(rng, Rect(0, south_m, length_m, south_m + north_m), row),
     ]
     return cells, _ends(rng)
@@ -512,7 +512,7 @@ def _office_along_corridor(rng: Rng) -> Layout:
     north = longest_that_fits(rng, length_m, north_choices)
     depth_m = south_m + hall_m + north_m
     cells = [
-        Cell("hall", Rect(0, south_m, length_m, south_m + hall_m)),
+        RoomCell("hall", Rect(0, south_m, length_m, south_m + hall_m)),
         *divided(rng, Rect(0, 0, length_m, south_m), south),
         *divided(rng, Rect(0, south_m + hall_m, length_m, depth_m), north),
     ]
@@ -527,10 +527,10 @@ def _office_with_end(rng: Rng) -> Layout:
     choices = [["meeting", "pantry"], ["cell", "meeting"], ["cell", "pantry", "cell"]]
     column = longest_that_fits(rng, depth_m, choices)
     transposed = divided(rng, Rect(0, length_m, depth_m, length_m + end_m), column)
-    cells = [Cell("open", Rect(0, 0, length_m, depth_m))]
+    cells = [RoomCell("open", Rect(0, 0, length_m, depth_m))]
     for cell in transposed:
         rect = cell.rect
-        cells.append(Cell(cell.use, Rect(rect.y0, rect.x0, rect.y1, rect.x1)))
+        cells.append(RoomCell(cell.use, Rect(rect.y0, rect.x0, rect.y1, rect.x1)))
     return cells, _ends(rng)
 
 
@@ -584,10 +584,10 @@ def _flat_with_end_room(rng: Rng) -> Layout:
     south = longest_that_fits(rng, length_m, [["bedroom"], ["bedroom", "study"], ["study", "bedroom"]])
     north = longest_that_fits(rng, length_m, [["bath", "kitchen"]])
     cells = [
-        Cell("hall", Rect(0, south_m, length_m, south_m + hall_m)),
+        RoomCell("hall", Rect(0, south_m, length_m, south_m + hall_m)),
         *divided(rng, Rect(0, 0, length_m, south_m), south),
         *divided(rng, Rect(0, south_m + hall_m, length_m, depth_m), north),
-        Cell("living", Rect(length_m, 0, length_m + end_m, depth_m)),
+        RoomCell("living", Rect(length_m, 0, length_m + end_m, depth_m)),
     ]
     return cells, _ends(rng)
 
@@ -602,8 +602,8 @@ def _flat_on_one_side(rng: Rng) -> Layout:
     choices += [["kitchen", "living", "bedroom"], ["study", "living", "kitchen"]]
     south = longest_that_fits(rng, length_m, choices)
     cells = [
-        Cell("hall", Rect(0, south_m, length_m - bath_m, south_m + hall_m)),
-        Cell("bath", Rect(length_m - bath_m, south_m, length_m, south_m + hall_m)),
+        RoomCell("hall", Rect(0, south_m, length_m - bath_m, south_m + hall_m)),
+        RoomCell("bath", Rect(length_m - bath_m, south_m, length_m, south_m + hall_m)),
         *divided(rng, Rect(0, 0, length_m, south_m), south),
     ]
     return cells, ["north", *_ends(rng)]
@@ -620,7 +620,7 @@ def _flat_on_both_sides(rng: Rng) -> Layout:
     north = longest_that_fits(rng, length_m, north_choices)
     depth_m = south_m + hall_m + north_m
     cells = [
-        Cell("hall", Rect(0, south_m, length_m, south_m + hall_m)),
+        RoomCell("hall", Rect(0, south_m, length_m, south_m + hall_m)),
         *divided(rng, Rect(0, 0, length_m, south_m), south),
         *divided(rng, Rect(0, south_m + hall_m, length_m, depth_m), north),
     ]
@@ -634,8 +634,8 @@ def _flat_of_one_room(rng: Rng) -> Layout:
     length_m = rng.uniform(7.2, 8.8)
     bath_m = rng.uniform(2.3, 3.0)
     cells = [
-        Cell("hall", Rect(0, south_m, length_m - bath_m, south_m + north_m)),
-        Cell("bath", Rect(length_m - bath_m, south_m, length_m, south_m + north_m)),
+        RoomCell("hall", Rect(0, south_m, length_m - bath_m, south_m + north_m)),
+        RoomCell("bath", Rect(length_m - bath_m, south_m, length_m, south_m + north_m)),
         *divided(rng, Rect(0, 0, length_m, south_m), ["living", "kitchen"]),
     ]
     return cells, ["north", *_ends(rng)]

@@ -54,7 +54,7 @@ TRIES = 7  # places along a wall
 
 
 @dataclass(frozen=True, slots=True)
-class Placed:
+class PlacedPiece:
     """A piece of furniture: its name, its room, its parts in the frame of the place, and what holds it.
 
     `beside` names pieces whose bounding boxes it may enter, as a chair does under a table.
@@ -82,7 +82,7 @@ class Interior:
 
     plan: FloorPlan
     shell: tuple[Instance, ...]
-    pieces: tuple[Placed, ...]
+    pieces: tuple[PlacedPiece, ...]
     lights: tuple[Light, ...]
 
     def place(self) -> GeneratedPlace:
@@ -276,7 +276,7 @@ class RoomLayout:
     room: Room
     seed: int
     rng: Rng
-    placed: list[Placed] = field(default_factory=list)
+    placed: list[PlacedPiece] = field(default_factory=list)
     lights: list[Light] = field(default_factory=list)
     _bodies: list[_Body] = field(default_factory=list)
     _kept_free: list[Rect] = field(default_factory=list)
@@ -476,7 +476,7 @@ class RoomLayout:
         name = self.name(kind)
         T_place_piece = at(*xy_m, z_m, yaw=yaw_deg)
         parts = tuple(part.moved(T_place_piece) for part in make(self.rng_of(name), **size))
-        self.placed.append(Placed(name, self.room.name, parts, support, tuple(beside)))
+        self.placed.append(PlacedPiece(name, self.room.name, parts, support, tuple(beside)))
         return name
 
     def take(self, body: Rect, height_m: float) -> None:
@@ -561,7 +561,7 @@ class RoomLayout:
         if is_on:
             self.lights.append(AreaLight(name, mesh, power_lm, colour=colour))
         else:
-            self.placed.append(Placed(name, self.room.name, (Part(mesh, WHITE),), SHELL))
+            self.placed.append(PlacedPiece(name, self.room.name, (Part(mesh, WHITE),), SHELL))
 
 
 def most_faces(plan: FloorPlan) -> int:
@@ -569,11 +569,11 @@ def most_faces(plan: FloorPlan) -> int:
     return round(FACES + FACES_PER_M2 * plan.area_m2)
 
 
-def _face_count(piece: Placed) -> int:
+def _face_count(piece: PlacedPiece) -> int:
     return sum(len(part.arrays.faces) for part in piece.parts)
 
 
-def without_excess(pieces: Sequence[Placed], faces: int, optional: Sequence[str]) -> tuple[Placed, ...]:
+def without_excess(pieces: Sequence[PlacedPiece], faces: int, optional: Sequence[str]) -> tuple[PlacedPiece, ...]:
     """The pieces without as many of some optional kinds, the last ones first, as leave at most a number of faces.
 
     Nothing may lie on pieces of these kinds. Lamps do not count, so that switching them changes nothing else.

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from vobench.asset.floor_plan import Room
-from vobench.asset.interior import CEILING, FLOOR, SHELL, WALL, Interior, Placed
+from vobench.asset.interior import CEILING, FLOOR, SHELL, WALL, Interior, PlacedPiece
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Sky, Sun
 
@@ -29,12 +29,12 @@ FREE_ROOM_M2 = 0.4
 class _Box:
     """The bounding box of a piece."""
 
-    piece: Placed
+    piece: PlacedPiece
     low_m: Array
     high_m: Array
 
 
-def _box(piece: Placed) -> _Box:
+def _box(piece: PlacedPiece) -> _Box:
     vertices = np.concatenate([part.arrays.vertices_m for part in piece.parts])
     return _Box(piece, vertices.min(axis=0), vertices.max(axis=0))
 
@@ -59,7 +59,7 @@ def face_count(interior: Interior) -> int:
     return sum(len(part.arrays.faces) for part in parts) + sum(len(lamp.mesh.faces) for lamp in lamps)
 
 
-def _is_furniture(piece: Placed) -> bool:
+def _is_furniture(piece: PlacedPiece) -> bool:
     """Whether a piece is something that may not enter others, unlike linings, frames and curtains."""
     return piece.support != SHELL or ".leaf_" in piece.name
 

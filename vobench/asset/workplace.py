@@ -28,10 +28,11 @@ from vobench.scene.material import Material
 from vobench.scene.mesh import quad
 
 PANORAMAS = ("city", "city", "city", "suburb")
-OPTIONAL = ("sill_mug", "socket", "mug", "keyboard", "sill_plant", "plant", "picture")
+OPTIONAL = ("sill_mug", "socket", "mug", "keyboard", "sill_plant", "plant", "picture", "pedestal")
 DESK_M = 0.8  # depth
 SEAT_M = 0.72  # of floor behind a desk for its chair
 AISLE_M = 0.95
+COATS_M = 0.2  # from the wall to the outside of coats on hooks
 SCREENS = 4  # pictures on displays, from which those of an office are drawn
 
 
@@ -518,7 +519,7 @@ def _furnish_hall(layout: RoomLayout, style: Style, top: Material) -> None:
         layout.stand("copier", office.copier, (0.68, 0.62, 1.06), back_m=0.31)
     if rng.random() < 0.5:
         rack_m = 1.1
-        layout.hang(
+        rack = layout.hang(
             "coat_rack",
             bedroom.coat_rack,
             (rack_m + 0.24, 1.3),
@@ -526,6 +527,8 @@ def _furnish_hall(layout: RoomLayout, style: Style, top: Material) -> None:
             width_m=rack_m,
             tones=style.tones,
         )
+        if rack is not None:
+            layout.take(rack.body(COATS_M, rack_m + 0.2), 1.8)
     for _ in range(int(rng.integers(1, 3))):
         furnishing.floor_plant(layout)
     _wall_things(layout, style, int(rng.integers(2, 5)))
