@@ -33,7 +33,7 @@ WHEELED_BODIES = ("pioneer", "car")
 CAR = "kitti_like"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class BodyHabits:
     """How a body moves, and the space that it takes.
 
@@ -60,10 +60,57 @@ class BodyHabits:
 # Engineering choices. The Pioneer is 0.4 m wide. The car is that of KITTI, with the middle of the rear axle as its
 # origin. People walk slowly where they look around; a hand neither stops nor turns on the spot.
 HABITS: dict[str, BodyHabits] = {
-    "pioneer": BodyHabits(0.25, (0.0,), 0.05, 0.6, 0.25, 0.35, (0.25, 0.6), 0.5, 0.5, 1.2, 5.0),
-    "car": BodyHabits(1.05, (0.0, 1.35, 2.7), 0.15, 1.7, 1.5, 6.0, (4.0, 10.0), 1.8, 2.5, 0.6, 80.0, (1.0, 3.0)),
-    "hand": BodyHabits(0.25, (0.0,), 0.05, 1.9, 0.35, 0.45, (0.6, 1.1), 0.6, 0.9, 1.6),
-    "quadrotor": BodyHabits(0.25, (0.0,), 0.15, 1.9, 0.4, 0.8, (0.5, 1.2), 0.8, 1.5, 1.5),
+    "pioneer": BodyHabits(
+        radius_m=0.25,
+        discs_m=(0.0,),
+        margin_m=0.05,
+        column_m=0.6,
+        step_m=0.25,
+        turn_radius_m=0.35,
+        speed_mps=(0.25, 0.6),
+        accel_mps2=0.5,
+        lateral_mps2=0.5,
+        yaw_radps=1.2,
+        stop_every_m=5.0,
+    ),
+    "car": BodyHabits(
+        radius_m=1.05,
+        discs_m=(0.0, 1.35, 2.7),
+        margin_m=0.15,
+        column_m=1.7,
+        step_m=1.5,
+        turn_radius_m=6.0,
+        speed_mps=(4.0, 10.0),
+        accel_mps2=1.8,
+        lateral_mps2=2.5,
+        yaw_radps=0.6,
+        stop_every_m=80.0,
+        stop_s=(1.0, 3.0),
+    ),
+    "hand": BodyHabits(
+        radius_m=0.25,
+        discs_m=(0.0,),
+        margin_m=0.05,
+        column_m=1.9,
+        step_m=0.35,
+        turn_radius_m=0.45,
+        speed_mps=(0.6, 1.1),
+        accel_mps2=0.6,
+        lateral_mps2=0.9,
+        yaw_radps=1.6,
+    ),
+    "quadrotor": BodyHabits(
+        radius_m=0.25,
+        discs_m=(0.0,),
+        margin_m=0.15,
+        column_m=1.9,
+        step_m=0.4,
+        turn_radius_m=0.8,
+        speed_mps=(0.5, 1.2),
+        accel_mps2=0.8,
+        lateral_mps2=1.5,
+        yaw_radps=1.5,
+    ),
 }
 HAND_HEIGHT_M = (1.35, 1.55)
 HAND_PITCH_DEG = (2.0, 10.0)

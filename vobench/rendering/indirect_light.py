@@ -358,6 +358,15 @@ class _Found:
     take = take
 
 
+def _concatenated(parts: Sequence[_Found]) -> _Found:
+    """What the rays of all parts found, one part after the other."""
+    columns = {}
+    for column in fields(_Found):
+        values = [getattr(part, column.name) for part in parts]
+        columns[column.name] = np.concatenate(values)
+    return _Found(**columns)
+
+
 @dataclass(frozen=True, slots=True)
 class Sample:
     """What rays of some points found: near and far (P, S + L) are tables by how far the last segment of a ray led.
@@ -478,8 +487,7 @@ class Gatherer:
                 self._add_sky(sky, gone)
             if not len(batch.point):
                 break
-        columns = [[getattr(part, field.name) for part in parts] for field in fields(_Found)]
-        found = _Found(*(np.concatenate(column) for column in columns))
+        found = _concatenated(parts)
         found.share[:] /= ray_count
         return Sample(
             self._table(found, found.is_near, len(points)),

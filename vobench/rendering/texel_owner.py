@@ -82,15 +82,14 @@ def _nearest_on(corners: Array, area: float, x: float, y: float) -> tuple[float,
     second = _across(corners[2], corners[0], x, y) / area
     if first >= 0 and second >= 0 and third >= 0:
         return 0.0, second, third
-    distance, along = _nearest_on_edge(corners[0], corners[1], x, y)
-    nearest, u, v = distance, along, 0.0
-    distance, along = _nearest_on_edge(corners[1], corners[2], x, y)
-    if distance < nearest:
-        nearest, u, v = distance, 1 - along, along
-    distance, along = _nearest_on_edge(corners[2], corners[0], x, y)
-    if distance < nearest:
-        nearest, u, v = distance, 0.0, 1 - along
-    return nearest, u, v
+    on_first_edge, to_second = _nearest_on_edge(corners[0], corners[1], x, y)
+    on_second_edge, to_third = _nearest_on_edge(corners[1], corners[2], x, y)
+    on_third_edge, to_first = _nearest_on_edge(corners[2], corners[0], x, y)
+    if on_first_edge <= on_second_edge and on_first_edge <= on_third_edge:
+        return on_first_edge, to_second, 0.0
+    if on_second_edge <= on_third_edge:
+        return on_second_edge, 1 - to_third, to_third
+    return on_third_edge, 0.0, 1 - to_first
 
 
 @compiled
