@@ -217,10 +217,10 @@ def test_a_signature_names_who_signed_and_whether_that_is_verified(honest, tmp_p
         sign(path, tmp_path / "no_key")
 
 
-def with_targets(files, count):
-    """The files with a case of the waypoints in a row."""
+def with_targets(files, count, **options):
+    """The files with a case of that many targets."""
     case = json.loads(files["cases/full/case.json"])
-    trajectory = case["trajectory"] | {"kind": "waypoints", "targets_m": [[0.3, 0.0]] * count}
+    trajectory = case["trajectory"] | {"kind": "waypoints", "targets_m": [[0.3, 0.0]] * count, **options}
     return files | {"cases/full/case.json": json.dumps(case | {"trajectory": trajectory}).encode()}
 
 
@@ -228,7 +228,7 @@ def with_targets(files, count):
     ("forge", "sentence"),
     [
         (lambda files: with_targets(files, 100_000), "its case.json is too long (trajectory.waypoints.targets_m"),
-        (lambda files: with_targets(files, 9_000), "frames; at most 20000000 are possible"),
+        (lambda files: with_targets(files, 9_000, max_time_s=3600.0), "frames; at most 20000000 are possible"),
         (
             lambda files: files | {"cases/full/case.json": b" " * (33 << 20) + files["cases/full/case.json"]},
             "its case.json is larger than 32 MiB",
