@@ -42,7 +42,11 @@ def test_a_program_that_ends_well_has_its_time_and_its_memory(tmp_path):
     ("code", "kind", "sentence"),
     [
         ("print('last words'); raise SystemExit(3)", "crashed", "the process ended with exit code 3: last words"),
-        ("import os; os.kill(os.getpid(), 11)", "crashed", "the process ended with signal SIGSEGV"),
+        (
+            "print('a', flush=True); import os; os.kill(os.getpid(), 11)",
+            "crashed",
+            "the process ended with signal SIGSEGV: a",
+        ),
         ("import os; os.kill(os.getpid(), 9)", "out_of_memory", "killed by the system, most likely for memory"),
         ("print('a'); print('b'); print(' '); raise SystemExit(1)", "crashed", "ended with exit code 1: b"),
     ],

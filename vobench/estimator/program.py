@@ -42,8 +42,7 @@ KEPT_ENVIRONMENT = (
 )
 LOG_BYTES = 1 << 20
 LOG_SPACE_BYTES = 2 * LOG_BYTES  # more disk space than a log of LOG_BYTES needs
-LAST_LINES_BYTES = 4096  # the end of a log that is searched for the last line
-STACK_BYTES = 1 << 16  # the end of a log that is searched for a stack
+END_BYTES = 1 << 16  # the end of a log that is searched for a stack, or for the last line
 STACK_HEADING = "Fatal Python error: "
 # The lines of a stack with the calls of the thread that failed; the innermost call comes first.
 FAILED_THREAD = re.compile(r"^Current thread .*\n((?:  .*\n)*)", re.MULTILINE)
@@ -121,6 +120,7 @@ class Program:
         self._log_path = log
         self._folder = folder
         self._printed = 0
+        self._cut_end = b""
         self._stack = ""
         self._began = time.monotonic()
         self._looked = 0.0
@@ -395,6 +395,10 @@ class Program:
         size = facts.st_size
         kept = min(size, LOG_BYTES)
         self._printed += size - kept
+        if size > kept:
+            start = max(size - END_BYTES, LOG_BYTES)
+            end = self._cut_end + os.pread(self._log, END_BYTES, start)
+            self._cut_end = end[-END_BYTES:]
         if size > kept or facts.st_blocks * STAT_BLOCK_BYTES > LOG_SPACE_BYTES:
             os.ftruncate(self._log, kept)
 
@@ -434,17 +438,20 @@ class Program:
         return "crashed", f"the process ended with {cause}{printed}"
 
     def _printed_stack(self) -> str:
-        """The calls of every thread, which Python's fault handler has printed at the end of the log; empty if none."""
-        start = max(os.fstat(self._log).st_size - STACK_BYTES, 0)
-        text = os.pread(self._log, STACK_BYTES, start).decode("utf-8", "replace")
-        _, heading, stack = text.rpartition(STACK_HEADING)
-        return f"{heading}{stack}"
+        """The calls of every thread, which Python's fault handler has printed at the end; empty if it has not."""
+        _, heading, stack = self._printed_end().rpartition(STACK_HEADING)
+        return f"{heading}{stack}" if heading else ""
+
+    def _printed_end(self) -> str:
+        """The last END_BYTES that the program printed, even if they were cut off the log."""
+        size = os.fstat(self._log).st_size
+        start = max(size - END_BYTES, LOG_BYTES if self._printed else 0)
+        end = self._cut_end + os.pread(self._log, END_BYTES, start)
+        return end[-END_BYTES:].decode("utf-8", "replace")
 
     def _last_line(self) -> str:
-        """The last line of the log that is not blank; empty if there is none."""
-        start = max(os.fstat(self._log).st_size - LAST_LINES_BYTES, 0)
-        text = os.pread(self._log, LAST_LINES_BYTES, start).decode("utf-8", "replace")
-        for line in reversed(text.split("\n")):
+        """The last printed line that is not blank; empty if there is none."""
+        for line in reversed(self._printed_end().split("\n")):
             printed = in_one_line(line, LINE_LETTERS)
             if printed:
                 return printed
