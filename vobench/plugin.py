@@ -12,9 +12,11 @@ Makers       Thing make_mesh joined moved copies flipped two_sided textured: mes
              quad at block card cards cushion extrusion lathe pierced reveal sheet spline tube: shapes
              Material Picture Procedural coated matt wood picture STEEL CHROME WHITE DARK BLACK: materials, textures
              BRICK INK INKS NAVY OCHRE PAPER PLUM SAND TEAL: colours
-             Part Piece put stood things mm bars bulb: furniture
+             Part Piece put stood things mm bars bulb kitchen: furniture
              Opening shell FINISHES OUTWARD: rooms
              AreaLight PointLight SpotLight Sun Sky Steady Flicker Dimmer Switched: lights
+             Surroundings GeneratedPlace home workplace: the panorama of a sky, what a generator returns,
+             furnished flats and offices
 Layouts      Layout Writing ReadOptions Topics: the definition of a layout, and the options of its reader
              Recording RecordedFrame RecordedPicture PictureStream assemble picture_files numbered truth_file unread
              chain_rig: reading
@@ -34,7 +36,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vobench.asset import picture
+    from vobench.asset import home, kitchen, picture, workplace
     from vobench.asset.fitting import bars
     from vobench.asset.furniture import (
         BLACK,
@@ -51,6 +53,7 @@ if TYPE_CHECKING:
         wood,
     )
     from vobench.asset.household import bulb
+    from vobench.asset.panorama import Surroundings
     from vobench.asset.picture import BRICK, INK, INKS, NAVY, OCHRE, PAPER, PLUM, SAND, TEAL
     from vobench.asset.room import FINISHES, OUTWARD, Opening, Piece, shell, things
     from vobench.asset.shape import (
@@ -123,6 +126,7 @@ if TYPE_CHECKING:
     from vobench.metric.comparison import POSES, Comparison, MetricDefinition, OverLengths
     from vobench.metric.settings import ScoreSettings
     from vobench.report.contract import assert_contract
+    from vobench.scene.generated_place import GeneratedPlace
     from vobench.scene.light import (
         AreaLight,
         Dimmer,
@@ -157,6 +161,7 @@ HOMES = {
     "stood": "vobench.asset.furniture",
     "wood": "vobench.asset.furniture",
     "bulb": "vobench.asset.household",
+    "Surroundings": "vobench.asset.panorama",
     "BRICK": "vobench.asset.picture",
     "INK": "vobench.asset.picture",
     "INKS": "vobench.asset.picture",
@@ -167,6 +172,9 @@ HOMES = {
     "SAND": "vobench.asset.picture",
     "TEAL": "vobench.asset.picture",
     "picture": "vobench.asset.picture",
+    "home": "vobench.asset.home",
+    "kitchen": "vobench.asset.kitchen",
+    "workplace": "vobench.asset.workplace",
     "FINISHES": "vobench.asset.room",
     "OUTWARD": "vobench.asset.room",
     "Opening": "vobench.asset.room",
@@ -262,6 +270,7 @@ HOMES = {
     "POSES": "vobench.metric.comparison",
     "ScoreSettings": "vobench.metric.settings",
     "assert_contract": "vobench.report.contract",
+    "GeneratedPlace": "vobench.scene.generated_place",
     "AreaLight": "vobench.scene.light",
     "Dimmer": "vobench.scene.light",
     "Flicker": "vobench.scene.light",
@@ -323,6 +332,7 @@ __all__ = [
     "Flicker",
     "Followed",
     "Frame",
+    "GeneratedPlace",
     "Image",
     "ImuCalibration",
     "ImuReadings",
@@ -361,6 +371,7 @@ __all__ = [
     "StereoPair",
     "StereoTracker",
     "Sun",
+    "Surroundings",
     "Switched",
     "Thing",
     "Topics",
@@ -393,8 +404,10 @@ __all__ = [
     "flipped",
     "follow",
     "follow_predicted",
+    "home",
     "inside",
     "joined",
+    "kitchen",
     "lathe",
     "local_contrast",
     "looking",
@@ -432,6 +445,7 @@ __all__ = [
     "unit",
     "unread",
     "wood",
+    "workplace",
 ]
 
 if not TYPE_CHECKING:  # otherwise a type checker would accept every misspelt name

@@ -19,6 +19,9 @@ VARIABLES = {
     "OPENCV_IPP": "disabled",
     "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR",
     "OPENBLAS_CORETYPE": "Nehalem",
+    # Numba compiles the kernels of the bake for the processor it runs on.
+    "NUMBA_CPU_NAME": "nehalem",
+    "NUMBA_CPU_FEATURES": "+sse4.1,+sse4.2",
 }
 LOADED_TOO_EARLY = ("numpy", "cv2")
 

@@ -6,17 +6,12 @@ import numpy as np
 
 from vobench.plugin import (
     BLACK,
-    BRICK,
-    CHROME,
     DARK,
     FINISHES,
     NAVY,
-    OCHRE,
     OUTWARD,
     SAND,
     STEEL,
-    TEAL,
-    WHITE,
     AreaLight,
     Opening,
     Part,
@@ -25,25 +20,19 @@ from vobench.plugin import (
     at,
     block,
     bulb,
-    card,
     coated,
-    cushion,
     extrusion,
     flipped,
     joined,
-    lathe,
+    kitchen,
     matt,
-    mm,
-    moved,
     picture,
     pierced,
     put,
     quad,
     shell,
-    spline,
     stood,
     things,
-    tube,
     wood,
 )
 
@@ -65,7 +54,6 @@ WINDOWS = (
 )
 WARM = (1.25, 0.95, 0.62)
 DIM = Steady(0.01)
-FRONTS = "#7f9182"
 
 
 def make(seed):
@@ -120,94 +108,22 @@ def _lamps():
     yield AreaLight("strip", strip, 1400.0, DIM, colour=(1.08, 0.99, 0.84))
 
 
-def _unit(wide, *, drawers=(), doors=1, high=0.77, deep=0.56, colour=FRONTS):
-    """A cupboard from z = 0 up with drawers of some heights, from below, or doors."""
-    paint = coated(colour, roughness=0.35)
-    grip = tube(mm("0 -60 0, 22 -60 0, 22 60 0, 0 60 0"), 0.005)
-    parts = [stood((deep, wide - 0.002, high), paint, 0, 0, 0, bevel=0.001)]
-    z = 0.004
-    for tall in drawers:
-        parts.append(stood((0.02, wide - 0.006, tall - 0.006), paint, deep / 2 + 0.01, 0, z))
-        parts.append(put(grip, STEEL, deep / 2 + 0.02, 0, z + tall - 0.05))
-        z += tall
-    for k in () if drawers else range(doors):
-        one = wide / doors
-        y = (k + 0.5) * wide / doors - wide / 2
-        parts.append(stood((0.02, one - 0.006, high - 0.008), paint, deep / 2 + 0.01, y, 0.004))
-        side = 1 if k % 2 == 0 else -1
-        up = high - 0.12 if deep > 0.4 else 0.12
-        parts.append(put(grip, STEEL, deep / 2 + 0.02, y + side * (one / 2 - 0.05), up, roll=90))
-    return parts
-
-
-def _oven():
-    """An oven with a window and knobs, in a unit 0.6 m wide."""
-    glass = coated("#0d0f10", roughness=0.05)
-    knob = lathe(mm("0 0, 20 0, 18 22, 0 22"), sections=20)
-    front = stood((0.02, 0.594, 0.6), STEEL, 0.29, 0, 0.15)
-    window = put(block((0.006, 0.48, 0.36), bevel_m=0.002), glass, 0.301, 0, 0.38)
-    bar = put(tube(mm("0 -240 0, 40 -240 0, 40 240 0, 0 240 0"), 0.008), CHROME, 0.3, 0, 0.6)
-    knobs = [put(knob, BLACK, 0.3, y, 0.69, pitch=90) for y in (-0.22, -0.14, 0.14, 0.22)]
-    clock = put(card((0.12, 0.05)), matt("#1d3b2c", picture.sign("12:04", "#101312")), 0.3012, 0, 0.69)
-    body = [stood((0.56, 0.598, 0.77), WHITE), stood((0.02, 0.594, 0.135), DARK, 0.29, 0, 0.008)]
-    return [*body, front, window, bar, *knobs, clock]
-
-
-def _sink():
-    """A basin and a tap, its rim on z = 0."""
-    wide = 0.42
-    long = 0.56
-    deep = 0.17
-    x = wide / 2
-    y = long / 2
-    walls = [
-        flipped(quad((-x, -y, -deep), (0, 0, deep), (0, long, 0))),
-        flipped(quad((x, -y, -deep), (0, long, 0), (0, 0, deep))),
-        flipped(quad((-x, -y, -deep), (wide, 0, 0), (0, 0, deep))),
-        flipped(quad((-x, y, -deep), (0, 0, deep), (wide, 0, 0))),
-        quad((-x, -y, -deep), (wide, 0, 0), (0, long, 0)),
-    ]
-    ring = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    rim = extrusion(ring * [x + 0.025, y + 0.025], 0.004, holes_m=[ring * [x, y]])
-    tap = tube(spline(mm("-255 0 0, -255 0 240, -200 0 330, -110 0 300, -95 0 230"), 24), 0.013, sections=12)
-    lever = tube(mm("-255 20 60, -255 60 90"), 0.008)
-    plug = lathe(mm("0 0, 40 0, 38 3, 0 3"))
-    return [put(joined([*walls, rim]), STEEL), put(joined([tap, lever]), CHROME), put(plug, CHROME, z=-deep)]
-
-
-def _fridge():
-    """A fridge 1.85 m high with two doors, and notes on it."""
-    paint = coated("#c9cdcc", roughness=0.2)
-    grip = tube(mm("0 0 -200, 40 0 -200, 40 0 200, 0 0 200"), 0.009)
-    doors = [stood((0.05, 0.594, high), paint, 0.3, 0, z, bevel=0.012) for z, high in ((0.06, 0.62), (0.69, 1.16))]
-    grips = [put(grip, STEEL, 0.325, -0.25, z) for z in (0.48, 0.98)]
-    notes = [
-        put(card((w, h), cell=cell), matt(texture=picture.pages(3)), 0.3262, y, z, roll=turn)
-        for w, h, cell, y, z, turn in (
-            (0.15, 0.21, (0, 1 / 3, 0, 0.5), 0.08, 1.5, 4), (0.1, 0.14, (1 / 3, 2 / 3, 0, 0.5), -0.1, 1.42, -6),
-            (0.12, 0.17, (2 / 3, 1, 0.5, 1), 0.15, 1.2, 2),
-        )
-    ]  # fmt: skip
-    dots = [put(cushion((0.012, 0.03, 0.03), power=2, cells=4), coated(c), 0.328, y, z)
-            for c, y, z in ((BRICK, 0.08, 1.59), (OCHRE, -0.1, 1.48), (TEAL, 0.15, 1.275))]  # fmt: skip
-    return [stood((0.56, 0.596, 1.85), paint, 0, 0, 0, bevel=0.01), *doors, *grips, *notes, *dots]
-
-
 def _kitchen():
     """Units along the north and the west wall, their worktop, tiles above it, a hob, a hood and a fridge."""
     north = WIDE / 2 - 0.3
     west = -LONG / 2 + 0.3
     rows = (0.34, 0.26, 0.17)
     line = [
-        ("drawers", _unit(0.6, drawers=rows), at(-3.9, north, 0.1, yaw=-90)),
-        ("oven", _oven(), at(-3.3, north, 0.1, yaw=-90)),
-        ("cupboard", _unit(1.1, doors=2), at(-2.45, north, 0.1, yaw=-90)),
-        ("corner", _unit(0.6), at(west, 1.8, 0.1)), ("sink_unit", _unit(1.2, doors=2), at(west, 0.9, 0.1)),
-        ("dishwasher", _unit(0.6, drawers=(0.6, 0.17)), at(west, 0.0, 0.1)),
-        ("fridge", _fridge(), at(-1.585, WIDE / 2 - 0.3, 0.0, yaw=-90)),
+        ("drawers", kitchen.cupboard(0.6, drawers=rows), at(-3.9, north, 0.1, yaw=-90)),
+        ("oven", kitchen.oven(), at(-3.3, north, 0.1, yaw=-90)),
+        ("cupboard", kitchen.cupboard(1.1, doors=2), at(-2.45, north, 0.1, yaw=-90)),
+        ("corner", kitchen.cupboard(0.6), at(west, 1.8, 0.1)),
+        ("sink_unit", kitchen.cupboard(1.2, doors=2), at(west, 0.9, 0.1)),
+        ("dishwasher", kitchen.cupboard(0.6, drawers=(0.6, 0.17)), at(west, 0.0, 0.1)),
+        ("fridge", kitchen.fridge(), at(-1.585, WIDE / 2 - 0.3, 0.0, yaw=-90)),
     ]  # fmt: skip
     for k, (x, wide, doors) in enumerate(((-4.2, 1.2, 2), (-2.45, 1.1, 2))):
-        cupboard = _unit(wide, doors=doors, high=0.72, deep=0.33, colour="#e4e0d6")
+        cupboard = kitchen.cupboard(wide, doors=doors, height_m=0.72, depth_m=0.33, colour="#e4e0d6")
         line.append((f"wall_cupboard_{k}", cupboard, at(x, WIDE / 2 - 0.166, 1.45, yaw=-90)))
     for name, parts, place in line:
         yield name, [part.moved(place) for part in parts]
@@ -219,7 +135,10 @@ def _kitchen():
     hole = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [0.21, 0.28] + [x0 + 0.32, 0.9]
     top = put(extrusion(outline, 0.03, holes_m=[hole]), wood("beech"), z=TOP_M - 0.03)
     plinth = [(x0, y0), (x0 + 0.54, y0), (x0 + 0.54, y1 - 0.54), (x1, y1 - 0.54), (x1, y1), (x0, y1)]
-    yield "worktop", [top, put(extrusion(plinth, 0.1), DARK), *(p.moved(at(x0 + 0.32, 0.9, TOP_M)) for p in _sink())]
+    yield (
+        "worktop",
+        [top, put(extrusion(plinth, 0.1), DARK), *(p.moved(at(x0 + 0.32, 0.9, TOP_M)) for p in kitchen.sink())],
+    )
     tiles = coated("#eef0ec", picture.masonry("tile", 3, 1024, 0.8, rows=10, columns=5), roughness=0.1)
     back = [flipped(quad((x1, y1 - 0.008, TOP_M), (x0 - x1, 0, 0), (0, 0, 0.56)))]
     back += [quad((x0 + 0.008, y1, TOP_M), (0, y0 - y1, 0), (0, 0, 0.13))]
@@ -231,36 +150,17 @@ def _kitchen():
         "west_tiles",
         [put(block((0.008, y1 - y0, 0.12), bevel_m=0.001), tiles, x0 + 0.004, (y0 + y1) / 2, TOP_M + 0.06)],
     )
-    rings = [moved(lathe([[0, 0], [r, 0], [r, 0.001], [0, 0.001]]), at(x, y, 0.008))
-             for x, y, r in ((-0.14, -0.12, 0.1), (0.14, -0.12, 0.08), (0.14, 0.13, 0.11))]  # fmt: skip
-    plate = put(block((0.58, 0.51, 0.008), bevel_m=0.002), coated("#0e0f10", roughness=0.04), z=0.004)
-    hob = [plate, put(joined(rings), coated("#3a3c3e", roughness=0.2))]
-    yield "hob", [part.moved(at(-3.3, y1 - 0.31, TOP_M)) for part in (*hob, *_pot())]
+    yield "hob", [part.moved(at(-3.3, y1 - 0.31, TOP_M)) for part in (*kitchen.hob(), *kitchen.pot(-0.14, 0.13, 0.01))]
     hood = [stood((0.6, 0.48, 0.06), STEEL, 0, -0.24, 1.6), stood((0.26, 0.24, HIGH - 1.66), STEEL, 0, -0.12, 1.66)]
     yield "hood", [part.moved(at(-3.3, y1, 0)) for part in hood]
     yield "worktop_things", list(_worktop_things())
 
 
-def _pot():
-    body = lathe(mm("0 0, 105 0, 110 6, 110 130, 113 132, 0 138, 0 140"), sections=32)
-    ears = [tube(spline(mm(f"{s * 108} -35 110, {s * 145} -25 115, {s * 145} 25 115, {s * 108} 35 110"), 10), 0.007)
-            for s in (-1, 1)]  # fmt: skip
-    knob = moved(lathe(mm("0 0, 10 0, 18 20, 0 24")), at(z_m=0.138))
-    return [put(joined([body, *ears]), coated(BRICK, roughness=0.12), -0.14, 0.13, 0.01),
-            put(knob, BLACK, -0.14, 0.13, 0.01)]  # fmt: skip
-
-
 def _worktop_things():
     """A kettle, jars, boards, a block of knives and a bottle."""
-    kettle = lathe(mm("0 0, 78 0, 82 12, 74 150, 50 190, 20 200, 14 215, 0 218"), sections=32)
-    grip = tube(spline(mm("60 0 175, 125 0 180, 130 0 80, 84 0 40"), 16), 0.011)
-    spout = tube(spline(mm("-60 0 130, -95 0 165, -105 0 180"), 8), 0.012)
-    yield put(kettle, STEEL, -4.45, 1.55, TOP_M, yaw=40)
-    yield put(joined([grip, spout]), BLACK, -4.45, 1.55, TOP_M, yaw=40)
+    yield from kitchen.kettle(-4.45, 1.55, TOP_M, yaw_deg=40)
     for k, (x, tall, ink) in enumerate(((-2.75, 0.2, "#b98a4e"), (-2.6, 0.16, "#d9cfb8"), (-2.46, 0.24, "#8a4a2e"))):
-        jar = lathe(mm("0 0, 50 0, 55 8, 55 800, 0 805") * [1, tall / 0.8], sections=24)
-        yield put(jar, coated(ink, roughness=0.06), x, 2.55, TOP_M)
-        yield put(lathe(mm("0 0, 50 0, 50 24, 0 24")), wood("beech"), x, 2.55, TOP_M + tall, yaw=40 * k)
+        yield from kitchen.jar(x, 2.55, TOP_M, height_m=tall, colour=ink, yaw_deg=40 * k)
     for k, (y, w, h) in enumerate(((2.62, 0.28, 0.4), (2.59, 0.22, 0.32))):
         yield put(
             block((w, 0.018, h), bevel_m=0.004), wood(("walnut", "oak")[k]), -2.12 + 0.03 * k, y, TOP_M + h / 2, roll=-5
@@ -270,8 +170,7 @@ def _worktop_things():
         yield put(
             block((0.02, 0.026, 0.11), bevel_m=0.006), BLACK, -4.58 + 0.022 * k, 2.35 + 0.03 * (k % 2), TOP_M + 0.26
         )
-    bottle = lathe(mm("0 0, 36 0, 38 6, 38 190, 15 240, 13 300, 16 302, 16 315, 0 316"), sections=24)
-    yield put(bottle, coated("#2c3a1c", roughness=0.05), -3.75, 2.5, TOP_M)
+    yield from kitchen.bottle(-3.75, 2.5, TOP_M)
 
 
 def _kitchen_pieces():

@@ -64,9 +64,9 @@ def test_a_number_of_frames_cuts_the_plan(monkeypatch):
     ],
 )
 def test_changes_are_values_by_key_and_repeats_is_one_of_them(options, values):
-    assert Changes(**options).values() == values
+    assert Changes(**options).values("quickstart") == values
 
 
 def test_a_change_without_an_equals_sign_is_refused():
     with pytest.raises(InputError, match=r"--set should be key=value, as in rigs\.ahead\.pitch_deg=20, got 'seed'"):
-        Changes(changes=["seed"]).values()
+        Changes(changes=["seed"]).values("quickstart")

@@ -48,7 +48,7 @@ def test_a_wall_stops_all_light_but_a_segment_that_ends_before_it_is_clear() -> 
 def test_the_first_pane_of_a_ray_is_the_nearest_one() -> None:
     visibility = seen((3.0, "glass"), (1.0, "glass"), (2.0, "glass"))
     segments = np.concatenate([AHEAD, AHEAD * [[-1, 1, 1]]]).astype(np.float32)
-    rays, hits = visibility.first_panes(np.repeat(START, 2, 0), segments)
+    rays, hits = visibility.first_panes(np.repeat(START, 2, 0), segments, np.ones(2, np.float32))
     assert rays.tolist() == [0]
     assert visibility.faces.thing[hits.face].tolist() == [1]
     assert hits.distance[0] == pytest.approx(0.2)

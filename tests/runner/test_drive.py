@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.runner.conftest import CLOSET
-from vobench.errors import InputError, SuiteError, UnknownNameError
+from vobench.errors import SuiteError, UnknownNameError
 from vobench.runner.drive import chosen_trajectories, drive_plan
 from vobench.suite.suite import read_plan
 from vobench.trajectory.formats import parse_tum
@@ -115,12 +115,11 @@ def test_the_table_has_the_values_of_the_dictionaries(read):
     assert frame["path_m"].tolist() == [row["path_m"] for row in facts]
 
 
-def test_names_and_suites_without_trajectories_are_refused(read, tmp_path):
+def test_an_unknown_name_is_refused_and_a_suite_of_scenarios_is_driven(read, tmp_path):
     with pytest.raises(UnknownNameError, match=r"no trajectory named 'leg'\. Did you mean 'legs'"):
         chosen_trajectories(read(), trajectory="leg")
     (tmp_path / "scenario.yaml").write_text("name: none\nscenarios: {spin_in_place: [1]}\nestimators: [stand_still]\n")
-    with pytest.raises(InputError, match="has no trajectory to drive"):
-        chosen_trajectories(read_plan(str(tmp_path / "scenario.yaml")))
+    assert chosen_trajectories(read_plan(str(tmp_path / "scenario.yaml"))) == ("spin_in_place.1",)
 
 
 def test_a_target_out_of_reach_names_its_line(read):

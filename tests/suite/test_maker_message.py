@@ -11,7 +11,7 @@ from vobench.errors import SuiteError
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Scaled, Sky, SpotLight, Steady, Sun, Switched
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import Thing, make_mesh, quad
-from vobench.suite.maker_message import LENGTH, MakerScene, checked, decode, encode
+from vobench.suite.maker_message import LENGTH, GeneratedPlace, checked, decode, encode
 
 WALL = quad((0, 0, 0), (1, 0, 0), (0, 1, 0))
 LEVELS = (
@@ -23,7 +23,7 @@ LEVELS = (
 )
 
 
-def _scene() -> MakerScene:
+def _scene() -> GeneratedPlace:
     picture = Picture(np.arange(48, dtype=np.uint8).reshape(4, 4, 3), tile_m=2.0)
     materials = {
         "chalk": Material(colour=(0.1, 0.2, 0.3), texture=picture),
@@ -40,7 +40,7 @@ def _scene() -> MakerScene:
         Sun("sun", 1e4, (0.0,), (10.0,), (20.0,), LEVELS[3]),
         Sky("sky", 5e3, "clear", up, level=LEVELS[4]),
     )
-    return MakerScene(things, materials, lights)
+    return GeneratedPlace(things, materials, lights)
 
 
 def test_all_that_a_maker_may_return_arrives_with_the_same_bytes() -> None:
@@ -67,7 +67,7 @@ def test_a_texture_of_the_makers_own_class_arrives_as_its_picture() -> None:
         def pixels(self):
             return np.eye(3, dtype=np.float32)
 
-    arrived = decode(encode(MakerScene((), {"striped": Material(texture=Stripes())})))
+    arrived = decode(encode(GeneratedPlace((), {"striped": Material(texture=Stripes())})))
     texture = arrived.materials["striped"].texture
     assert isinstance(texture, Picture)
     assert texture.tile_m == 0.5

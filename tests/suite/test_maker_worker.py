@@ -3,7 +3,7 @@
 import pytest
 
 from vobench.suite.maker_message import decode
-from vobench.suite.maker_worker import ERROR, SCENE, call, main
+from vobench.suite.maker_worker import ERROR, MAKE, SCENE, call, main
 
 HEAD = """
 from vobench.plugin import Material, Thing, quad
@@ -36,9 +36,9 @@ def maker(tmp_path, monkeypatch):
 
 def test_a_scene_is_left_as_data_that_is_the_scene_of_the_call(maker, tmp_path):
     path = maker(GREY)
-    main(path, 3)
+    main(path, MAKE, [3])
     made = decode((tmp_path / "work" / SCENE).read_bytes())
-    assert made.materials == call(path, 3).materials
+    assert made.materials == call(path, MAKE, [3]).materials
     assert made.materials["paint"].colour[0] == pytest.approx(0.3)
     assert not (tmp_path / "work" / ERROR).exists()
 
@@ -57,12 +57,12 @@ def make(seed):
 
 def test_two_calls_do_not_share_what_the_maker_keeps_in_globals(maker):
     path = maker(COUNTING)
-    assert call(path, 1).materials == call(path, 1).materials
+    assert call(path, MAKE, [1]).materials == call(path, MAKE, [1]).materials
 
 
 def test_a_file_that_was_just_edited_is_read_anew(maker):
-    red = call(maker(GREY), 2).materials["paint"].colour[0]
-    brighter = call(maker(GREY.replace("0.1 * seed", "0.4 * seed")), 2).materials["paint"].colour[0]
+    red = call(maker(GREY), MAKE, [2]).materials["paint"].colour[0]
+    brighter = call(maker(GREY.replace("0.1 * seed", "0.4 * seed")), MAKE, [2]).materials["paint"].colour[0]
     assert brighter == pytest.approx(4 * red)
 
 
@@ -77,7 +77,7 @@ def test_a_file_that_was_just_edited_is_read_anew(maker):
     ],
 )
 def test_an_error_is_left_as_one_line_and_no_scene(maker, tmp_path, text, sentence):
-    main(maker(text), 0)
+    main(maker(text), MAKE, [0])
     left = (tmp_path / "work" / ERROR).read_text()
     assert sentence in left
     assert "\n" not in left
@@ -87,4 +87,4 @@ def test_an_error_is_left_as_one_line_and_no_scene(maker, tmp_path, text, senten
 def test_a_maker_that_wants_to_end_the_process_ends_it(maker):
     """So that the harness sees its exit code, instead of an error that the maker worded."""
     with pytest.raises(SystemExit):
-        main(maker("import sys\ndef make(seed):\n    sys.exit(3)\n"), 0)
+        main(maker("import sys\ndef make(seed):\n    sys.exit(3)\n"), MAKE, [0])

@@ -199,7 +199,7 @@ def test_a_maker_gets_the_scenes_seed_and_what_it_raises_is_named(yard, tmp_path
     with pytest.raises(SuiteError, match=r"maker.py: ZeroDivisionError: division by zero"):
         yard("maker: maker.py\n")
     (tmp_path / "maker.py").write_text(MAKER.replace('{"chalk"', '{"cheese"'))
-    with pytest.raises(SuiteError, match=r"make\(\) returns things without materials: chalk"):
+    with pytest.raises(SuiteError, match=r"returns things without materials: chalk"):
         yard("maker: maker.py\n")
 
 
@@ -220,7 +220,7 @@ def test_a_maker_may_return_meshes_of_trimesh_and_nothing_else(yard, tmp_path: P
     column = vertices(yard("maker: maker.py\n"), "column")
     np.testing.assert_allclose([column[:, 2].min(), column[:, 2].max()], [-1, 1])
     maker.write_text(TRIMESH_MAKER.replace("trimesh.creation.cylinder(0.3, 2.0)", "[[0, 0, 0]]"))
-    with pytest.raises(SuiteError, match=r"make\(\) returns 'column' with a mesh of type list; it should be a trimesh"):
+    with pytest.raises(SuiteError, match=r"returns 'column' with a mesh of type list; it should be a trimesh"):
         yard("maker: maker.py\n")
     grain = "Material(texture=__import__('vobench.asset.texture').asset.texture.Procedural('plaster', 0.5))"
     maker.write_text(TRIMESH_MAKER.replace("Material(colour=(0.8, 0.8, 0.7))", grain))

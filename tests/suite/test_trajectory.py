@@ -38,6 +38,7 @@ LEAST = {
     "rail": "points_m: [[0, 0, 1], [1, 0, 1]]",
     "quadrotor": "points_m: [[0, 0, 1], [1, 0, 1]]",
     "replay": "file: path.tum",
+    "wander": "length_m: 4",
 }
 ON_WHEELS = tuple(LEAST)[:8]
 KIND = TypeAdapter(TrajectorySpec)
@@ -97,9 +98,9 @@ def test_what_is_dumped_holds_no_key_of_another_mover(trajectory, kind):
 
 
 WRONG = [
-    ("{kind: cirle, radius_m: 1}", ".kind: no kind of trajectory named 'cirle'. Did you mean 'circle'? Known: circle, figure_8, handheld, lissajous, pose_spline, pure_rotation, quadrotor, rail, replay, reverse, square, stop_and_go, waypoints"),
-    ("{kind: 3, radius_m: 1}", ".kind: no kind of trajectory named '3'. Known: circle, figure_8, handheld, lissajous, pose_spline, pure_rotation, quadrotor, rail, replay, reverse, square, stop_and_go, waypoints"),
-    ("{kind: {a: 1}, radius_m: 1}", ".kind: no kind of trajectory named '{'a': 1}'. Known: circle, figure_8, handheld, lissajous, pose_spline, pure_rotation, quadrotor, rail, replay, reverse, square, stop_and_go, waypoints"),
+    ("{kind: cirle, radius_m: 1}", ".kind: no kind of trajectory named 'cirle'. Did you mean 'circle'? Known: circle, figure_8, handheld, lissajous, pose_spline, pure_rotation, quadrotor, rail, replay, reverse, square, stop_and_go, wander, waypoints"),
+    ("{kind: 3, radius_m: 1}", ".kind: no kind of trajectory named '3'. Known: circle, figure_8, handheld, lissajous, pose_spline, pure_rotation, quadrotor, rail, replay, reverse, square, stop_and_go, wander, waypoints"),
+    ("{kind: {a: 1}, radius_m: 1}", ".kind: no kind of trajectory named '{'a': 1}'. Known: circle, figure_8, handheld, lissajous, pose_spline, pure_rotation, quadrotor, rail, replay, reverse, square, stop_and_go, wander, waypoints"),
     ("3", ": should be keys with values (got 3)"),
     ("{kind: circle}", ".radius_m: this key is missing"),
     ("{kind: circle, radius_m: -1}", ".radius_m: should be greater than 0 (got -1)"),

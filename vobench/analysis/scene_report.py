@@ -16,9 +16,9 @@ from vobench.runner.store import SILENT, Progress
 from vobench.runner.task import bake_task, is_done, perform
 from vobench.scene.scene import Scene
 from vobench.sequence.picture import write_png
-from vobench.suite import catalog
 from vobench.suite.scene_build import build
-from vobench.suite.scene_file import read_scene
+from vobench.suite.scene_entry import DRAWN
+from vobench.suite.scene_file import read_place
 from vobench.suite.scene_spec import ModelSpec, SceneFile
 from vobench.suite.suite_spec import Rendering
 from vobench.suite.white import white_of
@@ -39,7 +39,7 @@ class SceneReport:
         corners_m = zip(found.low_m, found.high_m, strict=True)
         size = " x ".join(f"{high_m - low_m:.2f}" for low_m, high_m in corners_m)
         lines = [
-            f"{self.spec.name}: {found.things} things, {found.faces:,} faces, {found.materials} materials",
+            f"{self.spec.place_name}: {found.things} things, {found.faces:,} faces, {found.materials} materials",
             f"size: {size} m",
             f"textures: {found.textures_mb:.0f} MB",
             f"open edges: {found.open_edges:,}; faces on a face: {found.twins:,}",
@@ -86,12 +86,14 @@ class SceneReport:
         write_png(path, picture)
 
 
-def survey_scene(scene: str) -> SceneReport:
+def survey_scene(scene: str, *, seed: int | None = None, lighting: str = DRAWN) -> SceneReport:
     """Survey a scene, given its name or the path of its file or model. Its light is not computed.
+
+    With a seed, it is the place that the scene's generator creates, under a lighting.
 
     Raises UnknownNameError if there is no such scene, and SuiteError or ModelError if its files are invalid.
     """
-    spec = read_scene(catalog.find("scene", scene).path)
+    spec = read_place(scene, seed=seed, lighting=lighting)
     built = build(spec, {})
     return SceneReport(spec, built, survey(built), tuple(_notes(spec.meshes)))
 

@@ -150,9 +150,10 @@ def curtain(
     width_m: float = 0.5,
     height_m: float = 1.9,
     colour: str = SAND,
+    columns: int = 41,
 ) -> list[Part]:
-    """A curtain that hangs in folds from z = 0."""
-    u, v = np.meshgrid(np.linspace(0, 1, 41), np.linspace(1, 0, 6))
+    """A curtain that hangs in folds from z = 0; `columns` of vertices form them."""
+    u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(1, 0, 6))
     unevenness = 0.15 * np.sin(5 * u + rng.uniform(0, 6))
     phase = 2 * np.pi * (u * width_m / 0.11 + unevenness)
     folds = 0.05 + (0.02 + 0.02 * v) * np.sin(phase)
@@ -184,6 +185,27 @@ def radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]
         Part(joined([*columns, *headers]), CREAM),
         put(feed, STEEL, 0, w),
         put(valve, WHITE, 0.075, w + 0.03, 0.14),
+    ]
+
+
+def panel_radiator(_: Rng, width_m: float = 1.4, height_m: float = 0.55) -> list[Part]:
+    """A radiator of two steel panels with a grille between them, a valve and a pipe into the floor."""
+    bottom = 0.12
+    panel = block((0.02, width_m, height_m), bevel_m=0.006)
+    count = max(2, round(width_m / 0.09))
+    ribs_y = (np.arange(count) + 0.5) * width_m / count - width_m / 2
+    rib = block((0.006, 0.03, height_m - 0.08), bevel_m=0)
+    ribs = [moved(rib, at(0.126, y, bottom + height_m / 2)) for y in ribs_y.tolist()]
+    grille = block((0.1, width_m - 0.004, 0.012), bevel_m=0.002)
+    panels = [moved(panel, at(x, 0, bottom + height_m / 2)) for x in (0.05, 0.114)]
+    feed = tube(mm("80 0 0, 80 0 150"), 0.009, sections=6)
+    valve = lathe(mm("0 0, 20 0, 22 50, 14 56, 0 56"), sections=12)
+    enamel = coated("#e4e2dc", roughness=0.25)
+    return [
+        Part(joined([*panels, *ribs]), enamel),
+        put(grille, GREY, 0.082, 0, bottom + height_m - 0.006),
+        put(feed, WHITE, 0, width_m / 2 - 0.03),
+        put(valve, WHITE, 0.08, width_m / 2 + 0.02, bottom + height_m - 0.1, roll=-90),
     ]
 
 

@@ -31,7 +31,7 @@ from vobench.asset.picture import (
     Rng,
     one_of,
 )
-from vobench.asset.shape import at, card, cushion, lathe, sheet, spline, tube
+from vobench.asset.shape import at, block, card, cushion, lathe, sheet, spline, tube
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import flipped, joined, moved
 
@@ -91,6 +91,63 @@ def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
         stood(seat_m, look, 0, 0, 0.425, bevel=0.01),
         put(pad, cloth(colour), 0, 0, 0.47),
     ]
+
+
+def slat_chair(rng: Rng, colour: str = SAND, tones: str = "oak", *, has_pad: bool = True) -> list[Part]:
+    """A chair of square bars with slats in its back; a person on it looks along x."""
+    look = wood(tones)
+    parts = [stood((0.42, 0.42, 0.028), look, 0, 0, 0.43, bevel=0.008, u=rng.uniform(0, 2))]
+    for side in (-1, 1):
+        parts.append(stood((0.036, 0.036, 0.43), look, 0.18, side * 0.18, bevel=0.003))
+        post = block((0.032, 0.036, 0.9), bevel_m=0.004)
+        parts.append(put(post, look, -0.2, side * 0.18, 0.45, pitch=-5))
+    level = rng.random() < 0.5
+    slats = [((0.016, 0.34, 0.06), 0.0, z) for z in (0.58, 0.7, 0.82)]
+    if not level:
+        slats = [((0.014, 0.03, 0.36), y, 0.68) for y in (-0.1, 0.0, 0.1)]
+        slats.append(((0.02, 0.34, 0.06), 0.0, 0.86))
+    for size_m, y, z in slats:
+        x = -0.2 - 0.0875 * (z - 0.45)
+        parts.append(put(block(size_m, bevel_m=0.003), look, x, y, z, pitch=-5))
+    if has_pad:
+        pad = cushion((0.4, 0.4, 0.045), power=6, cells=4)
+        parts.append(put(pad, cloth(colour), 0.01, 0, 0.477))
+    return parts
+
+
+def couch(
+    rng: Rng,
+    width_m: float = 2.0,
+    colour: str = SAGE,
+    tones: str = "oak",
+    accents: tuple[str, str] = (OCHRE, BRICK),
+) -> list[Part]:
+    """A sofa 0.9 m deep for two or three on wooden legs, with cushions; its middle is at the origin."""
+    cover = cloth(colour)
+    seats = 3 if width_m > 1.95 else 2
+    arm_m = float(rng.choice([0.1, 0.16, 0.2]))
+    seat_m = (width_m - 2 * arm_m) / seats
+    rises = float(rng.choice([0.12, 0.16]))
+    base = cushion((0.86, width_m - 0.02, 0.2), power=14, cells=4)
+    back = cushion((0.2, width_m - 0.04, 0.5), power=9, cells=4)
+    arm = cushion((0.86, arm_m, 0.42 if arm_m > 0.12 else 0.34), power=8, cells=4)
+    parts = [put(base, cover, 0, 0, rises + 0.1), put(back, cover, -0.34, 0, 0.53, pitch=-5)]
+    for side in (-1, 1):
+        parts.append(put(arm, cover, 0, side * (width_m - arm_m) / 2, 0.36))
+        leg_y = side * (width_m / 2 - 0.09)
+        parts += [stood((0.05, 0.05, rises + 0.03), wood(tones), x, leg_y, bevel=0.004) for x in (-0.36, 0.36)]
+    seat = cushion((0.68, seat_m - 0.006, 0.16), power=7, cells=4)
+    rest = cushion((0.17, seat_m - 0.012, 0.4), power=5, cells=4)
+    for k in range(seats):
+        y = (k - (seats - 1) / 2) * seat_m
+        parts.append(put(seat, cover, 0.09, y, 0.37))
+        parts.append(put(rest, cover, -0.18, y, 0.6, pitch=-11))
+    loose = cushion((0.12, 0.42, 0.4), power=2.8, cells=4)
+    for side, accent in zip((-1, 1), accents, strict=True):
+        if rng.random() < 0.75:
+            y = side * (width_m / 2 - arm_m - 0.24)
+            parts.append(put(loose, cloth(accent), -0.03, y, 0.61, pitch=-18, yaw=side * 8))
+    return parts
 
 
 @picture.painted
@@ -169,6 +226,9 @@ def television(
     ]
 
 
+SHADE_M = 0.28  # height of the shade of a floor lamp
+
+
 def _shade(colour: str, width_m: float, height_m: float) -> list[Part]:
     """A conical lampshade of cloth on z = 0, open at both ends and white inside."""
     angle = np.linspace(0, 2 * np.pi, 33)
@@ -201,8 +261,8 @@ def floor_lamp(
     foot_profile = mm("0 0, 130 0, 130 12, 40 22, 12 30, 0 30") * [1, 1]
     foot = lathe(foot_profile * (0.6 + 0.25 * height_m))
     stem = tube(np.array([[0, 0, 0.01], [0, 0, height_m - 0.2]]), 0.011)
-    raised = at(z_m=height_m - 0.28)
-    shade = [part.moved(raised) for part in _shade(colour, wide_m, 0.28)]
+    raised = at(z_m=height_m - SHADE_M)
+    shade = [part.moved(raised) for part in _shade(colour, wide_m, SHADE_M)]
     return [put(foot, BLACK), put(stem, STEEL), *shade]
 
 
@@ -211,11 +271,12 @@ def pendant(
     drop_m: float = 1.0,
     colour: str = "",
     wide_m: float = 0.4,
+    sections: int = 36,
 ) -> list[Part]:
     """A pendant lamp. Its shade ends `drop_m` below z = 0, and the bulb belongs 0.08 m above that."""
     scale = wide_m / 0.4
     profile = mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232") * [scale, scale]
-    shade = lathe(profile, sections=36)
+    shade = lathe(profile, sections=sections)
     inner = moved(flipped(shade), np.diag([0.985, 0.985, 0.985, 1]))
     paint = coated(colour or one_of(rng, NAVY, INK, "#5c6b5a"), roughness=0.3)
     cord = tube(np.array([[0, 0, 0.2 - drop_m], [0, 0, 0]]), 0.004, sections=6)
@@ -226,6 +287,34 @@ def pendant(
         put(cord, DARK),
         put(rose, WHITE),
     ]
+
+
+def diffuser(x_m: float, y_m: float, z_m: float, width_m: float) -> "Trimesh":
+    """A disc that looks down, for the mesh of a lamp in a shade."""
+    angle = np.linspace(0, 2 * np.pi, 17)
+    ring = np.stack([width_m / 2 * np.cos(angle), width_m / 2 * np.sin(angle), 0 * angle], axis=-1)
+    middle = np.zeros_like(ring)
+    disc = sheet(np.stack([middle, ring]))
+    looks_down = disc.face_normals[0, 2] < 0
+    return moved(disc if looks_down else flipped(disc), at(x_m, y_m, z_m))
+
+
+def glowing_shade(x_m: float, y_m: float, top_m: float, width_m: float) -> "Trimesh":
+    """The outside of the shade of a floor lamp whose top is at `top_m`, for the mesh of a lamp."""
+    outer = _shade(SAND, 1.01 * width_m, SHADE_M)[0]
+    return moved(outer.mesh, at(x_m, y_m, top_m - SHADE_M))
+
+
+CEILING_LAMP_M = 0.07  # height of a ceiling lamp
+
+
+def ceiling_lamp(_: Rng, width_m: float = 0.4, *, is_round: bool = True) -> list[Part]:
+    """The body of a flat lamp below z = 0, round or square. What shines is to be at its lower face."""
+    paint = matt("#dcdbd6")
+    if is_round:
+        profile = [[0, -CEILING_LAMP_M], [width_m / 2, -CEILING_LAMP_M], [width_m / 2, 0], [0, 0]]
+        return [put(lathe(np.array(profile), sections=24), paint)]
+    return [stood((width_m, width_m, CEILING_LAMP_M), paint, 0, 0, -CEILING_LAMP_M, bevel=0.006)]
 
 
 def fruit_bowl(rng: Rng) -> list[Part]:

@@ -21,10 +21,18 @@ LAP_M = 0.01
 Hole = tuple[float, float, float, float]  # first and last u, first and last v, in metres from the corner of a wall
 
 
-def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes: Sequence[Hole] = ()) -> "Trimesh":
+def pierced(
+    corner_m: ArrayLike,
+    edge_u_m: ArrayLike,
+    edge_v_m: ArrayLike,
+    holes: Sequence[Hole] = (),
+    *,
+    doors: Sequence[Hole] = (),
+) -> "Trimesh":
     """A rectangle with rectangular holes, which is divided into a grid along their edges, with laps behind its borders.
 
-    The laps block light that would otherwise leak through the line where two walls touch.
+    The laps block light that would otherwise leak through the line where two walls touch. `doors` are further holes,
+    which reach the lower border and interrupt the lap there.
     """
     corner = np.asarray(corner_m, float)
     u = np.asarray(edge_u_m, float)
@@ -32,14 +40,14 @@ def pierced(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, holes
     width_m = float(np.linalg.norm(u))
     height_m = float(np.linalg.norm(v))
 
-    rectangles = [_rectangle(corner, u, v, cell) for cell in _solid_cells(width_m, height_m, holes)]
-    return joined_arrays(rectangles + _laps(corner, u, v)).mesh()
+    rectangles = [_rectangle(corner, u, v, cell) for cell in _solid_cells(width_m, height_m, [*holes, *doors])]
+    return joined_arrays(rectangles + _laps(corner, u, v, doors)).mesh()
 
 
-def _laps(corner: Array, u: Array, v: Array) -> list[MeshArrays]:
+def _laps(corner: Array, u: Array, v: Array, doors: Sequence[Hole] = ()) -> list[MeshArrays]:
     """A lap behind each of the four borders of a rectangle."""
     behind = -LAP_BEHIND_M * unit(cross(u, v))
-    cells = _lap_cells(float(np.linalg.norm(u)), float(np.linalg.norm(v)))
+    cells = _lap_cells(float(np.linalg.norm(u)), float(np.linalg.norm(v)), doors)
     return [_rectangle(corner + behind, u, v, cell) for cell in cells]
 
 
@@ -68,12 +76,15 @@ def _is_in_hole(u: float, v: float, holes: Sequence[Hole]) -> bool:
     return any(u0 < u < u1 and v0 < v < v1 for u0, u1, v0, v1 in holes)
 
 
-def _lap_cells(width_m: float, height_m: float) -> list[Hole]:
+def _lap_cells(width_m: float, height_m: float, doors: Sequence[Hole]) -> list[Hole]:
     """A strip along each of the four borders: bottom, top, left and right."""
     full_u = (-LAP_M, width_m + LAP_M)
     full_v = (-LAP_M, height_m + LAP_M)
+    door_spans = sorted((u0, u1) for u0, u1, _, _ in doors)
+    starts = [full_u[0], *(u1 for _, u1 in door_spans)]
+    ends = [*(u0 for u0, _ in door_spans), full_u[1]]
     return [
-        (*full_u, -LAP_M, LAP_M),
+        *((start, end, -LAP_M, LAP_M) for start, end in zip(starts, ends, strict=True)),
         (*full_u, height_m - LAP_M, height_m + LAP_M),
         (-LAP_M, LAP_M, *full_v),
         (width_m - LAP_M, width_m + LAP_M, *full_v),

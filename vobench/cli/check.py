@@ -41,11 +41,20 @@ def print_summary(summary: PlanSummary, *, as_json: bool) -> None:
 
 
 def _print_cases(summary: PlanSummary, console: "Console") -> None:
+    has_clearance = any(case.clearance_m is not None for case in summary.cases)
     rows = list[list[str]]()
     for case in summary.cases:
-        rows.append([case.case, str(case.frames), f"{case.duration_s:.1f}", case.sequence])
+        frames = "" if case.frames is None else str(case.frames)
+        seconds = "" if case.duration_s is None else f"{case.duration_s:.1f}"
+        row = [case.case, frames, seconds, case.sequence]
+        if has_clearance:
+            row.append("" if case.clearance_m is None else f"{case.clearance_m:.2f}")
+        rows.append(row)
     title = f"{summary.plan.suite.name}: cases"
-    console.print(terminal.table(title, ["case", "frames", "seconds", "sequence"], rows))
+    headings = ["case", "frames", "seconds", "sequence"]
+    if has_clearance:
+        headings.append("clearance m")
+    console.print(terminal.table(title, headings, rows))
 
 
 def _print_estimators(summary: PlanSummary, console: "Console") -> None:

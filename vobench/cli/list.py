@@ -13,13 +13,14 @@ from vobench.suite import catalog
 from vobench.suite.catalog import KINDS, CatalogEntry
 from vobench.suite.file_kind import Kind
 
-COLUMNS = ("kind", "name", "summary", "origin", "path")
+COLUMNS = ("kind", "name", "seeds", "summary", "origin", "path")
 
 # The top-level key `summary` with a value that needs no YAML parser: on one line, in quotes without escapes, or as two
 # words or more of plain text without a colon or a comment.
 QUOTED = r"""(?:"(?P<double>[^"\\\x00-\x1f]*)"|'(?P<single>[^'\x00-\x1f]*)') *$"""
 PLAIN = r"(?P<plain>[^\W\d_][^:#\x00-\x1f]* [^:#\x00-\x1f]*\w[.!?)]?) *$(?=\n+\S|\s*\Z)"
 SUMMARY = re.compile(rf"^summary: +(?:{QUOTED}|{PLAIN})", re.MULTILINE)
+GENERATOR_KEY = re.compile(r"^generator *:", re.MULTILINE)
 SUMMARY_KEY = re.compile(r"^[\"']?summary\b", re.MULTILINE)
 
 
@@ -30,7 +31,7 @@ def list_command(
     *,
     json: Json = False,
 ) -> None:
-    """List the suites, scenes and estimators that can be found, and where they are."""
+    """List the suites, scenes and estimators that can be found, and where they are; which scenes have seeds."""
     kinds = [known for known in KINDS if kind in (None, known, f"{known}s")]
     if not kinds:
         known_kinds = [f"{known}s" for known in KINDS]
@@ -54,6 +55,7 @@ def _entry_rows(kind: Kind) -> list[dict[str, Any]]:
             {
                 "kind": entry.kind,
                 "name": entry.name,
+                "seeds": _has_seeds(entry),
                 "summary": _summary(entry),
                 "origin": entry.origin,
                 "path": str(entry.path),
@@ -66,7 +68,14 @@ def _entry_rows(kind: Kind) -> list[dict[str, Any]]:
 
 def _cells(row: dict[str, Any]) -> list[str]:
     name = f"{row['name']} (hidden)" if row["hidden"] else row["name"]
-    return [name if column == "name" else row[column] for column in COLUMNS]
+    cells = {**row, "name": name, "seeds": "yes" if row["seeds"] else ""}
+    return [cells[column] for column in COLUMNS]
+
+
+def _has_seeds(entry: CatalogEntry) -> bool:
+    """Whether an entry is a scene with a generator, whose places have seeds."""
+    is_file = entry.kind == "scene" and entry.path.suffix not in MODEL_SUFFIXES
+    return is_file and GENERATOR_KEY.search(_text(entry)) is not None
 
 
 def _summary(entry: CatalogEntry) -> str:

@@ -9,8 +9,11 @@ from vobench.cli import terminal
 from vobench.cli.option import Json, Trust, option_group, with_option_groups
 from vobench.cli.png_file import require_png
 from vobench.cli.progress import Bars
+from vobench.errors import require_known
 from vobench.runner.scene_picture import render_scene
 from vobench.setting import Triple
+from vobench.suite.scene_entry import DRAWN
+from vobench.suite.scene_spec import LIGHTINGS, MOST_SEED
 
 
 @option_group
@@ -24,6 +27,18 @@ class CameraOptions:
     time: Annotated[float, typer.Option(help="The time in seconds, for lights and things that change.")] = 0.0
     sensor: Annotated[str, typer.Option(help="The preset of the image sensor.")] = "clean"
     gain: Annotated[float, typer.Option(min=1e-6, help="A factor of the exposure.")] = 1.0
+
+
+@option_group
+class PlaceOptions:
+    """The place, for a scene with a generator."""
+
+    seed: Annotated[
+        int | None, typer.Option(min=0, max=MOST_SEED, help="Use the place that the scene's generator creates.")
+    ] = None
+    lighting: Annotated[
+        str, typer.Option(help=f"The lighting of this place: {', '.join(LIGHTINGS)}, or drawn by the seed.")
+    ] = DRAWN
 
 
 @option_group
@@ -41,6 +56,7 @@ def render_command(
     scene: Annotated[str, typer.Argument(metavar="SCENE", help="The name of a scene, or the path of its YAML.")],
     *,
     out: Annotated[Path, typer.Option(help="The image to write.")] = Path("frame.png"),
+    place_options: PlaceOptions,
     camera_options: CameraOptions,
     engine_options: EngineOptions,
     truth: Annotated[bool, typer.Option("--truth", help="Write ground truth beside the image.")] = False,
@@ -50,8 +66,11 @@ def render_command(
     """Render one image of a scene, to inspect and debug it."""
     del trust  # its callback has the effect
     require_png(out)
+    require_known("lighting", place_options.lighting, (*LIGHTINGS, DRAWN))
     image = render_scene(
         scene,
+        seed=place_options.seed,
+        lighting=place_options.lighting,
         camera=camera_options.camera,
         at_m=camera_options.at,
         yaw_deg=camera_options.yaw,

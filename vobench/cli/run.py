@@ -1,5 +1,6 @@
 """vobench run."""
 
+import secrets
 import shutil
 import sys
 from collections.abc import Mapping, Sequence
@@ -20,15 +21,21 @@ from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
 from vobench.runner.preflight import summarize
 from vobench.runner.store import SilentProgress
+from vobench.suite import catalog, yaml_file
 from vobench.suite.catalog import hidden_builtins
 from vobench.suite.plan import Plan
+from vobench.suite.spread import changes_for_units
 from vobench.suite.suite import read_plan
+from vobench.suite.suite_spec import Suite
 
 if TYPE_CHECKING:
     from vobench.report.leaderboard import Board
     from vobench.report.threshold import Threshold
     from vobench.runner.folder import RunFolder, TrialScore
 
+# Base seeds are drawn so far apart that places and drives of two draws have different seeds.
+SEEDS_PER_DRAW = 10_000
+DRAWS = 199_000
 INCOMPLETE_RUN = 1  # exit codes
 BROKEN_LIMIT = 3
 
@@ -64,12 +71,27 @@ class Changes:
         list[str] | None, typer.Option("--set", help="Replace a value of the suite, as in seed=3; can be repeated.")
     ] = None
 
-    def values(self) -> dict[str, str]:
-        """The changed values in YAML, by their keys joined by dots. Raises InputError."""
+    units: Annotated[
+        int | None, typer.Option(min=1, help="Spread the suite over this many units, with more seeds of its places.")
+    ] = None
+    fresh_units: Annotated[
+        bool,
+        typer.Option("--fresh-units", help="Draw places and drives that nobody has seen; the board names their seed."),
+    ] = False
+
+    def values(self, suite: str) -> dict[str, str]:
+        """The changed values in YAML, by their keys joined by dots. Raises InputError or SuiteError."""
         assignments = list(self.changes or ())
         if self.repeats:
             assignments.append(f"repeats={self.repeats}")
-        return _split_assignments(assignments)
+        if self.fresh_units:
+            assignments.append(f"base_seed={SEEDS_PER_DRAW * (1 + secrets.randbelow(DRAWS))}")
+        values = _split_assignments(assignments)
+        if self.units:
+            path = catalog.find("suite", suite).path
+            written = yaml_file.read_all(path, Suite, values, kind="suite").source.plain
+            values |= changes_for_units(written, self.units)
+        return values
 
 
 @option_group
@@ -156,7 +178,7 @@ def run_command(
     from vobench.report.threshold import parse_threshold
 
     thresholds = [parse_threshold(text) for text in fail_if or ()]
-    plan = selection.read_plan(suite, changes.values())
+    plan = selection.read_plan(suite, changes.values(suite))
     for sentence in hidden_builtins(plan.found):
         terminal.warn(sentence)
     plan = limits.apply(plan)

@@ -60,10 +60,11 @@ class Run:
 
     @cached_property
     def trials(self) -> "pd.DataFrame":
-        """One row per trial: case, estimator, repeat, the choices that make the case, status and metrics."""
+        """One row per trial: case, estimator, repeat, the choices that make the case, its seeds, status and metrics."""
         from vobench.report.run_tables import trial_frame
 
-        return trial_frame(self._scores)
+        facts = {cell.case: cell.facts for cell in self._board.cells}
+        return trial_frame(self._scores, facts)
 
     @cached_property
     def frames(self) -> "pd.DataFrame":

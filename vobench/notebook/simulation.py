@@ -24,8 +24,10 @@ if TYPE_CHECKING:
 
 
 class RenderOptions(TypedDict, total=False):
-    """The options of `render`: the camera's pose, time and sensor, and the rendering engine."""
+    """The options of `render`: the place of a generator, the camera's pose, time and sensor, and the engine."""
 
+    seed: int | None
+    lighting: str
     camera: str
     at_m: tuple[float, float, float]
     yaw_deg: float
@@ -109,8 +111,8 @@ def _recordings(case: Case | RecordedCase) -> "dict[str, Recording]":
 def render(scene: str, **options: Unpack[RenderOptions]) -> "NDArray[np.uint8]":
     """An RGB picture (H, W, 3) of a scene, the same that `vobench render` draws.
 
-    `options` are the keywords of `RenderOptions`: camera, at_m, yaw_deg, pitch_deg, time_s, sensor, gain, engine,
-    samples. Raises UnknownNameError, InputError and MissingDependencyError.
+    `options` are the keywords of `RenderOptions`: seed, lighting, camera, at_m, yaw_deg, pitch_deg, time_s, sensor,
+    gain, engine, samples. Raises UnknownNameError, InputError and MissingDependencyError.
     """
     from vobench.runner.scene_picture import render_scene
 

@@ -4,7 +4,6 @@ import json
 import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
-from functools import partial
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -22,7 +21,17 @@ from vobench.rendering.direct_light import direct_light, mirror_images
 from vobench.rendering.emitter import emitters
 from vobench.rendering.gathering import Rounds, Smoothing
 from vobench.rendering.geometry import FAR_M, RayCaster, are_panes, face_materials, offset_from_surface
-from vobench.rendering.indirect_light import MOST_RAYS, Gatherer, Surfels, albedo, blend, bounced, response, surfels
+from vobench.rendering.indirect_light import (
+    MOST_RAYS,
+    Gatherer,
+    Surfels,
+    albedo,
+    blend,
+    bounced,
+    evenly_dithered,
+    response,
+    surfels,
+)
 from vobench.rendering.photons import Reflectors
 from vobench.rendering.texel import Texels, texel_areas_m2, texels
 from vobench.rendering.texel_layout import TexelLayout
@@ -251,14 +260,15 @@ def bake(
         response(faces, scene.materials, visibility),
         skies,
         surfel_of,
-        len(groups),
-        len(scene.lights),
+        surfels=len(groups),
+        lamps=0,  # what lamps give by mirrors is carried by photons
     )
     rays = max(settings.indirect_rays, SKY_RAYS if skies else 0)
     rays_each = min(rays, MOST_RAYS / max(len(groups), 1))
+    middles = evenly_dithered(points.take(groups.middle), groups.step_m)
     rounds = Rounds(
         gatherer,
-        points.take(groups.middle),
+        middles,
         side=round(np.sqrt(rays_each / 2)),
         done=lambda share: report(PLACED_DONE + (GATHER_DONE - PLACED_DONE) * share),
     )
@@ -360,23 +370,39 @@ def _bounces(
     lights = _Lights(scene, instants)
     received = straight.received
     reflectance = straight.reflectance
-    bounce = partial(bounced, received, reflectance, bounces=settings.bounces)
     by_mirrors_lx = straight.by_mirrors_lx.mean(0)
-    pilot = bounce(rounds.table(), by_mirrors_lx + lights.of_skies(rounds.sky_lx()))
+    if not settings.bounces:
+        return np.zeros(received.shape, np.float32), np.zeros(len(reflectance), np.float32)
+
+    # All bounces but the last, by the rays of the first round, whose noise averages out over all that the last finds.
+    # The last of these is smoothed as light is shown.
+    first_lx = by_mirrors_lx + lights.of_skies(rounds.sky_lx())
+    pilot = bounced(received, reflectance, rounds.table(), first_lx, bounces=max(settings.bounces - 2, 0))
+    if settings.bounces > 1:
+        light_lx = rounds.first_light(smoothing, _as_columns(received + reflectance * pilot))
+        pilot = _by_light(light_lx, received.shape) + first_lx[..., None]
     gathered = rounds.refined(
         smoothing,
-        radiosity=lights.luminance(received + reflectance * pilot),
+        radiosity=_as_columns(received + reflectance * pilot),
+        luminance=lights.channel_luminances(received.shape[2]),
         sky_weights=lights.sky_weights,
         direct=lights.luminance(straight.illuminance_lx[..., None]),
         by_mirrors=np.stack([lights.luminance(half_lx[..., None]) for half_lx in straight.by_mirrors_lx]),
-        noise=settings.light_noise if settings.bounces else np.inf,
+        noise=settings.light_noise,
     )
-    indirect = bounce(gathered.near + gathered.far, by_mirrors_lx + lights.of_skies(gathered.sky_lx))
-    if settings.bounces:
-        for row, sent in enumerate(received + reflectance * indirect):
-            far_lx = gathered.far @ sent
-            indirect[row] += smoothing.averaged(far_lx) - far_lx
-    return indirect, gathered.noise
+    last_lx = by_mirrors_lx + lights.of_skies(gathered.sky_lx)
+    return _by_light(gathered.light_lx, received.shape) + last_lx[..., None], gathered.noise
+
+
+def _as_columns(values: Floats) -> Floats:
+    """Values (K, S, C) of lights as columns (S, K * C)."""
+    return np.ascontiguousarray(values.transpose(1, 0, 2)).reshape(values.shape[1], -1).astype(np.float32)
+
+
+def _by_light(columns: Floats, shape: tuple[int, ...]) -> Floats:
+    """Columns (S, K * C) as values (K, S, C) of lights."""
+    light_count, surfel_count, channels = shape
+    return np.ascontiguousarray(columns.reshape(surfel_count, light_count, channels).transpose(1, 0, 2))
 
 
 class _Lights:
@@ -398,6 +424,10 @@ class _Lights:
         for weight, of_light in zip(self._weights, values, strict=True):
             total += (of_light * weight).sum(-1) if of_light.shape[-1] > 1 else of_light[:, 0] * weight.sum()
         return total
+
+    def channel_luminances(self, channels: int) -> Floats:
+        """The luminance (K * C,) of each channel of each light."""
+        return np.asarray(self._weights[:, :channels].ravel())
 
     def of_skies(self, sky_lx: Floats) -> Floats:
         """What each sky gives (N, S) as what each light does (K, S)."""

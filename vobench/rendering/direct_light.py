@@ -3,11 +3,19 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.emitter import Aim, Emitter, Occluder, emitters
 from vobench.rendering.geometry import RAY_OFFSET_M, BoundingSphere, PlanarPatch, RayCaster, bounding_sphere
+from vobench.rendering.shadow_kernels import (
+    add_arrived,
+    ahead_of,
+    entering_light,
+    lit_rays,
+    places_in_cell,
+    spread_over_texels,
+)
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.thread_pool import chunked
@@ -128,13 +136,9 @@ def mirror_images(
     return images
 
 
-# Steps of additive recurrences that fill the unit interval evenly: Roberts (2018), R2 and the golden ratio.
-JITTER = np.array([0.7548776662, 0.5698402910], np.float32)
-FOOTPRINT = np.array([0.6180339887, 0.3247179572], np.float32)
 # emitters that are seen narrower or wider need fewer or more rays
 NARROW_RAD = 0.15
 WIDE_RAD = 0.6
-MOST = 0.7  # share of rays from which on all are cast at once
 RIM = 2  # texels around a place of half shadow
 PARTIAL = 0.2  # share of the points around that see an emitter in part, from which a shadow takes more rays
 LEAST_LX = 1e-30  # by which nothing is divided that is darker
@@ -323,9 +327,10 @@ def reached(emitter: Emitter, points: Texels, rows: Rows) -> Rows:
 
     def reached_part(part: slice) -> Rows:
         part_rows = rows[part]
-        to_centre_m = emitter.ball.centre_m - points.points_m[part_rows]
-        ahead_m = np.einsum("ij,ij->i", to_centre_m, points.normals[part_rows])
-        part_rows = part_rows[ahead_m > -emitter.ball.radius_m]
+        is_ahead = np.empty(len(part_rows), bool)
+        ball = emitter.ball
+        ahead_of(points.points_m, points.normals, part_rows, ball.centre_m, ball.radius_m, is_ahead)
+        part_rows = part_rows[is_ahead]
         return np.asarray(part_rows[emitter.may_light(points.points_m[part_rows])])
 
     return chunked(reached_part, len(rows))
@@ -374,28 +379,21 @@ def _arriving(
     occluder: Occluder,
     rays: Rays,
 ) -> Floats:
-    total = np.zeros(len(texels), np.float32)
-    unshaded = np.zeros(len(texels), np.float32)
-    passed_count = np.zeros(len(texels), np.float32)
-    ray_count = np.zeros(len(texels), np.float32)
+    count = len(texels)
+    total, unshaded, passed_count, ray_count = np.zeros((4, count), np.float32)
+    rows = np.empty(count, np.int32)
+    origins_m = np.empty((count, 3), np.float32)
+    segments_m = np.empty((count, 3), np.float32)
     towards = emitter.towards(texels)
     for cell in range(rays.side**2):
         vectors_m, light = _sent(towards, texels, cell, rays.side)
-        unshaded += light
-        is_lit = light > 0
-        # All at once where most are: picking rows costs as much as rays.
-        are_few = np.count_nonzero(is_lit) < MOST * len(light)
-        cast = np.flatnonzero(is_lit) if are_few else slice(None)
-        start_m = texels.points_m[cast]
-        ahead_m = vectors_m[cast]
+        lit_count = lit_rays(texels.points_m, vectors_m, light, rows, origins_m, segments_m)
+        lit = slice(lit_count)
         if rays.spread:
-            aside_m = footprint_m(texels, cast, cell)
-            start_m = start_m + aside_m
-            ahead_m = ahead_m - aside_m
-        share = emitter.passing(occluder, start_m, ahead_m)
-        total[cast] += light[cast] * share
-        passed_count[cast] += (share > 0) & is_lit[cast]
-        ray_count += is_lit
+            steps_m = (texels.step_u_m, texels.step_v_m)
+            spread_over_texels(texels.dither, *steps_m, cell, rows[lit], origins_m[lit], segments_m[lit])
+        share = emitter.passing(occluder, origins_m[lit], segments_m[lit])
+        add_arrived(rows[lit], share.astype(np.float32), light, total, unshaded, passed_count, ray_count)
     with np.errstate(invalid="ignore"):
         clear_share = passed_count / ray_count
     return np.stack([total / rays.side**2, clear_share, unshaded / rays.side**2], -1)
@@ -434,34 +432,10 @@ def _sent(
     side: int,
 ) -> tuple[Floats, Floats]:
     """Vectors (P, 3) to an emitter, and the illuminance (P,) that enters from there if nothing hides it."""
-    a, b = place_in_cell(texels, cell, side)
+    a, b, light = np.empty((3, len(texels)), np.float32)
+    places_in_cell(texels.dither, cell, side, a, b)
     vectors_m, strength = towards(a, b)
-    cosine = texels.cosine(vectors_m)
-    return vectors_m, strength * np.maximum(cosine, 0) * texels.entering(cosine)
-
-
-def place_in_cell(
-    texels: Texels,
-    cell: ArrayLike,
-    side: int,
-) -> tuple[Floats, Floats]:
-    """Where in a cell of side x side of the unit square each point aims (P,), of cells (K, 1) (K, P): by its dither."""
-    cells = np.asarray(cell, np.float32)
-    jitter = texels.dither + cells[..., None] * JITTER
-    jitter -= np.floor(jitter)
-    a = (cells % side + jitter[..., 0]) / np.float32(side)
-    b = (cells // side + jitter[..., 1]) / np.float32(side)
-    return a, b
-
-
-def footprint_m(
-    texels: Texels,
-    rows: Rows | slice,
-    cell: int,
-) -> Floats:
-    """Steps (N, 3) from the middle of texels to somewhere on their area."""
-    place = texels.dither[rows] + cell * FOOTPRINT
-    place -= np.floor(place) + np.float32(0.5)
-    along_u_m = place[:, 1:] * texels.step_u_m[rows]
-    along_v_m = place[:, :1] * texels.step_v_m[rows]
-    return np.asarray(along_u_m + along_v_m)
+    vectors_m = np.ascontiguousarray(vectors_m, np.float32)
+    strength = np.ascontiguousarray(strength, np.float32)
+    entering_light(vectors_m, strength, texels.normals, texels.planes, texels.eta, light)
+    return vectors_m, light

@@ -72,8 +72,8 @@ class TriangleCaster:
         self._scene = new_scene(robust=robust)
         self._mesh = mesh_construction.TriangleMesh(self._scene, self._triangles)
 
-    def hits(self, origins_m: ArrayLike, directions: ArrayLike, reach: float) -> Hits:
-        """The nearest face along rays (R, 3), no farther than `reach` lengths of their directions."""
+    def hits(self, origins_m: ArrayLike, directions: ArrayLike, reach: ArrayLike) -> Hits:
+        """The nearest face along rays (R, 3), no farther than `reach` (R,) lengths of their directions."""
         rays = _rays(origins_m, directions, reach)
         result = self._scene.run(*rays, query="INTERSECT", output=1)
         hit = with_portable_places(result, self._triangles, rays[0], rays[1])

@@ -20,6 +20,7 @@ from vobench.rendering.geometry import (
     sample_points,
     tangents,
 )
+from vobench.rendering.shadow_kernels import aim_at_area
 from vobench.rendering.solid_angle import Rectangle, SeenRectangle, SolidAngle, rectangle
 from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
@@ -147,17 +148,16 @@ class Panel(Emitter):
 
     def _by_area(self, texels: Texels) -> Aim:
         face = self.face
-        lifted_m = face.corner_m + RAY_OFFSET_M * face.normal
-        corner_m = (lifted_m - texels.points_m).astype(np.float32)
-        u_m = face.edge_u_m.astype(np.float32)
-        v_m = face.edge_v_m.astype(np.float32)
-        normal = face.normal.astype(np.float32)
         area_m2 = np.linalg.norm(face.edge_u_m) * np.linalg.norm(face.edge_v_m)
-        intensity_cd = np.float32(self.light.luminance_cd_m2 * area_m2)  # straight ahead
+        intensity_cd = float(self.light.luminance_cd_m2 * area_m2)  # straight ahead
+        lifted_m = face.corner_m + RAY_OFFSET_M * face.normal
+        panel = (lifted_m, face.edge_u_m, face.edge_v_m, face.normal, intensity_cd)
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            vectors_m = corner_m + a[:, None] * u_m + b[:, None] * v_m
-            return vectors_m, _from_area(intensity_cd, vectors_m, vectors_m @ normal)
+            vectors_m = np.empty((len(texels), 3), np.float32)
+            strength = np.empty(len(texels), np.float32)
+            aim_at_area(texels.points_m, *panel, a, b, vectors_m, strength)
+            return vectors_m, strength
 
         return aim
 

@@ -8,33 +8,32 @@ import numpy as np
 import scipy
 
 from vobench import stop
-from vobench.rendering.array_types import Floats, Mask, Rows
+from vobench.rendering.array_types import Floats
 from vobench.rendering.indirect_light import Gatherer
 from vobench.rendering.texel import Texels
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
+    from scipy.sparse.linalg import LinearOperator
 
 SMOOTHINGS = 4  # how often light from far surfels is averaged over neighbouring surfels
-PROBES = 8  # the number of random patterns from which the noise after smoothing is estimated
+VARIANCE_SMOOTHINGS = 2  # how often variances are smoothed
 DARK = 0.1  # the noise of a place darker than this share of the mean light is relative to this share
 FAINTEST = 1e-9  # the smallest light in lux that noise is relative to, for a scene without light
 MOST_ROUNDS = 8  # the largest number of rounds of rays from a surfel
-ALONE = 1e-3  # the weight of a surfel's own variance, which matters only without neighbours
 FEWEST = 0.002  # the share of noisy surfels up to which another round is not worth its overhead
 
 
 @dataclass(frozen=True, slots=True)
 class Gathered:
-    """The indirect light that S surfels receive.
+    """The indirect light that S surfels receive from surfels and skies.
 
-    `near` and `far` (S, S) map the radiosity of all surfels to the light that comes from near and from far surfels.
+    `light_lx` (S, C) comes from the radiosity of surfels in C channels; light from far surfels is smoothed.
     `sky_lx` (K, S) is the smoothed light of each sky via mirrors.
     `noise` (S,) is the standard error of the light that is shown at each surfel, relative to all light.
     """
 
-    near: "csr_matrix"
-    far: "csr_matrix"
+    light_lx: Floats
     sky_lx: Floats
     noise: Floats
 
@@ -98,26 +97,34 @@ class Rounds:
         self.escaped = (halves[0].escaped + halves[1].escaped) / 2
         self.hits = gatherer.hits(halves[0]) + gatherer.hits(halves[1])
 
-    def table(self) -> "csr_matrix":
-        """The matrix (S, S) of the first round, which maps the radiosity of surfels to the light that they receive."""
-        surfels = self._gatherer.surfels
-        total = sum(half.near + half.far for half in self._halves)
-        return (total / 2)[:, :surfels].tocsr()
+    def table(self) -> "LinearOperator":
+        """The table (S, S) of the first round, which maps the radiosity of surfels to the light that they receive."""
+        parts = [
+            scipy.sparse.linalg.aslinearoperator(table) for half in self._halves for table in (half.near, half.far)
+        ]
+        return (parts[0] + parts[1] + parts[2] + parts[3]) * 0.5
 
     def met(self) -> Floats:
         """The share (S,) of the rays of the first round that ended at a surfel or a lamp."""
-        tables = [half.near + half.far for half in self._halves]
-        return np.asarray(sum(table.sum(1) for table in tables)).ravel() / 2
+        shares = [table.sum(1) for half in self._halves for table in (half.near, half.far)]
+        return np.asarray(sum(shares)).ravel() / 2
 
     def sky_lx(self) -> Floats:
         """The illuminance (K, S) by each sky via mirrors, from the first round."""
         return (self._halves[0].sky + self._halves[1].sky) / 2
+
+    def first_light(self, smoothing: Smoothing, radiosity: Floats) -> Floats:
+        """The light (S, C) from the radiosity (S, C) of surfels by the first round alone."""
+        near = sum(half.near @ radiosity for half in self._halves)
+        far = sum(half.far @ radiosity for half in self._halves)
+        return np.asarray(near + smoothing.averaged(far)) / 2
 
     def refined(
         self,
         smoothing: Smoothing,
         *,
         radiosity: Floats,
+        luminance: Floats,
         sky_weights: Floats,
         direct: Floats,
         by_mirrors: Floats,
@@ -126,73 +133,56 @@ class Rounds:
     ) -> Gathered:
         """The gathered light after further rays from all surfels whose relative standard error exceeds `noise`.
 
-        `radiosity` (S,), `direct` (S,) and `by_mirrors` (2, S), from two sets of photons, are luminances of all lights
-        together.
+        `radiosity` (S, C) is that of surfels in channels, `luminance` (C,) the weight of each channel.
+        `direct` (S,) and `by_mirrors` (2, S), from two sets of photons, are luminances of all lights together.
         `sky_weights` (K,) is the luminance of the colour of each sky.
         """
-        surfels = self._gatherer.surfels
         count = len(self._middles)
         rounds = np.ones(count, np.int64)
         other_light = smoothing.blended(direct + by_mirrors.mean(0))
-        first, second = self._halves
-        near = (first.near + second.near)[:, :surfels].tocsr()
-        far = (first.far + second.far)[:, :surfels].tocsr()
-        near_halves = np.stack([half.near[:, :surfels] @ radiosity for half in self._halves])
-        far_halves = np.stack([half.far[:, :surfels] @ radiosity + sky_weights @ half.sky for half in self._halves])
-        sky = first.sky + second.sky
+        near = np.stack([half.near @ radiosity for half in self._halves])
+        far = np.stack([half.far @ radiosity for half in self._halves])
+        sky = np.stack([half.sky for half in self._halves])
         self._halves = []
+
+        def halves() -> tuple[Floats, Floats]:
+            """Near and far light (2, S) by each half of the rays, in luminance."""
+            far_sky = np.einsum("k,hks->hs", sky_weights, sky)
+            return near @ luminance / rounds, (far @ luminance + far_sky) / rounds
+
         while True:
             stop.check()
-            standard_error = _noise(smoothing, near_halves / rounds, far_halves / rounds, rounds, other_light)
+            standard_error = _noise(smoothing, *halves(), other_light)
             rows = np.flatnonzero((standard_error > noise) & (rounds < MOST_ROUNDS))
             if len(rows) <= FEWEST * count:
                 break
             round_count = int(rounds[rows].max())
+            middles = self._middles.take(rows)
             for repeat in range(round_count):
                 for half in (0, 1):
-                    sample = self._gatherer.sample(
-                        self._middles.take(rows), side=self._side, turn=2 * (round_count + repeat) + half
+                    turn = 2 * (round_count + repeat) + half
+                    found_near, found_far, found_sky = self._gatherer.light(
+                        middles, radiosity, side=self._side, turn=turn
                     )
-                    rows_near = sample.near[:, :surfels]
-                    rows_far = sample.far[:, :surfels]
-                    near_halves[half, rows] += rows_near @ radiosity
-                    far_halves[half, rows] += rows_far @ radiosity + sky_weights @ sample.sky
-                    sky[:, rows] += sample.sky
-                    near = near + _at_rows(rows_near, rows, count)
-                    far = far + _at_rows(rows_far, rows, count)
+                    near[half, rows] += found_near
+                    far[half, rows] += found_far
+                    sky[half][:, rows] += found_sky
             rounds[rows] += round_count
             if done:
                 done(np.log2(2 * round_count) / np.log2(2 * MOST_ROUNDS))
         by_photons = smoothing.blended((by_mirrors[0] - by_mirrors[1]) / 2)
         photon_variance = smoothing.averaged(by_photons**2)
-        light = _relative_to(smoothing.blended((near_halves + far_halves).mean(0) / rounds) + other_light)
+        near_halves, far_halves = halves()
+        light = _relative_to(smoothing.blended((near_halves + far_halves).mean(0)) + other_light)
         standard_error = np.sqrt(standard_error**2 + photon_variance / light**2)
-        inverse_counts = scipy.sparse.diags_array((1 / (2 * rounds)).astype(np.float32))
+        near_lx = near.mean(0) / rounds[:, None]
+        far_lx = far.mean(0) / rounds[:, None]
+        sky_lx = sky.mean(0) / rounds
         return Gathered(
-            (inverse_counts @ near).tocsr(),
-            (inverse_counts @ far).tocsr(),
-            smoothing.averaged((sky / (2 * rounds)).T).T,
+            (near_lx + smoothing.averaged(far_lx)).astype(np.float32),
+            smoothing.averaged(sky_lx.T).T,
             standard_error,
         )
-
-
-def _at_rows(table: "csr_matrix", rows: Rows, count: int) -> "csr_matrix":
-    """A table with `count` rows: those of a table (N, S) at the indices `rows` (N,), and empty rows elsewhere."""
-    entries = np.zeros(count, np.int64)
-    entries[rows] = np.diff(table.indptr)
-    starts = np.concatenate([[0], np.cumsum(entries)])
-    return scipy.sparse.csr_matrix((table.data, table.indices, starts), (count, table.shape[1]))
-
-
-def _of_others(smoothing: Smoothing, variance: Floats, is_even: Mask) -> Floats:
-    """The variances (S,), averaged over the neighbours in the other one of two random groups.
-
-    `is_even` (S,) is whether a surfel is in the first group. Thus the rays of a surfel do not decide whether it gets
-    more rays. If they did, rare bright rays would get too small a weight.
-    """
-    weights = np.column_stack([is_even + ALONE, ~is_even + ALONE])
-    of_kind = smoothing.averaged(variance[:, None] * weights) / smoothing.averaged(weights)
-    return np.where(is_even, of_kind[:, 1], of_kind[:, 0])
 
 
 def _relative_to(light: Floats) -> Floats:
@@ -205,28 +195,18 @@ def _noise(
     smoothing: Smoothing,
     near_halves: Floats,
     far_halves: Floats,
-    rounds: Rows,
     other_light: Floats,
 ) -> Floats:
     """The standard error (S,) of the light that is shown at surfels, relative to all light.
 
-    It is estimated from the two halves (2, S) of near light and of far light. Variances are averaged over neighbours,
-    because two values give a poor estimate. Random patterns are smoothed to find how much noise smoothing leaves.
+    It is estimated from the two halves (2, S) of near light and of far light, both smoothed as they are shown. The
+    squared difference is averaged over neighbours, because two values give a poor estimate.
     """
-    far = smoothing.averaged(far_halves.mean(0))
-    light = smoothing.blended(near_halves.mean(0) + far) + other_light
-    light = _relative_to(light)
-
-    # `variance` is that of one round. The variance of the mean of several rounds is smaller by their number.
-    random = np.random.default_rng(0)
-    is_even = random.random(len(rounds)) < 0.5
-    deviations = []
-    for halves in (near_halves, far_halves):
-        variance = _of_others(smoothing, rounds * (halves[0] - halves[1]) ** 2 / 4, is_even)
-        deviations.append(np.sqrt(variance / rounds))
-    sign = random.integers(0, 2, (2, len(rounds), PROBES)).astype(np.float32) * 2 - 1
-    near_pattern = deviations[0][:, None] * sign[0]
-    far_pattern = smoothing.averaged(deviations[1][:, None] * sign[1])
-    shown = smoothing.blended((near_pattern + far_pattern).astype(np.float32))
-    variance = smoothing.blended((shown**2).mean(1))
+    shown_halves = [
+        smoothing.blended(near + smoothing.averaged(far)) for near, far in zip(near_halves, far_halves, strict=True)
+    ]
+    light = _relative_to((shown_halves[0] + shown_halves[1]) / 2 + other_light)
+    variance = ((shown_halves[0] - shown_halves[1]) / 2) ** 2
+    for _ in range(VARIANCE_SMOOTHINGS):
+        variance = smoothing.averaged(variance)
     return np.asarray(np.sqrt(variance) / light)

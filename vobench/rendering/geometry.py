@@ -109,7 +109,8 @@ def reversed_faces(corners_m: Array) -> Indices:
 class RayCaster:
     """Rays against the faces `among` (K,) of a table, by Embree; hits name them by their place in the table.
 
-    Of the two sides of a sheet rays meet the one that they come from.
+    Of the two sides of a sheet rays meet the one that they come from. twin (F + 1,): the other side of a sheet that a
+    face is one of, -1 for none.
     """
 
     def __init__(
@@ -124,8 +125,8 @@ class RayCaster:
         twin = reversed_faces(faces.corners_m[rows])
         has_twin = twin >= 0
         self._has_sheets = bool(has_twin.any())
-        self._twin = np.full(len(faces) + 1, -1, np.int32)  # the last one for the face -1
-        self._twin[rows[has_twin]] = rows[twin[has_twin]]
+        self.twin = np.full(len(faces) + 1, -1, np.int32)  # the last one for the face -1
+        self.twin[rows[has_twin]] = rows[twin[has_twin]]
         self.solid = rows[~has_twin]
 
     def occluded(self, origins_m: ArrayLike, targets_m: ArrayLike) -> Mask:
@@ -140,25 +141,37 @@ class RayCaster:
         """Which face each ray (R, 3) meets first, -1 for none: `hits` for those who work out the rest."""
         face = self._triangles.nearest(origins_m, directions, ENDLESS)
         behind = self._behind(face, directions)
-        face[behind] = self._twin[face[behind]]
+        face[behind] = self.twin[face[behind]]
         return face
 
     def _behind(self, face: Indices, directions: ArrayLike) -> Rows:
         """The rays (K,) that met the far one of a sheet's two sides."""
         if not self._has_sheets:
             return np.zeros(0, np.int64)
-        rays = np.flatnonzero(self._twin[face] >= 0)
+        rays = np.flatnonzero(self.twin[face] >= 0)
         ray_directions = np.asarray(directions)[rays]
         facing = np.einsum("ij,ij->i", self._planes[face[rays]], ray_directions)
         return np.asarray(rays[facing > 0])
 
+    def one_sided_hits(
+        self,
+        origins_m: ArrayLike,
+        directions: ArrayLike,
+        reach: ArrayLike = ENDLESS,
+    ) -> Hits:
+        """The nearest face along each ray (R, 3), of a sheet any side, no farther than `reach` of its lengths."""
+        return self._triangles.hits(origins_m, directions, reach)
+
     def hits(self, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
         """The nearest face along each ray (R, 3)."""
-        hits = self._triangles.hits(origins_m, directions, ENDLESS)
+        return self.facing(self._triangles.hits(origins_m, directions, ENDLESS), directions)
+
+    def facing(self, hits: Hits, directions: ArrayLike) -> Hits:
+        """The same hits on the side of each sheet that their rays (R, 3) come from; changed in place."""
         behind = self._behind(hits.face, directions)
         # The corners in reverse: the second keeps its place, the first is the third.
         hits.v[behind] = 1 - hits.u[behind] - hits.v[behind]
-        hits.face[behind] = self._twin[hits.face[behind]]
+        hits.face[behind] = self.twin[hits.face[behind]]
         return hits
 
 

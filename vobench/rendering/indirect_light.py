@@ -1,20 +1,19 @@
 """Indirect light: surfels, which of them see each other by rays that follow mirrors and pass panes, and bounces."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING
 
 import cv2
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas
-from vobench.rendering.direct_light import JITTER, place_in_cell
+from vobench.rendering.direct_light import EvenPattern
 from vobench.rendering.embree import Hits
-from vobench.rendering.emitter import cosine_weighted
-from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, face_materials, take, tangents
+from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, face_materials, take
+from vobench.rendering.ray_kernels import FACE, FAINT, Faces, cosine_rays, end_rays, sorted_by_point
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.thread_pool import chunked, in_chunks
@@ -26,12 +25,14 @@ from vobench.scene.mesh import Triangles
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
+    from scipy.sparse.linalg import LinearOperator
 
 RAISED = 0.25  # of a cell, above their faces: places that see each other there share light
 NEIGHBOURS = 9  # surfels whose light a texel may take, its own included
 WIDTH = 1.2  # square of the blend's width, in cells
 TURNED = 2.0  # cells that two opposite normals are apart by, and by half
 LEAST = 0.02  # of the weights of a blend
+PATTERN_SIDE = 64  # cells after which the dither of surfels repeats
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +80,19 @@ def surfels(
     is_beyond = chunked(hidden, len(points))
     group, middle = _grouped(2 * group + is_beyond, points.points_m)
     return Surfels(group.astype(np.int32), middle, step_m[middle].astype(np.float32))
+
+
+def evenly_dithered(middles: Texels, step_m: Floats) -> Texels:
+    """The middles (S,) of surfels, with dithers by which the rays of surfels beside one another fit together.
+
+    Light from far surfels is averaged over neighbours, so that their rays count as if they were those of one point.
+    """
+    cell = np.floor(middles.points_m / step_m[:, None]).astype(np.int64)
+    axis = nearest_axis(middles.planes) // 2
+    row = np.where(axis == 0, cell[:, 1], cell[:, 0]) % PATTERN_SIDE
+    column = np.where(axis == 2, cell[:, 1], cell[:, 2]) % PATTERN_SIDE
+    pattern = EvenPattern(PATTERN_SIDE, 1, middles.dither[:1])
+    return replace(middles, dither=pattern.dither(row * PATTERN_SIDE + column))
 
 
 def _grouped(key: Rows, points_m: Floats) -> tuple[Rows, Rows]:
@@ -215,11 +229,9 @@ def _tile(material: Material) -> Floats:
 
 TURN = np.array([0.4142135624, 0.7320508076], np.float32)  # by which further rays of a point differ
 MIRRORS = 4  # followed by one ray
-FAINT = 1e-3  # what a mirror returns of a ray is dropped below this
-ROWS = 1 << 10  # points at once: times their rays
+ROWS = 1 << 9  # points at once: times their rays
 MOST_RAYS = 25_000_000  # in one table
 PHOTON_ROWS = 1 << 16  # photons at once
-NEAR_M = 1.0  # light from nearer changes between a surfel and its neighbours
 
 
 @dataclass(frozen=True, slots=True)
@@ -317,7 +329,7 @@ class _RayBatch:
     is_direct: whether a lamp that they meet next is direct light, and counted as such.
     """
 
-    point: Rows
+    point: Indices
     origins_m: Floats
     directions: Floats
     weight: Floats
@@ -331,19 +343,28 @@ class _RayBatch:
 
 
 @dataclass(frozen=True, slots=True)
-class _Step:
-    """Rays at the faces that they have met: with what cosine, on which texel, and the light (R,) scattered there.
+class _Found:
+    """What rays (R,) found: of which point, in which column of the table, on which texel, and with which share.
 
-    gone: the rays that met nothing; from_panes: those that panes on the way reflected.
+    is_near: whether the last segment of the ray is shorter than NEAR_M.
     """
 
-    batch: _RayBatch
-    hits: Hits
-    cosine: Floats
+    point: Indices
+    column: Indices
     texel: Indices
-    scattered: Floats
-    gone: _RayBatch
-    from_panes: _RayBatch
+    share: Floats
+    is_near: Mask
+
+    take = take
+
+
+def _concatenated(parts: Sequence[_Found]) -> _Found:
+    """What the rays of all parts found, one part after the other."""
+    columns = {}
+    for column in fields(_Found):
+        values = [getattr(part, column.name) for part in parts]
+        columns[column.name] = np.concatenate(values)
+    return _Found(**columns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -385,6 +406,11 @@ class Gatherer:
     surfel_of: Indices
     surfels: int
     lamps: int
+    faces: Faces = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        faces = face_table(self.visibility.faces, self.atlas, self.visibility, self.response)
+        object.__setattr__(self, "faces", faces)
 
     def gather(
         self,
@@ -413,9 +439,7 @@ class Gatherer:
         """Send side x side rays from every point, in each turn others; `done` is called with shares."""
         parts = list[Sample]()
         if side and len(points):
-            turned = points.dither + np.float32(turn) * TURN
-            turned -= np.floor(turned)
-            points = replace(points, dither=turned)
+            points = turned(points, turn)
             parts = in_chunks(lambda part: self._sample(points.take(part), side), len(points), chunk=ROWS, done=done)
         unasked = 0 if parts else len(points)
         no_entries = scipy.sparse.csr_matrix((unasked, self.surfels + self.lamps), dtype=np.float32)
@@ -429,51 +453,65 @@ class Gatherer:
             texels=np.concatenate([np.zeros(0, np.int32), *(part.texels for part in parts)]),
         )
 
+    def light(
+        self,
+        points: Texels,
+        radiosity: Floats,
+        *,
+        side: int,
+        turn: int,
+    ) -> tuple[Floats, Floats, Floats]:
+        """What side x side rays from every point find of the radiosity (S, C): near and far (P, C), and sky (K, P)."""
+        points = turned(points, turn)
+
+        def found(part: slice) -> tuple[Floats, Floats, Floats]:
+            sample = self._sample(points.take(part), side)
+            return sample.near @ radiosity, sample.far @ radiosity, sample.sky
+
+        parts = in_chunks(found, len(points), chunk=ROWS)
+        near, far, sky = zip(*parts, strict=True)
+        return np.concatenate(near), np.concatenate(far), np.concatenate(sky, 1)
+
     def _sample(self, points: Texels, side: int) -> Sample:
-        batch = _start(points, side)
-        parts = []
-        texels = []
         ray_count = np.float32(side * side)
         sky = np.zeros((len(self.skies), len(points)), np.float32)
         escaped = np.zeros(len(points), np.float32)
+        batch = _start(points, side)
+        parts = []
         for depth in range(MIRRORS + 1):
-            step = self._step(batch)
+            found, batch, gone = self._followed(batch, points.dither, is_first=depth == 0)
+            parts.append(found)
             if depth == 0:
-                escaped += self._escaped(step.gone, len(points)) / ray_count
+                escaped += self._escaped(gone, len(points)) / ray_count
             else:
-                self._add_sky(sky, step.gone)
-            lamp = self.response.lamp[step.hits.face]
-            is_lamp = lamp >= 0
-            factor = np.where(is_lamp, step.batch.weight * ~step.batch.is_direct, step.scattered)
-            column = np.where(is_lamp, self.surfels + lamp, self.surfel_of[step.texel])
-            counts = (column >= 0) & (factor > 0)
-            parts.append(
-                (
-                    factor[counts] / ray_count,
-                    step.batch.point[counts],
-                    column[counts],
-                    step.hits.distance[counts] < NEAR_M,
-                )
-            )
-            texels.append(step.texel[counts])
-            batch = self._onwards(step, points.dither, is_first=depth == 0)
+                self._add_sky(sky, gone)
             if not len(batch.point):
                 break
-        factor, row, column, is_near = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+        found = _concatenated(parts)
+        found.share[:] /= ray_count
+        return Sample(
+            self._table(found, found.is_near, len(points)),
+            self._table(found, ~found.is_near, len(points)),
+            sky / ray_count,
+            escaped,
+            found.texel,
+        )
 
-        def table(chosen: Mask) -> "csr_matrix":
-            entries = (factor[chosen], (row[chosen], column[chosen]))
-            return scipy.sparse.csr_matrix(entries, (len(points), self.surfels + self.lamps), dtype=np.float32)
-
-        found = np.concatenate(texels)
-        return Sample(table(is_near), table(~is_near), sky / ray_count, escaped, found)
+    def _table(self, found: _Found, selected: Mask, point_count: int) -> "csr_matrix":
+        """What the selected rays (R,) found, as a table (P, S + L) with an entry for each ray."""
+        count = np.count_nonzero(selected)
+        starts = np.empty(point_count + 1, np.int32)
+        columns = np.empty(count, np.int32)
+        shares = np.empty(count, np.float32)
+        sorted_by_point(found.point, found.column, found.share, selected, starts, columns, shares)
+        return scipy.sparse.csr_matrix((shares, columns, starts), (point_count, self.surfels + self.lamps))
 
     def deposited(self, photons: Photons) -> Floats:
         """The flux (S,) in lumens that photons bring to surfels, of coats what enters."""
         flux_lm = np.zeros(self.surfels)
 
         def trace(part: slice) -> Floats:
-            photon = np.arange(len(photons.flux_lm))[part]
+            photon = np.arange(len(photons.flux_lm), dtype=np.int32)[part]
             batch = _RayBatch(
                 point=photon,
                 origins_m=photons.origins_m[part],
@@ -482,13 +520,17 @@ class Gatherer:
                 is_direct=photons.is_shown[part],
             )
             total_lm = np.zeros(self.surfels)
-            for _ in range(MIRRORS):
-                step = self._step(batch)
-                surfel = self.surfel_of[step.texel]
-                counts = np.flatnonzero((surfel >= 0) & ~step.batch.is_direct)
-                arriving_lm = step.scattered[counts] * photons.flux_lm[step.batch.point[counts]]
-                total_lm += np.bincount(surfel[counts], arriving_lm, self.surfels)
-                batch = self._onwards(step, photons.dither, is_first=False)
+            for depth in range(MIRRORS):
+                if depth == 0:
+                    # Light that the first face shows already goes on from it, and that alone counts.
+                    batch, shown = batch.take(~batch.is_direct), batch.take(batch.is_direct)
+                    _, from_shown, _ = self._followed(shown, photons.dither, is_first=False)
+                found, batch, _ = self._followed(batch, photons.dither, is_first=False)
+                if depth == 0:
+                    batch = batch.joined(from_shown)
+                is_surfel = found.column < self.surfels
+                arriving_lm = found.share[is_surfel] * photons.flux_lm[found.point[is_surfel]]
+                total_lm += np.bincount(found.column[is_surfel], arriving_lm, self.surfels)
                 if not len(batch.point):
                     break
             return total_lm
@@ -497,22 +539,64 @@ class Gatherer:
             flux_lm += part_lm
         return flux_lm
 
-    def _step(self, batch: _RayBatch) -> _Step:
-        """Follow rays to the next face that is no pane."""
-        hits = self.visibility.opaque.hits(batch.origins_m, batch.directions)
-        lengths_m = np.where(hits.face < 0, FAR_M, hits.distance)
-        segments_m = batch.directions * lengths_m[:, None]
-        from_panes = self._reflected_by_panes(batch, segments_m)
-        batch.weight *= self.visibility.through_panes(batch.origins_m, segments_m)
-        gone = batch.take(hits.face < 0)
-        along_normal = np.einsum("ij,ij->i", batch.directions, self.visibility.normals[hits.face])
-        met = np.flatnonzero((hits.face >= 0) & (along_normal < 0))
-        batch = batch.take(met)
-        hits = hits.take(met)
-        cosine = -along_normal[met]
-        texel = self.atlas.index(hits.at(self.atlas.light_px)).astype(np.int32)
-        scattered = batch.weight * self.response.scattered(hits.face, cosine)
-        return _Step(batch, hits, cosine, texel, scattered, gone, from_panes)
+    def _followed(
+        self,
+        batch: _RayBatch,
+        dither: Floats,
+        *,
+        is_first: bool,
+    ) -> tuple[_Found, _RayBatch, _RayBatch]:
+        """Follow rays to the next face that is no pane: what they find, the rays that go on, those that met nothing."""
+        hits = self.visibility.opaque.one_sided_hits(batch.origins_m, batch.directions)
+        from_panes = self._reflected_by_panes(batch, hits)
+        count = len(batch.weight)
+        found = _Found(
+            point=np.empty(count, np.int32),
+            column=np.empty(count, np.int32),
+            texel=np.empty(count, np.int32),
+            share=np.empty(count, np.float32),
+            is_near=np.empty(count, bool),
+        )
+        onward = _RayBatch(
+            point=np.empty(count, np.int32),
+            origins_m=np.empty((count, 3), np.float32),
+            directions=np.empty((count, 3), np.float32),
+            weight=np.empty(count, np.float32),
+            is_direct=np.empty(count, bool),
+        )
+        gone = np.empty(count, np.int64)
+        found_count, onward_count, gone_count = end_rays(
+            batch.origins_m,
+            batch.directions,
+            batch.weight,
+            batch.is_direct,
+            batch.point,
+            hits.face,
+            hits.u,
+            hits.v,
+            hits.distance,
+            self.faces,
+            self.surfel_of,
+            (self.atlas.height, self.atlas.width),
+            self.surfels if self.lamps else -1,
+            dither,
+            is_first,
+            found.point,
+            found.column,
+            found.texel,
+            found.share,
+            found.is_near,
+            onward.point,
+            onward.origins_m,
+            onward.directions,
+            onward.weight,
+            onward.is_direct,
+            gone,
+        )
+        onward = onward.take(slice(onward_count))
+        if len(from_panes.point):
+            onward = onward.joined(from_panes)
+        return found.take(slice(found_count)), onward, batch.take(gone[:gone_count])
 
     def _escaped(self, gone: _RayBatch, point_count: int) -> Floats:
         """How many (P,) of the rays of each point that met nothing crossed no pane that shows the sky."""
@@ -526,69 +610,59 @@ class Gatherer:
             ray_lx = np.pi * luminance_cd_m2 * gone.weight
             sky[nth] += np.bincount(gone.point, ray_lx, minlength=sky.shape[1])
 
-    def _reflected_by_panes(self, batch: _RayBatch, segments_m: Floats) -> _RayBatch:
-        """The rays that go back from the first pane on their segment; a lamp that they meet is no direct light."""
-        rays, hits = self.visibility.first_panes(batch.origins_m, segments_m)
-        batch = batch.take(rays)
-        normals = self.visibility.normals[hits.face]
-        along_normal = np.einsum("ij,ij->i", batch.directions, normals)
-        to_pane_m = hits.distance[:, None] * segments_m[rays]
-        ends_m = batch.origins_m + to_pane_m - RAY_OFFSET_M * batch.directions
-        directions = batch.directions - 2 * along_normal[:, None] * normals
-        weight = batch.weight * self.visibility.pane_mirrors(hits.face, along_normal)
-        is_direct = np.zeros(len(weight), bool)
-        reflected = _RayBatch(batch.point, ends_m, directions, weight, is_direct)
+    def _reflected_by_panes(self, batch: _RayBatch, hits: Hits) -> _RayBatch:
+        """The rays that go back from the first pane before a hit; those that pass lose what panes do not let through.
+
+        A lamp that a reflected ray meets is no direct light.
+        """
+        reach_m = np.where(hits.face < 0, FAR_M, hits.distance)
+        rays, panes = self.visibility.first_panes(batch.origins_m, batch.directions, reach_m)
+        reflected = batch.take(rays)
+        batch.weight[rays] *= self.visibility.through_panes(
+            reflected.origins_m, reflected.directions * reach_m[rays, None]
+        )
+        normals = self.visibility.normals[panes.face]
+        along_normal = np.einsum("ij,ij->i", reflected.directions, normals)
+        to_pane_m = (panes.distance - RAY_OFFSET_M)[:, None] * reflected.directions
+        weight = reflected.weight * self.visibility.pane_mirrors(panes.face, along_normal)
+        reflected = _RayBatch(
+            reflected.point,
+            reflected.origins_m + to_pane_m,
+            reflected.directions - 2 * along_normal[:, None] * normals,
+            weight,
+            np.zeros(len(weight), bool),
+        )
         return reflected.take(weight > FAINT)
 
-    def _onwards(self, step: _Step, dither: Floats, *, is_first: bool) -> _RayBatch:
-        """The rays that go on from the faces and panes that they have met."""
-        weight = step.batch.weight * self.response.mirrored(step.hits.face, step.cosine)
-        rays = np.flatnonzero(weight > FAINT)
-        batch = step.batch.take(rays)
-        face = step.hits.face[rays]
-        face_normals = self.visibility.normals[face]
-        normals = facets(face_normals, self.response.roughness[face], dither[batch.point], rays)
-        along_normal = np.einsum("ij,ij->i", batch.directions, normals)[:, None]
-        directions = batch.directions - 2 * along_normal * normals
-        ends_m = batch.origins_m + step.hits.distance[rays, None] * batch.directions
-        # A facet may reflect a ray into its own surface.
-        is_leaving = np.einsum("ij,ij->i", directions, face_normals) > 0
-        is_direct = self.response.shows_lamps[face] & is_first
-        origins_m = ends_m + RAY_OFFSET_M * face_normals
-        mirrored = _RayBatch(batch.point, origins_m, directions, weight[rays], is_direct)
-        return mirrored.take(is_leaving).joined(step.from_panes)
+
+def turned(points: Texels, turn: int) -> Texels:
+    """Points whose rays differ from those of any other turn."""
+    dither = points.dither + np.float32(turn) * TURN
+    dither -= np.floor(dither)
+    return replace(points, dither=dither)
+
+
+def face_table(faces: Triangles, atlas: Atlas, visibility: Visibility, response: Response) -> Faces:
+    """What rays must know (F + 1,) of the faces of a table, the last one for nothing."""
+    table = np.zeros(len(faces) + 1, FACE)
+    table["normal"] = visibility.normals
+    table["light_px"][:-1] = atlas.light_px
+    table["twin"] = visibility.opaque.twin
+    for name in ("lamp", "eta", "tint", "metal", "roughness", "scatters", "shows_lamps"):
+        table[name] = getattr(response, name)
+    return table
 
 
 def _start(points: Texels, side: int) -> _RayBatch:
     """Side x side cosine-weighted rays from each point; their weights average to what enters its coat."""
-    a, b = place_in_cell(points, np.arange(side**2)[:, None], side)
-    directions = cosine_weighted(points.normals)(a, b)  # (side², P, 3)
-    cosines = points.cosine(directions)
-    weight = (points.entering(cosines) * (cosines > 0)).ravel()
-    origins_m = np.tile(points.points_m, (side**2, 1))
-    point = np.tile(np.arange(len(points)), side**2)
-    return _RayBatch(point, origins_m, directions.reshape(-1, 3), weight, np.ones(len(point), bool))
-
-
-def facets(
-    normals: Floats,
-    roughness: Floats,
-    dither: Floats,
-    turn: NDArray[np.int64],
-) -> Floats:
-    """Unit normals (R, 3) of facets around a face's, by GGX. Source: Walter et al. (2007), eqs 35 and 36."""
-    rough = np.flatnonzero(roughness)
-    jitter = (dither[rough] + turn[rough, None] * JITTER) % 1
-    a, b = jitter.T
-    steepness = np.sqrt(a / np.maximum(1 - a, 1e-6))
-    slope = (roughness[rough] * steepness)[:, None]
-    u_axis, v_axis = tangents(normals[rough])
-    angle = 2 * np.pi * b[:, None]
-    aside = np.cos(angle) * u_axis + np.sin(angle) * v_axis
-    tilted = normals[rough] + slope * aside
-    facets = normals.copy()
-    facets[rough] = tilted / np.linalg.norm(tilted, axis=1, keepdims=True)
-    return facets
+    count = len(points) * side**2
+    origins_m = np.empty((count, 3), np.float32)
+    directions = np.empty((count, 3), np.float32)
+    weight = np.empty(count, np.float32)
+    vectors = (points.points_m, points.normals, points.planes)
+    cosine_rays(*vectors, points.eta, points.dither, side, origins_m, directions, weight)
+    point = np.repeat(np.arange(len(points), dtype=np.int32), side**2)
+    return _RayBatch(point, origins_m, directions, weight, np.ones(count, bool))
 
 
 # Bounces of a ratio this even, whose rest is this small a share of the light, or a rest too faint, are summed up.
@@ -600,7 +674,7 @@ FAINT_REST = 1e-4
 def bounced(
     straight: Floats,
     reflectance: Floats,
-    table: "csr_matrix",
+    table: "csr_matrix | LinearOperator",
     first: Floats,
     *,
     bounces: int,

@@ -53,6 +53,14 @@ class Body:
         return np.asarray(squared_distance <= self.radius_m**2)
 
 
+@dataclass(frozen=True, slots=True)
+class Occluders:
+    """Triangles (T, 3, 3) that stop light, and which of them (T,) have no holes."""
+
+    corners_m: Array
+    is_whole: Mask
+
+
 class Bodies:
     """The faces of a scene, each in its body's frame, and rays against them; body 0 is all that stands.
 
@@ -80,6 +88,10 @@ class Bodies:
         glass = {name for name, material in scene.materials.items() if material.kind == "pane"}
         of_glass = [thing.material in glass for thing in self.faces.things]
         is_pane = np.array(of_glass, bool)[self.faces.thing]
+        # Of two faces back to back only one is there for rays: they could meet either.
+        twin = self._twin[:-1]
+        is_first = (twin < 0) | (twin > np.arange(len(is_pane)))
+        self._is_solid = is_first & ~is_pane
         body_count = 1 + len(scene.movers)
         self._bodies = [self._body(index, is_pane) for index in range(body_count)]
 
@@ -122,16 +134,35 @@ class Bodies:
         reach: Floats,
     ) -> Mask:
         """Whether anything but glass is between starts and starts + reach * vectors (R, 3), both in the world."""
-        world, *movers = self._bodies
-        is_blocked = self._stopped(world, starts_m, vectors_m, reach)
+        is_blocked = self._stopped(self._bodies[0], starts_m, vectors_m, reach)
+        return is_blocked | self.blocked_by_movers(starts_m, vectors_m, T_bodies_world, reach, where=~is_blocked)
+
+    def blocked_by_movers(
+        self,
+        starts_m: Floats,
+        vectors_m: Floats,
+        T_bodies_world: Sequence[Array],
+        reach: Floats,
+        *,
+        where: Mask,
+    ) -> Mask:
+        """Whether a mover is between starts and starts + reach * vectors (R, 3), of the rays in the mask `where`."""
+        movers = self._bodies[1:]
+        is_blocked = np.zeros(len(starts_m), bool)
         for body, T_body_world in zip(movers, T_bodies_world[1:], strict=True):
             body_starts_m = moved(T_body_world, starts_m.astype(float))
             body_vectors_m = turn(T_body_world, vectors_m.astype(float))
             length_m = np.linalg.norm(body_vectors_m, axis=1)
             is_near = body.near(body_starts_m, body_vectors_m / length_m[:, None], length_m)
-            rays = np.flatnonzero(is_near & ~is_blocked & (reach > 0))
+            rays = np.flatnonzero(is_near & where & ~is_blocked & (reach > 0))
             is_blocked[rays] = self._stopped(body, body_starts_m[rays], body_vectors_m[rays], reach[rays])
         return is_blocked
+
+    def stationary_occluders(self) -> Occluders:
+        """All stationary triangles that can stop light."""
+        rows = np.flatnonzero(self._is_solid & (self.body[:-1] == 0) & (self._height_m[:-1] > 0))
+        is_cut_out = self._cut_outs.material[rows] >= 0
+        return Occluders(self.faces.corners_m[rows], ~is_cut_out)
 
     def _body(self, index: int, is_pane: Mask) -> Body:
         has_area = self._height_m[:-1] > 0
@@ -147,10 +178,7 @@ class Bodies:
             rows = np.flatnonzero(is_member & is_included)
             return TriangleCaster(self.faces.corners_m, rows, robust=False)
 
-        # Of two faces back to back only one is there for rays: they could meet either.
-        twin = self._twin[:-1]
-        is_first = (twin < 0) | (twin > np.arange(len(is_pane)))
-        is_solid = is_first & ~is_pane
+        is_solid = self._is_solid
         is_cut_out = self._cut_outs.material[:-1] >= 0
         has_holes = is_member & is_solid & is_cut_out
         is_glass = is_member & is_pane

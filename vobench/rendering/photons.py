@@ -8,7 +8,8 @@ from vobench import stop
 from vobench.rendering.array_types import Floats, Indices, Rows
 from vobench.rendering.emitter import Emitter
 from vobench.rendering.geometry import offset_from_surface, reversed_faces, sample_points
-from vobench.rendering.indirect_light import FAINT, Gatherer, Photons, facets
+from vobench.rendering.indirect_light import Gatherer, Photons
+from vobench.rendering.ray_kernels import FAINT, facet_normals
 from vobench.rendering.texel import Texels
 from vobench.rendering.thread_pool import in_chunks
 from vobench.scene.mesh import areas_m2
@@ -191,7 +192,8 @@ class Reflectors:
 
         # The reflected ray. Roughness varies its normal.
         roughness = np.where(self._is_pane[points.face], 0, response.roughness[points.face])
-        normals = facets(points.planes, roughness, points.dither, np.arange(len(points)))
+        normals = points.planes.copy()
+        facet_normals(normals, roughness.astype(np.float32), points.dither)
         along_normal = np.einsum("ij,ij->i", incoming, normals)[:, None]
         directions = (2 * along_normal * normals - incoming).astype(np.float32)
         is_leaving = np.einsum("ij,ij->i", directions, points.planes) > 0

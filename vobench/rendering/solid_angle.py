@@ -1,12 +1,14 @@
 """Rectangles as seen from points: places spread evenly over their solid angle, and the light that they give."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
-from vobench.rendering.array_types import Floats, Mask, Rows
+from vobench.rendering.array_types import Floats
+from vobench.rendering.compiled import compiled
 
 FILLED = 1e-4  # share by which triangles may miss the rectangle that they fill
 FLAT = 1e-6  # difference of a normal from that of its plane
@@ -48,123 +50,195 @@ def rectangle(corners_m: Array) -> Rectangle | None:
     return Rectangle(corner_m, size_m[0] * u_axis, size_m[1] * v_axis, normal)
 
 
+# Columns of the table of a rectangle as it is seen from points: its edges in its own frame, how far ahead its plane is,
+# and the direction of its normal, 1 away from the point and -1 towards it.
+X0 = 0
+Y0 = 1
+X1 = 2
+Y1 = 3
+DEPTH = 4
+AHEAD = 5
+# Columns of the table of its solid angle, named as in the source of `SolidAngle`.
+STERADIAN = 0
+K = 1
+B0 = 2
+B1 = 3
+
+
 class SeenRectangle:
-    """A rectangle in the frame of its edges, as seen from points (P, 3); it lies `depth_m` (P,) ahead along z."""
+    """A rectangle in the frame of its edges, as seen from points (P, 3). `is_before` (P,): it faces the point."""
 
     def __init__(self, face: Rectangle, points_m: Floats) -> None:
-        to_corner_m = face.corner_m - points_m.astype(float)
-        width_m = np.linalg.norm(face.edge_u_m)
-        length_m = np.linalg.norm(face.edge_v_m)
-        x_axis = face.edge_u_m / width_m
-        y_axis = face.edge_v_m / length_m
-        height_m = to_corner_m @ face.normal
-        self._axes = np.stack([x_axis, y_axis, face.normal])
-        self._ahead = np.where(height_m > 0, 1.0, -1.0)
+        width_m = float(np.linalg.norm(face.edge_u_m))
+        length_m = float(np.linalg.norm(face.edge_v_m))
+        self.axes = np.stack([face.edge_u_m / width_m, face.edge_v_m / length_m, face.normal])
+        self.table = np.empty((len(points_m), 6))
+        height_m = np.empty(len(points_m))
+        _see(points_m, face.corner_m, self.axes, (width_m, length_m), self.table, height_m)
         self.is_before = height_m < -LEVEL_M
         self.is_seen = np.abs(height_m) > LEVEL_M
-        self.depth_m = np.maximum(np.abs(height_m), LEVEL_M)
-        self.x0_m = to_corner_m @ x_axis
-        self.y0_m = to_corner_m @ y_axis
-        self.x1_m = self.x0_m + width_m
-        self.y1_m = self.y0_m + length_m
-
-    def vectors_m(self, x_m: Floats, y_m: Floats) -> Floats:
-        """Vectors (P, 3) float32 to the places x, y (P,) in its plane."""
-        local_m = np.stack([x_m, y_m, self.depth_m * self._ahead], -1)
-        return np.asarray((local_m @ self._axes).astype(np.float32))
 
     def projected_sr(self, normals: Floats, planes: Floats) -> Floats:
         """Its solid angle (P,) weighted by the cosine to normals (P, 3), of the part before the planes (P, 3).
 
-        NaN where it is only in part before both and these differ. Half the sum over the edges of the angle that each
-        is seen under, times the normal of the plane through it and the point. Source: Lambert, Photometria, 1760.
+        NaN where it is only in part before both and these differ.
         """
-        near_y_m = np.hypot(self.depth_m, self.y0_m)
-        far_y_m = np.hypot(self.depth_m, self.y1_m)
-        near_x_m = np.hypot(self.depth_m, self.x0_m)
-        far_x_m = np.hypot(self.depth_m, self.x1_m)
-        near_y = _angle_between(self.x0_m, self.x1_m, near_y_m) / near_y_m
-        far_y = _angle_between(self.x0_m, self.x1_m, far_y_m) / far_y_m
-        near_x = _angle_between(self.y0_m, self.y1_m, near_x_m) / near_x_m
-        far_x = _angle_between(self.y0_m, self.y1_m, far_x_m) / far_x_m
-        along_x = self.depth_m * (near_x - far_x)
-        along_y = self.depth_m * (near_y - far_y)
-        across_x = self.x1_m * far_x - self.x0_m * near_x
-        across_y = self.y1_m * far_y - self.y0_m * near_y
-
-        local = self._local(normals)
-        projected = along_x * local[0] + along_y * local[1] + (across_x + across_y) * local[2]
-        local_planes = self._local(planes)
-        is_whole = self._is_above(local) & self._is_above(local_planes)
-        result = np.where(is_whole, projected / 2, np.nan)
-        is_flat = (np.abs(local - local_planes) < FLAT).all(0)
-        cut = np.flatnonzero(is_flat & ~is_whole)
-        result[cut] = self._cut_sr(local_planes[:, cut], cut)
+        result = np.empty(len(self.table))
+        _project(self.table, self.axes, normals, planes, result)
         return result
 
-    def _cut_sr(self, normals: Floats, rows: Rows) -> Floats:
-        """The weighted solid angle (N,) of what is above the planes with normals (3, N) through the points at rows."""
-        depth_m = self.depth_m[rows]
-        near_x_m = self.x0_m[rows]
-        near_y_m = self.y0_m[rows]
-        far_x_m = self.x1_m[rows]
-        far_y_m = self.y1_m[rows]
-        places = ((near_x_m, near_y_m), (far_x_m, near_y_m), (far_x_m, far_y_m), (near_x_m, far_y_m))
-        corners = [np.stack([x_m, y_m, depth_m]) for x_m, y_m in places]
-        heights = [(normals * corner).sum(0) for corner in corners]
 
-        total = np.zeros(len(rows))
-        leaves_at = np.ones((3, len(rows)))
-        enters_at = np.ones((3, len(rows)))
-        for nth in range(4):
-            start = corners[nth - 1]
-            end = corners[nth]
-            start_height = heights[nth - 1]
-            end_height = heights[nth]
-            rise = end_height - start_height
-            share = np.clip(-start_height / np.where(rise == 0, 1, rise), 0, 1)
-            crossing = start + share * (end - start)
-            leaves = (start_height > 0) & (end_height <= 0)
-            enters = (start_height <= 0) & (end_height > 0)
-            leaves_at = np.where(leaves, crossing, leaves_at)
-            enters_at = np.where(enters, crossing, enters_at)
-            above_start = np.where(enters, crossing, start)
-            above_end = np.where(leaves, crossing, end)
-            is_above = (start_height > 0) | (end_height > 0)
-            total += np.where(is_above, _edge_term(above_start, above_end, normals), 0)
-        is_above_in_part = np.max(heights, axis=0) > 0
-        is_cut = is_above_in_part & (np.min(heights, axis=0) <= 0)
-        total += np.where(is_cut, _edge_term(leaves_at, enters_at, normals), 0)
-        return np.where(is_above_in_part, np.abs(total) / 2, 0)
-
-    def _local(self, vectors: Floats) -> Floats:
-        """The parts (3, P) of vectors (P, 3) along the edges and ahead."""
-        local: Floats = self._axes @ vectors.T.astype(float)
-        local[2] *= self._ahead
-        return local
-
-    def _is_above(self, normals: Floats) -> Mask:
-        """Whether all four corners lie above the planes through the points that have normals (3, P)."""
-        lowest_x_m = np.minimum(normals[0] * self.x0_m, normals[0] * self.x1_m)
-        lowest_y_m = np.minimum(normals[1] * self.y0_m, normals[1] * self.y1_m)
-        return np.asarray(lowest_x_m + lowest_y_m + normals[2] * self.depth_m > 0)
+@compiled
+def _see(
+    points_m: Floats,
+    corner_m: Floats,
+    axes: Floats,
+    size_m: tuple[float, float],
+    table: Floats,
+    height_m: Floats,
+) -> None:
+    for point in range(len(points_m)):
+        x = corner_m[0] - np.float64(points_m[point, 0])
+        y = corner_m[1] - np.float64(points_m[point, 1])
+        z = corner_m[2] - np.float64(points_m[point, 2])
+        height = x * axes[2, 0] + y * axes[2, 1] + z * axes[2, 2]
+        height_m[point] = height
+        table[point, X0] = x * axes[0, 0] + y * axes[0, 1] + z * axes[0, 2]
+        table[point, Y0] = x * axes[1, 0] + y * axes[1, 1] + z * axes[1, 2]
+        table[point, X1] = table[point, X0] + size_m[0]
+        table[point, Y1] = table[point, Y0] + size_m[1]
+        table[point, DEPTH] = max(abs(height), LEVEL_M)
+        table[point, AHEAD] = 1.0 if height > 0 else -1.0
 
 
-def _angle_between(start_m: Floats, end_m: Floats, distance_m: Floats) -> Floats:
-    """The angle (P,) under which a line is seen from its start to its end, at a distance from it."""
-    return np.asarray(np.arctan(end_m / distance_m) - np.arctan(start_m / distance_m))
+@compiled
+def _local(axes: Floats, ahead: float, vector: Floats) -> tuple[float, float, float]:
+    """The parts of a vector along the edges and ahead."""
+    x = np.float64(vector[0])
+    y = np.float64(vector[1])
+    z = np.float64(vector[2])
+    along_u = axes[0, 0] * x + axes[0, 1] * y + axes[0, 2] * z
+    along_v = axes[1, 0] * x + axes[1, 1] * y + axes[1, 2] * z
+    forward = axes[2, 0] * x + axes[2, 1] * y + axes[2, 2] * z
+    return along_u, along_v, forward * ahead
 
 
-def _edge_term(start: Floats, end: Floats, normals: Floats) -> Floats:
-    """The angle (P,) between vectors (3, P), times the cosine of normals (3, P) to that of the plane through both."""
-    across = np.cross(start, end, axis=0)
-    length = np.sqrt((across**2).sum(0))
-    angle = np.arctan2(length, (start * end).sum(0))
-    return np.asarray(angle * (across * normals).sum(0) / np.maximum(length, 1e-30))
+@compiled
+def _lowest(seen: Floats, normal: tuple[float, float, float]) -> float:
+    """The height of the lowest corner over the plane through the point that has a normal."""
+    along_x = min(normal[0] * seen[X0], normal[0] * seen[X1])
+    along_y = min(normal[1] * seen[Y0], normal[1] * seen[Y1])
+    lowest: float = along_x + along_y + normal[2] * seen[DEPTH]
+    return lowest
+
+
+@compiled
+def _project(table: Floats, axes: Floats, normals: Floats, planes: Floats, result: Floats) -> None:
+    for point in range(len(table)):
+        seen = table[point]
+        normal = _local(axes, seen[AHEAD], normals[point])
+        plane = _local(axes, seen[AHEAD], planes[point])
+        if _lowest(seen, normal) > 0 and _lowest(seen, plane) > 0:
+            result[point] = _whole_sr(seen, normal)
+            continue
+        turn = max(abs(normal[0] - plane[0]), abs(normal[1] - plane[1]), abs(normal[2] - plane[2]))
+        result[point] = _cut_sr(seen, plane) if turn < FLAT else np.nan
+
+
+@compiled
+def _whole_sr(seen: Floats, normal: tuple[float, float, float]) -> float:
+    """The weighted solid angle of a rectangle that is above the horizon.
+
+    Half the sum over the edges of the angle that each is seen under, times the normal of the plane through it and the
+    point. Source: Lambert, Photometria, 1760.
+    """
+    depth = seen[DEPTH]
+    near_y_m = math.hypot(depth, seen[Y0])
+    far_y_m = math.hypot(depth, seen[Y1])
+    near_x_m = math.hypot(depth, seen[X0])
+    far_x_m = math.hypot(depth, seen[X1])
+    near_y = (math.atan(seen[X1] / near_y_m) - math.atan(seen[X0] / near_y_m)) / near_y_m
+    far_y = (math.atan(seen[X1] / far_y_m) - math.atan(seen[X0] / far_y_m)) / far_y_m
+    near_x = (math.atan(seen[Y1] / near_x_m) - math.atan(seen[Y0] / near_x_m)) / near_x_m
+    far_x = (math.atan(seen[Y1] / far_x_m) - math.atan(seen[Y0] / far_x_m)) / far_x_m
+    along_x = depth * (near_x - far_x)
+    along_y = depth * (near_y - far_y)
+    across = seen[X1] * far_x - seen[X0] * near_x + seen[Y1] * far_y - seen[Y0] * near_y
+    doubled_sr: float = along_x * normal[0] + along_y * normal[1] + across * normal[2]
+    return doubled_sr / 2
+
+
+@compiled
+def _cut_sr(seen: Floats, normal: tuple[float, float, float]) -> float:
+    """The weighted solid angle of what is above the plane with a normal through the point."""
+    depth = seen[DEPTH]
+    corners = (
+        (seen[X0], seen[Y0], depth),
+        (seen[X1], seen[Y0], depth),
+        (seen[X1], seen[Y1], depth),
+        (seen[X0], seen[Y1], depth),
+    )
+    total = 0.0
+    leaves_at = (1.0, 1.0, 1.0)
+    enters_at = (1.0, 1.0, 1.0)
+    highest = -np.inf
+    lowest = np.inf
+    for nth in range(4):
+        start = corners[nth - 1]
+        end = corners[nth]
+        start_height = _dot(start, normal)
+        end_height = _dot(end, normal)
+        highest = max(highest, end_height)
+        lowest = min(lowest, end_height)
+        if start_height <= 0 and end_height <= 0:
+            continue
+        above_start = start
+        above_end = end
+        if start_height <= 0 or end_height <= 0:
+            share = min(max(-start_height / (end_height - start_height), 0.0), 1.0)
+            crossing = (
+                start[0] + share * (end[0] - start[0]),
+                start[1] + share * (end[1] - start[1]),
+                start[2] + share * (end[2] - start[2]),
+            )
+            if start_height > 0:
+                leaves_at = crossing
+                above_end = crossing
+            else:
+                enters_at = crossing
+                above_start = crossing
+        total += _edge_term(above_start, above_end, normal)
+    if highest <= 0:
+        return 0.0
+    if lowest <= 0:
+        total += _edge_term(leaves_at, enters_at, normal)
+    return abs(total) / 2
+
+
+@compiled
+def _dot(first: tuple[float, float, float], second: tuple[float, float, float]) -> float:
+    return first[0] * second[0] + first[1] * second[1] + first[2] * second[2]
+
+
+@compiled
+def _edge_term(
+    start: tuple[float, float, float],
+    end: tuple[float, float, float],
+    normal: tuple[float, float, float],
+) -> float:
+    """The angle between two vectors, times the cosine of a normal to that of the plane through both."""
+    across = (
+        start[1] * end[2] - start[2] * end[1],
+        start[2] * end[0] - start[0] * end[2],
+        start[0] * end[1] - start[1] * end[0],
+    )
+    length = math.sqrt(_dot(across, across))
+    angle = math.atan2(length, _dot(start, end))
+    return angle * _dot(across, normal) / max(length, 1e-30)
 
 
 class SolidAngle:
-    """A rectangle as seen from points, and places on it spread evenly over its solid angle.
+    """A rectangle as seen from points, and places on it spread evenly over its solid angle `steradian` (P,).
 
     Names are those of the source: Ureña, Fajardo, King (2013), An area-preserving parametrization for spherical
     rectangles.
@@ -172,40 +246,59 @@ class SolidAngle:
 
     def __init__(self, seen: SeenRectangle) -> None:
         self._seen = seen
-        self._z0 = -seen.depth_m
-        n0 = -seen.y0_m / np.hypot(self._z0, seen.y0_m)
-        n2 = seen.y1_m / np.hypot(self._z0, seen.y1_m)
-        n1 = seen.x1_m / np.hypot(self._z0, seen.x1_m)
-        n3 = -seen.x0_m / np.hypot(self._z0, seen.x0_m)
-        g0 = _angle(n0, n1)
-        g1 = _angle(n1, n2)
-        g2 = _angle(n2, n3)
-        g3 = _angle(n3, n0)
-        self._b0 = n0
-        self._b1 = n2
-        self._k = 2 * np.pi - g2 - g3
-        self.steradian = np.where(seen.is_seen, np.maximum(g0 + g1 - self._k, 0), 0)
+        self._table = np.empty((len(seen.table), 4))
+        _span(seen.table, self._table)
+        self.steradian = np.where(seen.is_seen, self._table[:, STERADIAN], 0)
 
     def vectors_m(self, a: Floats, b: Floats) -> Floats:
-        """Vectors (P, 3) to places on the rectangle, by two numbers (P,) in [0, 1) each."""
-        seen = self._seen
-        au = a * self.steradian + self._k
-        sine = np.sin(au)
-        divisor = np.where(sine == 0, 1e-12, sine)
-        fu = (np.cos(au) * self._b0 - self._b1) / divisor
-        cu = np.copysign(1.0, fu) / np.sqrt(fu * fu + self._b0 * self._b0)
-        cu = np.clip(cu, -1, 1)
-        xu = -cu * self._z0 / np.sqrt(np.maximum(1 - cu * cu, 1e-30))
-        xu = np.clip(xu, seen.x0_m, seen.x1_m)
-        d = np.hypot(xu, self._z0)
-        h0 = seen.y0_m / np.hypot(d, seen.y0_m)
-        h1 = seen.y1_m / np.hypot(d, seen.y1_m)
-        hv = h0 + b * (h1 - h0)
-        yv = hv * d / np.sqrt(np.maximum(1 - hv * hv, 1e-30))
-        yv = np.clip(yv, seen.y0_m, seen.y1_m)
-        return seen.vectors_m(xu, yv)
+        """Vectors (P, 3) float32 to places on the rectangle, by two numbers (P,) in [0, 1) each."""
+        result = np.empty((len(self._table), 3), np.float32)
+        _aim(self._seen.table, self._seen.axes, self._table, a, b, result)
+        return result
 
 
-def _angle(a: Floats, b: Floats) -> Floats:
+@compiled
+def _span(table: Floats, angles: Floats) -> None:
+    for point in range(len(table)):
+        seen = table[point]
+        z0 = -seen[DEPTH]
+        n0 = -seen[Y0] / math.hypot(z0, seen[Y0])
+        n1 = seen[X1] / math.hypot(z0, seen[X1])
+        n2 = seen[Y1] / math.hypot(z0, seen[Y1])
+        n3 = -seen[X0] / math.hypot(z0, seen[X0])
+        k = 2 * math.pi - _angle(n2, n3) - _angle(n3, n0)
+        angles[point, STERADIAN] = max(_angle(n0, n1) + _angle(n1, n2) - k, 0.0)
+        angles[point, K] = k
+        angles[point, B0] = n0
+        angles[point, B1] = n2
+
+
+@compiled
+def _angle(a: float, b: float) -> float:
     """The inner angle of a spherical rectangle between sides whose normals have these z."""
-    return np.asarray(np.arccos(np.clip(-a * b, -1, 1)))
+    return math.acos(min(max(-a * b, -1.0), 1.0))
+
+
+@compiled
+def _aim(table: Floats, axes: Floats, angles: Floats, a: Floats, b: Floats, vectors_m: Floats) -> None:
+    for point in range(len(table)):
+        seen = table[point]
+        z0 = -seen[DEPTH]
+        b0 = angles[point, B0]
+        au = a[point] * angles[point, STERADIAN] + angles[point, K]
+        sine = math.sin(au)
+        fu = (math.cos(au) * b0 - angles[point, B1]) / (sine if sine != 0 else 1e-12)
+        cu = math.copysign(1.0, fu) / math.sqrt(fu * fu + b0 * b0)
+        cu = min(max(cu, -1.0), 1.0)
+        xu = -cu * z0 / math.sqrt(max(1 - cu * cu, 1e-30))
+        xu = min(max(xu, seen[X0]), seen[X1])
+        d = math.hypot(xu, z0)
+        h0 = seen[Y0] / math.hypot(d, seen[Y0])
+        h1 = seen[Y1] / math.hypot(d, seen[Y1])
+        hv = h0 + b[point] * (h1 - h0)
+        yv = hv * d / math.sqrt(max(1 - hv * hv, 1e-30))
+        yv = min(max(yv, seen[Y0]), seen[Y1])
+        forward = seen[DEPTH] * seen[AHEAD]
+        vectors_m[point, 0] = xu * axes[0, 0] + yv * axes[1, 0] + forward * axes[2, 0]
+        vectors_m[point, 1] = xu * axes[0, 1] + yv * axes[1, 1] + forward * axes[2, 1]
+        vectors_m[point, 2] = xu * axes[0, 2] + yv * axes[1, 2] + forward * axes[2, 2]

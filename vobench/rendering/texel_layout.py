@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas
+from vobench.rendering.shadow_kernels import blur_along, dilate
 from vobench.rendering.texel_owner import Owners
 from vobench.rendering.thread_pool import chunked
 from vobench.rendering.visibility import Visibility
@@ -47,8 +48,9 @@ class TexelLayout:
     def dilated(self, marked: Mask, *, steps: int) -> Mask:
         """Points (P,) that so many steps from texel to texel lead to from a marked one."""
         for _ in range(steps):
-            marked_neighbours = [marked[neighbour] for neighbour in self.neighbours]
-            marked = np.logical_or.reduce([marked, *marked_neighbours])
+            result = np.empty_like(marked)
+            dilate(marked, self.neighbours, result)
+            marked = result
         return marked
 
     def interpolated(self, values: Floats) -> Floats:
@@ -57,26 +59,28 @@ class TexelLayout:
 
     def blurred(self, values: Floats) -> Floats:
         """Values (P,) smoothed by about one texel, each chart by itself."""
-        left, right, above, below = self.neighbours
-        for _ in range(BLURS):
-            values = (2 * values + values[left] + values[right]) / 4
-            values = (2 * values + values[above] + values[below]) / 4
-        return values
+        return _blurred(values.astype(np.float32), self.neighbours)
 
     def blurred_among(self, values: Floats, rows: Rows, counts: Mask) -> Floats:
         """Values (N,) of the points at rows smoothed as by `blurred`, of those of them alone that count (N,)."""
         place = np.full(len(values), -1, np.int32)
         place[rows] = np.arange(len(rows))
         beside = place[self.neighbours[:, rows]]
-        left, right, above, below = np.where(beside < 0, np.arange(len(rows)), beside)
+        beside = np.where(beside < 0, np.arange(len(rows), dtype=np.int32), beside)
         weight = counts.astype(np.float32)
-        weighted = values[rows] * weight
-        for _ in range(BLURS):
-            weight = (2 * weight + weight[left] + weight[right]) / 4
-            weight = (2 * weight + weight[above] + weight[below]) / 4
-            weighted = (2 * weighted + weighted[left] + weighted[right]) / 4
-            weighted = (2 * weighted + weighted[above] + weighted[below]) / 4
-        return weighted / np.maximum(weight, np.float32(1e-6))
+        weighted = values[rows].astype(np.float32) * weight
+        return _blurred(weighted, beside) / np.maximum(_blurred(weight, beside), np.float32(1e-6))
+
+
+def _blurred(values: Floats, beside: Indices) -> Floats:
+    """Values (P,) float32 smoothed by about one texel, among neighbours (4, P)."""
+    left, right, above, below = beside
+    for _ in range(BLURS):
+        along_row = np.empty_like(values)
+        blur_along(values, left, right, along_row)
+        values = np.empty_like(values)
+        blur_along(along_row, above, below, values)
+    return values
 
 
 def neighbours(index: Rows, atlas: Atlas, owner: Owners) -> Indices:

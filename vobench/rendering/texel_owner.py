@@ -1,18 +1,17 @@
 """Rasterising the light map: which face each texel belongs to, and the nearest place on it."""
 
-from collections.abc import Iterator
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from vobench import stop
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas, doubled_areas_px2
+from vobench.rendering.compiled import compiled
 
 CLAIMED_PX = 0.7072  # half a texel's diagonal: every place of a face is nearest to a texel that belongs to it
 READ_PX = 1.4143  # from a face, texels that interpolation on it can read
-PAIRS = 1 << 14  # of faces and texels at once: their arrays fit the processor's cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,92 +32,83 @@ def owners(atlas: Atlas) -> Owners:
         distance_px=np.full(count, READ_PX, np.float32),
     )
     corners_px = atlas.light_px.astype(float)
-    for face, column, row in _nearby(atlas, corners_px):
-        stop.check()
-        middle_px = np.asarray(np.stack([column, row], -1) + 0.5, float)
-        uv, distance_px = _nearest_on(corners_px[face], middle_px)
-        texel = row * atlas.width + column
-        nearer = np.flatnonzero(distance_px < result.distance_px[texel])
-        # A texel that stands here several times takes the last value: that of the nearest face.
-        nearer = nearer[np.argsort(-distance_px[nearer], kind="stable")]
-        texel = texel[nearer]
-        result.face[texel] = face[nearer]
-        result.uv[texel] = uv[nearer]
-        result.distance_px[texel] = distance_px[nearer]
-    return result
-
-
-def _nearby(atlas: Atlas, corners_px: Array) -> Iterator[tuple[Rows, Rows, Rows]]:
-    """All faces with all texels in their boxes, READ_PX larger: face, column and row (N,), some PAIRS at a time."""
     size_px = (atlas.width, atlas.height)
     box_low_px = corners_px.min(1) - READ_PX - 0.5
     low = np.maximum(np.ceil(box_low_px), 0).astype(np.int64)
     box_high_px = corners_px.max(1) + READ_PX - 0.5
     high = np.minimum(np.floor(box_high_px) + 1, size_px).astype(np.int64)
-    is_charted = (atlas.chart >= 0) & (doubled_areas_px2(corners_px) != 0)
-    size = np.where(is_charted[:, None], high - low, 0)  # (F, 2): columns and rows of each face's box
-
-    ends = np.cumsum(size.prod(1))
-    pair_count = int(ends[-1]) if len(ends) else 0
-    limits = np.arange(PAIRS, pair_count + PAIRS, PAIRS)
-    cuts = np.unique(np.searchsorted(ends, limits) + 1)
-    for faces in np.split(np.arange(len(corners_px)), cuts):
-        counts = size[faces].prod(1)
-        face = np.repeat(faces, counts)
-        first = np.repeat(np.cumsum(counts) - counts, counts)
-        nth = np.arange(len(face)) - first  # texel in the face's box
-        column = low[face, 0] + nth % size[face, 0]
-        row = low[face, 1] + nth // size[face, 0]
-        yield face, column, row
+    doubled_px2 = doubled_areas_px2(corners_px)
+    charted = np.flatnonzero((atlas.chart >= 0) & (doubled_px2 != 0))
+    _claim(charted, corners_px, doubled_px2, low, high, atlas.width, result.face, result.uv, result.distance_px)
+    return result
 
 
-def _nearest_on(corners: Array, points: Array) -> tuple[Array, Array]:
-    """The nearest places of triangles (N, 3, 2) to points (N, 2): weights (N, 2) of corners two and three, distance.
+@compiled
+def _claim(
+    charted: Rows,
+    corners_px: Array,
+    doubled_px2: Array,
+    low: Rows,
+    high: Rows,
+    width: int,
+    owner: Indices,
+    uv: Floats,
+    distance_px: Floats,
+) -> None:
+    """Give each texel in the boxes from `low` to `high` (F, 2) of charted faces to the nearest of them."""
+    for face in charted:
+        corners = corners_px[face]
+        area = doubled_px2[face]
+        for row in range(low[face, 1], high[face, 1]):
+            for column in range(low[face, 0], high[face, 0]):
+                distance, u, v = _nearest_on(corners, area, column + 0.5, row + 0.5)
+                texel = row * width + column
+                if distance < distance_px[texel]:
+                    owner[texel] = face
+                    uv[texel, 0] = u
+                    uv[texel, 1] = v
+                    distance_px[texel] = distance
 
-    What is farther than READ_PX from the line of an edge is infinitely far.
+
+@compiled
+def _nearest_on(corners: Array, area: float, x: float, y: float) -> tuple[float, float, float]:
+    """The distance of a point from a triangle (3, 2), and the weights of corners two and three at the nearest place.
+
+    `area` is twice the triangle's, signed.
     """
-    edges = np.roll(corners, -1, axis=1) - corners
-    from_corners = points[:, None] - corners
-    area = _cross(edges[:, 0], edges[:, 1])  # twice the triangle's, signed
-    across = _cross(edges, from_corners)
-    inwards = across * np.sign(area)[:, None]
-    squared_lengths = np.einsum("nij,nij->ni", edges, edges)
-    is_inside = (inwards >= 0).all(1) & (area != 0)
-    is_in_reach = inwards**2 <= READ_PX**2 * squared_lengths
-    is_near = ((inwards > 0) | is_in_reach).all(1)
-
     # The first edge lies across from the third corner.
-    divisor = np.where(area == 0, 1, area)[:, None]
-    weights = np.roll(across, -1, axis=1) / divisor
-    distance = np.where(is_inside, 0, np.inf)
-    beside = np.flatnonzero(is_near & ~is_inside)
-    edge_weights, edge_distance = _nearest_on_edges(edges[beside], from_corners[beside], squared_lengths[beside])
-    weights[beside] = edge_weights
-    distance[beside] = edge_distance
-    return weights[:, 1:], distance
+    third = _across(corners[0], corners[1], x, y) / area
+    first = _across(corners[1], corners[2], x, y) / area
+    second = _across(corners[2], corners[0], x, y) / area
+    if first >= 0 and second >= 0 and third >= 0:
+        return 0.0, second, third
+    on_first_edge, to_second = _nearest_on_edge(corners[0], corners[1], x, y)
+    on_second_edge, to_third = _nearest_on_edge(corners[1], corners[2], x, y)
+    on_third_edge, to_first = _nearest_on_edge(corners[2], corners[0], x, y)
+    if on_first_edge <= on_second_edge and on_first_edge <= on_third_edge:
+        return on_first_edge, to_second, 0.0
+    if on_second_edge <= on_third_edge:
+        return on_second_edge, 1 - to_third, to_third
+    return on_third_edge, 0.0, 1 - to_first
 
 
-def _cross(a: Array, b: Array) -> Array:
-    """Cross products (...) of vectors (..., 2)."""
-    return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])
+@compiled
+def _across(start: Array, end: Array, x: float, y: float) -> float:
+    """Twice the signed area of a triangle between an edge and a point."""
+    across: float = (end[0] - start[0]) * (y - start[1]) - (end[1] - start[1]) * (x - start[0])
+    return across
 
 
-def _nearest_on_edges(
-    edges: Array,
-    from_corners: Array,
-    squared_lengths: Array,
-) -> tuple[Array, Array]:
-    """Weights (N, 3) of corners, and distance, of the nearest places on edges (N, 3, 2) to points."""
-    along = np.einsum("nij,nij->ni", from_corners, edges) / np.maximum(squared_lengths, 1e-12)
-    along = np.clip(along, 0, 1)
-    from_edges = from_corners - along[..., None] * edges
-    distances = np.linalg.norm(from_edges, axis=-1)
-    nearest = distances.argmin(1)
-    rows = np.arange(len(edges))
-    weights = np.zeros((len(edges), 3))
-    weights[rows, nearest] = 1 - along[rows, nearest]
-    weights[rows, (nearest + 1) % 3] = along[rows, nearest]
-    return weights, distances[rows, nearest]
+@compiled
+def _nearest_on_edge(start: Array, end: Array, x: float, y: float) -> tuple[float, float]:
+    """The distance of the nearest place on an edge to a point, and the share of the edge before it."""
+    edge_x = end[0] - start[0]
+    edge_y = end[1] - start[1]
+    squared = max(edge_x * edge_x + edge_y * edge_y, 1e-12)
+    along = ((x - start[0]) * edge_x + (y - start[1]) * edge_y) / squared
+    along = min(max(along, 0.0), 1.0)
+    distance = math.hypot(x - start[0] - along * edge_x, y - start[1] - along * edge_y)
+    return distance, along
 
 
 def claimed(owner: Owners, among: Mask) -> Rows:

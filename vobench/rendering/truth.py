@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.rendering.array_types import Floats, Indices, Mask, Pixels
+from vobench.rendering.array_types import Floats, Indices, Mask, Pixels, Rows
 from vobench.rendering.lamp import Lamp, LampGroup, lamp_groups, lamps_on
 from vobench.rendering.occlusion import Bodies, dot
+from vobench.rendering.shadow_cells import KnownShadows, large_planes
 from vobench.rendering.shot import CameraShot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene
@@ -42,6 +43,14 @@ class FaceIds:
 
 
 @dataclass(frozen=True, slots=True)
+class LitLamps:
+    """A group of lamps, and what is known about their shadows before any ray is cast."""
+
+    group: LampGroup
+    known: KnownShadows
+
+
+@dataclass(frozen=True, slots=True)
 class TruthPicture:
     """A picture to find the ground truth of: its scene, its camera now and for the next picture, if there is one."""
 
@@ -50,7 +59,7 @@ class TruthPicture:
     camera: Camera
     here: ShotTransforms
     there: ShotTransforms | None
-    lamps: tuple[LampGroup, ...]
+    lamps: tuple[LitLamps, ...]
 
 
 @lru_cache(maxsize=4)
@@ -137,22 +146,46 @@ class Band:
         starts_m = (self._world_m + lift_m).astype(np.float32)
         offsets_m = dot(self._world_m, normals) if self._movers else np.empty(0)
         count = np.zeros(len(self._face), np.uint16)
-        for group in picture.lamps:
+        for lamps in picture.lamps:
+            group = lamps.group
             facing = group.facing[self._face]
             for _, pixels in self._movers:
                 is_diffuse = picture.ids.diffuse[self._face[pixels]]
                 facing[pixels] = np.where(is_diffuse, group.bits_before(normals[pixels], offsets_m[pixels]), 0)
-            for lamp, pixels in group.pixels_facing(facing):
-                count[pixels] += self._is_hidden(lamp, starts_m, T_bodies_world, pixels)
+            decided, hidden = lamps.known.bits(self._face, starts_m)
+            hidden &= facing
+            count += np.bitwise_count(hidden)
+            for lamp, pixels in group.pixels_facing(facing & ~decided):
+                count[pixels] += self._is_hidden(lamp, starts_m, T_bodies_world, pixels, by_movers=False)
+            if self._bodies.movers:
+                for lamp, pixels in group.pixels_facing(facing & decided & ~hidden):
+                    count[pixels] += self._is_hidden(lamp, starts_m, T_bodies_world, pixels, by_movers=True)
         return count
 
-    def _is_hidden(self, lamp: Lamp, starts_m: Floats, T_bodies_world: Sequence[Array], pixels: Pixels) -> Mask:
-        """Whether something is between a lamp that shines towards pixels (P,) and what they show at starts_m (R, 3)."""
+    def shown(self) -> list[Rows]:
+        """How many pixels show each of the planes (P,) whose shadows may be known, for each group of lamps."""
+        return [lamps.known.shown(self._face) for lamps in self._picture.lamps]
+
+    def _is_hidden(
+        self,
+        lamp: Lamp,
+        starts_m: Floats,
+        T_bodies_world: Sequence[Array],
+        pixels: Pixels,
+        *,
+        by_movers: bool,
+    ) -> Mask:
+        """Whether something is between a lamp that shines towards pixels (P,) and what they show at starts_m (R, 3).
+
+        With `by_movers`, only movers count.
+        """
         pixel_starts_m = starts_m[pixels]
         vectors_m = lamp.vectors_m(pixel_starts_m)
         is_lit = np.broadcast_to(lamp.shines(vectors_m), len(pixels))
         reach = np.where(is_lit, np.float32(1 - LAMP_TOLERANCE), NO_RAY)
         T_bodies_pixels = [of_rays(T_body_world, pixels) for T_body_world in T_bodies_world]
+        if by_movers:
+            return self._bodies.blocked_by_movers(pixel_starts_m, vectors_m, T_bodies_pixels, reach, where=is_lit)
         return self._bodies.blocked(pixel_starts_m, vectors_m, T_bodies_pixels, reach)
 
     def _flow(self, *, hides: bool) -> tuple[Array, Mask]:
@@ -267,17 +300,26 @@ class TruthCaster:
             diffuse=np.array([*diffuse, False])[thing_of] & is_no_lamp,
         )
         self._pool = ThreadPoolExecutor(THREADS)
-        self._lamp_groups = lru_cache(maxsize=2)(self._lamp_groups_of)
+        self._lit_lamps = lru_cache(maxsize=2)(self._lit_lamps_of)
+        is_surface = self._ids.diffuse[:-1] & (self._bodies.body[:-1] == 0)
+        planes, self._face_plane = large_planes(faces.corners_m, faces.plane, is_surface, self._bodies.ray_offset_m)
+        self._planes = planes
+        self._occluders = self._bodies.stationary_occluders()
 
-    def _lamp_groups_of(self, lights: tuple[int, ...], t_ns: int) -> tuple[LampGroup, ...]:
+    def _lit_lamps_of(self, lights: tuple[int, ...], t_ns: int, is_moving: bool) -> tuple[LitLamps, ...]:
         """The lamps among lights, by their indices, as they are at an instant."""
-        return tuple(lamp_groups(self._scene, self._bodies, self._ids.diffuse, lights, t_ns))
+        result = []
+        for group in lamp_groups(self._scene, self._bodies, self._ids.diffuse, lights, t_ns):
+            stationary = () if is_moving else group.lamps
+            known = KnownShadows(self._planes, self._face_plane, stationary, self._occluders)
+            result.append(LitLamps(group, known))
+        return tuple(result)
 
-    def _lamps_at(self, t_ns: int) -> tuple[LampGroup, ...]:
+    def _lamps_at(self, t_ns: int) -> tuple[LitLamps, ...]:
         """The lamps that are on at an instant; computed again if others are on or the sun has moved."""
         lights = lamps_on(self._scene, t_ns)
         is_moving = any(self._scene.lights[index].moves for index in lights)
-        return self._lamp_groups(lights, t_ns if is_moving else 0)
+        return self._lit_lamps(lights, t_ns if is_moving else 0, is_moving)
 
     def frame(
         self,
@@ -307,13 +349,16 @@ class TruthCaster:
             lamps=self._lamps_at(middle_ns) if "shadow" in wanted else (),
         )
 
-        def fill(rows: slice) -> None:
+        def fill(rows: slice) -> list[Rows]:
             band = Band(picture, rows)
             for name, channel in band.values(tuple(wanted)).items():
                 values[name][rows] = channel.reshape(values[name][rows].shape)
+            return band.shown()
 
         bands = [slice(row, min(row + BAND_ROWS, height)) for row in range(0, height, BAND_ROWS)]
-        list(self._pool.map(fill, bands))
+        for shown_by_group in list(self._pool.map(fill, bands)):
+            for lamps, shown in zip(picture.lamps, shown_by_group, strict=True):
+                lamps.known.learn(shown)
         return TruthFrame(**values)
 
 

@@ -12,6 +12,7 @@ from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import (
     FAR_M,
     RAY_OFFSET_M,
+    SHORT_OF_END,
     PlanarPatch,
     RayCaster,
     face_materials,
@@ -19,11 +20,14 @@ from vobench.rendering.geometry import (
     planar_patches,
     sample_points,
 )
+from vobench.rendering.shadow_kernels import meet_boxes
 from vobench.scene.material import Material, pane_reflectance
 from vobench.scene.mesh import Triangles
 
 MOST_PANES = 16  # crossed by one ray
 WIDE_M2 = 0.05  # of mirrors that show lamps and of panes that show the sky
+BOX_MARGIN_M = 0.01  # around panes
+MOST_BOXES = 48  # around panes; where there are more, one box around all is tested
 SKY_PROBES = 512  # rays to each side of a pane that tell whether the sky is seen through it
 
 
@@ -52,6 +56,7 @@ class Visibility:
         self.opaque = RayCaster(faces, rows[~is_pane])
         self._glass = RayCaster(faces, rows[is_pane])
         self._has_panes = bool(is_pane.any())
+        self._pane_boxes = _boxes(faces, rows[is_pane])
         self.is_pane = np.zeros(len(faces), bool)
         self.is_pane[rows[is_pane]] = True
         self.is_static = np.zeros(len(faces), bool)
@@ -82,9 +87,18 @@ class Visibility:
         """Share (R,) of light that comes from origins + segments (R, 3) to the origins (R, 3)."""
         share = (~self.opaque.stops(origins_m, segments_m)).astype(np.float32)
         if self._has_panes:
-            clear = np.flatnonzero(share)
-            share[clear] = self.through_panes(origins_m[clear], segments_m[clear])
+            rays = self._near_panes(origins_m, segments_m)
+            rays = rays[share[rays] > 0]
+            share[rays] = self.through_panes(origins_m[rays], segments_m[rays])
         return share
+
+    def _near_panes(self, origins_m: Floats, segments_m: Floats) -> Rows:
+        """The rays from origins along segments (R, 3) that meet the box of a pane; all others cross none."""
+        is_near = np.empty(len(origins_m), bool)
+        origins = np.ascontiguousarray(origins_m, np.float32)
+        segments = np.ascontiguousarray(segments_m, np.float32)
+        meet_boxes(origins, segments, self._pane_boxes, is_near)
+        return np.flatnonzero(is_near)
 
     def clear(self, origins_m: Floats, segments_m: Floats) -> Mask:
         """Whether nothing opaque is between origins and origins + segments (R, 3)."""
@@ -102,13 +116,20 @@ class Visibility:
             return np.zeros(len(origins_m), bool)
         return self._sky_panes.stops(origins_m, segments_m)
 
-    def first_panes(self, origins_m: Floats, segments_m: Floats) -> tuple[Rows, Hits]:
-        """Which rays from origins along segments (R, 3) cross a pane (K,), and where they meet their first."""
-        crosses = np.zeros(len(origins_m), bool)
-        if self._has_panes:
-            crosses = self._glass.stops(origins_m, segments_m)
-        rays = np.flatnonzero(crosses)
-        return rays, self._glass.hits(origins_m[rays], segments_m[rays])
+    def first_panes(self, origins_m: Floats, directions: Floats, reach_m: Floats) -> tuple[Rows, Hits]:
+        """Which rays (R, 3) cross a pane (K,) within their reach, and where they meet their first.
+
+        reach_m (R,) is in lengths of the direction, as are the hits.
+        """
+        if not self._has_panes:
+            none = np.zeros(0, np.int64)
+            no_values = np.zeros(0, np.float32)
+            return none, Hits(none.astype(np.int32), no_values, no_values, no_values)
+        near = self._near_panes(origins_m, directions * reach_m[:, None])
+        hits = self._glass.one_sided_hits(origins_m[near], directions[near], SHORT_OF_END * reach_m[near])
+        met = np.flatnonzero(hits.face >= 0)
+        rays = near[met]
+        return rays, self._glass.facing(hits.take(met), directions[rays])
 
     def pane_mirrors(self, panes: Indices, cosine: Floats) -> Floats:
         """Share (R,) that panes, given by their faces (R,), reflect at cosines (R,)."""
@@ -119,7 +140,8 @@ class Visibility:
         share = np.ones(len(origins_m), np.float32)
         if not self._has_panes:
             return share
-        rays = np.flatnonzero(self._glass.stops(origins_m, segments_m))
+        rays = self._near_panes(origins_m, segments_m)
+        rays = rays[self._glass.stops(origins_m[rays], segments_m[rays])]
         travelled = np.zeros(len(rays), np.float32)  # share of the segment
         for _ in range(MOST_PANES):
             if not len(rays):
@@ -157,6 +179,20 @@ class Visibility:
         is_walled = self.opaque.stops(origins_m, segments_m)
         is_blocked = is_walled | self._glass.stops(origins_m, segments_m)
         return not is_blocked.all()
+
+
+def _boxes(faces: Triangles, rows: Indices) -> Floats:
+    """Boxes (K, 2, 3) float32 around the faces at rows, one for each plane of each thing, slightly enlarged."""
+    patches = planar_patches(faces, rows)
+    corners_m = [[patch.corners_m.min((0, 1)), patch.corners_m.max((0, 1))] for patch in patches]
+    boxes_m = np.array(corners_m).reshape(-1, 2, 3)
+    boxes_m[:, 0] -= BOX_MARGIN_M
+    boxes_m[:, 1] += BOX_MARGIN_M
+    rounded_m = np.round(boxes_m, 3).reshape(-1, 6)
+    boxes_m = np.unique(rounded_m, axis=0).reshape(-1, 2, 3)
+    if len(boxes_m) > MOST_BOXES:
+        boxes_m = np.stack([boxes_m[:, 0].min(0), boxes_m[:, 1].max(0)])[None]
+    return boxes_m.astype(np.float32)
 
 
 def _by_face(

@@ -43,12 +43,13 @@ def as_csv(board: Board) -> str:
     import pandas as pd
 
     # Objects stay as they are: a column with a gap would otherwise turn whole numbers into floats.
-    table = pd.DataFrame([_csv_record(record) for record in records(board)], dtype=object)
+    table = pd.DataFrame([csv_record(record) for record in records(board)], dtype=object)
     text: str = table.to_csv(index=False, lineterminator="\n")
     return text
 
 
-def _csv_record(record: Record) -> Record:
+def csv_record(record: Record) -> Record:
+    """A record whose text no spreadsheet takes for a formula."""
     return {name: _csv_value(value) for name, value in record.items()}
 
 

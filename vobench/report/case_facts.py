@@ -1,9 +1,10 @@
 """What the file of a case states that a board needs: calibration group, scenario, and noise of the ground truth."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+from vobench.errors import counted
 from vobench.report.cell import CaseFacts
 from vobench.report.json_file import read_object
 from vobench.runner.folder import CASE, RunFolder
@@ -23,12 +24,27 @@ def case_facts(folder: RunFolder, case: str) -> CaseFacts:
     return CaseFacts(
         group=group,
         scenario=str(content.get("scenario") or ""),
-        severity=severity if isinstance(severity, int) else None,
+        severity=_whole_number(severity),
         place=_place(content),
         drive=_drive(content),
+        place_seed=_place_seed(content),
+        drive_seed=_drive_seed(content),
+        lighting=_lighting(content),
+        noise_seed=_whole_number(content.get("seed")),
         truth_noise=_truth_noise(truth_noise),
         truth_noise_m=truth_noise.get("position_m", 0.0),
     )
+
+
+def design_remarks(facts: Iterable[CaseFacts], *, base_seed: int) -> list[str]:
+    """One sentence on the units of a run whose places or drives were drawn by seeds; nothing for other runs."""
+    drawn = [each for each in facts if each.place_seed is not None or each.drive_seed is not None]
+    if not drawn:
+        return []
+    places = {each.place for each in drawn}
+    units = {(each.place, each.drive) for each in drawn}
+    counts = f"{counted(len(units), 'unit')} (a drive in a place) in {counted(len(places), 'place')}"
+    return [f"The cases with seeds are in {counts}; the base seed is {base_seed}."]
 
 
 def _place(content: Mapping[str, Any]) -> str:
@@ -36,8 +52,39 @@ def _place(content: Mapping[str, Any]) -> str:
     scene = content.get("scene") or {}
     if not isinstance(scene, dict) or not scene.get("name"):
         return ""
+    place_seed = _place_seed(content)
+    if place_seed is not None:
+        return f"{scene['name']}.{place_seed}"
     seed = scene.get("seed")
     return f"{scene['name']} {seed}" if seed else str(scene["name"])
+
+
+def _place_seed(content: Mapping[str, Any]) -> int | None:
+    """The seed of a generator's place; None for another scene."""
+    generated = _section(_section(content, "scene"), "generated")
+    return _whole_number(generated.get("seed"))
+
+
+def _drive_seed(content: Mapping[str, Any]) -> int | None:
+    """The seed of the drive of a body that wanders; None for another trajectory."""
+    trajectory = _section(content, "trajectory")
+    return _whole_number(trajectory.get("seed")) if trajectory.get("kind") == "wander" else None
+
+
+def _lighting(content: Mapping[str, Any]) -> str:
+    """The lighting of a generator's place, or the name of the suite's lighting; empty if unknown."""
+    generated = _section(_section(content, "scene"), "generated")
+    lighting = generated.get("lighting") or _section(content, "variant").get("lighting")
+    return str(lighting or "")
+
+
+def _section(content: Mapping[str, Any], key: str) -> Mapping[str, Any]:
+    section = content.get(key)
+    return section if isinstance(section, dict) else {}
+
+
+def _whole_number(value: Any) -> int | None:
+    return value if isinstance(value, int) else None
 
 
 def _drive(content: Mapping[str, Any]) -> str:

@@ -21,6 +21,8 @@ class CaseFacts:
     """Facts from the file of a case: its calibration group, scenario and severity, place and drive, and truth noise.
 
     `place` and `drive` are empty if they are unknown; a drive is told apart from others by its text.
+    `place_seed` is that of a generator's place, and `drive_seed` that of a body that wanders. `lighting` is the name of
+    the lighting, and `noise_seed` the seed of noise and of all else that the simulation draws.
     `truth_noise_m` is the standard deviation of the position of the ground truth that scores are computed with.
     """
 
@@ -29,6 +31,10 @@ class CaseFacts:
     severity: int | None = None
     place: str = ""
     drive: str = ""
+    place_seed: int | None = None
+    drive_seed: int | None = None
+    lighting: str = ""
+    noise_seed: int | None = None
     truth_noise: str = ""
     truth_noise_m: float = 0.0
 

@@ -66,23 +66,27 @@ def make_board(
     *,
     title: str = "",
     environment: Environment | None = None,
+    remarks: Sequence[str] = (),
 ) -> Board:
-    """The board of trials; `answered` is by case and estimator, `facts` by case, and entries may be missing in both."""
+    """The board of trials; `answered` is by case and estimator, `facts` by case, and entries may be missing in both.
+
+    `remarks` are further ones, which come first.
+    """
     scores = list(scores)
     unmade = unavailable_cases(scores)
     trials = list(with_sequence(scores))
     cells = _cells(trials, answered, facts or {})
-    remarks = _unmade_remark(unmade, cases=len({score.case for score in scores}))
+    all_remarks = [*remarks, *_unmade_remark(unmade, cases=len({score.case for score in scores}))]
 
     totals, division_remarks = _rank(cells)
-    remarks += division_remarks
-    remarks += _truth_noise_remarks(cells)
+    all_remarks += division_remarks
+    all_remarks += _truth_noise_remarks(cells)
     return Board(
         title=title,
         cells=tuple(cells),
         totals=tuple(totals),
         curves=tuple(breakdown_curves(cells)),
-        remarks=tuple(remarks),
+        remarks=tuple(all_remarks),
         unmade=unmade,
         environment=environment,
         visible=visible_to(trials),

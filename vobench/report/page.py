@@ -12,11 +12,12 @@ from vobench import stop
 from vobench.report import board_table, leaderboard
 from vobench.report.board_formats import FORMATS
 from vobench.report.board_metric import METRICS
-from vobench.report.case_facts import case_facts
+from vobench.report.case_facts import case_facts, design_remarks
 from vobench.report.frame_statistics import Answered, EstimatorStatistics, summarize_frames
 from vobench.report.json_file import read_object
 from vobench.report.leaderboard import Board
 from vobench.report.page_data import page_data
+from vobench.report.run_tables import trial_csv
 from vobench.report.thumbnail import Thumbnails
 from vobench.runner.environment import Environment, read_environment
 from vobench.runner.folder import CASE, PAGE, SUITE, SURVIVED, RunFolder, TrialScore, visible_to, with_sequence
@@ -24,6 +25,7 @@ from vobench.runner.frames import TIMES, FrameRow, new_table, read_frames
 
 TEMPLATES = Path(__file__).parent / "templates"
 STEM = "leaderboard"
+TRIALS = "trials.csv"
 COST_COLUMNS = ("case", "estimator", "wall_ms", "cpu_ms", "memory_mib")
 MOST_RIGS = 4  # of which the page shows a picture
 RIG_WIDTH_PX = 256
@@ -48,7 +50,20 @@ def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> B
     cases = {score.case for score in scores}
     facts = {case: case_facts(folder, case) for case in cases}
     title = folder.path.resolve().parent.name
-    return leaderboard.make_board(scores, answered, facts, title=title, environment=read_environment(folder))
+    return leaderboard.make_board(
+        scores,
+        answered,
+        facts,
+        title=title,
+        environment=read_environment(folder),
+        remarks=design_remarks(facts.values(), base_seed=_base_seed(folder)),
+    )
+
+
+def _base_seed(folder: RunFolder) -> int:
+    """The base seed of the suite of a run; 0 if it is unknown, as in runs of an older vobench."""
+    base_seed = read_object(folder.path / SUITE).get("base_seed", 0)
+    return base_seed if isinstance(base_seed, int) else 0
 
 
 def _answered(frames: Iterator[CellFrames] | list[CellFrames]) -> Answered:
@@ -56,9 +71,9 @@ def _answered(frames: Iterator[CellFrames] | list[CellFrames]) -> Answered:
 
 
 def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
-    """Write leaderboard.md, .json and .csv without costs, times.csv with costs, and the page to the folder of a run.
+    """Write the reports of a run to its folder: leaderboard.md, .json and .csv, trials.csv, times.csv and the page.
 
-    Costs and dates differ between equal runs, so the first three leave them out.
+    Costs and dates differ between equal runs, so only times.csv and the page have them.
     """
     cells = list(_cell_frames(folder, scores))
     answered = _answered(cells)
@@ -68,6 +83,9 @@ def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
         stop.check()
         text = FORMATS[suffix](repeatable, board_table.DEFAULT_METRIC)
         (folder.path / f"{STEM}.{suffix}").write_text(text, encoding="utf-8")
+
+    facts = {cell.case: cell.facts for cell in repeatable.cells}
+    (folder.path / TRIALS).write_text(trial_csv(scores, facts), encoding="utf-8")
 
     with new_table(folder.path / TIMES, COST_COLUMNS) as table:
         for cell in cells:

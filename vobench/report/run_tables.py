@@ -1,11 +1,13 @@
 """A run as pandas tables: one row per estimator, per cell, per trial or per frame."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from vobench.report.board_metric import COSTS, METRICS, lost_aware
-from vobench.report.board_records import cell_records
+from vobench.report.board_records import cell_records, csv_record
+from vobench.report.cell import CaseFacts
 from vobench.report.leaderboard import Board
 from vobench.report.total import Total
 from vobench.runner.folder import RunFolder, TrialScore
@@ -15,6 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Record = dict[str, Any]
+NO_FACTS: Mapping[str, CaseFacts] = MappingProxyType({})
 # The columns that a notebook shows if it has room for few.
 FIRST_COLUMNS = ("rank", "estimator", "score", "ate_percent", "failed", "trials", "cases")
 # The intervals of a total, which are two columns each, and the names of these.
@@ -49,19 +52,43 @@ def cell_frame(board: Board) -> "pd.DataFrame":
     return pd.DataFrame(cell_records(board))
 
 
-def trial_frame(scores: Iterable[TrialScore]) -> "pd.DataFrame":
-    """One row per trial: its case and the choices that make it, its status, and its metrics."""
+def trial_frame(scores: Iterable[TrialScore], facts: Mapping[str, CaseFacts] = NO_FACTS) -> "pd.DataFrame":
+    """One row per trial: its case and the choices that make it, its place and drive, its status, and its metrics.
+
+    `facts` are those of the cases by name.
+    """
     import pandas as pd
 
-    return pd.DataFrame([_trial_record(score) for score in scores])
+    return pd.DataFrame(trial_records(scores, facts))
 
 
-def _trial_record(score: TrialScore) -> Record:
+def trial_csv(scores: Iterable[TrialScore], facts: Mapping[str, CaseFacts]) -> str:
+    """The rows of `trial_frame` as CSV, with numbers in full."""
+    import pandas as pd
+
+    rows = [csv_record(record) for record in trial_records(scores, facts)]
+    text: str = pd.DataFrame(rows, dtype=object).to_csv(index=False, lineterminator="\n")
+    return text
+
+
+def trial_records(scores: Iterable[TrialScore], facts: Mapping[str, CaseFacts]) -> list[Record]:
+    """The rows of `trial_frame`."""
+    return [_trial_record(score, facts.get(score.case, CaseFacts())) for score in scores]
+
+
+def _trial_record(score: TrialScore, facts: CaseFacts) -> Record:
     record: Record = {
         "case": score.case,
         "estimator": score.estimator,
         "repeat": score.repeat,
         **score.variant,
+        "place": facts.place,
+        "place_seed": facts.place_seed,
+        "drive_seed": facts.drive_seed,
+        "lighting": facts.lighting,
+        "noise_seed": facts.noise_seed,
+        "scenario": facts.scenario,
+        "severity": facts.severity,
         "status": score.status,
         "reason": score.reason,
         "coverage": score.coverage,

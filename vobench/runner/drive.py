@@ -13,7 +13,7 @@ from vobench.motion.drive import Waypoints
 from vobench.motion.motor import loop_voltages, wheel_voltages
 from vobench.motion.wheeled import Wheeled
 from vobench.runner.data_frame import data_frame
-from vobench.runner.motion import BodyMotion, body_motion, check_cases
+from vobench.runner.motion import BodyMotion, body_motion, check_cases, motion_name, place_in_suite
 from vobench.runner.sensors import wheel_error_m
 from vobench.suite.case import Case
 from vobench.suite.plan import Plan
@@ -180,17 +180,25 @@ class SuiteDrive:
 
 
 def chosen_trajectories(plan: Plan, *, trajectory: str | None = None) -> tuple[str, ...]:
-    """The names of the plan's trajectories, or only the requested one.
+    """The names of the motions of the plan's cases, or only those of the requested trajectory.
 
-    Raises InputError for a suite without trajectories, and UnknownNameError for a name that is not in the suite.
+    A body that wanders has one motion for each seed in each scene. Raises InputError for a suite of recordings, and
+    UnknownNameError for a name that is not in the suite.
     """
-    names = tuple(plan.suite.trajectories or ())
+    names = tuple(dict.fromkeys(motion_name(case) for case in plan.simulated))
     if not names:
-        raise InputError(f"suite '{plan.suite.name}' has no trajectory to drive, only recordings or scenarios")
+        raise InputError(f"suite '{plan.suite.name}' has no trajectory to drive, only recordings")
     if trajectory is None:
         return names
-    require_known("trajectory", trajectory, names)
-    return (trajectory,)
+    chosen = tuple(name for name in names if _is_of(name, trajectory))
+    if not chosen:
+        require_known("trajectory", trajectory, names)
+    return chosen
+
+
+def _is_of(name: str, trajectory: str) -> bool:
+    """Whether a motion is of a trajectory of the suite, of one of its seeds, or has this name."""
+    return name == trajectory or name.startswith((f"{trajectory}.", f"{trajectory} in "))
 
 
 def drive_plan(plan: Plan, *, trajectory: str | None = None) -> SuiteDrive:
@@ -206,10 +214,10 @@ def drive_plan(plan: Plan, *, trajectory: str | None = None) -> SuiteDrive:
 
 
 def drive_trajectory(plan: Plan, name: str) -> TrajectoryDrive:
-    """Drive one trajectory of a plan. Raises SuiteError if the body cannot follow it."""
-    cases = [case for case in plan.simulated if case.variant["trajectory"] == name]
+    """Drive the cases of a plan that have one motion. Raises SuiteError if the body cannot follow it."""
+    cases = [case for case in plan.simulated if motion_name(case) == name]
     mistakes = plan.mistakes()
-    with mistakes.at("trajectories", name):
+    with mistakes.at(*place_in_suite(cases[0], "trajectory")):
         motion = body_motion(cases[0])
     mistakes.require_none()
 

@@ -66,7 +66,7 @@ def run_plan(
     from vobench.runner.run import run_suite
 
     if recordings is None:
-        recordings = preflight(planned, only_missing=not is_fresh).recordings
+        recordings = preflight(planned, only_missing=not is_fresh, runs_generators=False).recordings
     if cause := why_unwritable(out):
         raise InputError(f"out should be a folder that can be written ({cause}): {out}")
 

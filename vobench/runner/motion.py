@@ -2,7 +2,7 @@
 
 import hashlib
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -23,8 +23,10 @@ from vobench.motion.handheld import Handheld
 from vobench.motion.pioneer import Theta, feed_forward
 from vobench.motion.replay import Replay
 from vobench.motion.slip import DISTURBANCE_STREAMS, Generators
+from vobench.motion.wander import Wander
 from vobench.motion.wheeled import Wheeled
 from vobench.rendering.geometry import RayCaster
+from vobench.runner.wander import wander_motion
 from vobench.scene.mesh import Thing, Triangles, table
 from vobench.scene.scene import Scene
 from vobench.suite.case import Case
@@ -65,6 +67,7 @@ class BodyMotion:
     All true poses, twists and accelerations come from `motion`, which can be evaluated at any time.
     `rims` are those of a body with wheels, and `drive` is that of a body with a controller.
     `first` is the index of the first picture among the pictures of the whole motion.
+    `clearance_m` is the least distance from the body to anything, for one that wanders through free space.
     """
 
     motion: Motion
@@ -72,6 +75,7 @@ class BodyMotion:
     rims: Rims | None = None
     drive: Drive | None = None
     first: int = 0
+    clearance_m: float | None = None
 
     def at_frames(self) -> Kinematics:
         """The poses and velocities of the body at the stamps of its pictures."""
@@ -79,7 +83,10 @@ class BodyMotion:
 
 
 def body_motion(case: Case) -> BodyMotion:
-    """The motion of the body of a case, which does not depend on scene, rig and camera. Raises MotionError."""
+    """The motion of the body of a case. It does not depend on rig and camera, and only a wander depends on the scene.
+
+    Raises MotionError.
+    """
     whole = _whole_motion(case)
     if case.frames is None:
         return whole
@@ -100,6 +107,8 @@ def _whole_motion(case: Case) -> BodyMotion:
         drive = _driven(spec, case.seed)
         rims = Rims(drive.encoder_t_ns, drive.rim_rad)
         return BodyMotion(drive.motion, drive.t_ns, rims, drive)
+    if isinstance(spec, Wander):
+        return _wandering(case, spec)
     motion: Motion
     if isinstance(spec, Replay):
         assert case.replayed is not None  # it is read with the suite
@@ -110,6 +119,17 @@ def _whole_motion(case: Case) -> BodyMotion:
     else:
         motion = spec.motion()
     return BodyMotion(motion, stamps(motion, spec.rate_hz))
+
+
+def _wandering(case: Case, spec: Wander) -> BodyMotion:
+    """The motion of a body through the free space of the case's place. Its wheels, if it has any, do not slip."""
+    found = wander_motion(case, spec)
+    if spec.wheels is None:
+        t_ns = stamps(found.motion, spec.rate_hz)
+        return BodyMotion(found.motion, t_ns, clearance_m=found.clearance_m)
+    encoder_t_ns = stamps(found.motion, spec.rate_hz, per_frame=ENCODERS_PER_FRAME)
+    rims = Rims(encoder_t_ns, rolled(found.motion, encoder_t_ns, spec.wheels))
+    return BodyMotion(found.motion, encoder_t_ns[::ENCODERS_PER_FRAME], rims, clearance_m=found.clearance_m)
 
 
 def recorded_drive(folder: Path) -> Drive:
@@ -198,6 +218,14 @@ def _rolling(spec: Planar) -> BodyMotion:
     return BodyMotion(motion, encoder_t_ns[::ENCODERS_PER_FRAME], rims)
 
 
+def motion_name(case: Case) -> str:
+    """The name of the motion of a case: that of its trajectory, with the scene if it wanders there."""
+    trajectory = case.variant["trajectory"]
+    if isinstance(case.trajectory, Wander):
+        return f"{trajectory} in {case.variant['scene']}"
+    return trajectory
+
+
 def cut(planned: Plan, frames: int) -> Plan:
     """The plan with at most `frames` frames of each simulated case. Recordings are not cut.
 
@@ -206,7 +234,7 @@ def cut(planned: Plan, frames: int) -> Plan:
     motions = body_motions(planned, are_checked=False)
     cases = []
     for case in planned.simulated:
-        motion = motions[case.variant["trajectory"]]
+        motion = motions[motion_name(case)]
         is_longer = len(motion.t_ns) > frames
         window = (motion.first, motion.first + frames)
         cases.append(replace(case, frames=window) if is_longer else case)
@@ -214,7 +242,7 @@ def cut(planned: Plan, frames: int) -> Plan:
 
 
 def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotion]:
-    """The motion of each trajectory of a plan, by name. Nothing is rendered.
+    """The motions of the cases of a plan by `motion_name`. Nothing is rendered.
 
     Raises SuiteError with all mistakes: a target cannot be reached and, if cases `are_checked`, a trajectory ends
     within a frame, a camera leaves the room, its pictures take longer than a frame, or an IMU would feel the noise of
@@ -222,9 +250,9 @@ def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotio
     """
     motions = dict[str, BodyMotion]()
     mistakes = plan.mistakes()
-    for name, cases in _by(plan.simulated, "trajectory").items():
+    for name, cases in _grouped(plan.simulated, motion_name).items():
         stop.check()
-        with mistakes.at(*_place_in_suite(cases[0], "trajectory")):
+        with mistakes.at(*place_in_suite(cases[0], "trajectory")):
             motions[name] = body_motion(cases[0])
             if are_checked:
                 check_cases(cases, motions[name], mistakes)
@@ -234,38 +262,58 @@ def body_motions(plan: Plan, *, are_checked: bool = True) -> dict[str, BodyMotio
 
 def check_cases(cases: Sequence[Case], motion: BodyMotion, mistakes: Mistakes) -> None:
     """Collect the mistakes because of which cases with this trajectory cannot be simulated."""
-    with mistakes.at(*_place_in_suite(cases[0], "trajectory")):
-        if len(motion.t_ns) < 2:
-            raise MotionError(
-                f"the trajectory ends within its first frame at {cases[0].trajectory.rate_hz:g} Hz: one picture shows "
-                "no motion; go further, more slowly or with a higher rate_hz"
-            )
+    with mistakes.at(*place_in_suite(cases[0], "trajectory")):
+        _check_moves(cases[0], motion)
     for case, *_ in _by(cases, "scene", "rig").values():
-        with mistakes.at(*_place_in_suite(case, "trajectory")):
+        with mistakes.at(*place_in_suite(case, "trajectory")):
             _check_clear(case, motion)
             _check_smooth(case)
     for case, *_ in _by(cases, "rig", "camera").values():
-        with mistakes.at(*_place_in_suite(case, "camera")):
+        with mistakes.at(*place_in_suite(case, "camera")):
             _check_fits_frame(case)
             _check_imu_delay(case)
+
+
+def require_possible(case: Case, motion: BodyMotion) -> None:
+    """Raise MotionError if a case cannot be simulated, for the reasons that `check_cases` collects."""
+    _check_moves(case, motion)
+    _check_clear(case, motion)
+    _check_smooth(case)
+    _check_fits_frame(case)
+    _check_imu_delay(case)
+
+
+def _check_moves(case: Case, motion: BodyMotion) -> None:
+    if len(motion.t_ns) < 2:
+        raise MotionError(
+            f"the trajectory ends within its first frame at {case.trajectory.rate_hz:g} Hz: one picture shows "
+            "no motion; go further, more slowly or with a higher rate_hz"
+        )
 
 
 AXIS_KEYS = {"trajectory": "trajectories", "camera": "cameras"}
 
 
-def _place_in_suite(case: Case, axis: str) -> tuple[str, str]:
+def place_in_suite(case: Case, axis: str) -> tuple[str, str]:
     """The key and the name of the variant of a case on an axis, as they are in the suite."""
     if case.scenario:
         return "scenarios", case.scenario
-    return AXIS_KEYS[axis], case.variant[axis]
+    name = case.variant[axis]
+    if axis == "trajectory" and isinstance(case.trajectory, Wander):
+        name = name.removesuffix(f".{case.trajectory.seed}")  # of a number of seeds
+    return AXIS_KEYS[axis], name
 
 
 def _by(cases: Sequence[Case], *axes: str) -> dict[str, list[Case]]:
     """The cases of each combination of variants on some axes."""
+    return _grouped(cases, lambda case: " ".join(case.variant[axis] for axis in axes))
+
+
+def _grouped(cases: Sequence[Case], name_of: Callable[[Case], str]) -> dict[str, list[Case]]:
+    """The cases by the name that a function gives them."""
     groups = dict[str, list[Case]]()
     for case in cases:
-        combination = " ".join(case.variant[axis] for axis in axes)
-        groups.setdefault(combination, []).append(case)
+        groups.setdefault(name_of(case), []).append(case)
     return groups
 
 

@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.runner.exposure_doubt import doubts_of_plan
 from vobench.runner.key import cache_folder
-from vobench.runner.motion import BodyMotion, body_motions
+from vobench.runner.motion import BodyMotion, body_motions, motion_name
 from vobench.runner.task import is_done, plan, sequence_tasks
 from vobench.suite.case import Case
 from vobench.suite.plan import Plan
 from vobench.suite.source import RecordedCase
 from vobench.trajectory.nanoseconds import NS_PER_S
+from vobench.trajectory.trajectory import Stamps
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
@@ -31,18 +32,25 @@ class Preflight:
 
 @dataclass(frozen=True, slots=True)
 class CaseSummary:
-    """A case before it is created. `notes` are the assumptions of an import, and None for a simulated case."""
+    """A case before it is created. `notes` are the assumptions of an import, and None for a simulated case.
+
+    Frames and duration are None in a place of a generator that was not run. `clearance_m` is the least distance of a
+    body that wanders from everything.
+    """
 
     case: str
-    frames: int
-    duration_s: float
+    frames: int | None
+    duration_s: float | None
     simulated: bool
     sequence: str
+    clearance_m: float | None = None
     notes: tuple[str, ...] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The fields that apply, as plain JSON values."""
         content = asdict(self)
+        if self.clearance_m is None:
+            del content["clearance_m"]
         notes = content.pop("notes")
         return content if notes is None else {**content, "notes": list(notes)}
 
@@ -106,16 +114,19 @@ class PlanSummary:
         return content
 
 
-def preflight(planned: Plan, *, only_missing: bool = False) -> Preflight:
+def preflight(planned: Plan, *, only_missing: bool = False, runs_generators: bool = True) -> Preflight:
     """Compute the motion of all simulated cases, and read the recordings of all recorded cases.
 
-    With `only_missing`, cases whose sequence is cached are not checked. Raises SuiteError with all mistakes.
+    With `only_missing`, cases whose sequence is cached are not checked. Without `runs_generators`, cases in places of
+    generators are not checked; they are when they are simulated. Raises SuiteError with all mistakes.
     """
     wrong = planned.mistakes()
     motions: dict[str, BodyMotion] = {}
     recordings: dict[str, Recording] = {}
     with wrong.at():
         simulated = planned.simulated
+        if not runs_generators:
+            simulated = tuple(case for case in simulated if case.scene.generated is None)
         if only_missing:
             simulated = tuple(case for case in simulated if not is_in_cache(case, {}))
         motions = body_motions(replace(planned, simulated=simulated))
@@ -129,11 +140,11 @@ def preflight(planned: Plan, *, only_missing: bool = False) -> Preflight:
 
 
 def summarize(planned: Plan, *, with_stages: bool = False) -> PlanSummary:
-    """Validate a plan, and summarise it. With `with_stages`, the remaining work is counted, too.
+    """Validate a plan, and summarise it. With `with_stages`, the remaining work is counted, and no generator is run.
 
     Raises SuiteError with all mistakes.
     """
-    checked = preflight(planned)
+    checked = preflight(planned, runs_generators=not with_stages)
     cases = tuple(_case_summary(case, checked) for case in planned.cases)
     doubts = tuple(doubts_of_plan(planned))
     if not with_stages:
@@ -152,20 +163,21 @@ def is_in_cache(case: Case | RecordedCase, recordings: "Mapping[str, Recording]"
 
 def _case_summary(case: Case | RecordedCase, checked: Preflight) -> CaseSummary:
     is_made = is_in_cache(case, checked.recordings)
-    notes: tuple[str, ...] | None = None
-    if isinstance(case, RecordedCase):
-        recording = checked.recordings[case.name]
-        t_ns = recording.t_ns
-        to_make = f"to import from {case.source.path}"
-        notes = tuple(recording.notes)
-    else:
-        t_ns = checked.motions[case.variant["trajectory"]].t_ns
-        to_make = TO_SIMULATE
-    return CaseSummary(
-        case=case.name,
-        frames=len(t_ns),
-        duration_s=float(t_ns[-1] - t_ns[0]) / NS_PER_S,
-        simulated=is_made and not isinstance(case, RecordedCase),
-        sequence=IN_CACHE if is_made else to_make,
-        notes=notes,
-    )
+    sequence = IN_CACHE if is_made else TO_SIMULATE
+    if not isinstance(case, RecordedCase):
+        motion = checked.motions.get(motion_name(case))
+        t_ns = motion.t_ns if motion else None
+        clearance_m = motion.clearance_m if motion else None
+        return CaseSummary(case.name, *_extent(t_ns), is_made, sequence, clearance_m)
+
+    recording = checked.recordings[case.name]
+    if not is_made:
+        sequence = f"to import from {case.source.path}"
+    return CaseSummary(case.name, *_extent(recording.t_ns), False, sequence, notes=tuple(recording.notes))
+
+
+def _extent(t_ns: Stamps | None) -> tuple[int | None, float | None]:
+    """The number of frames, and the duration in s; None if they are unknown."""
+    if t_ns is None:
+        return None, None
+    return len(t_ns), float(t_ns[-1] - t_ns[0]) / NS_PER_S

@@ -24,9 +24,9 @@ from vobench.sensor.pixel_truth import CHANNELS, picture
 from vobench.sensor.response import Grey
 from vobench.sequence.picture import write_png
 from vobench.setting import Triple
-from vobench.suite import catalog
 from vobench.suite.scene_build import build
-from vobench.suite.scene_file import read_scene
+from vobench.suite.scene_entry import DRAWN
+from vobench.suite.scene_file import read_place
 from vobench.suite.suite_spec import Rendering
 from vobench.suite.white import white_of
 from vobench.trajectory.nanoseconds import NS_PER_S
@@ -64,6 +64,8 @@ class ScenePicture:
 def render_scene(
     scene: str,
     *,
+    seed: int | None = None,
+    lighting: str = DRAWN,
     camera: str = "paper_blender",
     at_m: Triple = (0.0, 0.0, 1.2),
     yaw_deg: float = 0.0,
@@ -80,6 +82,8 @@ def render_scene(
 
     Args:
         scene: the scene's name, or the path of its file or model.
+        seed: that of the place which the scene's generator creates; None for the scene as its file describes it.
+        lighting: of that place: day, evening, night, overcast, or drawn by the seed.
         camera: the rig preset whose left lens is used.
         at_m: the position of the camera in the world.
         yaw_deg: the direction in which it looks: 0 is along x, 90 along y.
@@ -103,7 +107,7 @@ def render_scene(
     lens = PRESETS[camera].left
     chip = CAMERAS[sensor]
     T_world_camera, t_ns = _pose(at_m, yaw_deg, pitch_deg, time_s)
-    spec = read_scene(catalog.find("scene", scene).path)
+    spec = read_place(scene, seed=seed, lighting=lighting)
     if spec.room and not spec.room.holds(at_m):
         raise InputError(f"--at should be inside the room ({spec.room.extent}), got {at_m}")
 

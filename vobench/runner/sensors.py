@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from vobench.geometry.rig import Side
+from vobench.motion.wander import Wander
 from vobench.motion.wheeled import ENCODERS, Wheeled, ticks
 from vobench.rendering.shot import CameraShot
 from vobench.rendering.truth import TruthCaster
@@ -56,7 +57,7 @@ class SensorFeed:
 def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
     """The stamps (M,) and counts (M, 2) of both encoders, 0 at the first picture; empty for a body without wheels."""
     spec = case.trajectory
-    if travel.rims is None or not isinstance(spec, Wheeled):
+    if travel.rims is None or not isinstance(spec, Wheeled | Wander) or spec.wheels is None:
         return EMPTY, EMPTY.reshape(0, 2)
     t_ns = travel.rims.t_ns
     counts = ticks(travel.rims.rim_rad, spec.wheels, ENCODERS[spec.encoders])
@@ -84,10 +85,9 @@ def _between(t_ns: Stamps, last_ns: int, now_ns: int) -> slice:
 
 def wheel_error_m(case: Case, travel: BodyMotion) -> float | None:
     """The final position error of wheel odometry from the true start; None for a body without wheels."""
-    spec = case.trajectory
-    if not isinstance(spec, Wheeled):
+    wheels = case.build_rig().wheels
+    if wheels is None:
         return None
-    wheels = spec.wheels
     t_ns, counts = _counted(case, travel)
     is_in_case = (t_ns >= travel.t_ns[0]) & (t_ns <= travel.t_ns[-1])
     steps = np.diff(counts[is_in_case], axis=0)  # ticks (M, 2)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.geometry.rig import SIDES
 from vobench.runner.key import canonical, versions
-from vobench.runner.motion import BodyMotion, body_motion, generator
+from vobench.runner.motion import BodyMotion, body_motion, generator, require_possible
 from vobench.suite.scene_file import scene_content
 from vobench.suite.yaml_file import plain
 
@@ -98,12 +98,17 @@ def open_renderer(
 
 
 def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progress") -> None:
-    """Render the sequence of a case, and write it to a folder. `light` is the light of its scene, if it is needed."""
+    """Render the sequence of a case, and write it to a folder. `light` is the light of its scene, if it is needed.
+
+    Raises MotionError if the body cannot move so in a place of a generator.
+    """
     from vobench.runner.sensors import PixelTruth, SensorFeed
     from vobench.runner.stereo_camera import StereoCamera, World
     from vobench.suite.white import white_of
 
     travel = body_motion(case)
+    if case.scene.generated:
+        require_possible(case, travel)  # a generator is not run before, so the plan has not been checked
     scene = case.build_scene()
     truth = PixelTruth(case, scene, travel.motion) if case.truth else None
     white_cd_m2 = white_of(case.scene, light)

@@ -4,6 +4,7 @@ import os
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from shutil import copyfile
 from typing import TYPE_CHECKING, Any, Literal
@@ -71,7 +72,9 @@ class Task:
 
     @property
     def name(self) -> str:
-        """The name of the task for users."""
+        """The name of the task for users. That of a place of a generator has its seed."""
+        if isinstance(self.subject, SceneFile):
+            return self.subject.place_name
         return self.subject.name
 
     @property
@@ -120,8 +123,21 @@ def bake_task(spec: SceneFile) -> Task:
     """The task that computes the light of a scene, which does not depend on the levels of lights."""
     scene = scene_content(spec, exclude=UNLIT)
     libraries = library_versions("numpy", "scipy", "embreex", "xatlas", "pillow", "trimesh", "opencv-python-headless")
-    inputs = {"scene": scene, **_made_by("bake"), "libraries": libraries}
+    inputs = {"scene": scene, **_made_by("bake"), **_generator_code(spec), "libraries": libraries}
     return Task("bake", spec, inputs, ())
+
+
+def _generator_code(spec: SceneFile) -> dict[str, str]:
+    """The hash of all code of vobench that the generator of a place imports; nothing for other scenes."""
+    if spec.generated is None or spec.generator is None:
+        return {}
+    return {"generator": _imported_code(Path(spec.generator).parent)}
+
+
+@cache
+def _imported_code(folder: Path) -> str:
+    """The hash of the code of vobench that the Python files of a folder import. It is read once in a process."""
+    return code_digest(*imported_by(folder))
 
 
 def _import_task(case: RecordedCase, recording: "Recording") -> Task:

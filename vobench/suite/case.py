@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vobench.geometry.rig import Rig, drawn_calibration_error, true_rig
+from vobench.motion.wander import Wander
 from vobench.motion.wheeled import Wheeled
 from vobench.scene.scene import Scene
 from vobench.sensor.image_sensor import CameraSettings
@@ -57,7 +58,8 @@ class Case:
 
     def build_rig(self) -> Rig:
         """The sensors with the nominal calibration that estimators receive."""
-        wheels = self.trajectory.wheels if isinstance(self.trajectory, Wheeled) else None
+        trajectory = self.trajectory
+        wheels = trajectory.wheels if isinstance(trajectory, Wheeled | Wander) else None
         return replace(self.rig.build(), wheels=wheels)
 
     def build_true_rig(self) -> Rig:

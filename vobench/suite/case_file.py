@@ -57,7 +57,7 @@ def _write_scene_files(case: Case, folder: Path) -> Any:
     scene = without_nothing(plain(case.scene))
     parts = (*scene.get("meshes", ()), *scene.get("movers", ()), scene)
     for part in parts:
-        for key in ("file", "maker"):
+        for key in ("file", "maker", "generator"):
             if part.get(key):
                 source = Path(part[key])
                 copyfile(source, folder / source.name)

@@ -18,6 +18,7 @@ MARKS: dict[Kind, frozenset[str]] = {
     "scenario": frozenset({"base", "severity"}),
     "scene": frozenset(
         {"white_cd_m2", "room", "lamps", "materials", "furniture", "boxes", "boards", "meshes", "maker", "sun", "sky"}
+        | {"generator"}
     ),
     "estimator": frozenset({"class", "command", "stream", "needs", "pose_of", "params"}),
 }

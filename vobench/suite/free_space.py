@@ -1,5 +1,6 @@
 """Finds the free space on the floor of a scene by ray casting: the largest free circle, and a path in it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ from numpy.typing import NDArray
 from vobench.errors import SuiteError
 from vobench.geometry.se3 import Array
 from vobench.motion.spline import Pose, PoseSpline
+from vobench.motion.wander import Clearance
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import Triangles, areas_m2
 from vobench.scene.scene import Scene, triangles
@@ -24,7 +26,7 @@ FLOOR_SHARE = 0.4  # the smallest area of the floor, relative to the largest lev
 CELL_M = 0.1
 MOST_CELLS = 600  # the largest number of cells along one side
 BODY_M = 0.6
-WALL_HEIGHTS_M = (0.1, 0.35, 0.6)  # where horizontal rays look for walls
+WALL_HEIGHTS_M = (0.1, 0.35, 0.6, 0.9, 1.2, 1.5, 1.8)  # where horizontal rays look for walls, up to a body's height
 SIDES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # (4, 3) unit directions
 
 # The circular path of a body.
@@ -59,15 +61,24 @@ class FloorMap:
     floor_m: float
     cell_m: float
 
-    def largest_circle(self) -> FreeCircle | None:
-        """The largest circle around the centre of a cell that contains free cells only."""
+    def clearance(self) -> Clearance:
+        """The distance from every cell to the nearest one that is not free."""
+        return Clearance(float(self.x_m[0]), float(self.y_m[0]), self.floor_m, self.cell_m, self._distances_m())
+
+    def _distances_m(self) -> Array:
+        """Distances (H, W) from the centres of free cells to the border of the nearest cell that is not free."""
         # Cells beyond the map count as occupied.
         padded = np.pad(self.free, 1)
         distance_cells = scipy.ndimage.distance_transform_edt(padded)[1:-1, 1:-1]
-        row, column = np.unravel_index(distance_cells.argmax(), distance_cells.shape)
-
         # Distances are between cell centres, but an occupied cell begins half a cell before its centre.
-        radius_m = float((distance_cells[row, column] - 0.5) * self.cell_m)
+        distances_m: Array = np.maximum(distance_cells - 0.5, 0.0) * self.cell_m
+        return distances_m
+
+    def largest_circle(self) -> FreeCircle | None:
+        """The largest circle around the centre of a cell that contains free cells only."""
+        distances_m = self._distances_m()
+        row, column = np.unravel_index(distances_m.argmax(), distances_m.shape)
+        radius_m = float(distances_m[row, column])
         if radius_m <= 0:
             return None
         return FreeCircle(float(self.x_m[column]), float(self.y_m[row]), self.floor_m, radius_m)
@@ -82,8 +93,8 @@ def largest_free_circle(faces: Triangles, caster: RayCaster) -> FreeCircle | Non
     return floor.largest_circle() if floor else None
 
 
-def floor_map(faces: Triangles, caster: RayCaster) -> FloorMap | None:
-    """The map of the floor; None if the scene has no level face."""
+def floor_map(faces: Triangles, caster: RayCaster, *, body_m: float = BODY_M) -> FloorMap | None:
+    """The map of the floor for a body of some height; None if the scene has no level face."""
     is_level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
     if not is_level.any():
         return None
@@ -104,11 +115,12 @@ def floor_map(faces: Triangles, caster: RayCaster) -> FloorMap | None:
 
     # A cell is free if a ray down from the height of a body hits the floor first, and if no wall is near.
     centres_m = np.stack(np.meshgrid(x_m, y_m), -1).reshape(-1, 2)  # (H * W, 2)
-    starts_m = at_height(centres_m, floor_m + BODY_M)
+    starts_m = at_height(centres_m, floor_m + body_m)
     hits = caster.hits(starts_m, downward_directions(len(starts_m)))
-    meets_floor = np.abs(hits.distance - BODY_M) < FLOOR_STEP_M
+    meets_floor = np.abs(hits.distance - body_m) < FLOOR_STEP_M
     is_free = meets_floor & (faces.plane[hits.face, 2] > 0)
-    is_free[is_free] = _away_from_walls(centres_m[is_free], floor_m, cell_m, faces, caster)
+    heights_m = [height_m for height_m in WALL_HEIGHTS_M if height_m <= body_m]
+    is_free[is_free] = _away_from_walls(centres_m[is_free], floor_m, cell_m, faces, caster, heights_m=heights_m)
     return FloorMap(x_m, y_m, is_free.reshape(len(y_m), len(x_m)), floor_m, cell_m)
 
 
@@ -128,13 +140,21 @@ def at_height(places_m: Array, z_m: float) -> Array:
     return np.column_stack([places_m, np.full(len(places_m), z_m)])
 
 
-def _away_from_walls(centres_m: Array, floor_m: float, cell_m: float, faces: Triangles, caster: RayCaster) -> Mask:
-    """Whether each cell (N, 2) has no wall within the width of a cell, and is not inside of a thing.
+def _away_from_walls(
+    centres_m: Array,
+    floor_m: float,
+    cell_m: float,
+    faces: Triangles,
+    caster: RayCaster,
+    *,
+    heights_m: Sequence[float],
+) -> Mask:
+    """Whether each cell (N, 2) has no wall within the width of a cell at some heights, and is not inside of a thing.
 
     A point is inside of a thing if rays to all four sides hit the backs of faces.
     """
     is_clear = np.ones(len(centres_m), bool)
-    for height_m in WALL_HEIGHTS_M:
+    for height_m in heights_m:
         starts_m = at_height(centres_m, floor_m + height_m)
         is_inside = np.ones(len(centres_m), bool)
         for direction in SIDES:

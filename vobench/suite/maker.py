@@ -1,15 +1,18 @@
-"""Runs the maker of a scene: a Python file whose `make(seed)` returns things, materials and, optionally, lights.
+"""Runs the maker or the generator of a scene, which are Python files.
 
-A maker can be untrusted code. It therefore runs in the same sandbox as estimators, where it can read the files in its
-folder but no other files of the user, and returns the scene as data. The makers that are included in vobench are
-trusted, and run in this process.
+`make(seed)` of a maker returns things, materials and, optionally, lights; `generate(seed, lighting)` of a generator
+returns a GeneratedPlace. Both can be untrusted code. They therefore run in the same sandbox as estimators, where they
+can read the files in their folder but no other files of the user, and return the scene as data. Those that are
+included in vobench are trusted, and run in this process.
 """
 
+import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from vobench import trust
 from vobench.errors import SuiteError, error_sentence
@@ -18,9 +21,10 @@ from vobench.estimator.check import in_one_line
 from vobench.estimator.home import Home
 from vobench.estimator.manifest import Limits
 from vobench.estimator.program import EstimatorFailure, Program, sandbox_here
+from vobench.scene.generated_place import GeneratedPlace
 from vobench.suite.catalog import builtin_root
-from vobench.suite.maker_message import MakerScene, decode
-from vobench.suite.maker_worker import ERROR, SCENE, call
+from vobench.suite.maker_message import decode
+from vobench.suite.maker_worker import ERROR, GENERATE, MAKE, SCENE, call
 
 LIMITS = Limits(trial_s=600.0, threads=max(os.cpu_count() or 1, 1))
 WORKER = (sys.executable, "-P", "-m", "vobench.suite.maker_worker")
@@ -29,22 +33,31 @@ ERROR_BYTES = 1 << 16
 NO_SCENE = "ended without handing back a scene"
 
 
-def made_by(maker: Path, *, seed: int, scene: str) -> MakerScene:
+def made_by(maker: Path, *, seed: int, scene: str) -> GeneratedPlace:
     """The scene that a maker creates from a seed. `scene` is the name of the scene.
 
     Raises SuiteError if the maker fails, or if this machine has no sandbox and the user does not trust the maker.
     """
-    if maker.resolve().is_relative_to(builtin_root().resolve()):
-        return _in_this_process(maker, seed)
-    trust.admit(maker, _sources(maker), scene, is_contained=_is_contained())
-    return _in_a_sandbox(maker, seed)
+    return _returned_by(maker, MAKE, (seed,), scene)
 
 
-def _in_this_process(maker: Path, seed: int) -> MakerScene:
+def generated_by(generator: Path, *, seed: int, lighting: str, scene: str) -> GeneratedPlace:
+    """The place that a generator creates from a seed. Raises SuiteError under the same conditions as `made_by`."""
+    return _returned_by(generator, GENERATE, (seed, lighting), scene)
+
+
+def _returned_by(file: Path, function: str, arguments: Sequence[Any], scene: str) -> GeneratedPlace:
+    if file.resolve().is_relative_to(builtin_root().resolve()):
+        return _in_this_process(file, function, arguments)
+    trust.admit(file, _sources(file), scene, is_contained=_is_contained())
+    return _in_a_sandbox(file, function, arguments)
+
+
+def _in_this_process(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
     try:
-        return call(str(maker), seed)
+        return call(str(file), function, arguments)
     except Exception as error:
-        raise SuiteError(f"{maker}: {error_sentence(error)}") from error
+        raise SuiteError(f"{file}: {error_sentence(error)}") from error
 
 
 def _is_contained() -> bool:
@@ -60,27 +73,25 @@ def _sources(maker: Path) -> Iterator[bytes]:
         yield path.read_bytes()
 
 
-def _in_a_sandbox(maker: Path, seed: int) -> MakerScene:
+def _in_a_sandbox(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
     try:
-        return decode(_worker_output(maker, seed))
+        return decode(_worker_output(file, function, arguments))
     except EstimatorFailure as failure:
-        raise SuiteError(f"{maker}: {_reason(failure)}") from None
+        raise SuiteError(f"{file}: {_reason(failure)}") from None
     except SuiteError as error:
-        raise SuiteError(f"{maker}: {error}") from None
+        raise SuiteError(f"{file}: {error}") from None
 
 
-def _worker_output(maker: Path, seed: int) -> bytes:
+def _worker_output(file: Path, function: str, arguments: Sequence[Any]) -> bytes:
     """The encoded scene that a worker process writes in the sandbox.
 
-    Raises EstimatorFailure if the process fails, and SuiteError with the error that the maker raised.
+    Raises EstimatorFailure if the process fails, and SuiteError with the error that the code raised.
     """
-    command = [*WORKER, str(maker.resolve()), str(seed)]
+    command = [*WORKER, str(file.resolve()), function, json.dumps(arguments)]
     with ExitStack() as stack:
         home = stack.enter_context(Home(Path(os.devnull)))
         log = home.path.parent / "log.txt"
-        program = stack.enter_context(
-            Program(command, log=log, limits=LIMITS, home=home, folder=maker.parent.resolve())
-        )
+        program = stack.enter_context(Program(command, log=log, limits=LIMITS, home=home, folder=file.parent.resolve()))
         program.wait()
         error_text = _read_if_written(program, ERROR, ERROR_BYTES)
         scene = b"" if error_text else program.read(SCENE, most_bytes=SCENE_BYTES)

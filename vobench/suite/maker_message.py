@@ -10,7 +10,7 @@ import json
 import math
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import fields, is_dataclass
 from functools import cache, partial
 from typing import Annotated, Any, get_type_hints
 
@@ -18,14 +18,15 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, create_model
 
+from vobench.asset.panorama import Surroundings
 from vobench.asset.texture import Procedural
 from vobench.errors import SuiteError, VobenchError
+from vobench.scene.generated_place import GeneratedPlace
 from vobench.scene.light import (
     AreaLight,
     Dimmer,
     Flicker,
     Level,
-    Light,
     Panorama,
     PointLight,
     Scaled,
@@ -41,7 +42,8 @@ from vobench.scene.mesh import MeshArrays, Thing, arrays, has_texture_coordinate
 LIGHTS = (AreaLight, PointLight, SpotLight, Sun, Sky)
 LEVELS = (Steady, Flicker, Dimmer, Switched, Scaled)
 TEXTURES = (Picture, Procedural)
-CLASSES: dict[str, type] = {each.__name__: each for each in (MeshArrays, Thing, Material, *LIGHTS, *LEVELS, *TEXTURES)}
+PARTS = (MeshArrays, Thing, Material, Surroundings)
+CLASSES: dict[str, type] = {each.__name__: each for each in (*PARTS, *LIGHTS, *LEVELS, *TEXTURES)}
 DTYPES = ("float64", "float32", "int64", "int32", "uint8", "bool")
 # What reading bytes that do not describe a scene raises.
 UNREADABLE = (
@@ -60,32 +62,32 @@ LENGTH = struct.Struct("<Q")  # the length of the header
 ALIGNMENT = 16  # arrays begin at multiples of this
 
 
-@dataclass(frozen=True, slots=True)
-class MakerScene:
-    """The things, materials and lights that a maker returns."""
-
-    things: tuple[Thing, ...]
-    materials: Mapping[str, Material]
-    lights: tuple[Light, ...] = ()
-
-
-def checked(returned: Any) -> MakerScene:
-    """The scene that `make(seed)` returned: things, materials by name and, optionally, lights. Raises SuiteError."""
+def checked(returned: Any) -> GeneratedPlace:
+    """What `make(seed)` returned: things, materials by name and, optionally, lights. Raises SuiteError."""
     if not isinstance(returned, Sequence) or len(returned) not in (2, 3):
-        raise SuiteError("make() should return things, materials by name and, optionally, lights")
-    returned_things, materials, *rest = returned
+        raise SuiteError("should return things, materials by name and, optionally, lights")
+    things, materials, *rest = returned
+    lights = rest[0] if rest else ()
+    return checked_place(GeneratedPlace(things, materials, lights))
+
+
+def checked_place(returned: Any) -> GeneratedPlace:
+    """What `generate(seed, lighting)` returned. Raises SuiteError if it is not valid."""
+    if not isinstance(returned, GeneratedPlace):
+        raise SuiteError(f"should return a GeneratedPlace, not {type(returned).__name__}")
+    materials = returned.materials
     if not isinstance(materials, Mapping):
-        raise SuiteError(f"make() should return materials by name, not {type(materials).__name__}")
-    things = _all_of("thing", returned_things, (Thing,))
-    lights = _all_of("light", rest[0] if rest else (), LIGHTS)
+        raise SuiteError(f"should return materials by name, not {type(materials).__name__}")
+    things = _all_of("thing", returned.things, (Thing,))
+    lights = _all_of("light", returned.lights, LIGHTS)
     _all_of("material", materials.values(), (Material,))
 
     missing = {thing.material for thing in things} - materials.keys()
     if missing:
-        raise SuiteError(f"make() returns things without materials: {', '.join(sorted(map(str, missing)))}")
+        raise SuiteError(f"returns things without materials: {', '.join(sorted(map(str, missing)))}")
     for thing in things:
         _require_drawable(thing, materials[thing.material])
-    return MakerScene(things, dict(materials), lights)
+    return GeneratedPlace(things, dict(materials), lights)
 
 
 def _all_of(noun: str, objects: Any, classes: tuple[type, ...]) -> tuple[Any, ...]:
@@ -93,11 +95,11 @@ def _all_of(noun: str, objects: Any, classes: tuple[type, ...]) -> tuple[Any, ..
     try:
         listed = tuple(objects)
     except TypeError:
-        raise SuiteError(f"make() should return a list of {noun}s, not {type(objects).__name__}") from None
+        raise SuiteError(f"should return a list of {noun}s, not {type(objects).__name__}") from None
     strange = [each for each in listed if not isinstance(each, classes)]
     if strange:
         names = " or ".join(each.__name__ for each in classes)
-        raise SuiteError(f"make() returns a {noun} that is no {names}: {type(strange[0]).__name__}")
+        raise SuiteError(f"returns a {noun} that is no {names}: {type(strange[0]).__name__}")
     return listed
 
 
@@ -105,14 +107,14 @@ def _require_drawable(thing: Thing, material: Material) -> None:
     """Raise SuiteError if the mesh of a thing cannot be drawn."""
     if not is_mesh(thing.mesh):
         kind = type(thing.mesh).__name__
-        raise SuiteError(f"make() returns '{thing.name}' with a mesh of type {kind}; it should be a trimesh.Trimesh")
+        raise SuiteError(f"returns '{thing.name}' with a mesh of type {kind}; it should be a trimesh.Trimesh")
     if material.texture is not None and not has_texture_coordinates(thing.mesh):
         advice = "set mesh.visual = trimesh.visual.TextureVisuals(uv=...)"
-        raise SuiteError(f"make() returns '{thing.name}' with a texture but without texture coordinates; {advice}")
+        raise SuiteError(f"returns '{thing.name}' with a texture but without texture coordinates; {advice}")
     try:
         _require_sound(arrays(thing.mesh))
     except SuiteError as error:
-        raise SuiteError(f"make() returns '{thing.name}' with a mesh whose {error}") from None
+        raise SuiteError(f"returns '{thing.name}' with a mesh whose {error}") from None
 
 
 def _require_sound(mesh: MeshArrays) -> None:
@@ -177,7 +179,7 @@ class _Writer:
             entry = {"values": self.value(np.asarray(thing.pixels())), "tile_m": self.value(thing.tile_m)}
         else:
             known = ", ".join(CLASSES)
-            raise SuiteError(f"make() returns something of class {kind.__name__}, which is none of {known}")
+            raise SuiteError(f"returns something of class {kind.__name__}, which is none of {known}")
         self.objects.append({"class": kind.__name__, "fields": entry})
         self._alive.append(thing)
         self._places[id(thing)] = len(self.objects) - 1
@@ -190,7 +192,7 @@ class _Writer:
         """Add an array, and return its dtype, shape and offset."""
         name = array.dtype.name
         if name not in DTYPES:
-            raise SuiteError(f"make() returns an array of {name}, which is none of {', '.join(DTYPES)}")
+            raise SuiteError(f"returns an array of {name}, which is none of {', '.join(DTYPES)}")
         content = np.ascontiguousarray(array).tobytes()
         offset = self._offset
         padding = b"\0" * (-len(content) % ALIGNMENT)
@@ -199,7 +201,7 @@ class _Writer:
         return {"dtype": name, "shape": list(array.shape), "offset": offset}
 
 
-def encode(scene: MakerScene) -> bytes:
+def encode(scene: GeneratedPlace) -> bytes:
     """The scene of a maker as bytes. Raises SuiteError if it contains an object of a class not in `CLASSES`."""
     writer = _Writer()
     header = {
@@ -216,7 +218,7 @@ def encode(scene: MakerScene) -> bytes:
 # Reading
 
 
-def decode(content: bytes) -> MakerScene:
+def decode(content: bytes) -> GeneratedPlace:
     """The scene of a maker from bytes that are not trusted. Raises SuiteError if they are not valid."""
     try:
         (length,) = LENGTH.unpack_from(content)
@@ -232,7 +234,7 @@ def decode(content: bytes) -> MakerScene:
     except ValidationError as error:
         mistake = error.errors()[0]
         place = ".".join(map(str, mistake["loc"]))
-        raise SuiteError(f"make() returns a {error.title} with a wrong {place}: {mistake['msg']}") from None
+        raise SuiteError(f"returns a {error.title} with a wrong {place}: {mistake['msg']}") from None
     except VobenchError:
         raise
     except UNREADABLE as error:
@@ -282,7 +284,7 @@ _OF_FIELDS: dict[Any, Any] = {
     _Mesh: Annotated[Any, AfterValidator(_require_mesh)],
     Level: _instance_of(*LEVELS),
     Texture | None: _instance_of(*TEXTURES, type(None)),
-    Panorama | None: _instance_of(type(None)),  # a scene's file adds it
+    Panorama | None: _instance_of(Surroundings, type(None)),
 }
 
 
@@ -327,6 +329,4 @@ def _require_picture(texture: Picture) -> None:
     is_colour = has_bytes and len(shape) == 3 and shape[2] in (3, 4)
     if not (is_grey or is_colour) or 0 in shape:
         kind = texture.values.dtype.name
-        raise SuiteError(
-            f"make() returns a picture of shape {shape} and {kind}: (H, W) or uint8 (H, W, 3 or 4) is right"
-        )
+        raise SuiteError(f"returns a picture of shape {shape} and {kind}: (H, W) or uint8 (H, W, 3 or 4) is right")

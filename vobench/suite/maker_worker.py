@@ -1,36 +1,44 @@
-"""The process that runs the maker of a scene: `python -m vobench.suite.maker_worker MAKER SEED`.
+"""The process that runs code beside a scene: `python -m vobench.suite.maker_worker FILE FUNCTION ARGUMENTS`.
 
-It writes the returned scene to the file `scene.bin` in the working folder, or an error to `error.txt` in one line.
+FUNCTION is `make` of a maker or `generate` of a generator, and ARGUMENTS are its arguments as a JSON list. The process
+writes the returned scene to the file `scene.bin` in the working folder, or an error to `error.txt` in one line.
 """
 
+import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from runpy import run_path
 from typing import Any
 
 from vobench.errors import SuiteError, error_sentence
-from vobench.suite.maker_message import MakerScene, checked, encode
+from vobench.scene.generated_place import GeneratedPlace
+from vobench.suite.maker_message import checked, checked_place, encode
 
 SCENE = "scene.bin"
 ERROR = "error.txt"
+MAKE = "make"
+GENERATE = "generate"
+PARAMETERS = {MAKE: "seed", GENERATE: "seed, lighting"}
 
 
-def call(maker: str, seed: int) -> MakerScene:
-    """The scene that `make(seed)` of a maker returns. Raises SuiteError if it is not valid, and the maker's errors."""
+def call(file: str, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
+    """What a function of a file returns. Raises SuiteError if it is not valid, and the errors of the function."""
     # run_path compiles the source. Cached bytecode could be outdated if the file is edited twice within a second.
-    make: Any = run_path(maker).get("make")
-    if make is None:
-        raise SuiteError("has no function make(seed)")
-    return checked(make(seed))
+    called: Any = run_path(file).get(function)
+    if called is None:
+        raise SuiteError(f"has no function {function}({PARAMETERS[function]})")
+    returned = called(*arguments)
+    return checked_place(returned) if function == GENERATE else checked(returned)
 
 
-def main(maker: str, seed: int) -> None:
-    """Run the maker, and write its scene or its error to a file in the working folder."""
+def main(file: str, function: str, arguments: Sequence[Any]) -> None:
+    """Call the function, and write its scene or its error to a file in the working folder."""
     try:
-        Path(SCENE).write_bytes(encode(call(maker, seed)))
+        Path(SCENE).write_bytes(encode(call(file, function, arguments)))
     except Exception as error:  # the user's code may raise anything
         Path(ERROR).write_text(error_sentence(error), encoding="utf-8")
 
 
 if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]))
+    main(sys.argv[1], sys.argv[2], json.loads(sys.argv[3]))

@@ -1,7 +1,9 @@
 """Scenarios: simulated cases in which one difficulty for odometry increases from severity 0 to severity 5."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 from typing import Annotated, Any
 
 from annotated_types import MaxLen, MinLen
@@ -16,6 +18,7 @@ from vobench.suite.trajectory import TrajectorySpec
 
 MOST_SEVERE = 5
 SETUP_AXES = ("lighting", "rig", "trajectory", "camera")
+PLACE_KEYS = ("scene", "scene_changes", "lighting", "trajectory")  # of a setup, which belong to a place and a drive
 NO_CAMERA = CameraSettings()
 
 
@@ -58,6 +61,14 @@ class Scenario:
     path: Path
     setups: tuple[Setup, ...]
 
+    @property
+    def suits_any_place(self) -> bool:
+        """Whether it changes only the rig and the camera, so that it can be laid over any place and drive."""
+        first = self.setups[0]
+        return not first.lighting and all(
+            getattr(setup, key) == getattr(first, key) for setup in self.setups for key in PLACE_KEYS
+        )
+
     def setup(self, severity: int) -> Setup:
         """The setup of a case of this severity."""
         return self.setups[severity]
@@ -79,12 +90,15 @@ class Scenario:
         return name if is_unchanged else f"{name}.{severity}"
 
 
-def read_scenario(path: Path) -> Scenario:
-    """The scenario in a file. Raises SuiteError with all mistakes in it."""
+def read_scenario(path: Path, replaced: Mapping[str, Any] = MappingProxyType({})) -> Scenario:
+    """The scenario in a file. Raises SuiteError with all mistakes in it.
+
+    `replaced` are keys of its base with other values, as plain YAML, to which its changes are applied instead.
+    """
     reading = yaml_file.read_all(path, ScenarioFile, kind="scenario")
     if reading.mistakes:
         raise SuiteError(*reading.mistakes)
-    base = reading.source.plain["base"]
+    base = {**reading.source.plain["base"], **replaced}
     setups: list[Setup] = []
     mistakes: list[Mistake] = []
     for severity, changes in enumerate(reading.model.severity):

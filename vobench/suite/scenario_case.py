@@ -1,6 +1,6 @@
 """The cases of a suite's scenarios: each scenario at each severity, with each calibration."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -9,13 +9,16 @@ from vobench.errors import SuiteError
 from vobench.geometry.rig import Level
 from vobench.motion.replay import Replay
 from vobench.suite import scene_file, scene_lighting
+from vobench.suite.axis import RigSettings
 from vobench.suite.case import Case
 from vobench.suite.lookup import Lookup
 from vobench.suite.scenario import Scenario, Setup, read_scenario
+from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_spec import SceneFile
-from vobench.suite.suite_case import check_buildable, scene_lights, shared_settings
+from vobench.suite.spread import UNIT_AXES, Dealer, units
+from vobench.suite.suite_case import Axes, check_buildable, scene_lights, shared_settings
 from vobench.suite.suite_spec import Suite
-from vobench.suite.trajectory import read_replayed, read_times
+from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
 from vobench.suite.yaml_source import Mistakes
 
 
@@ -23,51 +26,127 @@ from vobench.suite.yaml_source import Mistakes
 class ScenarioCases:
     """Reads the cases of the scenarios of a suite, and collects mistakes.
 
+    `axes` are those of the suite, over whose scenes and trajectories scenarios can be spread, and `replayed` the poses
+    of the trajectories that are replayed.
     `scenes` caches the scenes with a scenario's changes, because scenarios can share them.
     """
 
     suite: Suite
     mistakes: Mistakes
     lookup: Lookup
+    axes: Axes
+    replayed: Mapping[str, str]
     scenes: dict[str, SceneFile] = field(default_factory=dict)
 
     def all(self) -> list[Case]:
         """All cases, in the order of the suite."""
         cases = list[Case]()
+        dealer = self._dealer()
         for name, severities in (self.suite.scenarios or {}).items():
             with self.mistakes.at("scenarios", name):
-                scenario = read_scenario(self.lookup.find("scenario", name).path)
+                path = self.lookup.find("scenario", name).path
+                scenario = read_scenario(path)
                 if scenario.name in (self.suite.trajectories or {}):
                     raise SuiteError("a trajectory of the suite has this name, too; rename it")
-                for severity in dict.fromkeys(severities):
+                distinct = list(dict.fromkeys(severities))
+                if dealer and scenario.suits_any_place:
+                    cases += self._in_units(read_scenario(path, self._base()), distinct, dealer)
+                    continue
+                for severity in distinct:
                     cases += self._at_severity(scenario, severity)
         return cases
 
-    def _at_severity(self, scenario: Scenario, severity: int) -> Iterator[Case]:
-        """One case for each calibration level. Raises VobenchError."""
-        levels = self._calibration_levels(severity)
-        setup = scenario.setup(severity)
-        rig = setup.rig.read(scenario.path.parent)
+    def _dealer(self) -> Dealer | None:
+        """What deals units to scenarios; None if the suite does not spread them, or has mistakes."""
+        spread = self.suite.spread
+        if spread is None or not self.suite.scenarios or self.mistakes.found:
+            return None
+        with self.mistakes.at("spread"):
+            for axis in UNIT_AXES:
+                if axis not in spread.over and len(self.axes[axis]) > 1:
+                    raise SuiteError(f"scenarios are spread over variants of {axis}; add {axis} to over")
+            return Dealer(units(spread, self.axes), spread.each, self.suite.seed)
+        return None
 
+    def _base(self) -> dict[str, Any]:
+        """The rig and the camera of the suite as they are written, which replace those of a scenario's base."""
+        written = self.mistakes.source.plain
+        base = dict[str, Any]()
+        for key, name in {"rigs": "rig", "cameras": "camera"}.items():
+            for variant in (written.get(key) or {}).values():
+                base[name] = variant
+        return base
+
+    def _in_units(self, scenario: Scenario, severities: Sequence[int], dealer: Dealer) -> Iterator[Case]:
+        """The cases of a scenario in its units; severities share units, so that they differ by severity alone."""
+        runs = sum(len(self._calibration_levels(severity)) for severity in severities)
+        chosen = dealer.deal(runs)
+        for severity in severities:
+            setup = scenario.setup(severity)
+            for unit in chosen:
+                by_axis: dict[str, str] = {
+                    axis: unit.by_axis.get(axis) or next(iter(self.axes[axis])) for axis in UNIT_AXES
+                }
+                yield from self._cases(
+                    scenario,
+                    severity,
+                    scene=self.axes["scene"][by_axis["scene"]],
+                    trajectory=self.axes["trajectory"][by_axis["trajectory"]],
+                    replayed=self.replayed.get(by_axis["trajectory"]),
+                    variant={**scenario.variant(severity, by_axis["scene"]), **by_axis},
+                    rig=setup.rig.read(self._folder_of_rig(scenario)),
+                    unit=unit.name,
+                )
+
+    def _folder_of_rig(self, scenario: Scenario) -> Path:
+        """The folder at which the paths in a rig start: that of the suite if it has a rig, or of the scenario."""
+        return self.mistakes.source.path.parent if self.suite.rigs else scenario.path.parent
+
+    def _at_severity(self, scenario: Scenario, severity: int) -> Iterator[Case]:
+        """The cases of a scenario in its own place, one for each calibration level. Raises VobenchError."""
+        setup = scenario.setup(severity)
         scene_entry = self.lookup.find_for(scenario.path, setup.scene)
         scene = self._read_scene(scene_entry.path, setup.scene_changes)
         if setup.lighting:
             scene_lighting.with_lighting(scene_lights(scene, setup.lighting), setup.lighting)
+        yield from self._cases(
+            scenario,
+            severity,
+            scene=scene,
+            trajectory=setup.trajectory,
+            replayed=_replayed_poses(setup, scenario.path.parent),
+            variant=scenario.variant(severity, scene_entry.name),
+            rig=setup.rig.read(scenario.path.parent),
+        )
 
-        replayed = _replayed_poses(setup, scenario.path.parent)
-        variant = scenario.variant(severity, scene_entry.name)
+    def _cases(
+        self,
+        scenario: Scenario,
+        severity: int,
+        *,
+        scene: SceneFile,
+        trajectory: TrajectorySpec,
+        replayed: str | None,
+        variant: dict[str, str],
+        rig: RigSettings,
+        unit: str = "",
+    ) -> Iterator[Case]:
+        """One case for each calibration level. Raises VobenchError."""
+        setup = scenario.setup(severity)
+        levels = self._calibration_levels(severity)
         has_several_levels = len(self.suite.calibrations or ()) > 1
+        in_unit = f"-{unit}" if unit else ""
         for level in levels:
             suffix = f"-{level}" if has_several_levels else ""
             error = rig.calibration_error
             level_rig = replace(rig, calibration_error=replace(error, level=level)) if level else rig
             yield Case(
-                name=f"{scenario.name}-{severity}{suffix}",
+                name=f"{scenario.name}-{severity}{suffix}{in_unit}",
                 variant={**variant, "rig": f"{variant['rig']}{suffix}"},
                 scene=scene,
                 lighting=setup.lighting,
                 rig=check_buildable(level_rig),
-                trajectory=setup.trajectory,
+                trajectory=trajectory,
                 replayed=replayed,
                 camera=setup.camera,
                 **shared_settings(self.suite),
@@ -89,8 +168,9 @@ class ScenarioCases:
         """The scene in a file with a scenario's changes. Raises SuiteError."""
         key = f"{path} {changes}"
         if key not in self.scenes:
-            self.scenes[key], scene_mistakes = scene_file.read_scene_with_mistakes(path, changes)
+            scene, scene_mistakes = scene_file.read_scene_with_mistakes(path, changes)
             scene_mistakes.require_none()
+            self.scenes[key] = described_scene(scene)
         return self.scenes[key]
 
 

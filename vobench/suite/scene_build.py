@@ -21,12 +21,13 @@ from vobench.errors import SuiteError, VobenchError, error_sentence
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.scene import scene as scripted
+from vobench.scene.generated_place import GeneratedPlace
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, WHITE, Material, emitted_cd_m2
 from vobench.scene.mesh import Thing, areas_m2, corners, moved
 from vobench.scene.scene import Scene
-from vobench.suite.maker_message import MakerScene
 from vobench.suite.scene_check import materials_used
+from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_file import scene_content
 from vobench.suite.scene_lighting import SKY, SUN, Lighting, with_lighting
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, PanoramaSpec, SceneFile, SunSpec, unit_luminance_colour
@@ -72,21 +73,27 @@ class Contents:
 
 def _scene(spec: SceneFile) -> Scene:
     """The scene in the light of its file. Things with an emissive material become lights."""
-    parts = [_room_and_furniture(spec), *_from_maker(spec), *map(_model, spec.meshes)]
-    parts.append(Contents(lights=tuple(listed_lights(spec))))
-    parts += [_mover(mover, spec) for mover in spec.movers]
-    whole = _joined(parts)
+    whole = _generated(spec) if spec.generated else _described(spec)
 
     emissive = {name for name, material in whole.materials.items() if emitted_cd_m2(material).max() > 0}
     luminous_things = [thing for thing in whole.things if thing.material in emissive]
     scene = Scene(
-        spec.name,
+        spec.place_name,
         tuple(thing for thing in whole.things if thing.material not in emissive),
         dict(whole.materials),
         (*whole.lights, *_area_lights(luminous_things, whole.materials)),
         whole.movers,
     )
     return scene if spec.scale == 1 else scripted.sized(scene, spec.scale)
+
+
+def _described(spec: SceneFile) -> Contents:
+    """What the scene file lists, and what its maker returns. Raises SuiteError if it lists nothing visible."""
+    described_scene(spec)
+    parts = [_room_and_furniture(spec), *_from_maker(spec), *map(_model, spec.meshes)]
+    parts.append(Contents(lights=tuple(listed_lights(spec))))
+    parts += [_mover(mover, spec) for mover in spec.movers]
+    return _joined(parts)
 
 
 def _joined(parts: Sequence[Contents]) -> Contents:
@@ -156,13 +163,27 @@ def _boxes(spec: SceneFile, material: Callable[[str], Material]) -> Iterator[Ins
         yield board.name or f"board_{index}", [Part(mesh, board_material)]
 
 
+# Cache keys follow imports, but not this one. A change of the sandbox therefore does not change scenes' keys.
+MAKER_MODULE = "vobench.suite.maker"
+
+
 def _from_maker(spec: SceneFile) -> Iterator[Contents]:
     """The contents that the scene's maker returns, if the scene has a maker."""
     if spec.maker is not None:
-        # Cache keys follow imports, but not this one. A change of the sandbox therefore does not change scenes' keys.
-        maker = import_module("vobench.suite.maker")
-        scene: MakerScene = maker.made_by(Path(spec.maker), seed=spec.seed, scene=spec.name)
-        yield Contents(scene.things, scene.materials, scene.lights)
+        maker = import_module(MAKER_MODULE)
+        place: GeneratedPlace = maker.made_by(Path(spec.maker), seed=spec.seed, scene=spec.name)
+        yield Contents(tuple(place.things), place.materials, tuple(place.lights))
+
+
+def _generated(spec: SceneFile) -> Contents:
+    """The contents that the scene's generator returns for the seed and the lighting of the spec."""
+    if spec.generated is None or spec.generator is None:
+        raise SuiteError(f"'{spec.name}' is no place of a generator; give it a generator and a seed")
+    maker = import_module(MAKER_MODULE)
+    place: GeneratedPlace = maker.generated_by(
+        Path(spec.generator), seed=spec.generated.seed, lighting=spec.generated.lighting, scene=spec.name
+    )
+    return Contents(tuple(place.things), place.materials, tuple(place.lights))
 
 
 @contextmanager

@@ -10,9 +10,10 @@ from typing import Any
 
 from vobench.asset import MODEL_SUFFIXES
 from vobench.errors import SuiteError
-from vobench.suite import yaml_file
+from vobench.suite import catalog, yaml_file
 from vobench.suite.bare_model import bare_model_scene
 from vobench.suite.scene_check import check_scene
+from vobench.suite.scene_entry import DRAWN, described_scene, generated_scene
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile
 from vobench.suite.yaml_source import Mistakes, YamlFile
 
@@ -22,6 +23,18 @@ def read_scene(path: Path) -> SceneFile:
     spec, mistakes = read_scene_with_mistakes(path)
     mistakes.require_none()
     return spec
+
+
+def read_place(scene: str, *, seed: int | None = None, lighting: str = DRAWN) -> SceneFile:
+    """A scene by its name or path: as its file describes it or, with a seed, as its generator creates it.
+
+    Raises UnknownNameError if there is no such scene, and SuiteError if its file is wrong, or if it cannot be had so.
+    """
+    entry = catalog.find("scene", scene)
+    spec = read_scene(entry.path)
+    if seed is None:
+        return described_scene(spec)
+    return generated_scene(spec, seed, lighting)
 
 
 def read_scene_with_mistakes(
@@ -42,7 +55,10 @@ def read_scene_with_mistakes(
     check_scene(reading.model, mistakes)
     if reading.mistakes:
         return reading.model, mistakes
-    return _with_absolute_paths(reading.model, path.parent, mistakes), mistakes
+    spec = _with_absolute_paths(reading.model, path.parent, mistakes)
+    if spec.generated:
+        spec = generated_scene(spec, spec.generated.seed, spec.generated.lighting)
+    return spec, mistakes
 
 
 def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> SceneFile:
@@ -63,12 +79,21 @@ def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> S
         file = mover.file and absolute(mover.file, "movers", index, "file")
         movers.append(replace(mover, file=file))
     maker = spec.maker and absolute(spec.maker, "maker")
-    return replace(spec, meshes=tuple(meshes), movers=tuple(movers), maker=maker)
+    generator = spec.generator and absolute(spec.generator, "generator")
+    return replace(spec, meshes=tuple(meshes), movers=tuple(movers), maker=maker, generator=generator)
 
 
 def scene_content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
-    """The scene as plain JSON values. Files are identified by their name and content, not by their path."""
+    """The scene as plain JSON values. Files are identified by their name and content, not by their path.
+
+    A scene that is described without a generator does not depend on it.
+    """
     scene: dict[str, Any] = yaml_file.plain(spec, exclude=exclude)
+    if spec.generated is None:
+        scene.pop("generator", None)
+        scene.pop("generated", None)
+    elif spec.generator:
+        scene["generator"] = _file_identity(Path(spec.generator))
     for part in (*scene.get("meshes", ()), *scene.get("movers", ())):
         if part.get("file"):
             part["file"] = _file_identity(Path(part["file"]))

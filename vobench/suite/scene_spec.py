@@ -433,6 +433,19 @@ class MoverSpec:
             )
 
 
+LIGHTINGS = ("day", "evening", "night", "overcast")
+MOST_SEED = 2**31 - 1
+Seed = Annotated[int, Ge(0), Le(MOST_SEED)]
+
+
+@settings()
+class GeneratedSpec:
+    """Which place a generator creates: its seed, and the lighting, one of LIGHTINGS."""
+
+    seed: Seed
+    lighting: Annotated[str, OneOf("lighting", LIGHTINGS)]
+
+
 @settings()
 class SceneFile:
     """A scene, and the luminance of diffuse white for which cameras are exposed.
@@ -441,6 +454,9 @@ class SceneFile:
 
     It contains a room, boxes, boards, furniture, models, and what the Python file `maker` creates. Paths are relative
     to the scene's file. `seed` determines the random details of furniture and makers. `scale` multiplies all lengths.
+
+    The Python file `generator` creates places for suites that name this scene with a seed. `generated` is such a place;
+    it contains nothing else that the file describes.
     """
 
     name: Name
@@ -453,6 +469,8 @@ class SceneFile:
     furniture: tuple[FurnitureSpec, ...] = ()
     meshes: tuple[ModelSpec, ...] = ()
     maker: str | None = None
+    generator: str | None = None
+    generated: GeneratedSpec | None = None
     seed: Annotated[int, Ge(0)] = 0
     scale: Annotated[float, Ge(0.05), Le(20)] = 1.0
     lamps: tuple[LampSpec, ...] = ()
@@ -462,5 +480,22 @@ class SceneFile:
 
     def __post_init__(self) -> None:
         has_objects = any((self.boxes, self.boards, self.furniture, self.meshes))
-        if not (self.room or self.maker or has_objects):
-            raise SettingError("a scene needs something visible: room, boxes, boards, furniture, meshes or a maker")
+        if self.generated and not self.generator:
+            raise SettingError("requires a generator, and the scene has none", "generated")
+        if not (self.room or self.maker or self.generator or has_objects):
+            raise SettingError(
+                "a scene needs something visible: room, boxes, boards, furniture, meshes, a maker or a generator"
+            )
+
+    @property
+    def place_name(self) -> str:
+        """The name of the scene, with the seed and the lighting of a place of its generator."""
+        if self.generated is None:
+            return self.name
+        return f"{self.name}.{self.generated.seed}.{self.generated.lighting}"
+
+    @property
+    def is_described(self) -> bool:
+        """Whether the file describes a place without a seed, rather than only where its generator is."""
+        has_objects = any((self.boxes, self.boards, self.furniture, self.meshes))
+        return bool(self.room or self.maker or has_objects)

@@ -14,7 +14,7 @@ from vobench.suite.lookup import Lookup
 from vobench.suite.plan import Plan
 from vobench.suite.scenario_case import ScenarioCases
 from vobench.suite.source import RecordedCase, recorded_cases
-from vobench.suite.suite_case import AxisReader
+from vobench.suite.suite_case import Axes, AxisReader, Variant
 from vobench.suite.suite_spec import Suite, missing_axis
 from vobench.suite.yaml_source import Mistakes
 
@@ -57,9 +57,8 @@ def _plan(suite: Suite, mistakes: Mistakes, only_estimators: tuple[str, ...]) ->
     scenes = axis_reader.scenes()
     replayed = axis_reader.replayed_poses()
     axes = axis_reader.axes(scenes, axis_reader.rigs())
-    variants = axis_reader.variants(axes)
-
-    scenario_cases = ScenarioCases(suite, mistakes, lookup).all()
+    variants = _variants(suite, axis_reader, axes)
+    scenario_cases = ScenarioCases(suite, mistakes, lookup, axes, replayed).all()
     simulated_names = [variant.name for variant in variants] + [case.name for case in scenario_cases]
     with mistakes.at("scenarios"):
         _require_distinct(simulated_names)
@@ -69,6 +68,17 @@ def _plan(suite: Suite, mistakes: Mistakes, only_estimators: tuple[str, ...]) ->
     axis_cases = [axis_reader.case(variant, axes, replayed) for variant in variants]
     simulated = (*axis_cases, *scenario_cases)
     return Plan(suite, simulated, recorded, estimator_entries, tuple(lookup.entries), mistakes.source)
+
+
+def _variants(suite: Suite, axis_reader: AxisReader, axes: Axes) -> list[Variant]:
+    """The cases of the axes: all combinations, or those of a design; none if the design spreads scenarios."""
+    if suite.spread is None:
+        return axis_reader.variants(axes)
+    variants = list[Variant]()
+    if not suite.scenarios and not axis_reader.mistakes.found:
+        with axis_reader.mistakes.at("spread"):
+            variants = axis_reader.spread_variants(axes, suite.spread)
+    return variants
 
 
 def _require_distinct(names: list[str]) -> None:

@@ -1,7 +1,7 @@
 """The cases of a suite's axes: every combination of scene, lighting, rig, trajectory and camera."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -9,18 +9,22 @@ from typing import Any
 from vobench.errors import SuiteError
 from vobench.geometry.rig import true_rig
 from vobench.motion.replay import Replay
+from vobench.motion.wander import Wander
 from vobench.scene.light import Light
 from vobench.suite import scene_file, scene_lighting
 from vobench.suite.axis import RigSettings
 from vobench.suite.case import AXES, Case
 from vobench.suite.lookup import Lookup
+from vobench.suite.scene_entry import places
 from vobench.suite.scene_spec import SceneFile
+from vobench.suite.spread import Dealer, Spread, units
 from vobench.suite.suite_spec import Suite
-from vobench.suite.trajectory import read_replayed, read_times
+from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
 from vobench.suite.yaml_source import Mistakes
 
 USUAL_RIG = "ahead"  # the name of the default rig
 USUAL_PITCH_DEG = 10
+USUAL_DRIVE = Wander(length_m=8.0, rate_hz=10.0)
 SHARED_SETTINGS = ("rendering", "truth", "truth_noise", "frames", "seed")  # the same for all cases of a suite
 
 Axes = dict[str, Mapping[str, Any]]  # the variants of each axis by name, in the order of AXES
@@ -36,29 +40,40 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class AxisReader:
-    """Reads the variants of a suite's axes, which may be incomplete, and collects mistakes."""
+    """Reads the variants of a suite's axes, which may be incomplete, and collects mistakes.
+
+    `entry_of` maps the name of each scene to the number of its entry in the suite.
+    """
 
     suite: Suite
     mistakes: Mistakes
     lookup: Lookup
+    entry_of: dict[str, int] = field(default_factory=dict)
 
     def _folder(self) -> Path:
         """The folder of the suite, at which its relative paths start."""
         return self.mistakes.source.path.parent
 
     def scenes(self) -> dict[str, SceneFile]:
-        """The scenes by the names of their files. The lightings of the suite are checked against each scene."""
+        """The scenes by name. The lightings of the suite are checked against each scene that its file describes.
+
+        No generator is run.
+        """
+        files = dict[Path, tuple[SceneFile, Mistakes]]()
         scenes = dict[str, SceneFile]()
-        for index, name in enumerate(self.suite.scenes or ()):
+        for index, entry in enumerate(self.suite.scenes or ()):
             with self.mistakes.at("scenes", index):
-                entry = self.lookup.find("scene", name)
-                if entry.name in scenes:
-                    raise SuiteError(
-                        f"two scenes are called '{entry.name}'; list each once, from files with different names"
-                    )
-                scenes[entry.name], scene_mistakes = scene_file.read_scene_with_mistakes(entry.path)
-                self._check_lightings(scenes[entry.name], scene_mistakes)
+                found = self.lookup.find("scene", entry.name)
+                if found.path not in files:
+                    files[found.path] = scene_file.read_scene_with_mistakes(found.path)
+                scene, scene_mistakes = files[found.path]
+                if scene.is_described and not entry.has_seeds:
+                    self._check_lightings(scene, scene_mistakes)
                 scene_mistakes.require_none()
+                for place in places(entry, found.name, scene, base_seed=self.suite.base_seed):
+                    _require_new(place.name, scenes)
+                    scenes[place.name] = place.scene
+                    self.entry_of[place.name] = index
         return scenes
 
     def _check_lightings(self, scene: SceneFile, scene_mistakes: Mistakes) -> None:
@@ -100,7 +115,7 @@ class AxisReader:
 
     def axes(self, scenes: dict[str, SceneFile], rigs: dict[str, RigSettings]) -> Axes:
         """The variants of each axis. If there are scenes, missing rigs and trajectories are replaced by defaults."""
-        trajectories: Mapping[str, Any] = self.suite.trajectories or {}
+        trajectories: Mapping[str, Any] = self._drives()
         if scenes and not rigs:
             rigs = {USUAL_RIG: RigSettings(pitch_deg=USUAL_PITCH_DEG)}
         if scenes and not trajectories:
@@ -113,16 +128,32 @@ class AxisReader:
             "camera": self.suite.cameras,
         }
 
+    def _drives(self) -> dict[str, TrajectorySpec]:
+        """The trajectories of the suite, one for each seed of those that wander."""
+        drives = dict[str, TrajectorySpec]()
+        for name, spec in (self.suite.trajectories or {}).items():
+            if not isinstance(spec, Wander) or spec.seeds is None:
+                drives[name] = spec
+                continue
+            for number in range(spec.seeds):
+                seed = self.suite.base_seed + spec.seed + number
+                drives[f"{name}.{seed}"] = replace(spec, seed=seed, seeds=None)
+        return drives
+
     def _default_trajectories(self, scenes: dict[str, SceneFile]) -> dict[str, Any]:
-        """A circular path in the free space of each scene."""
+        """A circular path in the free space of each scene. In a generated place, which is not built, a body wanders."""
         from vobench.suite.free_space import circular_path
         from vobench.suite.scene_build import build
 
         trajectories = dict[str, Any]()
-        for index, (name, scene) in enumerate(scenes.items()):
-            with self.mistakes.at("scenes", index):
+        for name, scene in scenes.items():
+            own_name = _default_trajectory_name(name, scenes)
+            if scene.generated:
+                trajectories[own_name] = USUAL_DRIVE
+                continue
+            with self.mistakes.at("scenes", self.entry_of[name]):
                 if not self.mistakes.found:
-                    trajectories[_default_trajectory_name(name, scenes)] = circular_path(build(scene, {}))
+                    trajectories[own_name] = circular_path(build(scene, {}))
         return trajectories
 
     def variants(self, axes: Axes) -> list[Variant]:
@@ -138,6 +169,23 @@ class AxisReader:
                 own_variants.append(variant)
         return own_variants
 
+    def spread_variants(self, axes: Axes, spread: Spread) -> list[Variant]:
+        """The combinations of a design: each combination of the other axes in some of the units.
+
+        Raises SuiteError if there are fewer units than the design asks for.
+        """
+        dealer = Dealer(units(spread, axes), spread.each, self.suite.seed)
+        others = {axis: names for axis, names in axes.items() if axis not in spread.over}
+        variants = list[Variant]()
+        for names in product(*others.values()):
+            treatment = dict(zip(others, names, strict=True))
+            differing = [name for axis, name in treatment.items() if len(axes[axis]) > 1]
+            for unit in dealer.deal():
+                chosen = {**treatment, **unit.by_axis}
+                by_axis = {axis: chosen[axis] for axis in AXES}
+                variants.append(Variant("-".join([*differing, unit.name]), by_axis))
+        return variants
+
     def case(self, variant: Variant, axes: Axes, replayed: Mapping[str, str]) -> Case:
         """The case of one combination."""
         chosen = {axis: axes[axis][name] for axis, name in variant.by_axis.items()}
@@ -148,6 +196,12 @@ class AxisReader:
             replayed=replayed.get(variant.by_axis["trajectory"]),
             **shared_settings(self.suite),
         )
+
+
+def _require_new(name: str, scenes: Collection[str]) -> None:
+    """Raise SuiteError if another scene has this name."""
+    if name in scenes:
+        raise SuiteError(f"two scenes are called '{name}'; list each once, from files with different names")
 
 
 def _default_trajectory_name(scene: str, scenes: Collection[str]) -> str:

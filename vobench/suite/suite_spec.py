@@ -14,12 +14,15 @@ from vobench.sensor.pixel_truth import CHANNELS
 from vobench.setting import Name, OneOf, ShortForm, hints, settings
 from vobench.suite.axis import Camera, RigSettings
 from vobench.suite.scenario import MOST_SEVERE
+from vobench.suite.scene_entry import NamedScene
 from vobench.suite.scene_lighting import Lighting
 from vobench.suite.source import SOURCES, Source
+from vobench.suite.spread import Spread
 from vobench.suite.trajectory import TrajectorySpec
 
 ENGINES = ("raster", "path", "pyrender")
 MOST_SAMPLES = 65536
+LARGEST_BASE_SEED = 2_000_000_000
 
 NEEDS_NO_SCENES = {"scenarios", "source"}
 NEEDS_SCENES = {"rigs", "trajectories"}
@@ -121,11 +124,13 @@ class Suite:
     name: Name
     summary: str = ""
     seed: Annotated[int, Ge(0)] = 0
+    base_seed: Annotated[int, Ge(0), Le(LARGEST_BASE_SEED)] = 0
     repeats: Annotated[int, Ge(1), Le(100)] = 1
     source: Annotated[tuple[Source, ...], SOURCES] = ()
     scenarios: Annotated[dict[str, Severities], MinLen(1)] | None = None
+    spread: Spread | None = None
     calibrations: Calibrations | None = None
-    scenes: Annotated[tuple[str, ...], MinLen(1)] | None = None
+    scenes: Annotated[tuple[NamedScene, ...], MinLen(1)] | None = None
     lightings: Annotated[dict[Name, Lighting], MinLen(1)] = field(default_factory=lambda: {"as_built": {}})
     rigs: Annotated[dict[Name, RigSettings], MinLen(1)] | None = None
     trajectories: Annotated[dict[Name, TrajectorySpec], MinLen(1)] | None = None
@@ -147,6 +152,20 @@ class Suite:
             raise SettingError(
                 "requires scenarios, and the suite has none; use calibration_error of a rig", "calibrations"
             )
+        if self.spread:
+            self._check_spread(self.spread)
+
+    def _check_spread(self, spread: Spread) -> None:
+        """Raise SettingError if an axis of the design has no variants, or an axis of scenarios has several."""
+        for axis, key in {"scene": "scenes", "trajectory": "trajectories"}.items():
+            variants = getattr(self, key)
+            if not variants and (self.scenarios or axis in spread.over):
+                raise SettingError(f"requires {key}, and the suite has none", "spread")
+        if not self.scenarios:
+            return
+        for key in ("lightings", "rigs", "cameras"):
+            if len(getattr(self, key) or ()) > 1:
+                raise SettingError(f"scenarios are spread with one variant of {key}, but there are several", key)
 
 
 def missing_axis(given_keys: Collection[str]) -> str | None:

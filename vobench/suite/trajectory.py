@@ -15,6 +15,7 @@ from vobench.motion.quadrotor import Quadrotor
 from vobench.motion.rail import Rail
 from vobench.motion.replay import Replay
 from vobench.motion.spline import PoseSpline
+from vobench.motion.wander import Wander
 from vobench.motion.wheeled import MOVER_KEYS, Wheeled
 from vobench.setting import ByKind, hints
 from vobench.trajectory.formats import ParsedTrajectory, format_tum, parse_any, parse_times
@@ -22,7 +23,7 @@ from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 Spatial = PoseSpline | Handheld | Rail | Quadrotor
-AnyTrajectory = Waypoints | Planar | Spatial | Replay
+AnyTrajectory = Waypoints | Planar | Spatial | Wander | Replay
 KINDS = {get_args(hints(each)["kind"])[0]: each for each in get_args(AnyTrajectory)}
 # The keys of wheeled trajectories that only some movers have.
 MOVER_SPECIFIC_KEYS = set[str]().union(*MOVER_KEYS.values())

@@ -226,6 +226,29 @@ def in_stages(laws: Sequence[TimeLaw], *, pause_s: float = 0.0) -> TimeLaw:
     return _in_turn(stages)
 
 
+def through_speeds(lengths: Array, speeds: Array, pauses_s: Array) -> TimeLaw:
+    """The law of progress over N lengths (N,) with given speeds (N + 1,) at their ends.
+
+    Over a length, the speed changes as the quintic 10τ³ - 15τ⁴ + 6τ⁵ of time, so that the acceleration is 0 at its
+    ends and at most 15/16 |v₁² - v₀²| / length between them. At an end where the speed is 0, the body pauses for
+    pauses_s (N + 1,). Raises MotionError if the speeds at both ends of a length are 0.
+    """
+    stages = list[tuple[float, Array]]()
+    for k, length in enumerate(lengths.tolist()):
+        start_speed = float(speeds[k])
+        end_speed = float(speeds[k + 1])
+        if start_speed + end_speed <= 0:
+            raise MotionError(f"the speed is 0 at both ends of a stretch of {length:g}; it should be more at one")
+        if start_speed == 0 and pauses_s[k] > 0:
+            stages.append((float(pauses_s[k]), np.zeros(7)))
+        duration_s = 2 * length / (start_speed + end_speed)
+        change = end_speed - start_speed
+        ramp = change * np.array([duration_s**-5, -3 * duration_s**-4, 2.5 * duration_s**-3, 0.0, 0.0, 0.0, 0.0])
+        even = np.array([0.0, 0.0, 0.0, 0.0, 0.0, start_speed, 0.0])
+        stages.append((duration_s, ramp + even))
+    return _in_turn(stages)
+
+
 def _in_turn(stages: Sequence[tuple[float, Array]]) -> TimeLaw:
     """The law of several polynomials (duration, coefficients (7,)), each starting at the end of the one before."""
     durations_s = [duration_s for duration_s, _ in stages]

@@ -1,0 +1,80 @@
+"""Rays are spread by their cosine, a mirrored ray leaves at the angle it came in at, entries are sorted by point."""
+
+import numpy as np
+import pytest
+
+from vobench.geometry.se3 import Array
+from vobench.rendering import ray_kernels
+from vobench.rendering.ray_kernels import FACE, cosine_rays, facet_normals, sorted_by_point
+
+RNG = np.random.default_rng(0)
+
+
+def rays(normal: Array, eta: float = 0.0, side: int = 32) -> tuple[Array, Array]:
+    count = side * side
+    origins_m = np.empty((count, 3), np.float32)
+    directions = np.empty((count, 3), np.float32)
+    weight = np.empty(count, np.float32)
+    normals = normal[None].astype(np.float32)
+    point = np.zeros((1, 3), np.float32)
+    dither = np.full((1, 2), 0.3, np.float32)
+    etas = np.full(1, eta, np.float32)
+    cosine_rays(point, normals, normals, etas, dither, side, origins_m, directions, weight)
+    return directions, weight
+
+
+@pytest.mark.parametrize("normal", [np.array([0.0, 0.0, -1.0]), np.array([0.6, -0.64, 0.48])])
+def test_rays_are_unit_vectors_spread_evenly_by_their_cosine(normal: Array) -> None:
+    directions, weight = rays(normal)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1, atol=1e-5)
+    cosine = directions @ normal
+    assert cosine.min() >= 0
+    assert (weight == 1).all()
+    assert cosine.mean() == pytest.approx(2 / 3, abs=2e-3)
+    np.testing.assert_allclose(directions.mean(0), 2 / 3 * normal, atol=5e-3)
+
+
+def test_weights_under_a_coat_average_to_the_share_that_enters() -> None:
+    eta = 1.5
+    _, weight = rays(np.array([0.0, 0.0, 1.0]), eta)
+    # Diffuse light from outside: 1 - F, averaged with the cosine, is 0.908 for 1.5 (Duntley, 1942).
+    assert weight.mean() == pytest.approx(0.908, abs=2e-3)
+
+
+def test_of_a_sheet_a_ray_meets_the_side_that_it_comes_from() -> None:
+    faces = np.zeros(2, FACE)
+    faces["normal"] = [[0, 0, 1], [0, 0, -1]]
+    faces["twin"] = [1, 0]
+    assert ray_kernels.face_towards(faces, 0, 0.0, 0.0, -1.0) == (0, False)
+    assert ray_kernels.face_towards(faces, 0, 0.0, 0.0, 1.0) == (1, True)
+    faces["twin"] = -1
+    assert ray_kernels.face_towards(faces, 0, 0.0, 0.0, 1.0) == (0, False)
+
+
+def test_facets_of_a_smooth_face_are_its_normal_and_those_of_a_rough_one_spread_with_roughness() -> None:
+    spread = []
+    for roughness in (0.0, 0.05, 0.2):
+        normals = np.tile(np.array([0, 0, 1], np.float32), (4000, 1))
+        dither = RNG.random((4000, 2), dtype=np.float32)
+        facet_normals(normals, np.full(4000, roughness, np.float32), dither)
+        np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1, atol=1e-5)
+        slope = np.hypot(normals[:, 0], normals[:, 1]) / normals[:, 2]
+        spread.append(np.median(slope))
+    # The median slope of GGX is its roughness.
+    np.testing.assert_allclose(spread, [0, 0.05, 0.2], rtol=0.06, atol=1e-7)
+
+
+def test_selected_entries_are_sorted_by_point_and_none_is_lost() -> None:
+    point = RNG.integers(0, 7, 50).astype(np.int32)
+    column = RNG.integers(0, 9, 50).astype(np.int32)
+    share = RNG.random(50).astype(np.float32)
+    selected = RNG.random(50) < 0.6
+    starts = np.empty(8, np.int32)
+    columns = np.empty(selected.sum(), np.int32)
+    shares = np.empty(selected.sum(), np.float32)
+    sorted_by_point(point, column, share, selected, starts, columns, shares)
+    for row in range(7):
+        expected = selected & (point == row)
+        part = slice(starts[row], starts[row + 1])
+        assert columns[part].tolist() == column[expected].tolist()
+        assert shares[part].tolist() == share[expected].tolist()

@@ -1,0 +1,38 @@
+"""Functions that Numba compiles to machine code, which is kept in the cache folder for the next process."""
+
+import os
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+import numba
+
+Function = TypeVar("Function", bound=Callable[..., object])
+FOLDER = "kernels"  # below vobench's cache folder
+
+
+def _is_cached() -> bool:
+    """Set the folder that Numba keeps machine code in; whether files can be written there."""
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    folder = Path(os.environ.get("VOBENCH_CACHE") or home / "vobench") / FOLDER
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError:
+        return False
+    numba.config.CACHE_DIR = str(folder)  # type: ignore[attr-defined]
+    return True
+
+
+IS_CACHED = _is_cached()
+
+
+def compiled(function: Function) -> Function:
+    """Compile a function when it is first called. It runs without Python's lock, so threads run it side by side.
+
+    Where the cache folder cannot be written, each process compiles the function anew.
+    """
+    kernel: Any = numba.njit(nogil=True, cache=IS_CACHED, error_model="numpy")(function)
+    return cast("Function", kernel)
