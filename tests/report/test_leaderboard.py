@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.boards import CASES, outcomes_of_four, scores_of
-from tests.report.work import Name, work_of
+from tests.work import Name, work_of
 from vobench.report.leaderboard import make_board
 from vobench.runner.folder import SURVIVED
 

@@ -1,4 +1,4 @@
-"""An exact measure of work, which does not depend on how busy or how fast the machine is."""
+"""Exact measures of work, which do not depend on how busy or how fast the machine is."""
 
 import sys
 
@@ -37,4 +37,21 @@ def work_of(function, *arguments):
         function(*arguments)
     finally:
         sys.settrace(before)
+    return count
+
+
+def calls_of(function, *arguments):
+    """The number of calls of functions, of Python or of C, that a call makes."""
+    count = 0
+
+    def profile(frame, event, value):
+        nonlocal count
+        count += event in ("call", "c_call")
+
+    before = sys.getprofile()
+    sys.setprofile(profile)
+    try:
+        function(*arguments)
+    finally:
+        sys.setprofile(before)
     return count
