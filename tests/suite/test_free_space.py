@@ -98,7 +98,7 @@ def test_no_thing_is_in_the_circle() -> None:
 
 
 def test_walls_take_as_much_of_the_floor_on_each_of_four_sides() -> None:
-    south = Thing("wall", quad((-2, -2, 0), (4, 0, 0), (0, 0, 2)), "grey")
+    south = Thing("wall", quad((2, -2, 0), (-4, 0, 0), (0, 0, 2)), "grey")
     walls = [replace(south, mesh=moved(south.mesh, at(yaw=yaw_deg))) for yaw_deg in (0, 90, 180, 270)]
     faces = triangles(scene(floor(6, 6), *walls), t_ns=0)
     free = floor_map(faces, RayCaster(faces)).free
