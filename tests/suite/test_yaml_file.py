@@ -120,6 +120,18 @@ def test_the_same_file_is_the_same_settings(tmp_path):
     assert read(tmp_path / "file.yaml", File) == File(name="a", chips=chips, courses={"b": course}, times_s=(1.0,))
 
 
+def test_a_change_is_made_at_its_keys_alone_and_the_file_reads_as_before_next_time(tmp_path):
+    path = tmp_path / "file.yaml"
+    path.write_text("name: x\nchips: {a: &a {prnu: 0.25}, b: *a}\ntimes_s: [1, 2]\n")
+    unchanged = read(path, File)
+    changed = read_all(path, File, {"chips.a.prnu": "0.5", "times_s.1": "3", "chips.a.read_noise_e": "2"}).model
+    assert changed.chips == {"a": Chip(prnu=0.5, read_noise_e=2.0), "b": Chip(prnu=0.25)}
+    assert changed.times_s == (1.0, 3.0)
+    assert read(path, File) == unchanged
+    whole = read_all(path, File, {"chips": "{c: {prnu: 0.1}}", "chips.c.prnu": "0.2"}).model
+    assert whole.chips == {"c": Chip(prnu=0.2)}
+
+
 def bomb(levels: int) -> str:
     """Each level repeats the one before nine times."""
     lines = ["name: x", "l0: &l0 {a: 1}"]
