@@ -95,7 +95,15 @@ def test_a_program_has_limits_of_its_files_and_of_a_core():
         assert guard.stdout.read() == b"(12345, 12345) (1, 1)\n"
 
 
-def test_a_program_has_none_of_the_guards_descriptors_and_handlers_of_signals():
+@pytest.fixture
+def heeds_sigint():
+    """SIGINT is not ignored, as it is where a shell has started the tests in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_a_program_has_none_of_the_guards_descriptors_and_handlers_of_signals(heeds_sigint):
     code = (
         "import os, signal\n"
         "numbers = set(map(int, os.listdir('/proc/self/fd')))\n"

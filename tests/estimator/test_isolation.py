@@ -30,6 +30,7 @@ OTHERS_X86_64 = {
     "clone": 56,
     "kill": 62,
     "clone3": 435,
+    "seccomp": 317,
 }
 OTHERS_AARCH64 = {
     "read": 63,
@@ -48,6 +49,7 @@ OTHERS_AARCH64 = {
     "clone": 220,
     "kill": 129,
     "clone3": 435,
+    "seccomp": 277,
 }
 REFUSED_X86_64 = {
     "acct": 163,
@@ -205,6 +207,24 @@ def called(
     program = system_call_filter(machine, kills_all=kills_all, truncates=truncates)
     data = {0: NUMBERS[machine][name], 4: AUDIT_ARCHITECTURE[machine], 16: first, 24: second, 32: third}
     return verdict(program, data)
+
+
+@machines
+def test_the_filter_is_installed_by_the_call_that_the_kernel_has_for_it(machine):
+    column, _ = isolation.MACHINES[machine]
+    assert isolation.SECCOMP[column] == NUMBERS[machine]["seccomp"]
+
+
+@machines
+@pytest.mark.parametrize("kills_all", [False, True])
+def test_only_comparisons_skip_instructions(machine, kills_all):
+    """As BPF_STMT of linux/filter.h writes all others, and none skips beyond the end."""
+    program = system_call_filter(machine, kills_all=kills_all)
+    for place, (code, if_true, if_false, _) in enumerate(program):
+        if code in (0x15, 0x35, 0x45):
+            assert place + 1 + max(if_true, if_false) < len(program)
+        else:
+            assert (if_true, if_false) == (0, 0)
 
 
 @machines

@@ -92,6 +92,30 @@ def test_a_program_that_takes_too_long_or_too_much_is_ended(tmp_path):
     assert reason.endswith("MiB, where the limit is 100 MiB")
 
 
+def test_a_trial_may_take_all_of_its_time_and_no_more(tmp_path, monkeypatch):
+    code = "import time; time.sleep(60)"
+    with Program([sys.executable, "-c", code], log=tmp_path / "log", limits=Limits(trial_s=100.0)) as running:
+        end_s = time.monotonic() + running.left_s()
+        with monkeypatch.context() as patch:
+            patch.setattr(time, "monotonic", lambda: end_s - 0.01)
+            running.look()
+            patch.setattr(time, "monotonic", lambda: end_s + 0.01)
+            with pytest.raises(EstimatorFailure, match="the whole trial took more than 100 s"):
+                running.look()
+
+
+def test_files_without_a_name_may_fill_the_limit_to_its_last_byte(tmp_path, monkeypatch):
+    file = SimpleNamespace(device=-1, target="/nowhere/gone", size=4 << 20)
+    monkeypatch.setattr(program, "_nameless", lambda _: [file])
+    monkeypatch.setattr(program, "WEIGH_S", 0.0)
+    code = "import time; time.sleep(60)"
+    with Program([sys.executable, "-c", code], log=tmp_path / "log", limits=Limits(disk_mib=4)) as running:
+        running.look(at_once=True)
+        file.size += 1
+        with pytest.raises(EstimatorFailure, match="its files hold more than the limit of 4 MiB"):
+            running.look(at_once=True)
+
+
 def test_a_program_that_is_not_there_is_refused_by_its_name(tmp_path):
     with pytest.raises(EstimatorFailure, match="refused: no-such-program cannot be started"):
         Program(["no-such-program"], log=tmp_path / "log", limits=Limits())

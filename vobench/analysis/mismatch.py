@@ -362,8 +362,9 @@ def _lever_of_motions(T_gt: Array, T_est: Array, rotation: Array, window: int) -
     # Windows overlap: only every window-th motion is independent.
     residuals_m = values - terms @ (axes @ along_axes)
     noise_m = np.sqrt(np.mean(residuals_m**2) * window)
-    sigmas = np.abs(along_axes) * np.sqrt(strength) / (noise_m + TINY)
-    lever_m = axes @ np.where(sigmas >= SIGNIFICANT_SIGMAS, along_axes, 0.0)
+    sigmas_m = noise_m / np.sqrt(strength)  # of the lever along each axis
+    is_significant = np.abs(along_axes) > SIGNIFICANT_SIGMAS * sigmas_m
+    lever_m = axes @ np.where(is_significant, along_axes, 0.0)
 
     after_m = _rms_length(values - terms @ lever_m)
     scale = float(t_est @ (t_gt - lever_terms @ lever_m)) / t_est_sq
