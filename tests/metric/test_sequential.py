@@ -7,8 +7,8 @@ from scipy import integrate, stats
 from vobench.metric.sequential import (
     MIN_UNITS,
     PRIOR_VARIANCE,
+    PairState,
     PairVerdict,
-    Verdict,
     bayes_factor,
     half_width,
     open_pairs,
@@ -51,7 +51,7 @@ def test_nothing_is_stated_below_the_least_number_of_units():
     few = PairedDifference(MIN_UNITS - 1, 5.0, 0.1)
     assert half_width(few, ALPHA) == np.inf
     assert bayes_factor(few) == 1
-    assert PairVerdict(0, 1, few, ALPHA, 1.5).verdict is Verdict.OPEN
+    assert PairVerdict(0, 1, few, ALPHA, 1.5).verdict is PairState.OPEN
     assert PairVerdict(0, 1, few, ALPHA, 1.5).units_needed(1000) is None
 
 
@@ -59,7 +59,7 @@ def test_equal_differences_are_certain():
     assert bayes_factor(PairedDifference(MIN_UNITS, 0.1, 0.0)) == np.inf
     assert bayes_factor(PairedDifference(MIN_UNITS, 0.0, 0.0)) == 1
     alike = PairVerdict(0, 1, PairedDifference(12, 0.0, 0.0), ALPHA, 1.5)
-    assert alike.verdict is Verdict.ALIKE
+    assert alike.verdict is PairState.ALIKE
 
 
 def statements(differences):
@@ -105,9 +105,9 @@ def test_what_differs_is_decided_and_what_does_not_is_found_alike():
     rng = np.random.default_rng(5)
     worse = rng.normal(np.log(2), 0.6, 60)
     same = rng.normal(0.0, 0.6, 300)
-    assert pair_verdicts(np.array([np.zeros(60), worse]), ratio=1.5, alpha=ALPHA)[0].verdict is Verdict.FIRST_BETTER
-    assert pair_verdicts(np.array([worse, np.zeros(60)]), ratio=1.5, alpha=ALPHA)[0].verdict is Verdict.SECOND_BETTER
-    assert pair_verdicts(np.array([np.zeros(300), same]), ratio=1.5, alpha=ALPHA)[0].verdict is Verdict.ALIKE
+    assert pair_verdicts(np.array([np.zeros(60), worse]), ratio=1.5, alpha=ALPHA)[0].verdict is PairState.FIRST_BETTER
+    assert pair_verdicts(np.array([worse, np.zeros(60)]), ratio=1.5, alpha=ALPHA)[0].verdict is PairState.SECOND_BETTER
+    assert pair_verdicts(np.array([np.zeros(300), same]), ratio=1.5, alpha=ALPHA)[0].verdict is PairState.ALIKE
 
 
 def test_all_pairs_share_the_error():
@@ -127,8 +127,8 @@ def test_units_that_an_estimator_lacks_do_not_count():
 def test_the_units_needed_are_the_first_that_decide_at_the_same_mean_and_deviation():
     pair = PairVerdict(0, 1, PairedDifference(10, np.log(1.5), 0.6), ALPHA, 1.5)
     needed = pair.units_needed(1000)
-    assert pair.verdict is Verdict.OPEN
+    assert pair.verdict is PairState.OPEN
     later = PairVerdict(0, 1, PairedDifference(needed, np.log(1.5), 0.6), ALPHA, 1.5)
     earlier = PairVerdict(0, 1, PairedDifference(needed - 1, np.log(1.5), 0.6), ALPHA, 1.5)
-    assert (earlier.verdict, later.verdict) == (Verdict.OPEN, Verdict.FIRST_BETTER)
+    assert (earlier.verdict, later.verdict) == (PairState.OPEN, PairState.FIRST_BETTER)
     assert pair.units_needed(needed - 1) is None

@@ -64,7 +64,7 @@ def bayes_factor(difference: PairedDifference) -> float:
     return float(np.exp(min(log_factor, 700.0)))
 
 
-class Verdict(StrEnum):
+class PairState(StrEnum):
     """What is known of a pair of estimators."""
 
     OPEN = "open"
@@ -100,16 +100,16 @@ class PairVerdict:
         return float(np.exp(self.difference.mean))
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> PairState:
         """What is known of the pair."""
         low, high = self.interval
         if low > 1.0:
-            return Verdict.FIRST_BETTER
+            return PairState.FIRST_BETTER
         if high < 1.0:
-            return Verdict.SECOND_BETTER
+            return PairState.SECOND_BETTER
         if low > 1.0 / self.ratio and high < self.ratio:
-            return Verdict.ALIKE
-        return Verdict.OPEN
+            return PairState.ALIKE
+        return PairState.OPEN
 
     def units_needed(self, most: int) -> int | None:
         """The number of units after which the pair is no longer open if mean and deviation stay as they were measured.
@@ -148,4 +148,4 @@ def pair_verdicts(log_losses: Array, *, ratio: float, alpha: float) -> list[Pair
 
 def open_pairs(verdicts: Sequence[PairVerdict]) -> list[PairVerdict]:
     """The pairs that are neither decided nor alike."""
-    return [pair for pair in verdicts if pair.verdict is Verdict.OPEN]
+    return [pair for pair in verdicts if pair.verdict is PairState.OPEN]
