@@ -33,7 +33,7 @@ class NamedPair:
             return f"{self.second} and {self.first}: no unit has both"
         low, high = self.known.interval
         ratio = f"{self.known.loss_ratio:.3g}"
-        interval = f"[{low:.3g}, {high:.3g}]" if high < inf else "too few units for an interval"
+        interval = f"[{low:.3g}, {high:.3g}]" if high < inf else "(too few units for an interval)"
         phrase = PHRASES[self.known.verdict].format(ratio=self.known.ratio)
         return f"{self.second} has {ratio} × {self.first}'s loss {interval}: {phrase}"
 
