@@ -29,6 +29,7 @@ ESTIMATES = "estimates"
 PAGE = "leaderboard.html"
 ENVIRONMENT = "environment.json"
 SUITE = "suite.json"
+UNTIL = "until.json"  # only in runs whose units were drawn until decided
 ESTIMATORS = "estimators.json"
 
 # The best status comes first. Those from `lost` to `not_applicable` are failures, which rank after all others. The last
