@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from vobench.errors import InputError
+from vobench.geometry.se3 import Array
 from vobench.report.figure_style import COLOURS, LINE_WIDTH, NEUTRAL
 from vobench.report.frame_moment import worst_moments
 from vobench.report.inline_figure import new_figure
@@ -114,19 +115,20 @@ def _draw_errors(axes: Axes, rows: Sequence[FrameRow], shown: Sequence[int]) -> 
     errors_m = np.array([np.nan if row.position_error_m is None else row.position_error_m for row in rows])
     axes.plot(time_s, MM_PER_M * errors_m, color=COLOURS[0], lw=LINE_WIDTH)
     is_lost = np.array([row.status in LOST_STATUSES for row in rows])
-    axes.fill_between(
-        time_s,
-        0,
-        1,
-        where=is_lost,
-        step="mid",
-        transform=axes.get_xaxis_transform(),
-        color=LOST_COLOUR,
-        alpha=0.3,
-        lw=0,
-    )
+    for low_s, high_s in _lost_spans(time_s, is_lost):
+        axes.axvspan(low_s, high_s, color=LOST_COLOUR, alpha=0.3, lw=0)
     for index in shown:
         axes.axvline(time_s[index], color=NEUTRAL, lw=0.6, ls=":")
     axes.set_xlim(time_s[0], time_s[-1] or 1.0)
     axes.set_ylim(bottom=0)
     axes.set(xlabel="time (s)", ylabel="position\nerror (mm)")
+
+
+def _lost_spans(time_s: Array, is_lost: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """The times in which track is lost, each from halfway after the last frame before to halfway before the next."""
+    halfway_s = (time_s[1:] + time_s[:-1]) / 2
+    borders_s = np.concatenate([time_s[:1], halfway_s, time_s[-1:]])
+    changes = np.diff(np.concatenate([[0], is_lost.astype(int), [0]]))
+    starts = np.flatnonzero(changes == 1)
+    ends = np.flatnonzero(changes == -1)
+    return [(float(borders_s[start]), float(borders_s[end])) for start, end in zip(starts, ends, strict=True)]
