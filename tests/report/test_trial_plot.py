@@ -7,8 +7,8 @@ from vobench.errors import InputError
 from vobench.report.trial_plot import COLOURS, LINES, plot_case
 from vobench.runner.estimate import ESTIMATE
 from vobench.runner.frames import GROUND_TRUTH
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 COUNT = 50
 T_S = np.linspace(0, 2, COUNT)
