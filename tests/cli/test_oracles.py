@@ -39,7 +39,7 @@ CLASS = """
 import numpy as np
 from vobench.estimator import Result
 from vobench.geometry import se3
-from vobench.trajectory.formats import parse_tum
+from vobench.trajectory.tum import parse_tum
 
 class Oracle:
     def start(self, rig, params, seed):

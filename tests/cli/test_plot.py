@@ -6,7 +6,7 @@ from tests.report.paths import path
 from vobench.cli.plot import FigureForm
 from vobench.errors import InputError
 from vobench.report.figure_style import COLUMN_INCHES, PAGE_INCHES
-from vobench.trajectory.formats import format_tum
+from vobench.trajectory.tum import format_tum
 
 DRAWN = ["path", "axes", "error", "cumulative", "matrix", "strip"]
 

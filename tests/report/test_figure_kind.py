@@ -8,7 +8,7 @@ from vobench.report.figure_kind import FILE_KINDS, FigureOptions, FileFigures, R
 from vobench.report.figure_style import COLUMN_INCHES, PAGE_INCHES
 from vobench.runner.estimate import ESTIMATE
 from vobench.runner.frames import GROUND_TRUTH
-from vobench.trajectory.formats import format_tum
+from vobench.trajectory.tum import format_tum
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from vobench.report.scored_case import file_labels, scored_case, scored_files
 from vobench.runner.estimate import ESTIMATE
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.trajectory_pair import TrajectorySource
-from vobench.trajectory.formats import format_tum
+from vobench.trajectory.tum import format_tum
 
 
 def test_of_several_repeats_the_one_with_the_median_error_is_shown(scored, write_run, tmp_path):

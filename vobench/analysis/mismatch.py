@@ -11,7 +11,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.settings import Side
 from vobench.trajectory.align import align
-from vobench.trajectory.formats import QuaternionOrder
+from vobench.trajectory.quaternion_columns import QuaternionOrder
 from vobench.trajectory.trajectory import Kind as MoveKind
 from vobench.trajectory.trajectory import PoseConvention
 

@@ -41,8 +41,8 @@ from vobench.runner.visible_truth import visible_truth
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence import EncodedFrame, Sequence, StereoFrame
 from vobench.sequence.picture import grey, rgb
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 if TYPE_CHECKING:
     from vobench.dataset.source import Views

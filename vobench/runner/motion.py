@@ -34,10 +34,10 @@ from vobench.suite.plan import Plan
 from vobench.suite.trajectory import TrajectorySpec
 from vobench.suite.yaml_file import checked
 from vobench.suite.yaml_source import Mistakes
-from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.kinematics import Kinematics, Motion
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
+from vobench.trajectory.tum import parse_tum
 
 
 def generator(seed: int, stream: str) -> np.random.Generator:

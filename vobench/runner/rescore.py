@@ -26,8 +26,8 @@ from vobench.runner.score import drift_m, scale_of, score_estimate, score_revise
 from vobench.runner.simulate import frames_of
 from vobench.suite.case import Case
 from vobench.suite.yaml_file import checked
-from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum, parse_tum
 
 # The last digits can differ between machines.
 RELATIVE = 1e-6
