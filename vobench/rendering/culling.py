@@ -118,5 +118,5 @@ def bounds(view: PinholeView, box: Box) -> Array:
     sides = [x - left * w, right * w - x, y - bottom * w, top * w - y]
     planes = [*sides, w - nearness]
     if view.mirror is not None:
-        planes.append(np.array([*view.mirror.normal, view.mirror.offset_m]))
+        planes.append(view.mirror.coefficients)
     return np.array(planes)
