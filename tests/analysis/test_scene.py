@@ -7,8 +7,9 @@ from vobench.analysis.scene import strength, survey
 from vobench.asset.shape import at, block
 from vobench.scene.light import PointLight, Sky
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flipped, joined, make_mesh, moved, quad
+from vobench.scene.mesh import flipped, joined, make_mesh, moved, quad
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing
 
 GREY = {"grey": Material(colour=(0.5, 0.5, 0.5))}
 FLOOR = Thing("floor", quad((-4, -3, 0), (8, 0, 0), (0, 6, 0)), "grey")

@@ -16,8 +16,9 @@ from vobench.analysis.scene_sheet import (
 )
 from vobench.asset.shape import at, block
 from vobench.scene.material import Material, srgb
-from vobench.scene.mesh import Thing, make_mesh, moved, texture_coordinates
+from vobench.scene.mesh import make_mesh, moved, texture_coordinates
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing
 
 
 def tone(linear: float) -> int:

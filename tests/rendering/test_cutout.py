@@ -5,7 +5,8 @@ import numpy as np
 from vobench.rendering.cutout import CutOuts, opaque
 from vobench.rendering.embree import Hits
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Thing, quad, table
+from vobench.scene.mesh import quad
+from vobench.scene.triangles import Thing, triangle_table
 
 PIXELS = np.full((8, 16, 4), 255, np.uint8)
 PIXELS[:, 8:, 3] = 0  # the right half is a hole
@@ -40,7 +41,7 @@ def test_opacity_is_linear_between_pixels() -> None:
 def test_holes_are_found_on_faces_of_that_material_alone() -> None:
     things = [Thing("leaf", quad([0, 0, 0], [1, 0, 0], [0, 1, 0]), "leaf")]
     things.append(Thing("wall", quad([0, 0, 1], [1, 0, 0], [0, 1, 0]), "wall"))
-    faces = table(things, [-1, -1], [-1, -1])
+    faces = triangle_table(things, [-1, -1], [-1, -1])
     cut_outs = CutOuts(faces, {"leaf": LEAF, "wall": Material()})
     assert cut_outs.material.tolist() == [0, 0, -1, -1, -1]
     weights = RNG.dirichlet(np.ones(3), 400)

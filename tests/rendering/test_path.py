@@ -20,8 +20,9 @@ from vobench.rendering.path import PathRenderer
 from vobench.rendering.renderer import View, single_instant
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import LUMINANCE, Material, Picture, fresnel, linear, pane_reflectance, under_coat
-from vobench.scene.mesh import Thing, quad, two_sided
+from vobench.scene.mesh import quad, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
+from vobench.scene.triangles import Thing
 
 X, Y, Z = np.eye(3)
 SMALL = Pinhole(12, 8, 200.0, 200.0, 5.5, 3.5)

@@ -9,8 +9,9 @@ from vobench.geometry.vector import unit
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture
-from vobench.scene.mesh import Triangles, distinct, open_edges, welded
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
+from vobench.scene.weld import distinct_rows, open_edges, welded
 from vobench.suite.free_space import FreeCircle, largest_free_circle
 from vobench.suite.viewpoint import is_place
 
@@ -90,7 +91,7 @@ def _rounded(point_m: ArrayLike) -> tuple[float, float, float]:
 
 def _point_ids(faces: Triangles) -> NDArray[np.intp]:
     """The index (F, 3) of the point at each corner; corners at the same position have the same index."""
-    _, point_ids = welded(faces.corners_m.reshape(-1, 3))
+    point_ids = welded(faces.corners_m.reshape(-1, 3)).inverse
     return point_ids.reshape(-1, 3)
 
 
@@ -108,7 +109,7 @@ def _open_edges(faces: Triangles, point_ids: NDArray[np.intp]) -> int:
 def _twins(point_ids: NDArray[np.intp]) -> int:
     """The number of faces whose three points are those of an earlier face, in any order."""
     sorted_corners = np.sort(point_ids, axis=1)
-    first_faces, _ = distinct(sorted_corners)
+    first_faces = distinct_rows(sorted_corners).first_index
     return len(point_ids) - len(first_faces)
 
 

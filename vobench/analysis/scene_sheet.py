@@ -13,8 +13,8 @@ from vobench.rendering.bake import BakedScene
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.renderer import Renderer, single_instant
 from vobench.scene.material import reflectance, srgb
-from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
 from vobench.suite.free_space import downward_directions
 from vobench.suite.viewpoint import COARSE_LENS, Viewpoint, around
 from vobench.suite.white import fitting_white_cd_m2, look_around

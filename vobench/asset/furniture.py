@@ -37,7 +37,8 @@ from vobench.asset.shape import (
 )
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material, Texture, linear
-from vobench.scene.mesh import MeshArrays, arrays, joined, joined_arrays, moved, textured
+from vobench.scene.mesh import as_arrays, as_mesh, joined, moved, textured
+from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -56,12 +57,12 @@ class Part:
     @property
     def arrays(self) -> MeshArrays:
         """The geometry as arrays."""
-        return self.geometry if isinstance(self.geometry, MeshArrays) else arrays(self.geometry)
+        return self.geometry if isinstance(self.geometry, MeshArrays) else as_arrays(self.geometry)
 
     @property
     def mesh(self) -> "Trimesh":
         """The geometry as a mesh."""
-        return self.geometry.mesh() if isinstance(self.geometry, MeshArrays) else self.geometry
+        return as_mesh(self.geometry) if isinstance(self.geometry, MeshArrays) else self.geometry
 
     def moved(self, T_a_b: Array) -> "Part":
         """The part transformed from frame b to frame a by T_a_b (4, 4)."""

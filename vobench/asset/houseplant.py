@@ -9,7 +9,7 @@ from vobench.asset.furniture import Part, coated, matt, mm, put
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.shape import at, lathe, sheet_arrays, tube_arrays
 from vobench.scene.material import Material
-from vobench.scene.mesh import MeshArrays, joined_arrays
+from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 
 Habit = Literal["broad", "upright", "tree", "trailing"]
 HABITS: tuple[Habit, ...] = ("broad", "upright", "tree", "trailing")

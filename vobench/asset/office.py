@@ -22,7 +22,7 @@ from vobench.asset.furniture import (
 from vobench.asset.picture import Rng
 from vobench.asset.shape import at, block, block_arrays, card, cushion, lathe, spline, tube, tube_arrays
 from vobench.scene.material import Material
-from vobench.scene.mesh import joined_arrays
+from vobench.scene.mesh_arrays import joined_arrays
 
 
 def task_chair(rng: Rng, colour: str = "#27445c") -> list[Part]:

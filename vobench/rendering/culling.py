@@ -11,7 +11,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Mask
 from vobench.rendering.view import Box, PinholeView
-from vobench.scene.mesh import WELD_M
+from vobench.scene.weld import WELD_M
 
 Indices = NDArray[np.int64]
 Runs = dict[int, list[tuple[int, int]]]

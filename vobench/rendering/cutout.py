@@ -8,7 +8,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.embree import Hits
 from vobench.scene.material import Material
-from vobench.scene.mesh import Triangles
+from vobench.scene.triangles import Triangles
 
 
 class CutOuts:

@@ -23,7 +23,7 @@ from vobench.rendering.view import NO_GLINTS, Box, PinholeView, pinhole_view
 from vobench.rendering.warp import Warp, warp
 from vobench.scene.light import STEADY, Light, Steady
 from vobench.scene.material import Rgb
-from vobench.scene.mesh import Triangles
+from vobench.scene.triangles import Triangles
 
 AWAY_M = 1e6  # where movers are while the probe is drawn
 HALVED_FRAMES = 4  # sub-frames, of which each may have half of the samples

@@ -14,8 +14,8 @@ from vobench.rendering.cutout import CutOuts
 from vobench.rendering.embree import Hits, TriangleCaster
 from vobench.rendering.geometry import RAY_OFFSET_M
 from vobench.rendering.shot import moved, rays_in, turn
-from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
 
 REACH_M = 1e8  # beyond every scene
 MOST_PASSED = 64  # backs and holes that a ray passes before it counts as lost between faces that touch
