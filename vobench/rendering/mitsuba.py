@@ -19,7 +19,7 @@ from vobench import stop
 from vobench.errors import MissingDependencyError
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Pixels
-from vobench.rendering.cutout import opaque
+from vobench.rendering.cutout import is_opaque
 from vobench.rendering.occlusion import back_faces
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Map, Material, Rgb, Texture, linear_texture
@@ -356,7 +356,7 @@ def _bsdf(mi: Any, material: Material, *, two_sided: bool) -> Plugin:
     v = (np.arange(rows) + 0.5) / rows
     u = (np.arange(columns) + 0.5) / columns
     places = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
-    is_solid = opaque(material, places).reshape(rows, columns)
+    is_solid = is_opaque(material, places).reshape(rows, columns)
     opacity = _bitmap(mi, is_solid.astype(np.float32), filter_type="nearest")
     return {"type": "mask", "opacity": opacity, "bsdf": bsdf}
 
