@@ -59,17 +59,19 @@ def plot_case(folder: RunFolder, trials: Sequence[TrialScore]) -> Figure:
         path_axes, error_axes = figure.subplots(1, 2, width_ratios=[1, 1.25])
         figure.suptitle(case, fontweight="bold", x=0.01, ha="left")
         _draw_truth(path_axes, truth)
+        errors_mm = []
         for index, trial in enumerate(trials):
             style = _style(index)
             scored = _score(folder, trial, truth)
             label = _label(trial, is_scored=scored is not None)
             if scored is None:
-                path_axes.plot([], [], **style, label=label)
+                _add_to_legend(path_axes, style, label)
                 continue
             _draw_path(path_axes, scored, style, label)
             _draw_error(error_axes, scored, style, label)
+            errors_mm.append(_errors_mm(scored))
         _finish_path(path_axes, truth)
-        _finish_errors(error_axes)
+        _finish_errors(error_axes, errors_mm)
     return figure
 
 
@@ -100,6 +102,11 @@ def _draw_truth(axes: "Axes", truth: "Trajectory") -> None:
     axes.plot(x_m[:1], y_m[:1], "o", color="black", ms=4, label="start")
 
 
+def _add_to_legend(axes: "Axes", style: Mapping[str, Any], label: str) -> None:
+    """Add a line to the legend that is not in the plot."""
+    axes.plot([], [], **style, label=label)
+
+
 def _draw_path(axes: "Axes", scored: "Score", style: Mapping[str, Any], label: str) -> None:
     """Draw an aligned estimate from above."""
     x_m, y_m, _ = scored.aligned_positions_m.T
@@ -109,8 +116,12 @@ def _draw_path(axes: "Axes", scored: "Score", style: Mapping[str, Any], label: s
 def _draw_error(axes: "Axes", scored: "Score", style: Mapping[str, Any], label: str) -> None:
     """Draw the position error of an estimate over time."""
     time_s = scored.gt_t_ns / NS_PER_S
-    error_mm = MM_PER_M * scored.ate_trans_m
-    axes.plot(time_s, error_mm, lw=LINE_WIDTH, label=label, **style)
+    axes.plot(time_s, _errors_mm(scored), lw=LINE_WIDTH, label=label, **style)
+
+
+def _errors_mm(scored: "Score") -> NDArray[np.float64]:
+    """The position errors (N,) after alignment."""
+    return MM_PER_M * scored.ate_trans_m
 
 
 def _finish_path(axes: "Axes", truth: "Trajectory") -> None:
@@ -120,21 +131,20 @@ def _finish_path(axes: "Axes", truth: "Trajectory") -> None:
     """
     low_m = truth.positions_m[:, :2].min(axis=0)  # (2,)
     high_m = truth.positions_m[:, :2].max(axis=0)
-    x_m, y_m = (low_m + high_m) / 2
+    center_x_m, center_y_m = (low_m + high_m) / 2
     longer_side_m = float((high_m - low_m).max())
     half_side_m = max(longer_side_m * RELATIVE_PATH_SIZE / 2, LEAST_HALF_SIDE_M)
     axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.set_xlim(x_m - half_side_m, x_m + half_side_m)
-    axes.set_ylim(y_m - half_side_m, y_m + half_side_m)
+    axes.set_xlim(center_x_m - half_side_m, center_x_m + half_side_m)
+    axes.set_ylim(center_y_m - half_side_m, center_y_m + half_side_m)
     axes.set_aspect("equal", adjustable="box")
     axes.legend(loc="best")
 
 
-def _finish_errors(axes: "Axes") -> None:
-    """Label the axes, and make the axis of errors linear from zero, or logarithmic if the errors differ widely."""
+def _finish_errors(axes: "Axes", errors_mm: Sequence[NDArray[np.float64]]) -> None:
+    """Label the axes, and make the axis of errors linear from zero, or logarithmic if the curves differ widely."""
     axes.set(xlabel="time (s)", ylabel="position error (mm)")
-    curves_mm = [np.asarray(line.get_ydata(), float) for line in axes.get_lines()]
-    if _differ_widely(curves_mm):
+    if _differ_widely(errors_mm):
         axes.set_yscale("log")
     else:
         axes.set_ylim(bottom=0)
