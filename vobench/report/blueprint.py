@@ -145,7 +145,8 @@ def layout(
 ) -> rrb.Blueprint:
     """The default blueprint for a true path (N, 3) and the points (M, 3) of all estimated paths.
 
-    `replayed_frames` are the first and the last frame that are replayed at first; without it, the recording starts paused.
+    `replayed_frames` are the first and the last frame that are replayed at first. Without them, the recording starts
+    paused.
     `labels` are the names of the estimators. Each has a picture with its tracks.
     `channels` are the channels of per-pixel ground truth. They are shown in one tab per camera.
     `has_stats` and `has_costs` add a plot of the numbers that an estimator reports, and of the cost of each frame.
