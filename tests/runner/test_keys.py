@@ -31,6 +31,7 @@ BASE = {
     "rail": {"points_m": POINTS},
     "quadrotor": {"points_m": POINTS},
     "replay": {"file": "way.tum", "start_m": [0, 0, 1]},
+    "wander": {"length_m": 3},
 }
 OTHER = {
     "targets_m": [[0.3, 0.1], [0.2, 0.4]],
@@ -76,10 +77,13 @@ OTHER = {
     "delta": "bumpy",
     "integrator": "euler",
     "substeps": 3,
+    "body": "hand",
+    "seed": 2,
 }
 RATE_HZ = 6  # few pictures, for a body goes its way whatever is taken of it
-# What the encoders count, when a drive or a replay gives up, and whose poses a file's are (tests/suite).
-NOT_OF_THE_MOTION = {"kind", "encoders", "max_time_s", "max_gap_s", "file", "times", "recorded_hz", "axes"}
+# What the encoders count, when a drive or a replay gives up, whose poses a file holds,
+# and how many drives there are (tests/suite).
+NOT_OF_THE_MOTION = {"kind", "encoders", "max_time_s", "max_gap_s", "file", "seeds", "times", "recorded_hz", "axes"}
 # Nothing turns on a straight way, and nothing drives on in a turn on the spot.
 IDLE = {("stop_and_go", "max_turn_accel_radps2"), ("pure_rotation", "max_accel_mps2")}
 KIND = TypeAdapter(TrajectorySpec)

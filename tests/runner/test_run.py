@@ -45,6 +45,7 @@ def test_a_run_holds_all_that_its_folder_promises(first):
         "hashes.json",
         "times.csv",
         "times_hashes.json",
+        "trials.csv",
         "cases",
         *(f"leaderboard.{suffix}" for suffix in ("md", "json", "csv", "html")),
     }
