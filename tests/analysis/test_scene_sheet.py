@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from tests.analysis.test_scene_survey import FLOOR, LIGHT, crate, scene
 
+from tests.analysis.test_scene_survey import FLOOR, LIGHT, crate, scene
 from vobench.analysis.scene_sheet import (
     CELL_HEIGHT_PX,
     CELL_WIDTH_PX,
