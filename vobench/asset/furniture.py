@@ -81,6 +81,7 @@ def coated(colour: str = "#ffffff", texture: Texture | None = None, roughness: f
     return replace(matt(colour, texture), eta=1.5, roughness=roughness)
 
 
+SIDES = (-1, 1)  # left and right, as factors of y
 STEEL = Material(colour=(0.52, 0.53, 0.54), metal=1.0, roughness=0.25)
 CHROME = Material(colour=(0.65, 0.66, 0.67), metal=1.0, roughness=0.06)
 BLACK = coated("#26282a")
