@@ -21,6 +21,8 @@ OTHERS_X86_64 = {
     "semget": 64,
     "shmget": 29,
     "vmsplice": 278,
+    "memfd_create": 319,
+    "memfd_secret": 447,
     "setsockopt": 54,
     "truncate": 76,
     "ftruncate": 77,
@@ -41,6 +43,8 @@ OTHERS_AARCH64 = {
     "semget": 190,
     "shmget": 194,
     "vmsplice": 75,
+    "memfd_create": 279,
+    "memfd_secret": 447,
     "setsockopt": 208,
     "truncate": 45,
     "ftruncate": 46,
@@ -275,7 +279,7 @@ def test_nothing_can_be_typed_into_a_terminal(machine):
 
 
 @machines
-@pytest.mark.parametrize("name", ["shmget", "msgget", "semget", "vmsplice"])
+@pytest.mark.parametrize("name", ["shmget", "msgget", "semget", "vmsplice", "memfd_create", "memfd_secret"])
 def test_memory_that_counts_as_nobodys_is_not_to_be_had(machine, name):
     assert called(machine, name) == FAIL | errno.ENOSYS
 

@@ -41,6 +41,7 @@ def found(folder: Path, known: tuple[Path, ...] = ()) -> list[str]:
         ("data/flight.bag", "data/flight.bag"),
         ("data/flight/flight_0.db3", "data/flight/flight_0.db3"),
         ("data/trial.rrd", "data/trial.rrd"),
+        ("drives/short.tum", "drives/short.tum"),
         ("dataset/poses/00.txt", "dataset/poses/00.txt"),
         ("dataset/sequences/00/poses.txt", "dataset/sequences/00/poses.txt"),
         ("dataset/sequences/00/00.txt", "dataset/sequences/00/00.txt"),

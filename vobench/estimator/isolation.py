@@ -607,8 +607,16 @@ IOCTL = (16, 29)
 KILL = (62, 129)
 FALLOCATE = (285, 47)
 # System V memory, messages and semaphores outlive their process and count as nobody's, so that no limit holds for them.
-# Neither does one hold for the pages that vmsplice lends to a pipe.
-UNCOUNTED = {"msgget": (68, 186), "semget": (64, 190), "shmget": (29, 194), "vmsplice": (278, 75)}
+# Neither does one hold for the pages that vmsplice lends to a pipe, and for files in memory without a name: a
+# descriptor that is in flight from one process to another is nobody's.
+UNCOUNTED = {
+    "memfd_create": (319, 279),
+    "memfd_secret": (447, 447),
+    "msgget": (68, 186),
+    "semget": (64, 190),
+    "shmget": (29, 194),
+    "vmsplice": (278, 75),
+}
 # Larger buffers of sockets count as nobody's, too. Requests for them have no effect.
 SETSOCKOPT = (54, 208)
 SOL_SOCKET = 1

@@ -15,7 +15,6 @@ from zipfile import BadZipFile, ZipFile
 from vobench.estimator import isolation, sandbox
 from vobench.estimator.program import EstimatorFailure
 from vobench.runner.folder import PAGE, SUITE
-from vobench.runner.frames import GROUND_TRUTH
 
 MOST_ENTRIES = 1_000_000  # the largest number of files and folders that are searched, which takes about 2 s
 # Folders with code that was installed or is managed by a tool. They are large, and nobody keeps recordings in them.
@@ -27,8 +26,8 @@ OF_STORE = {"sequences", "state"}
 TELLING = {CASES, PAGE, "sequences", "estimates", "scores"}
 BUNDLE_MEMBER = "sequence_hashes.json"
 BUNDLE_SUFFIX = ".zip"
-# The truth of a run, and recordings of the viewer, which contain it.
-OF_VOBENCH = (rf"[^/]*/{re.escape(GROUND_TRUTH)}", r"[^/]*/[^/]*\.rrd")
+# Trajectories that vobench writes, among them the truth of runs, and recordings of the viewer, which contain it.
+OF_VOBENCH = (r"[^/]*/[^/]*\.tum", r"[^/]*/[^/]*\.rrd")
 
 
 def visible_truth(estimator_folder: Path, known: Collection[Path]) -> list[Path]:
