@@ -15,7 +15,7 @@ import pytest
 from vobench.report import page
 from vobench.report.verify import verify_run
 from vobench.runner import executor
-from vobench.runner.executor import Dask, Executor, LocalProcesses, Serial, TaskEvent, TaskOutcome, perform_all
+from vobench.runner.executor import Dask, Executor, LocalProcesses, Serial, TaskEvent, TaskOutcome, _death, perform_all
 from vobench.runner.folder import PAGE, RunFolder
 from vobench.runner.run import run_suite
 from vobench.runner.store import locked
@@ -423,3 +423,17 @@ def test_a_scheduler_that_is_not_there_is_a_sentence(monkeypatch):
     monkeypatch.setattr(executor, "CONNECT_S", 0.5)
     with pytest.raises(InputError, match=r"no Dask scheduler answers .*: tcp://127.0.0.1:1"):
         Dask("tcp://127.0.0.1:1")
+
+
+@pytest.mark.parametrize(
+    ("exit_code", "status", "reason"),
+    [
+        (3, "crashed", "its process ended with exit code 3"),
+        (0, "crashed", "its process ended with exit code 0"),
+        (None, "crashed", "its process ended with exit code None"),
+        (-int(signal.SIGSEGV), "crashed", "its process ended with signal SIGSEGV"),
+        (-int(signal.SIGKILL), "out_of_memory", "its process was killed by the system, most likely for memory"),
+    ],
+)
+def test_the_death_of_a_process_is_told_by_its_exit_code_or_its_signal(exit_code, status, reason):
+    assert _death(exit_code, 1.5) == TaskOutcome(status, reason, 1.5)
