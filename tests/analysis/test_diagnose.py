@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.analysis.diagnose import _is_clear_gain, _unrelated, _wrong_scale, diagnose
+from vobench.analysis.diagnose import _is_clear_gain, _is_unrelated, _unrelated, _wrong_scale, diagnose
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.runner.trajectory_pair import TrajectoryReading
@@ -537,6 +537,25 @@ def test_an_offset_is_a_clear_gain_if_a_quarter_of_the_missing_correlation_or_mo
     assert not _is_clear_gain(1.0, 1.0)
     assert not _is_clear_gain(0.9999, 1.0)  # a gain too small to mean anything
     assert _is_clear_gain(None, 0.5)  # without the offset there was no overlap
+
+
+@pytest.mark.parametrize(
+    ("misfit_after", "disagreement", "is_unrelated"),
+    [
+        (0.01, 0.05, False),
+        (0.01, 0.2, False),  # noisy motions along a path that fits
+        (0.05, 0.05, False),  # a path that drifts
+        (0.05, 0.2, True),
+        (0.01, 0.4, True),  # motions of another drive along the same path
+        (0.9, 0.05, True),
+        (0.9, None, True),
+        (0.05, None, False),
+    ],
+)
+def test_pairs_are_unrelated_by_their_positions_by_their_motions_or_by_a_doubt_about_both(
+    misfit_after, disagreement, is_unrelated
+):
+    assert _is_unrelated(misfit_after, disagreement) is is_unrelated
 
 
 def test_what_is_left_of_unrelated_positions_is_in_percent_before_and_after():

@@ -1,5 +1,6 @@
 """Corners, tracks and local contrast: every picture is a known shift or change of brightness of another."""
 
+import cv2
 import numpy as np
 import pytest
 
@@ -13,6 +14,7 @@ from vobench.estimator.tracking import (
     follow_predicted,
     inside,
     local_contrast,
+    lucas_kanade,
 )
 
 
@@ -43,6 +45,18 @@ def test_a_picture_that_moves_by_a_fraction_is_followed_by_it(window_px):
     assert found.mean() > 0.95
     assert off.mean() < 0.05
     assert off.max() < 0.2
+
+
+def test_a_search_that_converges_nowhere_is_given_up_where_opencv_gives_up():
+    """Its defaults are 30 steps, or one below 0.01 px; the pictures have nothing in common."""
+    picture, other = texture(1), texture(2)
+    there, found = lucas_kanade(picture, other, grid(), grid())
+    flags = cv2.OPTFLOW_USE_INITIAL_FLOW
+    expected, status, _ = cv2.calcOpticalFlowPyrLK(picture, other, grid(), grid(), winSize=(21, 21), flags=flags)
+    np.testing.assert_array_equal(there, expected)
+    np.testing.assert_array_equal(found, status.ravel() == 1)
+    small_steps = np.linalg.norm(there - grid(), axis=1) < 1
+    assert small_steps.mean() < 0.5
 
 
 def test_what_is_too_far_to_be_found_is_found_from_a_guess():

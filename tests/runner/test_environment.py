@@ -161,6 +161,21 @@ def test_a_clone_is_named_by_its_commit_and_by_whether_its_files_differ(tmp_path
     assert environments.commit.__wrapped__() == f"{named}+changes"
 
 
+def test_a_git_that_fails_names_nothing_whatever_it_prints(tmp_path, monkeypatch):
+    (tmp_path / ".git").mkdir()
+    git = tmp_path / "git"
+    git.write_text("#!/bin/sh\necho 0123456789\nexit 1\n")
+    git.chmod(0o755)
+    monkeypatch.setattr(environments, "PACKAGE", tmp_path / "vobench")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    assert environments.commit.__wrapped__() == ""
+
+
+def test_a_release_has_its_version_and_its_commit_if_there_is_one():
+    assert Environment(vobench="1.2", commit="abc").release == "vobench 1.2 (abc)"
+    assert Environment(vobench="1.2").release == "vobench 1.2"
+
+
 def test_portable_results_have_keys_of_their_own(bench, monkeypatch):
     def keys():
         return {task.key for task in plan(bench.plan(), {})}

@@ -1,5 +1,7 @@
 """A run's progress counts every task once, and its time left follows what tasks really take."""
 
+import subprocess
+import sys
 from types import SimpleNamespace
 from typing import Any
 
@@ -74,3 +76,8 @@ def test_at_the_end_nothing_is_left():
 @pytest.mark.parametrize(("seconds", "spelled"), [(0, "0:00"), (59.6, "1:00"), (61, "1:01"), (3661, "1:01:01")])
 def test_times_are_spelled_as_on_a_clock(seconds, spelled):
     assert spell_time(seconds) == spelled
+
+
+def test_who_shows_progress_imports_nothing_that_performs_tasks():
+    code = "import sys, vobench.runner.progress; print('vobench.runner.executor' in sys.modules)"
+    assert subprocess.check_output([sys.executable, "-c", code], text=True) == "False\n"

@@ -224,3 +224,15 @@ def test_values_within_their_bounds_are_taken_and_others_refused(build, bound):
     for value in (least - 0.01, most + 0.01):
         with pytest.raises(SettingError, match="should be "):
             build(value)
+
+
+@pytest.mark.parametrize(
+    ("elevation_deg", "is_up"), [(-1.0, False), (0.0, False), (0.1, True), (90.0, True), (90.1, False)]
+)
+def test_a_sun_is_above_the_horizon_however_little(elevation_deg, is_up):
+    values = {"illuminance_lx": 1000.0, "azimuth_deg": 0.0, "elevation_deg": elevation_deg}
+    if is_up:
+        assert SunSpec(**values).elevation_deg == elevation_deg
+    else:
+        with pytest.raises(SettingError, match="elevation_deg"):
+            SunSpec(**values)

@@ -59,6 +59,21 @@ def test_a_sky_that_is_a_little_too_bright_is_exposed_for() -> None:
     assert exposed_shares(luminance_cd_m2, white_cd_m2).saturated < 0.05
 
 
+def test_of_two_whites_that_are_equally_near_and_good_the_brighter_one_saturates_less() -> None:
+    """15 % are just saturated and 30 % just black, so a step up mends as much as a step down."""
+    surface_cd_m2 = 100.0
+    luminance_cd_m2 = np.full(4000, surface_cd_m2)
+    luminance_cd_m2[:600] = 1.03 * SATURATED * surface_cd_m2
+    luminance_cd_m2[600:1800] = 0.97 * BLACK * surface_cd_m2
+    is_source = np.arange(4000) < 600
+    step = 2 ** (1 / 8)
+    up, down = (exposed_shares(luminance_cd_m2, white) for white in (surface_cd_m2 * step, surface_cd_m2 / step))
+    assert up.excess == pytest.approx(down.excess)
+    white_cd_m2 = fitting_white_cd_m2(luminance_cd_m2, is_source)
+    assert white_cd_m2 == pytest.approx(surface_cd_m2 * step, rel=0.01)
+    assert exposed_shares(luminance_cd_m2, white_cd_m2).saturated == 0
+
+
 def test_a_sunny_patch_in_a_dark_place_is_given_up_for_the_dark() -> None:
     """6 % in the sun are 1,000 times as bright as the rest, which would be black."""
     luminance_cd_m2 = np.where(np.arange(4000) < 240, 1000.0, 1.0)

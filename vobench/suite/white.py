@@ -95,7 +95,7 @@ def fitting_white_cd_m2(luminance_cd_m2: Array, is_source: Mask) -> float:
     """The white for luminances (N,) in cd/m², some of which are of lamps and the sky, to three digits.
 
     It is a high percentile of the surfaces. Where that leaves too many pixels saturated or black, it is the nearest
-    white whose excess is the least, to within TOLERANCE.
+    white whose excess is the least, to within TOLERANCE, and the brighter of two that are equally near.
     """
     is_lit = luminance_cd_m2 > 0
     is_lit_surface = is_lit & ~is_source
