@@ -34,6 +34,7 @@ CANNOT_START = 127
 # A limit of 0 would still pipe a whole core to a program that the kernel is told to start; 1 prevents that: core(5).
 CORE_BYTES = 1
 PLAN_BYTES = 1 << 20
+STAT_BYTES = 4096  # more than /proc/PID/stat has
 
 
 def main() -> "NoReturn":
@@ -197,6 +198,11 @@ def stat(pid: int) -> list[str]:
 
     Empty if the process no longer exists.
     """
-    with suppress(OSError), open(f"/proc/{pid}/stat", errors="replace") as file:
-        return file.read().rpartition(")")[2].split()
+    with suppress(OSError):
+        file = os.open(f"/proc/{pid}/stat", os.O_RDONLY)  # a text file takes twice the time, and there are many
+        try:
+            content = os.read(file, STAT_BYTES)
+        finally:
+            os.close(file)
+        return content.rpartition(b")")[2].decode("ascii").split()
     return []
