@@ -154,10 +154,10 @@ def test_a_frames_parts_are_its_head_its_pictures_and_its_readings():
     assert FRAME.unpack(head) == (2, 6, 4, 3, 1, 2, 2, 3)  # width, height, channels, pictures, IMU, encoders
     assert parts[0] == left.tobytes()
     assert parts[1] == (left + 1).tobytes()
-    for row, part in enumerate(parts[2:4]):
-        values = struct.unpack("<q6d", part)
+    for row, values in enumerate(struct.iter_unpack("<q6d", parts[2])):
         assert values == (IMU.t_ns[row], *IMU.gyro_radps[row], *IMU.accel_mps2[row])
-    assert struct.unpack("<9q", parts[4]) == (4, 1, 2, 5, 3, 4, 6, 5, 6)
+    assert row == 1
+    assert struct.unpack("<9q", parts[3]) == (4, 1, 2, 5, 3, 4, 6, 5, 6)
 
 
 def test_a_frame_without_pictures_has_no_size_and_a_colour_one_has_three_channels():

@@ -12,7 +12,7 @@ import pytest
 
 from vobench.estimator import Frame, Status
 from vobench.estimator.manifest import Limits
-from vobench.estimator.process import EstimatorProcess
+from vobench.estimator.process import EstimatorProcess, unsent_after
 from vobench.estimator.program import LOG_BYTES, EstimatorFailure
 from vobench.geometry.rig import LENSES, stereo_rig
 
@@ -246,3 +246,10 @@ with t.running(Path(sys.argv[1]), {("exec(" + repr(ORPHAN) + "); return Result(I
     )
     assert said.stdout.split() == [b"2"]
     await_end(tmp_path)
+
+
+@pytest.mark.parametrize("count", range(8))
+def test_what_is_unsent_after_some_bytes_is_the_rest_of_a_message(count):
+    parts = [memoryview(part) for part in (b"head", b"", b"abc", b"")]
+    assert b"".join(unsent_after(parts, count)) == b"headabc"[count:]
+    assert unsent_after(parts, 7) == []

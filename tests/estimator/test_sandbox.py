@@ -1,4 +1,4 @@
-"""The sandbox against programs that look for the truth, for neighbours and for vobench itself, in four languages.
+"""The sandbox against programs that look for the truth, for neighbours and for vobench itself, in six languages.
 
 Whatever an attack gets at must be of a kind that the trial's record says it could see. Where the record is "full" that
 is nothing. The file runs again as an ordinary user, and where the kernel gives no namespaces.
@@ -23,7 +23,7 @@ import pytest
 
 from vobench.estimator import isolation, sandbox
 from vobench.estimator.home import Home
-from vobench.estimator.isolation import FILES, NETWORK, PROCESSES, SHARED_MEMORY, SYSTEM_CALLS
+from vobench.estimator.isolation import FILES, NAMES, NETWORK, PROCESSES, SHARED_MEMORY, SYSTEM_CALLS
 from vobench.estimator.manifest import Limits
 from vobench.estimator.program import EstimatorFailure, Program, sandbox_here
 from vobench.estimator.sandbox import READ, SWITCH, Sandbox
@@ -35,6 +35,8 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reas
 RERUN = "VOBENCH_TEST_RERUN"
 LIMITS = Limits(start_s=30, trial_s=60)
 PREPARE = {
+    "awk": "",
+    "node": "",
     "python": "import ctypes, glob, os, socket, struct, sys, time\nfrom contextlib import suppress\nT = dict(word.split('=', 1) for word in sys.argv[1:])\nlibc = ctypes.CDLL(None, use_errno=True)\n",
     "sh": 'for word in "$@"; do eval "${word%%=*}=\\"\\${word#*=}\\""; done\n',
     "perl": "my %T = map { split(/=/, $_, 2) } @ARGV;\nsub show { my $f; open($f, '<', $_[0]) and print <$f>; }\n",
@@ -190,6 +192,28 @@ static void attack(void) { struct { short type, whence; long start, length; int 
     "goes from its log to the folder of the log": Attack(FILES, "python", "for place in ('/proc/self/fd/2/..', '/proc/self/fd/1/../..', os.path.dirname(os.readlink('/proc/self/fd/2'))):\n    with suppress(OSError):\n        if os.listdir(place): print(T['half'] + T['other_half'])", works_bare=False),
     "opens the truth by an io_uring": Attack(SYSTEM_CALLS, "c", """static void attack(void) {
   char parameters[120] = {0}; if (syscall(425, 4, parameters) >= 0) printf("%s%s", T("half"), T("other_half")); }""", works_bare=False),
+    "maps the truth into memory": Attack(FILES, "python", "import mmap\nwith open(T['truth'], 'rb') as file: print(mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)[:])"),
+    "makes a link to the truth and reads that": Attack(FILES, "sh", 'ln -s "$truth" here; cat here; ln "$truth" there 2>/dev/null && cat there'),
+    "opens the truth with awk": Attack(FILES, "awk", "END { while ((getline line < truth) > 0) print line }"),
+    "opens the truth with JavaScript": Attack(FILES, "node", "const word = process.argv.find(word => word.startsWith('truth='));\nconsole.log(require('fs').readFileSync(word.slice(6), 'utf8'));"),
+    "opens the truth by its handle": Attack(FILES, "c", """static void attack(void) {
+  struct { unsigned bytes; int type; char rest[128]; } handle = {128, 0}; int mount;
+  if (syscall(SYS_name_to_handle_at, AT_FDCWD, T("truth"), &handle, &mount, 0)) return;
+  int fd = syscall(SYS_open_by_handle_at, open("/", O_RDONLY), &handle, O_RDONLY); if (fd < 0) return;
+  char path[64]; sprintf(path, "/proc/self/fd/%d", fd); show(path); }""", works_bare=False),
+    "opens performance counters, programs of the kernel and faults of others": Attack(SYSTEM_CALLS, "c", """static void attack(void) {
+  char attributes[128] = {1, 0, 0, 0, 128}; int numbers[] = {SYS_perf_event_open, SYS_bpf, SYS_userfaultfd};
+  for (int i = 0; i < 3; ++i) { int fd = i == 0 ? syscall(numbers[0], attributes, 0, -1, -1, 0) : i == 1 ? syscall(numbers[1], 0, attributes, 128) : syscall(numbers[2], 1);
+    if (fd >= 0) printf("%d %s%s", i, T("half"), T("other_half")); } }""", works_bare=False),
+    "watches whole file systems": Attack(SYSTEM_CALLS, "c", """static void attack(void) {
+  if (syscall(SYS_fanotify_init, 0x200, O_RDONLY) >= 0) printf("%s%s", T("half"), T("other_half")); }""", works_bare=False),
+    "guesses from the sizes of files in the store": Attack(NAMES, "python", "if os.stat(T['truth']).st_size: print(T['half'] + T['other_half'])"),
+    "finds paths of the store in its variables": Attack(FILES, "sh", 'env | grep -F -e "$runs" -e "${truth%/*}" && echo "$half$other_half"', works_bare=False),
+    "finds paths of the store in its mounts and maps": Attack(FILES, "sh", 'cat /proc/self/mountinfo /proc/self/mounts /proc/self/maps | grep -F -e "$runs" -e "${truth%/*}" && echo "$half$other_half"', works_bare=False),
+    "goes through the mapped files of other processes": Attack(PROCESSES, "python", "for path in glob.glob('/proc/[0-9]*/map_files/*'):\n    with suppress(OSError):\n        if T['temporary'] in os.readlink(path): print(T['half'] + T['other_half'])", works_bare=False),
+    "types into the terminal of the user": Attack(SYSTEM_CALLS, "perl", "for my $device ('/dev/tty', '/dev/console', '/dev/tty0', '/dev/pts/0') { my $f; open($f, '+<', $device) and ioctl($f, 0x5412, 'x') and print $T{half}.$T{other_half}; }", works_bare=False),
+    "mounts in user space": Attack(FILES, "sh", '(: <> /dev/fuse) 2>/dev/null && echo "$half$other_half"', works_bare=False),
+    "asks the services of the machine by their sockets": Attack(FILES, "perl", "use IO::Socket::UNIX; for my $path (glob('/run/*.sock /run/*/*.sock /run/*/*/*.sock /run/dbus/* /tmp/.X11-unix/*')) { IO::Socket::UNIX->new(Peer => $path) and print \"$path $T{half}$T{other_half}\"; }", works_bare=False),
 }  # fmt: skip
 
 
@@ -284,7 +308,7 @@ def serve(server, secret):
 
 @pytest.fixture
 def run(world, tmp_path, monkeypatch):
-    """Runs an attack in one of four languages; returns what it could see and what it printed."""
+    """Runs an attack in one of six languages; returns what it could see and what it printed."""
     monkeypatch.setenv("SECRET_TOKEN", world.secret)
 
     def run(language, code, *, limits=LIMITS, own=world.own):
@@ -304,13 +328,15 @@ def command_of(language, code, own):
     source = PREPARE[language] + code
     if language == "python":
         return [sys.executable, "-I", "-S", "-c", source]
-    tool = shutil.which({"sh": "sh", "perl": "perl", "c": "cc"}[language])
+    tool = shutil.which({"sh": "sh", "perl": "perl", "c": "cc", "awk": "awk", "node": "node"}[language])
     if tool is None:
         pytest.skip(f"no {language} on this machine")
     if language == "sh":
         return [tool, "-c", source, "attack"]
-    if language == "perl":
+    if language in ("perl", "node"):
         return [tool, "-e", source]
+    if language == "awk":
+        return [tool, source]
     program = own / f"program-{hashlib.sha256(source.encode()).hexdigest()[:12]}"
     if not program.exists():
         subprocess.run([tool, "-w", "-O0", "-x", "c", "-o", program, "-"], input=source.encode(), check=True)
@@ -322,8 +348,8 @@ def test_what_an_attack_gets_at_is_of_a_kind_that_the_record_names(run, world, a
     saw, printed = run(attack.language, attack.code)
     assert "cannot be started" not in printed
     if world.secret in printed:
-        # By another process's links one comes to files, and by files to other processes.
-        kinds = {attack.sees, FILES} if attack.sees == PROCESSES else {attack.sees}
+        # By another process's links one comes to files, by files to other processes, and by files to their names.
+        kinds = {attack.sees, FILES} if attack.sees in (PROCESSES, NAMES) else {attack.sees}
         assert kinds & set(saw.sees), (saw, printed[:500])
     assert world.neighbour.poll() is None
 
@@ -391,12 +417,18 @@ SABOTAGE = {
     "kills everybody": ("c", 'static void attack(void) { kill(-1, SIGTERM); kill(-1, SIGSTOP); }'),
     "kills its neighbour and vobench by number": ("sh", 'kill -9 "$neighbour" 2>/dev/null; kill -STOP "$neighbour" 2>/dev/null; true'),
     "slows its neighbour down": ("python", "with suppress(OSError): os.setpriority(os.PRIO_PROCESS, int(T['neighbour']), 19)\nwith suppress(OSError): os.sched_setaffinity(int(T['neighbour']), {0})"),
+    "sends a signal to its neighbour by an owner of descriptors": ("c", """static void attack(void) {
+  int ends[2]; pipe(ends); fcntl(ends[0], F_SETOWN, atoi(T("neighbour"))); fcntl(ends[0], F_SETSIG, SIGKILL);
+  fcntl(ends[0], F_SETFL, O_ASYNC | O_NONBLOCK); write(ends[1], "x", 1); usleep(100000); }"""),
+    "limits its neighbour": ("python", "import resource\nwith suppress(OSError, ValueError): resource.prlimit(int(T['neighbour']), resource.RLIMIT_CPU, (0, 0))"),
     "takes away the permissions of devices": ("sh", "chmod 000 /dev/null /dev/urandom; rm -f /dev/null; mv /dev/zero /dev/nil"),
     "leaves files in shared memory": ("sh", 'echo evil > /dev/shm/vobench-test-evil'),
 }  # fmt: skip
 # What of it is possible where the record names this; all else never is.
 NEEDS = {
     "kills its neighbour and vobench by number": PROCESSES,
+    "sends a signal to its neighbour by an owner of descriptors": PROCESSES,
+    "limits its neighbour": PROCESSES,
     "slows its neighbour down": PROCESSES,
     "leaves files in shared memory": SHARED_MEMORY,
 }
@@ -468,6 +500,44 @@ def sleeping():
             if b"half=" in words or b"sleep\0001000" in words:
                 found.add((place.name, words[:40]))
     return found
+
+
+PLACES = "/tmp /var/tmp /dev/shm /run /run/lock /var/lock . $HOME $HOME/.config $HOME/.local/lib /etc /usr/local/lib /opt $own"
+LEAVES = {
+    "files": ("sh", f'for place in {PLACES}; do mkdir -p "$place" 2>/dev/null; (echo "$half$other_half" > "$place/vobench_test_left.pth") 2>/dev/null; done; true'),
+    "start-up files of interpreters": ("python", "import site\nfor place in {*sys.path, site.getusersitepackages(), os.path.expanduser('~'), os.getcwd(), '/tmp'}:\n    for name in ('sitecustomize.py', 'usercustomize.py', 'vobench_test_left.pth', '.bashrc', '.perldb'):\n        with suppress(OSError):\n            os.makedirs(place, exist_ok=True)\n            with open(os.path.join(place, name), 'x') as file: file.write('print(' + repr(T['half'] + T['other_half']) + ')')"),
+    "a server": ("perl", "use IO::Socket::INET; use IO::Socket::UNIX; use POSIX; exit if fork; POSIX::setsid(); exit if fork; my @s = (IO::Socket::INET->new(LocalAddr => '127.0.0.1', LocalPort => 47113, Listen => 5, ReuseAddr => 1), IO::Socket::UNIX->new(Local => \"\\0vobench-test-left\", Listen => 5)); for my $s (@s) { next if fork; while (my $c = $s->accept) { print $c $T{half}.$T{other_half}; close $c; } } sleep 1000;"),
+    "a queue": ("c", """
+#include <sys/msg.h>
+static void attack(void) { struct { long kind; char text[64]; } note = {1}; int queue = msgget(0x766f, 0600 | IPC_CREAT);
+  sprintf(note.text, "%s%s", T("half"), T("other_half")); if (queue >= 0) msgsnd(queue, &note, 64, IPC_NOWAIT); }"""),
+}  # fmt: skip
+FINDS = """
+import subprocess
+for place in os.path.expandvars(PLACES.replace('$own', T['own'])).split():
+    for name in ('vobench_test_left.pth', 'sitecustomize.py', 'usercustomize.py'):
+        with suppress(OSError): print(open(os.path.join(place, name)).read())
+for family, name in ((socket.AF_INET, ('127.0.0.1', 47113)), (socket.AF_UNIX, '\\0vobench-test-left')):
+    with suppress(OSError), socket.socket(family) as here:
+        here.settimeout(1); here.connect(name); print(here.recv(100))
+note = ctypes.create_string_buffer(72)
+queue = libc.msgget(0x766f, 0)
+if queue >= 0 and libc.msgrcv(queue, note, 64, 0, 0o4000) > 0: print(note.raw); libc.msgctl(queue, 0, None)
+"""
+
+
+@pytest.mark.parametrize("name", LEAVES)
+def test_what_a_trial_leaves_behind_is_not_there_in_the_next_one(run, world, name):
+    if FILES in sandbox_here().sees:
+        pytest.skip("this machine cannot keep files from an estimator, and says so")
+    language, code = LEAVES[name]
+    saw, _ = run(language, code)
+    _, printed = run("python", f"PLACES = {PLACES!r}{FINDS}")
+    Path("/dev/shm/vobench_test_left.pth").unlink(missing_ok=True)  # where the machine gives no memory of its own
+    assert "Traceback" not in printed
+    if world.secret in printed:
+        kinds = {"files": SHARED_MEMORY, "a queue": SYSTEM_CALLS}
+        assert kinds.get(name, FILES) in saw.sees, (saw, printed[:500])
 
 
 # What it is given

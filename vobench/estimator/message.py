@@ -64,11 +64,13 @@ def _camera(camera: Camera, T_body_camera: Array) -> dict[str, Any]:
 def framed(frame: Frame) -> list[bytes | memoryview]:
     """The parts of a frame: FRAME, the pictures by rows, and the IMU readings and encoder counts with their stamps."""
     parts: list[bytes | memoryview] = [_frame_head(frame)]
-    parts += [np.ascontiguousarray(picture).tobytes() for picture in _pictures(frame)]
+    parts += [np.ascontiguousarray(picture).data.cast("B") for picture in _pictures(frame)]
     if frame.imu is not None:
         vectors = np.hstack([frame.imu.gyro_radps, frame.imu.accel_mps2]).astype("<f8")
-        for t_ns, row in zip(frame.imu.t_ns.tolist(), vectors, strict=True):
-            parts.append(STAMP.pack(t_ns) + row.tobytes())
+        rows = []
+        for t_ns, vector in zip(frame.imu.t_ns.tolist(), vectors, strict=True):
+            rows.append(STAMP.pack(t_ns) + vector.tobytes())
+        parts.append(b"".join(rows))
     if frame.encoders is not None:
         counts = np.column_stack([frame.encoders.t_ns, frame.encoders.ticks])
         parts.append(counts.astype("<i8").tobytes())
@@ -102,7 +104,7 @@ def pickled(frame: Frame) -> list[bytes | memoryview]:
     return parts
 
 
-def unpickled(payload: bytearray) -> Frame:
+def unpickled(payload: bytearray | memoryview) -> Frame:
     """The frame in a payload of `pickled` parts. Its arrays share the memory of the payload."""
     view = memoryview(payload)
     contents = list[memoryview]()

@@ -204,19 +204,18 @@ class EstimatorProcess:
 
     def _send(self, tag: bytes, parts: Sequence[bytes | memoryview], until: float) -> None:
         length = sum(map(len, parts))
-        for part in (HEADER.pack(tag, length), *parts):
-            unsent = memoryview(part)
-            while unsent:
+        unsent = [memoryview(part) for part in (HEADER.pack(tag, length), *parts)]
+        while unsent:
+            try:
+                sent = os.writev(self._input, unsent)
+            except BlockingIOError:
                 self._await([], [self._input], until)
-                try:
-                    sent = os.write(self._input, unsent)
-                except BlockingIOError:
-                    continue
-                except BrokenPipeError:
-                    if tag != b"DONE":
-                        self._receive("its input", set(), until)  # raises the failure that the estimator reports
-                    return
-                unsent = unsent[sent:]
+                continue
+            except BrokenPipeError:
+                if tag != b"DONE":
+                    self._receive("its input", set(), until)  # raises the failure that the estimator reports
+                return
+            unsent = unsent_after(unsent, sent)
 
     def _receive(self, what: str, tags: set[bytes], until: float) -> tuple[bytes, bytes]:
         """The tag and payload of the next message. The tag is empty if the program has ended and `tags` allows that."""
@@ -276,3 +275,12 @@ class EstimatorProcess:
         """End the estimator and all processes that it has started."""
         if self._running:
             self._running.__exit__(*end)
+
+
+def unsent_after(parts: Sequence[memoryview], count: int) -> list[memoryview]:
+    """What remains of the parts of a message after its first `count` bytes."""
+    for number, part in enumerate(parts):
+        if count < len(part):
+            return [part[count:], *parts[number + 1 :]]
+        count -= len(part)
+    return []

@@ -16,6 +16,8 @@ from pathlib import Path
 from types import ModuleType
 from typing import BinaryIO, cast
 
+import numpy as np
+
 from vobench.errors import VobenchError, error_sentence
 from vobench.estimator.check import InvalidOutputError, checked, checked_revision, in_one_line
 from vobench.estimator.message import HEADER, answered, revision, unpickled
@@ -132,8 +134,10 @@ def _answers(requests: BinaryIO, estimator: Estimator) -> Iterator[Message]:
     is_watched = False
     while head := requests.read(HEADER.size):
         tag, length = HEADER.unpack(head)
-        payload = bytearray(length)
-        requests.readinto(payload)  # type: ignore[attr-defined]
+        payload = np.empty(length, np.uint8).data  # unlike a bytearray, it is not filled with zeros first
+        received = requests.readinto(payload)  # type: ignore[attr-defined]
+        if received < length:
+            raise EOFError
         if tag == b"FRAM":
             frame = unpickled(payload)
             before = pickle.dumps(frame) if is_watched else b""
