@@ -3,6 +3,7 @@
 import fnmatch
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from vobench.errors import UnknownNameError, unknown_name_sentence
@@ -18,11 +19,12 @@ AnyCase = Case | RecordedCase  # a case that is simulated, or one that is a reco
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One run of one estimator on one case. `repeat` counts from 0."""
+    """One run of one estimator on one case. `repeat` counts from 0, and `hidden` is that of the plan."""
 
     case: AnyCase
     estimator_entry: EstimatorEntry
     repeat: int
+    hidden: tuple[Path, ...] = ()
 
     @property
     def name(self) -> str:
@@ -36,6 +38,7 @@ class Plan:
 
     `found` lists the scenes, scenarios and estimators that the names in the suite refer to.
     `source` is the file of the suite.
+    `hidden` are files and folders that no estimator may see, such as the folder of all runs.
     """
 
     suite: Suite
@@ -44,6 +47,7 @@ class Plan:
     estimator_entries: tuple[EstimatorEntry, ...]
     found: tuple[CatalogEntry, ...]
     source: YamlFile
+    hidden: tuple[Path, ...] = ()
 
     @property
     def cases(self) -> tuple[AnyCase, ...]:
@@ -53,7 +57,7 @@ class Plan:
     def trials(self, case: AnyCase) -> list[Trial]:
         """Every trial on one case."""
         repeats = range(self.suite.repeats)
-        return [Trial(case, entry, repeat) for entry in self.estimator_entries for repeat in repeats]
+        return [Trial(case, entry, repeat, self.hidden) for entry in self.estimator_entries for repeat in repeats]
 
     def only(self, cases: Collection[str], scenes: Collection[str]) -> "Plan":
         """The plan with only the cases whose name matches one of `cases`, and whose scene matches one of `scenes`.
