@@ -13,7 +13,7 @@ from vobench.estimator.manifest import Limits
 from vobench.estimator.program import sandbox_here
 from vobench.suite import maker
 from vobench.suite.catalog import builtin_root
-from vobench.suite.maker import generated_by, made_by
+from vobench.suite.maker import create_scene, generate_place
 from vobench.suite.maker_message import encode
 
 pytestmark = pytest.mark.slow  # each starts a process; run by `pytest -m slow`, and by CI
@@ -41,7 +41,7 @@ def make(tmp_path):
         path.parent.mkdir(exist_ok=True)
         lines = "".join(f"    {line}\n" for line in body.splitlines())
         path.write_text(f"{HEAD}\ndef make(seed):\n{lines}")
-        return made_by(path, seed=seed, scene="theirs")
+        return create_scene(path, seed=seed, scene="theirs")
 
     return run
 
@@ -54,9 +54,9 @@ def test_it_gets_the_seed_and_its_scene_arrives(make) -> None:
 
 def test_one_of_ours_makes_the_same_in_the_sandbox(monkeypatch) -> None:
     ramp = builtin_root() / "scenes" / "ramp" / "maker.py"
-    in_this_process = encode(made_by(ramp, seed=2, scene="ramp"))
+    in_this_process = encode(create_scene(ramp, seed=2, scene="ramp"))
     monkeypatch.setattr(maker, "builtin_root", lambda: Path("/nowhere"))
-    assert encode(made_by(ramp, seed=2, scene="ramp")) == in_this_process
+    assert encode(create_scene(ramp, seed=2, scene="ramp")) == in_this_process
 
 
 def test_it_may_read_the_files_beside_it(make, tmp_path) -> None:
@@ -101,12 +101,12 @@ def test_what_it_prints_does_not_reach_our_output(make, capfd) -> None:
     [
         ("return 1 / 0", r"maker\.py: ZeroDivisionError: division by zero"),
         ("import no_such_module", r"maker\.py: ModuleNotFoundError: No module named 'no_such_module'"),
-        ("os._exit(0)", "ended without handing back a scene"),
+        ("os._exit(0)", "returned no scene"),
         ("os._exit(3)", "the process ended with exit code 3"),
         ("os.kill(os.getpid(), signal.SIGSEGV)", "SIGSEGV"),
         ("raise ValueError('a\\x1b[31m\\nb')", r"ValueError: a.?\[31m b$"),
         ("Path('scene.bin').write_bytes(b'junk')\nos._exit(0)", "what the maker handed back cannot be read"),
-        ("Path('scene.bin').symlink_to('/etc/passwd')\nos._exit(0)", "ended without handing back a scene"),
+        ("Path('scene.bin').symlink_to('/etc/passwd')\nos._exit(0)", "returned no scene"),
         ("Path('error.txt').write_text('all is lost')\nos._exit(0)", "all is lost"),
         ("return None", "should return things, materials by name and, optionally, lights"),
     ],
@@ -132,18 +132,18 @@ def test_a_file_without_make_is_named_once(tmp_path, monkeypatch, is_builtin) ->
     if is_builtin:
         monkeypatch.setattr(maker, "builtin_root", lambda: tmp_path)
     with pytest.raises(SuiteError) as raised:
-        made_by(path, seed=0, scene="theirs")
+        create_scene(path, seed=0, scene="theirs")
     assert str(raised.value) == f"{path}: has no function make(seed)"
 
 
 def test_a_scene_file_that_is_too_large_is_reported_as_such(make, monkeypatch) -> None:
     monkeypatch.setattr(maker, "SCENE_BYTES", 10)
-    with pytest.raises(SuiteError, match=r"handing back a scene: scene\.bin is larger than 10 bytes$"):
+    with pytest.raises(SuiteError, match=r"returned no scene: scene\.bin is larger than 10 bytes$"):
         make("return wall((0.5, 0.5, 0.5))")
 
 
 def test_a_scene_file_with_a_second_name_is_reported_as_such(make) -> None:
-    with pytest.raises(SuiteError, match=r"handing back a scene: scene\.bin has a second name.*\(a hard link\)$"):
+    with pytest.raises(SuiteError, match=r"returned no scene: scene\.bin has a second name.*\(a hard link\)$"):
         make("Path('a').write_bytes(b'x')\nos.link('a', 'scene.bin')\nos._exit(0)")
 
 
@@ -166,7 +166,7 @@ def generate(tmp_path):
     def run(old="", new="", *, seed=3, lighting="day"):
         assert old in GENERATOR
         scene = write_cell(tmp_path / "strangers", GENERATOR.replace(old, new, 1) if old else GENERATOR)
-        return generated_by(scene.with_name("generator.py"), seed=seed, lighting=lighting, scene="cell")
+        return generate_place(scene.with_name("generator.py"), seed=seed, lighting=lighting, scene="cell")
 
     return run
 
@@ -194,9 +194,9 @@ def test_a_generator_gives_the_same_bytes_in_the_sandbox_and_in_this_process(gen
 
 def test_a_generator_of_ours_gives_the_same_bytes_in_the_sandbox(monkeypatch):
     flat = builtin_root() / "scenes" / "flat" / "generator.py"
-    in_this_process = encode(generated_by(flat, seed=2, lighting="overcast", scene="flat"))
+    in_this_process = encode(generate_place(flat, seed=2, lighting="overcast", scene="flat"))
     monkeypatch.setattr(maker, "builtin_root", lambda: Path("/nowhere"))
-    assert encode(generated_by(flat, seed=2, lighting="overcast", scene="flat")) == in_this_process
+    assert encode(generate_place(flat, seed=2, lighting="overcast", scene="flat")) == in_this_process
 
 
 @needs_a_sandbox

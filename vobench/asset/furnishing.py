@@ -78,12 +78,12 @@ def _radiator(layout: RoomLayout, spot: Spot, width_m: float, sill_m: float) -> 
         height_m=height_m,
     )
     layout.take(body, height_m + 0.14)
-    along = spot.y_m if spot.side in ("east", "west") else spot.x_m
+    along = spot.along_m
     layout.take_wall(spot.side, along - length_m / 2 - 0.1, along + length_m / 2 + 0.1, 0.0, height_m + 0.14)
 
 
 def _curtains(layout: RoomLayout, style: Style, spot: Spot, window: Window, width_m: float) -> None:
-    along = spot.y_m if spot.side in ("east", "west") else spot.x_m
+    along = spot.along_m
     first_m, last_m = layout.room.span_m(spot.side)
     curtain_m = 0.42
     reach_m = width_m / 2 + 0.1 + curtain_m / 2
@@ -584,7 +584,7 @@ def _add_row(layout: RoomLayout, style: Style, spot: Spot, along: float, length_
 def _sign_along(spot: Spot) -> int:
     """Whether y of a spot runs along the coordinate of its wall (1) or against it (-1)."""
     x_m, y_m = spot.at(0, 1)
-    step_m = y_m - spot.y_m if spot.side in ("east", "west") else x_m - spot.x_m
+    step_m = (y_m if spot.side in ("east", "west") else x_m) - spot.along_m
     return 1 if step_m > 0 else -1
 
 

@@ -231,6 +231,11 @@ class Spot:
     yaw_deg: float
     side: Side
 
+    @property
+    def along_m(self) -> float:
+        """The coordinate along the wall."""
+        return self.y_m if self.side in ("east", "west") else self.x_m
+
     def at(self, dx_m: float, dy_m: float = 0.0) -> tuple[float, float]:
         """The place (x, y) in the room of a place in the frame of the spot."""
         angle = np.deg2rad(self.yaw_deg)
@@ -456,6 +461,10 @@ class RoomLayout:
         self._counts[kind] = self._counts.get(kind, 0) + 1
         return f"{self.room.name}.{kind}_{self._counts[kind]}"
 
+    def chance(self, probability: float) -> bool:
+        """Whether an event of a probability happens."""
+        return bool(self.rng.random() < probability)
+
     def rng_of(self, name: str) -> Rng:
         """The random generator of a piece, which depends on its name and the seed alone."""
         return np.random.default_rng([self.seed, crc32(name.encode())])
@@ -535,7 +544,7 @@ class RoomLayout:
             return None
         candidates = []
         if above is not None:
-            candidates.append((above.side, above.y_m if above.side in ("east", "west") else above.x_m))
+            candidates.append((above.side, above.along_m))
         else:
             for index in self.rng.permutation(len(sides)).tolist():
                 first_m, last_m = self.room.span_m(sides[index])

@@ -301,7 +301,7 @@ def _wall_desk(layout: RoomLayout, style: Style, top: Material) -> bool:
 
 def _along(spot: Spot, width_m: float) -> tuple[float, float]:
     """The part of a wall that something at a spot covers."""
-    along = spot.y_m if spot.side in ("east", "west") else spot.x_m
+    along = spot.along_m
     return along - width_m / 2, along + width_m / 2
 
 

@@ -86,6 +86,19 @@ class EstimatorFailure(Exception):  # noqa: N818 - a result, not an error of vob
         super().__init__(f"{kind}: {self.reason}")
 
 
+class OutputFailure(EstimatorFailure):
+    """The end of a program whose output file is missing, or has a `problem` that makes it unsafe to read.
+
+    The reason names the file as {out}. `problem` is a predicate in one line, such as "is larger than 10 bytes", and
+    None for a missing file.
+    """
+
+    def __init__(self, problem: str | None) -> None:
+        self.problem = None if problem is None else in_one_line(problem)
+        reason = "it ended well, but wrote no file {out}" if problem is None else f"{{out}} {problem}"
+        super().__init__("invalid_output", reason)
+
+
 @dataclass(frozen=True, slots=True)
 class Answer:
     """A checked result and its cost, measured by vobench. `memory_mib` is the peak so far."""
@@ -255,13 +268,13 @@ class Program:
                 os.unlink(path)
 
     def read(self, name: str, *, most_bytes: int) -> bytes:
-        """The content of a file below the home folder. Raises EstimatorFailure if it is missing or not safe to read."""
+        """The content of a file below the home folder. Raises OutputFailure if it is missing or not safe to read."""
         try:
             return read_below(self._files, name, most_bytes=most_bytes, check=self._check_time)
         except FileNotFoundError:
-            raise EstimatorFailure("invalid_output", "it ended well, but wrote no file {out}") from None
+            raise OutputFailure(None) from None
         except UnreadableFileError as error:
-            raise EstimatorFailure("invalid_output", f"{{out}} {error}") from None
+            raise OutputFailure(str(error)) from None
 
     def left_s(self) -> float:
         """The time until the limit of the trial, in seconds."""

@@ -13,8 +13,9 @@ from vobench.report.rerun_stream import time_columns
 from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture
 from vobench.sequence import StereoTruth
 
-UNSET = (0, 0, 0, 0)
-SET = (255, 255, 255, 160)
+SIDES = ("left", "right")
+TRANSPARENT = (0, 0, 0, 0)
+TRANSLUCENT_WHITE = (255, 255, 255, 160)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,18 +29,28 @@ class TruthView:
 
 def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
     """Log all channels of both cameras. Only one frame is in memory at a time."""
-    for side in ("left", "right"):
+    _log_classes(stream, view)
+    for frame in view.frames():
+        _log_frame(stream, frame)
+
+
+def _log_classes(stream: rr.RecordingStream, view: TruthView) -> None:
+    """Log the names and colours of classes, which are the same in all frames."""
+    for side in SIDES:
         for channel in view.channels:
             classes = _classes(channel, view.names)
             if classes:
                 stream.log(truth_entity(side, channel), rr.AnnotationContext(classes), static=True)
-    for frame in view.frames():
-        times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
-        for side, truth in (("left", frame.left), ("right", frame.right)):
-            if truth is None:
-                continue
-            for channel, values in truth.channels().items():
-                stream.send_columns(truth_entity(side, channel), times, _columns(channel, values))
+
+
+def _log_frame(stream: rr.RecordingStream, frame: StereoTruth) -> None:
+    """Log all channels that a frame has."""
+    times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
+    for side, truth in zip(SIDES, (frame.left, frame.right), strict=True):
+        if truth is None:
+            continue
+        for channel, values in truth.channels().items():
+            stream.send_columns(truth_entity(side, channel), times, _columns(channel, values))
 
 
 def _columns(channel: str, values: NDArray[np.generic]) -> Any:
@@ -64,25 +75,33 @@ def _format(
     datatype: rr.ChannelDatatype,
     colors: rr.ColorModel | None = None,
 ) -> rr.components.ImageFormat:
+    """The size in pixels and the type of the values of an image (H, W, ...)."""
     height_px, width_px = values.shape[:2]
     return rr.components.ImageFormat(width_px, height_px, color_model=colors, channel_datatype=datatype)
 
 
 def _bytes(values: NDArray[np.generic]) -> NDArray[np.uint8]:
+    """The values as bytes, row by row."""
     return np.ascontiguousarray(values).reshape(-1).view(np.uint8)
 
 
 def _classes(channel: str, names: TruthNames) -> list[rr.AnnotationInfo]:
-    """The name and the colour of each class of a channel; empty for a channel without classes."""
-    if channel == "instance":
-        return _named_ids(channel, names.instance)
-    if channel == "material":
-        return _named_ids(channel, names.material)
-    if CHANNELS[channel].dtype is np.bool_:
-        return [rr.AnnotationInfo(0, "", UNSET), rr.AnnotationInfo(1, channel, SET)]
-    if channel == "shadow":
-        return [rr.AnnotationInfo(0, "lit", UNSET), rr.AnnotationInfo(1, "one light hidden", SET)]
-    return []
+    """The name and the colour of each class of a channel; empty for a channel without classes.
+
+    Only the first two counts of hidden lights are classes of the channel `shadow`; Rerun chooses the other colours.
+    """
+    names_of_ids = {"instance": names.instance, "material": names.material}
+    if channel in names_of_ids:
+        return _named_ids(channel, names_of_ids[channel])
+    is_mask = CHANNELS[channel].dtype is np.bool_
+    if is_mask:
+        return _two_classes("", channel)
+    return _two_classes("lit", "one light hidden") if channel == "shadow" else []
+
+
+def _two_classes(zero: str, one: str) -> list[rr.AnnotationInfo]:
+    """Classes with the names of the values 0 and 1, of which only 1 is visible."""
+    return [rr.AnnotationInfo(0, zero, TRANSPARENT), rr.AnnotationInfo(1, one, TRANSLUCENT_WHITE)]
 
 
 def _named_ids(channel: str, names: tuple[str, ...]) -> list[rr.AnnotationInfo]:

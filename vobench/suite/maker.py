@@ -20,40 +20,45 @@ from vobench.estimator import isolation
 from vobench.estimator.check import in_one_line
 from vobench.estimator.home import Home
 from vobench.estimator.manifest import Limits
-from vobench.estimator.program import EstimatorFailure, Program, sandbox_here
+from vobench.estimator.program import EstimatorFailure, OutputFailure, Program, sandbox_here
 from vobench.scene.generated_place import GeneratedPlace
 from vobench.suite.catalog import builtin_root
 from vobench.suite.maker_message import decode
 from vobench.suite.maker_worker import ERROR, GENERATE, MAKE, SCENE, call
 
-LIMITS = Limits(trial_s=600.0, threads=max(os.cpu_count() or 1, 1))
+LIMITS = Limits(trial_s=600.0, threads=os.cpu_count() or 1)
 WORKER = (sys.executable, "-P", "-m", "vobench.suite.maker_worker")
 SCENE_BYTES = 2 << 30
 ERROR_BYTES = 1 << 16
-NO_SCENE = "ended without handing back a scene"
+NO_SCENE = "returned no scene"
 
 
-def made_by(maker: Path, *, seed: int, scene: str) -> GeneratedPlace:
+def create_scene(maker: Path, *, seed: int, scene: str) -> GeneratedPlace:
     """The scene that a maker creates from a seed. `scene` is the name of the scene.
 
     Raises SuiteError if the maker fails, or if this machine has no sandbox and the user does not trust the maker.
     """
-    return _returned_by(maker, MAKE, (seed,), scene)
+    return _run(maker, MAKE, (seed,), scene)
 
 
-def generated_by(generator: Path, *, seed: int, lighting: str, scene: str) -> GeneratedPlace:
-    """The place that a generator creates from a seed. Raises SuiteError under the same conditions as `made_by`."""
-    return _returned_by(generator, GENERATE, (seed, lighting), scene)
+def generate_place(generator: Path, *, seed: int, lighting: str, scene: str) -> GeneratedPlace:
+    """The place that a generator creates from a seed. `scene` is the name of the scene.
+
+    Raises SuiteError if the generator fails, or if this machine has no sandbox and the user does not trust it.
+    """
+    return _run(generator, GENERATE, (seed, lighting), scene)
 
 
-def _returned_by(file: Path, function: str, arguments: Sequence[Any], scene: str) -> GeneratedPlace:
+def _run(file: Path, function: str, arguments: Sequence[Any], scene: str) -> GeneratedPlace:
+    """What a function of a file returns, run in this process if the file is included in vobench."""
     if file.resolve().is_relative_to(builtin_root().resolve()):
-        return _in_this_process(file, function, arguments)
+        return _run_trusted(file, function, arguments)
     trust.admit(file, sources(file), scene, is_contained=_is_contained())
-    return _in_a_sandbox(file, function, arguments)
+    return _run_sandboxed(file, function, arguments)
 
 
-def _in_this_process(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
+def _run_trusted(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
+    """What a function returns in this process."""
     try:
         return call(str(file), function, arguments)
     except Exception as error:
@@ -73,11 +78,12 @@ def sources(maker: Path) -> Iterator[bytes]:
         yield path.read_bytes()
 
 
-def _in_a_sandbox(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
+def _run_sandboxed(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
+    """What a function returns in a worker process in the sandbox."""
     try:
         return decode(_worker_output(file, function, arguments))
     except EstimatorFailure as failure:
-        raise SuiteError(f"{file}: {_reason(failure)}") from None
+        raise SuiteError(f"{file}: {_failure_reason(failure)}") from None
     except SuiteError as error:
         raise SuiteError(f"{file}: {error}") from None
 
@@ -89,30 +95,24 @@ def _worker_output(file: Path, function: str, arguments: Sequence[Any]) -> bytes
     """
     command = [*WORKER, str(file.resolve()), function, json.dumps(arguments)]
     with ExitStack() as stack:
-        home = stack.enter_context(Home(Path(os.devnull)))
+        # Nobody reads what the code prints, nor what could not be removed: the log is deleted with the home.
+        home = stack.enter_context(Home(log=Path(os.devnull)))
         log = home.path.parent / "log.txt"
         program = stack.enter_context(Program(command, log=log, limits=LIMITS, home=home, folder=file.parent.resolve()))
         program.wait()
         error_text = _read_if_written(program, ERROR, ERROR_BYTES)
-        scene = b"" if error_text else program.read(SCENE, most_bytes=SCENE_BYTES)
-    if error_text:
-        raise SuiteError(in_one_line(error_text.decode("utf-8", "replace")))
-    return scene
+        if error_text:
+            raise SuiteError(in_one_line(error_text.decode("utf-8", "replace")))
+        return program.read(SCENE, most_bytes=SCENE_BYTES)
 
 
-def _reason(failure: EstimatorFailure) -> str:
-    """The reason why a maker returned no scene.
-
-    A failure's reason is worded for estimators: it can mention a trial, or the output file as {out}.
-    """
+def _failure_reason(failure: EstimatorFailure) -> str:
+    """Why there is no scene, in words for the author of a maker. Failures are worded for authors of estimators."""
     if failure.kind == "timeout":
         return f"took more than {LIMITS.trial_s:g} s"
-    if failure.kind != "invalid_output":
-        return failure.reason
-    is_file_unreadable = failure.reason.startswith("{out} ")
-    if not is_file_unreadable:
-        return NO_SCENE
-    return f"{NO_SCENE}: {failure.reason.replace('{out}', SCENE)}"
+    if isinstance(failure, OutputFailure):
+        return NO_SCENE if failure.problem is None else f"{NO_SCENE}: {SCENE} {failure.problem}"
+    return failure.reason
 
 
 def _read_if_written(program: Program, name: str, most_bytes: int) -> bytes:
