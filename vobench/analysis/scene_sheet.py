@@ -39,13 +39,14 @@ def sheet(
 
     They are in four directions from the free circle, or from around a scene that has none.
     """
-    views = [_view(renderer, viewpoint, white_cd_m2) for viewpoint in _viewpoints(found)]
+    views = [_view(renderer, viewpoint, white_cd_m2) for viewpoint in viewpoints(found)]
     upper = np.hstack([plan(scene, found), views[0], views[1]])
     lower = np.hstack([_text(lines), views[2], views[3]])
     return np.vstack([upper, lower])
 
 
-def _viewpoints(found: SceneSurvey) -> list[Viewpoint]:
+def viewpoints(found: SceneSurvey) -> list[Viewpoint]:
+    """The viewpoints of a scene's views: on its free circle, or from around a scene that has none."""
     free = found.free
     if free is None or not found.is_place:
         return around(found.low_m, found.high_m, count=len(VIEWS_DEG))
