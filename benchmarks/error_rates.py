@@ -17,8 +17,10 @@ from numpy.random import Generator
 from scipy import stats
 
 from vobench.geometry.se3 import Array
-from vobench.metric.ranking import DECIDED, TrialTable, rank
+from vobench.metric.ranking import DECIDED, MIN_DRIVES, TrialTable, rank
 from vobench.metric.repeat_test import worse_than_best
+from vobench.metric.sequential import half_width
+from vobench.metric.significance import PairedDifference
 from vobench.metric.unit import make_design
 from vobench.report.compare import NOT_DETERMINISTIC, REGRESSIONS, compare
 from vobench.report.leaderboard import Board, make_board
@@ -248,6 +250,108 @@ def false_marks(boards: int, rng: Generator) -> Iterator[list[str]]:
 
 
 @dataclass(frozen=True, slots=True)
+class Looks:
+    """Differences of log losses over places, looked at after every place, and what each look states.
+
+    low, high: the ends of the sequence (B, N) after each place; infinite before the first statement.
+    """
+
+    low: Array
+    high: Array
+
+    def claims(self, ratio: float) -> tuple[Array, Array, Array]:
+        """Whether each look states that the first is better, that the second is, and that they are alike (B, N)."""
+        limit = np.log(ratio)
+        return self.low > 0, self.high < 0, (self.low > -limit) & (self.high < limit)
+
+    def places_until_settled(self, ratio: float) -> Array:
+        """The number of places (B,) after which a board ends; NaN for one that never does."""
+        is_settled = np.logical_or.reduce(self.claims(ratio))
+        return np.where(is_settled.any(axis=1), is_settled.argmax(axis=1) + 1.0, np.nan)
+
+    def falsehoods(self, mean: float, ratio: float) -> float:
+        """The share of boards of which any look states what a true mean contradicts."""
+        first_better, second_better, alike = self.claims(ratio)
+        is_false = second_better & (mean >= 0) | first_better & (mean <= 0) | alike & (abs(mean) >= np.log(ratio))
+        return float(is_false.any(axis=1).mean())
+
+
+def looks(differences: Array, alpha: float) -> Looks:
+    """The looks at differences (B, N) of boards after every place."""
+    numbers = np.arange(1, differences.shape[1] + 1)
+    means = differences.cumsum(axis=1) / numbers
+    squares = (differences**2).cumsum(axis=1) - numbers * means**2
+    stds = np.sqrt(np.maximum(squares, 0.0) / np.maximum(numbers - 1, 1))
+    of_unit_std = np.array([half_width(PairedDifference(count, 0.0, 1.0), alpha) for count in numbers.tolist()])
+    with np.errstate(invalid="ignore"):
+        half = np.where(np.isinf(of_unit_std), np.inf, of_unit_std * stds)
+    return Looks(means - half, means + half)
+
+
+MOST_PLACES = 400
+RATIO = 1.5
+REAL_STD = 0.62  # of lk_epipolar against stereo_pnp, over the ten built-in places
+
+
+def _failing(shape: tuple[int, int], rng: Generator, *, both: bool) -> Array:
+    """Differences of mean 0 where one estimator, or each of the two, fails in a tenth of places at 4 log units."""
+    differences = 0.4 * rng.standard_normal(shape) + 4.0 * (rng.random(shape) < 0.1)
+    other = 4.0 * (rng.random(shape) < 0.1) if both else 0.4
+    return np.asarray(differences - other)
+
+
+def until_decided(boards: int, rng: Generator) -> Iterator[list[str]]:
+    """Of boards that are looked at after each of 400 places: how often any look states a falsehood at 2 %."""
+    yield ["differences of log loss", "true ratio 1", "true ratio 1.5", "a t test at 2 % at every look"]
+    shape = (boards, MOST_PLACES)
+    kinds: dict[str, Callable[[], Array]] = {
+        "normal, standard deviation 0.62": lambda: REAL_STD * rng.standard_normal(shape),
+        "heavy tails, t with 2 degrees of freedom": lambda: 0.3 * rng.standard_t(2, shape),
+        "two in three are ties": lambda: REAL_STD * rng.standard_normal(shape) * (rng.random(shape) < 1 / 3),
+        "each fails in a tenth of places": lambda: _failing(shape, rng, both=True),
+        "skewed, exponential": lambda: REAL_STD * (rng.exponential(size=shape) - 1),
+        "one fails in a tenth of places, and is better elsewhere": lambda: _failing(shape, rng, both=False),
+    }
+    for name, draw in kinds.items():
+        log_ratio = float(np.log(RATIO))
+        at_1 = looks(draw(), DECIDED).falsehoods(0.0, RATIO)
+        at_ratio = looks(draw() + log_ratio, DECIDED).falsehoods(log_ratio, RATIO)
+        yield [name, f"{at_1:.3f}", f"{at_ratio:.3f}", f"{_repeated_t_test(draw()):.3f}"]
+
+
+def _repeated_t_test(differences: Array) -> float:
+    """The share of boards (B, N) that a t test at 2 % decides at any look from the seventh place on."""
+    numbers = np.arange(1, differences.shape[1] + 1)
+    means = differences.cumsum(axis=1) / numbers
+    squares = (differences**2).cumsum(axis=1) - numbers * means**2
+    variances = np.maximum(squares, 1e-300) / np.maximum(numbers - 1, 1)
+    t = np.abs(means) / np.sqrt(variances / numbers)
+    threshold = stats.t.isf(DECIDED / 2, np.maximum(numbers - 1, 1))
+    return float((t > threshold)[:, MIN_DRIVES - 1 :].any(axis=1).mean())
+
+
+def places_until_decided(boards: int, rng: Generator) -> Iterator[list[str]]:
+    """Places that a pair takes until it is decided, or alike within 1.5; a t test's number has to be chosen before."""
+    quantiles = "places: 10 %, median, 90 %"
+    yield ["standard deviation", "true ratio", quantiles, "the same, one of three pairs", "t test, power .95"]
+    for std in (0.3, REAL_STD):
+        for ratio in (1.0, 1.3, 1.5, 2.0, 3.0):
+            row = [f"{std:g}", f"{ratio:g}"]
+            for pairs in (1, 3):
+                differences = np.log(ratio) + std * rng.standard_normal((boards, MOST_PLACES))
+                needed = looks(differences, DECIDED / pairs).places_until_settled(RATIO)
+                needed = np.nan_to_num(needed, nan=np.inf)
+                shown = np.quantile(needed, [0.1, 0.5, 0.9], method="higher")
+                row.append(", ".join(_count(value) for value in shown))
+            fixed = PairedDifference(MOST_PLACES, 0.0, std).units_needed(np.log(ratio), DECIDED) if ratio > 1 else None
+            yield [*row, str(fixed or "never")]
+
+
+def _count(places: float) -> str:
+    return f"over {MOST_PLACES}" if np.isinf(places) else f"{places:.0f}"
+
+
+@dataclass(frozen=True, slots=True)
 class Change:
     """What differs between two runs of four estimators: the factor on the loss of each trial, and failures by chance.
 
@@ -340,6 +444,8 @@ TABLES: list[Callable[[int, Generator], Iterator[list[str]]]] = [
     false_decisions,
     power,
     advice,
+    until_decided,
+    places_until_decided,
     false_marks,
     regressions,
 ]

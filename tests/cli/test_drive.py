@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vobench.report.drive_plot import PLAN
-from vobench.trajectory.formats import parse_tum
+from vobench.trajectory.tum import parse_tum
 
 WAYS = """name: ways
 scenes: [closet]

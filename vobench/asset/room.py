@@ -15,7 +15,9 @@ from vobench.asset.shape import at
 from vobench.asset.wall import Hole, pierced, planked, reveal
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material
-from vobench.scene.mesh import MeshArrays, Thing, joined_arrays, quad_arrays
+from vobench.scene.mesh import as_mesh
+from vobench.scene.mesh_arrays import MeshArrays, joined_arrays, quad_arrays
+from vobench.scene.triangles import Thing
 from vobench.setting import Triple
 
 if TYPE_CHECKING:
@@ -60,6 +62,12 @@ FINISHES: dict[str, Callable[[], Material]] = {
 }
 
 
+def piece_rng(name: str, seed: int = 0) -> np.random.Generator:
+    """The random generator of the piece with a name, in a scene with a seed."""
+    name_hash = crc32(name.encode())
+    return np.random.default_rng(np.random.SeedSequence([seed, name_hash]))
+
+
 @dataclass(frozen=True, slots=True)
 class Piece:
     """A piece of furniture of one of KINDS. Its random choices depend only on its name and the seed of the scene."""
@@ -73,8 +81,7 @@ class Piece:
 
     def rng(self, seed: int = 0) -> np.random.Generator:
         """The random generator of the piece."""
-        name_hash = crc32(self.name.encode())
-        return np.random.default_rng(np.random.SeedSequence([seed, name_hash]))
+        return piece_rng(self.name, seed)
 
     def build(self, seed: int = 0) -> Instance:
         """The name of the piece, and its parts in the frame of the scene."""
@@ -97,7 +104,7 @@ def things(
     for name, parts in instances:
         for k, (material, meshes) in enumerate(_by_material(parts).items()):
             material_name = names.setdefault(material, f"{name}.{k}")
-            result.append(Thing(name, joined_arrays(meshes).mesh(), material_name))
+            result.append(Thing(name, as_mesh(joined_arrays(meshes)), material_name))
     return tuple(result), {name: material for material, name in names.items()}
 
 

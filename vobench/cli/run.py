@@ -1,11 +1,11 @@
 """vobench run."""
 
-import secrets
 import shutil
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import typer
 
@@ -23,19 +23,20 @@ from vobench.runner.preflight import summarize
 from vobench.runner.store import SilentProgress
 from vobench.suite import catalog, yaml_file
 from vobench.suite.catalog import hidden_builtins
+from vobench.suite.draw import Draws, random_base_seed
 from vobench.suite.plan import Plan
 from vobench.suite.spread import changes_for_units
 from vobench.suite.suite import read_plan
 from vobench.suite.suite_spec import Suite
+from vobench.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from vobench.report.leaderboard import Board
     from vobench.report.threshold import Threshold
+    from vobench.report.until_decided import UntilDecided
     from vobench.runner.folder import RunFolder, TrialScore
+    from vobench.runner.run import Finish
 
-# Base seeds are drawn so far apart that places and drives of two draws have different seeds.
-SEEDS_PER_DRAW = 10_000
-DRAWS = 199_000
 INCOMPLETE_RUN = 1  # exit codes
 BROKEN_LIMIT = 3
 
@@ -55,6 +56,11 @@ class Selection:
     scene: Annotated[
         list[str] | None, typer.Option("--scene", "-s", help="Run only scenes that match; can be repeated.")
     ] = None
+
+    def draw(self, suite: str, changes: Mapping[str, str], number: int) -> Plan:
+        """The plan of one draw of a suite, restricted to these trials. Raises SuiteError or UnknownNameError."""
+        draws = Draws(suite, changes, tuple(self.estimator or ()))
+        return draws.plan(number).only(self.case or (), self.scene or ())
 
     def read_plan(self, suite: str, changes: Mapping[str, str]) -> Plan:
         """The plan of a suite, restricted to these trials. Raises SuiteError or UnknownNameError."""
@@ -85,13 +91,39 @@ class Changes:
         if self.repeats:
             assignments.append(f"repeats={self.repeats}")
         if self.fresh_units:
-            assignments.append(f"base_seed={SEEDS_PER_DRAW * (1 + secrets.randbelow(DRAWS))}")
+            assignments.append(f"base_seed={random_base_seed()}")
         values = _split_assignments(assignments)
         if self.units:
             path = catalog.find("suite", suite).path
             written = yaml_file.read_all(path, Suite, values, kind="suite").source.plain
             values |= changes_for_units(written, self.units)
         return values
+
+
+@option_group
+class Sequential:
+    """The options for drawing units until the estimators are decided."""
+
+    until: Annotated[
+        Literal["decided"] | None,
+        typer.Option(help="Draw fresh units until each pair of estimators is decided, or alike within the ratio."),
+    ] = None
+    ratio: Annotated[
+        float, typer.Option(min=1.01, max=100, help="With --until: the ratio of losses that is of interest.")
+    ] = 1.5
+    budget: Annotated[
+        str | None, typer.Option(help="With --until: the time after which no more units are drawn, as in 40min.")
+    ] = None
+
+    def budget_s(self) -> float:
+        """The budget in seconds; infinite if there is none. Raises InputError if there is no --until for it."""
+        from vobench.report.until_decided import parse_duration_s
+
+        if self.budget is None:
+            return inf
+        if self.until is None:
+            raise InputError("--budget requires --until decided")
+        return parse_duration_s(self.budget)
 
 
 @option_group
@@ -161,6 +193,7 @@ def run_command(
     *,
     selection: Selection,
     changes: Changes,
+    sequential: Sequential,
     limits: TrialLimits,
     execution: Execution,
     progress: ProgressOptions,
@@ -178,7 +211,9 @@ def run_command(
     from vobench.report.threshold import parse_threshold
 
     thresholds = [parse_threshold(text) for text in fail_if or ()]
-    plan = selection.read_plan(suite, changes.values(suite))
+    budget_s = sequential.budget_s()
+    values = changes.values(suite)
+    plan = selection.read_plan(suite, values)
     for sentence in hidden_builtins(plan.found):
         terminal.warn(sentence)
     plan = limits.apply(plan)
@@ -188,7 +223,23 @@ def run_command(
 
     from vobench.report import page
 
-    folder = _run(plan, out, execution, progress)
+    cost = ""
+    if sequential.until:
+        ended = _run_until_decided(
+            lambda number: limits.apply(selection.draw(suite, values, number)),
+            out,
+            execution,
+            progress,
+            ratio=sequential.ratio,
+            budget_s=budget_s,
+        )
+        folder = ended.folder
+        cost = ended.cost
+        if not ended.has_ended:
+            seeds = f", with --set base_seed={plan.suite.base_seed} for --fresh-units" if changes.fresh_units else ""
+            cost += f"\nTo resume, run the same command again{seeds}"
+    else:
+        folder = _run(plan, out, execution, progress)
     scores = folder.scores()
     board = page.run_board(folder, scores)
     _print_board(board, as_json=json)
@@ -196,6 +247,8 @@ def run_command(
         _print_remarks(folder, scores, shares_time=execution.share_time or plan.suite.share_time)
         for doubt in doubts_of_run(plan, folder):
             terminal.warn(doubt)
+        if cost:
+            terminal.console().print(cost)
     _exit_if_failed(scores, board, thresholds)
 
 
@@ -215,8 +268,46 @@ def _exit_if_failed(scores: "Sequence[TrialScore]", board: "Board", thresholds: 
         raise typer.Exit(BROKEN_LIMIT)
 
 
-def _run(plan: Plan, out: Path, execution: Execution, progress: ProgressOptions) -> "RunFolder":
-    """Run a plan with progress on the terminal; return the folder of the run."""
+def _run_until_decided(
+    draw: Callable[[int], Plan],
+    out: Path,
+    execution: Execution,
+    progress: ProgressOptions,
+    *,
+    ratio: float,
+    budget_s: float,
+) -> "UntilDecided":
+    """Run draws of a suite with progress on the terminal until each pair of estimators is decided or alike."""
+    from vobench.report import page
+    from vobench.report.until_decided import record, run_until_decided
+
+    def write_reports(folder: "RunFolder", scores: "list[TrialScore]") -> None:
+        record(folder, ratio=ratio)
+        page.write_reports(folder, scores)
+
+    def say(sentence: str) -> None:
+        if not progress.quiet:
+            terminal.warn(sentence)
+
+    with temporary_folder() as looks:
+        return run_until_decided(
+            draw,
+            look=lambda plan: _run(plan, looks, execution, progress, finish=_no_reports),
+            finish=lambda plan: _run(plan, out, execution, progress, finish=write_reports),
+            ratio=ratio,
+            budget_s=budget_s,
+            tell=say,
+        )
+
+
+def _no_reports(folder: "RunFolder", scores: "list[TrialScore]") -> None:
+    del folder, scores
+
+
+def _run(
+    plan: Plan, out: Path, execution: Execution, progress: ProgressOptions, *, finish: "Finish | None" = None
+) -> "RunFolder":
+    """Run a plan with progress on the terminal; return the folder of the run. `finish` replaces the usual reports."""
     from vobench.report import page
 
     display = TerminalDisplay(
@@ -228,7 +319,7 @@ def _run(plan: Plan, out: Path, execution: Execution, progress: ProgressOptions)
     return run_plan(
         plan,
         out=out,
-        finish=page.write_reports,
+        finish=finish or page.write_reports,
         display=display,
         jobs=execution.jobs,
         scheduler=execution.scheduler,

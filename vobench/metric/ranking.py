@@ -9,11 +9,12 @@ Symbols: E estimators, C cases, R repeats, P places.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
 from vobench.geometry.se3 import Array
+from vobench.metric import sequential
 from vobench.metric.significance import PairedDifference, holm, paired_difference, paired_p_values
 from vobench.metric.unit import Design, mean_of_known
 
@@ -32,7 +33,8 @@ class Standing:
     `place` counts from 1, and `places` is its 95 % interval. `loss` is the geometric mean of the loss. `error_ratio` is
     the error relative to the first's, on cases where both survive, with its confidence interval `error_interval`.
     `above` is the difference of log losses to the estimator ranked above, `p_above` its p-value after correction for
-    the number of such tests, and `level` that of each test before it.
+    the number of such tests, and `level` that of each test before it. `above` is None, too, if units were drawn until
+    decided.
     """
 
     index: int
@@ -67,11 +69,14 @@ class TrialTable:
 
     The loss is NaN where there is no such trial or it has none, as in a case whose ground truth is stationary; so is
     the error, and that of a failed trial. All estimators have trials on all cases.
+    `is_sequential` states that the number of units depends on what they showed: tests and intervals are then those of
+    `sequential`, which hold whenever one stops.
     """
 
     loss: Array
     error: Array
     design: Design
+    is_sequential: bool = False
 
     @property
     def is_tested(self) -> bool:
@@ -85,6 +90,32 @@ class TrialTable:
     def log_losses(self) -> Array:
         """The mean logarithm of the loss by estimator and place (E, P)."""
         return self.design.means(self.log_losses_by_case())
+
+    def p(self, difference: PairedDifference) -> float:
+        """The p-value of a difference between two of the estimators."""
+        if self.is_sequential:
+            return min(1.0, 1.0 / sequential.bayes_factor(difference))
+        return difference.p
+
+    def interval(self, difference: PairedDifference, alpha: float) -> tuple[float, float] | None:
+        """The confidence interval of a difference at the level 1 - alpha, None for too few units."""
+        if not self.is_sequential:
+            return difference.interval(alpha)
+        half_width = sequential.half_width(difference, alpha)
+        if np.isinf(half_width):
+            return None
+        return difference.mean - half_width, difference.mean + half_width
+
+    def pair_p_values(self) -> Array:
+        """The p-values (E, E) of all pairs of estimators over places; the diagonal is 1."""
+        log_losses = self.log_losses()
+        if not self.is_sequential:
+            return paired_p_values(log_losses)
+        p_values = np.ones((len(log_losses), len(log_losses)))
+        for a, b in combinations(range(len(log_losses)), 2):
+            p_values[a, b] = self.p(_difference(log_losses, a, b))
+            p_values[b, a] = p_values[a, b]
+        return p_values
 
     def log_errors_by_case(self) -> Array:
         """The mean logarithm of the error by estimator and case (E, C), NaN where every trial failed."""
@@ -105,8 +136,8 @@ def rank(trials: TrialTable) -> list[Standing]:
     means = _means(log_losses)
     order: list[int] = np.argsort(means, kind="stable").tolist()
     neighbours = [_difference(log_losses, a, b) for a, b in pairwise(order)]
-    p_values = holm([difference.p for difference in neighbours])
-    intervals = _place_intervals(log_losses, order, p_values) if trials.is_tested else None
+    p_values = holm([trials.p(difference) for difference in neighbours])
+    intervals = _place_intervals(trials, order, p_values) if trials.is_tested else None
     error_ratios = _error_ratios(trials, order)
 
     standings = list[Standing]()
@@ -121,7 +152,7 @@ def rank(trials: TrialTable) -> list[Standing]:
             loss=float(np.exp(means[estimator])),
             error_ratio=error_ratio,
             error_interval=error_interval,
-            above=neighbours[position - 1] if has_test else None,
+            above=neighbours[position - 1] if has_test and not trials.is_sequential else None,
             p_above=p_values[position - 1] if has_test else None,
             level=DECIDED / max(len(neighbours), 1),
         )
@@ -158,7 +189,7 @@ def _difference(log_losses: Array, a: int, b: int) -> PairedDifference:
     return paired_difference(log_losses[b] - log_losses[a])
 
 
-def _place_intervals(log_losses: Array, order: Sequence[int], neighbour_p: Sequence[float]) -> list[tuple[int, int]]:
+def _place_intervals(trials: TrialTable, order: Sequence[int], neighbour_p: Sequence[float]) -> list[tuple[int, int]]:
     """The first and the last place of each ranked estimator, by how many others are significantly better and worse.
 
     All pairs are tested, with Holm's correction at 5 %, so that all intervals of a board hold together in 95 of 100.
@@ -166,7 +197,7 @@ def _place_intervals(log_losses: Array, order: Sequence[int], neighbour_p: Seque
     Source: Mogstad, Romano, Shaikh and Wilhelm, Inference for ranks, 2024.
     """
     above, below = np.triu_indices(len(order), k=1)  # (pairs,)
-    p_values = paired_p_values(log_losses[list(order)])[above, below]
+    p_values = trials.pair_p_values()[np.ix_(order, order)][above, below]
     is_neighbour = below == above + 1
     is_decided = ~is_neighbour | (np.array(neighbour_p)[above.clip(max=len(order) - 2)] < DECIDED)
     is_significant = is_decided & (np.array(holm(p_values.tolist())) < ALPHA)
@@ -191,7 +222,7 @@ def _error_ratios(trials: TrialTable, order: Sequence[int]) -> list[tuple[float 
         by_case = log_errors[estimator] - log_errors[order[0]]
         difference = paired_difference(trials.design.means(by_case))
         ratio = float(np.exp(difference.mean)) if difference.units else None
-        ends = difference.interval(level) if trials.is_tested and estimator != order[0] else None
+        ends = trials.interval(difference, level) if trials.is_tested and estimator != order[0] else None
         interval = (float(np.exp(ends[0])), float(np.exp(ends[1]))) if ends else None
         ratios.append((ratio, interval))
     return ratios

@@ -206,7 +206,7 @@ def remarks(board: Board) -> list[str]:
     others = [curve.sentence for curve in board.curves if curve.breaks_at is None]
     undecided = []
     for above, total in zip(board.totals, board.totals[1:], strict=False):
-        if total.decided_above is False:
+        if total.decided_above is False and total.smallest_ratio is not None:
             undecided.append(_undecided(above, total))
     return [*board.remarks, *breaking, *undecided, *others]
 

@@ -9,6 +9,7 @@ from vobench.report.breakdown import BreakdownCurve, breakdown_curves
 from vobench.report.cell import CaseFacts, Cell, make_cell
 from vobench.report.division import divisions
 from vobench.report.frame_statistics import Answered, EstimatorStatistics
+from vobench.report.pair_sentence import named_pairs
 from vobench.report.total import Total, rank_division
 from vobench.runner.environment import Environment
 from vobench.runner.folder import TrialScore, UnavailableCases, unavailable_cases, visible_to, with_sequence
@@ -67,18 +68,21 @@ def make_board(
     title: str = "",
     environment: Environment | None = None,
     remarks: Sequence[str] = (),
+    until_ratio: float | None = None,
 ) -> Board:
     """The board of trials; `answered` is by case and estimator, `facts` by case, and entries may be missing in both.
 
-    `remarks` are further ones, which come first.
+    `remarks` are further ones, which come first. `until_ratio` is given if units were drawn until each pair was decided
+    or alike within this ratio: tests and intervals are then such that hold whenever one stops.
     """
     scores = list(scores)
     unmade = unavailable_cases(scores)
     trials = list(with_sequence(scores))
-    cells = _cells(trials, answered, facts or {})
+    cells = make_cells(trials, answered, facts or {})
     all_remarks = [*remarks, *_unmade_remark(unmade, cases=len({score.case for score in scores}))]
 
-    totals, division_remarks = _rank(cells)
+    totals, division_remarks = _rank(cells, is_sequential=until_ratio is not None)
+    all_remarks += _until_remarks(cells, until_ratio)
     all_remarks += division_remarks
     all_remarks += _truth_noise_remarks(cells)
     return Board(
@@ -93,14 +97,14 @@ def make_board(
     )
 
 
-def _rank(cells: Sequence[Cell]) -> tuple[list[Total], list[str]]:
+def _rank(cells: Sequence[Cell], *, is_sequential: bool) -> tuple[list[Total], list[str]]:
     """The totals of every division, and the remarks on them; a remark that holds for all of them is made once."""
     cells_of = divisions(cells)
     totals = list[Total]()
     labels_of: dict[str, list[str]] = {}
     for division, division_cells in cells_of.items():
         label = division.label(list(cells_of))
-        division_totals, remarks = rank_division(label, division_cells)
+        division_totals, remarks = rank_division(label, division_cells, is_sequential=is_sequential)
         totals += division_totals
         for remark in remarks:
             labels_of.setdefault(remark, []).append(label)
@@ -112,7 +116,7 @@ def _rank(cells: Sequence[Cell]) -> tuple[list[Total], list[str]]:
     return totals, sentences
 
 
-def _cells(trials: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts]) -> list[Cell]:
+def make_cells(trials: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts]) -> list[Cell]:
     """One cell for each case and estimator, in order of their names."""
 
     def cell_key(trial: TrialScore) -> tuple[str, str]:
@@ -133,6 +137,16 @@ def _unmade_remark(unmade: Sequence[UnavailableCases], *, cases: int) -> list[st
     count = sum(len(group.cases) for group in unmade)
     causes = "; ".join(f"{group.names}: {group.cause}" for group in unmade)
     return [f"{count} of {cases} cases could not be simulated or imported and count for no estimator: {causes}"]
+
+
+def _until_remarks(cells: Sequence[Cell], ratio: float | None) -> list[str]:
+    """How units were drawn and what that means for tests, and one sentence for each pair; nothing for other runs."""
+    if ratio is None:
+        return []
+    pairs = named_pairs(cells, ratio=ratio)
+    drawn = f"Units were drawn until each pair was decided or alike within {ratio:g} ×"
+    meaning = "all intervals hold together at 98 %, whenever one stops"
+    return [f"{drawn}; {meaning}", *(pair.sentence for pair in pairs)]
 
 
 def _truth_noise_remarks(cells: Iterable[Cell]) -> list[str]:

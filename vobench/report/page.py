@@ -19,6 +19,7 @@ from vobench.report.leaderboard import Board
 from vobench.report.page_data import page_data
 from vobench.report.run_tables import trial_csv
 from vobench.report.thumbnail import Thumbnails
+from vobench.report.until_decided import recorded_ratio
 from vobench.runner.environment import Environment, read_environment
 from vobench.runner.folder import CASE, PAGE, SUITE, SURVIVED, RunFolder, TrialScore, visible_to, with_sequence
 from vobench.runner.frames import TIMES, FrameRow, new_table, read_frames
@@ -57,6 +58,7 @@ def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> B
         title=title,
         environment=read_environment(folder),
         remarks=design_remarks(facts.values(), base_seed=_base_seed(folder)),
+        until_ratio=recorded_ratio(folder),
     )
 
 

@@ -53,11 +53,25 @@ class Total:
     is_efficient: bool = False
 
 
-def rank_division(label: str, cells: Sequence[Cell]) -> tuple[list[Total], list[str]]:
+def ranked_table(cells: Sequence[Cell]) -> tuple[list[str], ranking.TrialTable | None]:
+    """The ranked estimators of a division by name, and their trials on the cases that all of them have, if any."""
+    ranked = [cell for cell in _applicable(cells) if is_ranked(cell)]
+    names = sorted({cell.estimator for cell in ranked})
+    by_case = _grouped(ranked, lambda cell: cell.case)
+    common = [case for case, members in by_case.items() if len(members) == len(names)]
+    if not common:
+        return names, None
+    by_estimator = _grouped([cell for cell in ranked if cell.case in set(common)], lambda cell: cell.estimator)
+    design = _design([by_case[case][0] for case in common])
+    return names, _trial_table(by_estimator, names, common, design)
+
+
+def rank_division(label: str, cells: Sequence[Cell], *, is_sequential: bool = False) -> tuple[list[Total], list[str]]:
     """The totals of a division, the best estimator first, and remarks on what they cover.
 
-    Baselines and oracles follow without a rank. Cases without a sensor that an estimator requires are excluded for
-    that estimator. If no case has it, the estimator counts as failed.
+    `is_sequential` states that the number of units depends on what they showed. Baselines and oracles follow without a
+    rank. Cases without a sensor that an estimator requires are excluded for that estimator. If no case has it, the
+    estimator counts as failed.
     """
     applicable = _applicable(cells)
     ranked = [cell for cell in applicable if is_ranked(cell)]
@@ -75,7 +89,9 @@ def rank_division(label: str, cells: Sequence[Cell]) -> tuple[list[Total], list[
     ranked_names = names if ranked else []
     design = _design([by_case[case][0] for case in common])
     unranked = beside if ranked else names
-    totals = _totals(label, applicable, common, design, ranked=ranked_names, unranked=unranked)
+    totals = _totals(
+        label, applicable, common, design, ranked=ranked_names, unranked=unranked, is_sequential=is_sequential
+    )
     if len(ranked_names) > 1:
         remarks += _untested_remark(design)
     return _mark_efficient(totals), remarks
@@ -89,9 +105,11 @@ def _totals(
     *,
     ranked: Sequence[str],
     unranked: Sequence[str],
+    is_sequential: bool,
 ) -> list[Total]:
     """The totals of the ranked estimators in their order, then those of the others by score."""
-    by_estimator = _grouped([cell for cell in cells if cell.case in set(cases)], lambda cell: cell.estimator)
+    shared = set(cases)
+    by_estimator = _grouped([cell for cell in cells if cell.case in shared], lambda cell: cell.estimator)
 
     def total_of(name: str, standing: ranking.Standing, *, has_rank: bool) -> Total:
         return _total(label, by_estimator[name], standing, design, has_rank=has_rank)
@@ -99,14 +117,14 @@ def _totals(
     totals = list[Total]()
     first: list[str] = []
     if ranked:
-        table = _trial_table(by_estimator, ranked, cases, design)
+        table = _trial_table(by_estimator, ranked, cases, design, is_sequential=is_sequential)
         for standing in ranking.rank(table):
             totals.append(total_of(ranked[standing.index], standing, has_rank=True))
         first = [totals[0].estimator]
 
     others = list[Total]()
     for name in unranked:
-        table = _trial_table(by_estimator, [*first, name], cases, design)
+        table = _trial_table(by_estimator, [*first, name], cases, design, is_sequential=is_sequential)
         standing = ranking.beside(table)
         others.append(total_of(name, standing, has_rank=False))
     return totals + sorted(others, key=lambda total: -total.score)
@@ -162,7 +180,12 @@ def _untested_remark(design: Design) -> list[str]:
 
 
 def _trial_table(
-    by_estimator: Mapping[str, Sequence[Cell]], names: Sequence[str], cases: Sequence[str], design: Design
+    by_estimator: Mapping[str, Sequence[Cell]],
+    names: Sequence[str],
+    cases: Sequence[str],
+    design: Design,
+    *,
+    is_sequential: bool = False,
 ) -> ranking.TrialTable:
     """The trials of some estimators on the cases."""
     row_of = {name: row for row, name in enumerate(names)}
@@ -175,7 +198,7 @@ def _trial_table(
         index = row_of[cell.estimator], column_of[cell.case]
         losses[index][: cell.trials] = cell.losses
         errors[index][: cell.trials] = cell.errors
-    return ranking.TrialTable(losses, errors, design)
+    return ranking.TrialTable(losses, errors, design, is_sequential)
 
 
 def _total(label: str, cells: Sequence[Cell], standing: ranking.Standing, design: Design, *, has_rank: bool) -> Total:

@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from hashlib import sha256
 from pathlib import Path, PurePosixPath
+from shutil import copyfile
 from types import MappingProxyType
 from typing import Any
 from zipfile import ZIP_DEFLATED, BadZipFile, ZipFile, ZipInfo
@@ -31,6 +32,7 @@ from vobench.runner.folder import (
     SEQUENCE,
     SUITE,
     TIMES_HASHES,
+    UNTIL,
     RunFolder,
     TrialScore,
     open_run,
@@ -42,7 +44,7 @@ from vobench.runner.rescore import rescored
 from vobench.runner.store import Tell, write_json
 from vobench.temporary import temporary_folder
 
-OF_RUN = (SUITE, ENVIRONMENT, ESTIMATORS)
+OF_RUN = (SUITE, ENVIRONMENT, ESTIMATORS, UNTIL)
 OF_CASE = (CASE, GROUND_TRUTH)
 OF_TRIAL = (SCORE, ESTIMATE, REVISED, COVARIANCE, FRAMES, TIMES, LOG)
 SEQUENCES = "sequence_hashes.json"  # the hashes of the recordings, which are too large for a bundle
@@ -285,6 +287,9 @@ def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFo
         made.path.mkdir(parents=True)
         environments = [stated for folder in folders if (stated := read_environment(folder))]
         write_json(made.path / ENVIRONMENT, merged_environment(environments))
+        until = [folder.path / UNTIL for folder in folders if (folder.path / UNTIL).is_file()]
+        if until:
+            copyfile(until[0], made.path / UNTIL)  # the units of the merged run depend on what they showed, too
         known = dict[str, Any]()
         for folder, name in zip(folders, map(_plain_name, names), strict=True):
             facts = {each["label"]: each for each in _stated(folder)}

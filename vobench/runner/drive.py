@@ -19,10 +19,10 @@ from vobench.suite.case import Case
 from vobench.suite.floor_outline import floor_outlines_m
 from vobench.suite.plan import Plan
 from vobench.suite.scene_spec import SceneFile
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.kinematics import Kinematics
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame

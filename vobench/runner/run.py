@@ -1,7 +1,7 @@
 """Runs a suite: performs its tasks, and writes the results to one folder."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import ZipFile
@@ -38,9 +38,8 @@ from vobench.runner.key import digest, folder_digest
 from vobench.runner.store import Store, Tell, write_json
 from vobench.runner.task import Task, missing, plan
 from vobench.sequence import read_import_notes
-from vobench.suite.case import Case
 from vobench.suite.estimator_entry import EstimatorEntry
-from vobench.suite.plan import Plan
+from vobench.suite.plan import AnyCase, Plan
 from vobench.suite.source import RecordedCase
 from vobench.suite.yaml_file import plain
 
@@ -93,7 +92,7 @@ def run_suite(
     require_held()
     if unopened := note_on_unopened():
         tell(unopened)
-    tasks = plan(suite, recordings)
+    tasks = plan(_with_hidden_truth(suite, root), recordings)
     scores = [task for task in tasks if task.stage == "score"]
     results = Store(store)
     with results.in_use(tell):
@@ -116,6 +115,15 @@ def run_suite(
             write_hashes(folder)
 
         return make_run(root, suite.suite.name, digest(gathering.identity), fill)
+
+
+def _with_hidden_truth(suite: Plan, root: Path) -> Plan:
+    """The plan with everything hidden that tells the truth: the runs below `root`, and all recordings of the suite."""
+    hidden = [root.resolve()]
+    for case in suite.recorded:
+        truth = case.source.truth
+        hidden += [Path(path).resolve() for path in (case.source.path, truth) if path]
+    return replace(suite, hidden=(*suite.hidden, *hidden))
 
 
 class _Gathering:
@@ -192,7 +200,7 @@ def _require_sequences(unmade: Mapping[str, _Failure], cases: Collection[str], *
 
 
 def _gather(
-    task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, folder: RunFolder, failure: _Failure | None
+    task: Task, cases: Mapping[str, AnyCase], store: Path, folder: RunFolder, failure: _Failure | None
 ) -> TrialScore:
     """Copy the files of a trial from the store, and before the first trial of a case, those of the case."""
     stop.check()
@@ -240,7 +248,7 @@ def _write_failed(task: Task, failure: _Failure, folder: RunFolder) -> TrialScor
     return score
 
 
-def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> None:
+def _gather_case(case: AnyCase, sequence: Path, target: Path) -> None:
     target.mkdir(parents=True)
     is_made = sequence.is_dir()
     settings = plain(case)

@@ -15,17 +15,19 @@ import numpy as np
 from vobench.asset.furniture import Part
 from vobench.asset.outdoors import walker
 from vobench.asset.panorama import Surroundings
-from vobench.asset.room import FINISHES, OUTWARD, Instance, Opening, Piece, shell, things
+from vobench.asset.room import FINISHES, OUTWARD, Instance, Opening, Piece, piece_rng, shell, things
 from vobench.asset.shape import at, block, card
 from vobench.errors import SuiteError, VobenchError, error_sentence
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.scene import scene as scripted
 from vobench.scene.generated_place import GeneratedPlace
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, WHITE, Material, emitted_cd_m2
-from vobench.scene.mesh import Thing, areas_m2, corners, moved
+from vobench.scene.mesh import face_corners, moved
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing
 from vobench.suite.scene_check import materials_used
 from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_file import scene_content
@@ -289,7 +291,7 @@ def _area_lights(things: Sequence[Thing], materials: Mapping[str, Material]) -> 
         number = counts[thing.name]
         counts[thing.name] += 1
         name = f"{thing.name}.{number}" if number else thing.name
-        power_lm = luminance * np.pi * areas_m2(corners(thing.mesh)).sum()
+        power_lm = luminance * np.pi * areas_m2(face_corners(thing.mesh)).sum()
         red, green, blue = (emission / luminance).tolist()
         yield AreaLight(name, thing.mesh, power_lm, colour=(red, green, blue), material=thing.material)
 
@@ -327,7 +329,7 @@ def _mover_contents(mover: MoverSpec, spec: SceneFile) -> Contents:
 
 def _walker(name: str, motion: scripted.WaypointMotion, seed: int) -> Contents:
     """A person who walks along a path: one mover per limb, all with the same name."""
-    person = walker(Piece("person", name, (0.0, 0.0, 0.0)).rng(seed))
+    person = walker(piece_rng(name, seed))
     limb_names = [f"{name}.{index}" for index in range(len(person.limbs))]
     limb_parts = [(limb_name, limb.parts) for limb_name, limb in zip(limb_names, person.limbs, strict=True)]
     all_things, materials = things(limb_parts)

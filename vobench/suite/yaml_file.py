@@ -4,7 +4,6 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from copy import deepcopy
 from dataclasses import MISSING, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
@@ -12,13 +11,14 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
-from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from vobench.errors import FilePlace, Mistake, SuiteError, VobenchError
-from vobench.setting import COMPLAINTS, hints, unit_of
+from vobench.setting import MESSAGES, hints, unit_of
 from vobench.suite import catalog, file_kind
+from vobench.suite.display_path import display_path
 from vobench.suite.file_kind import Kind
-from vobench.suite.yaml_complaint import complaints, location
+from vobench.suite.validation_message import location, validation_mistakes
 from vobench.suite.yaml_parser import parse_file, parse_text
 from vobench.suite.yaml_source import Keys, YamlFile, line_of, plain_tree
 
@@ -61,11 +61,11 @@ def read_all(
     Raises SuiteError if the file is not YAML, or is evidently of another kind.
     """
     if kind:
-        _refuse(path, file_kind.about_model(kind, path))
+        _refuse(path, file_kind.model_sentence(kind, path))
     has_include = INCLUDE in hints(model)
     source, duplicates = _read_with_included(path, kind or "suite", ()) if has_include else _read_mapping(path)
     if kind:
-        _refuse(path, file_kind.about_other_kind(kind, path, [*source.plain]))
+        _refuse(path, file_kind.wrong_kind_sentence(kind, path, [*source.plain]))
     if changes:
         source = _changed(source, changes)
     return _checked_reading(model, source, duplicates)
@@ -73,7 +73,7 @@ def read_all(
 
 def _refuse(path: Path, sentence: str | None) -> None:
     if sentence:
-        raise SuiteError(Mistake(sentence, (FilePlace(file_kind.display_path(path)),)))
+        raise SuiteError(Mistake(sentence, (FilePlace(display_path(path)),)))
 
 
 def _read_mapping(path: Path) -> tuple[YamlFile, list[Mistake]]:
@@ -113,21 +113,37 @@ def _read_with_included(path: Path, kind: Kind, including: tuple[Path, ...]) -> 
 
 def _changed(source: YamlFile, changes: Mapping[str, str]) -> YamlFile:
     """The content of a file with other values. Raises SuiteError for an impossible key or value."""
-    tree = deepcopy(source.marked)
+    tree = _shallow_copy(source.marked)
     for dotted_keys, value in changes.items():
         _set_value(tree, dotted_keys, value)
     return replace(source, marked=tree)
 
 
+def _shallow_copy(section: Any) -> Any:
+    """A mapping or list of a file with the same values and line numbers; another one is not shared, so it is itself."""
+    if isinstance(section, CommentedMap):
+        return section.copy()
+    if isinstance(section, CommentedSeq):
+        copy = CommentedSeq(section)
+        section.copy_attributes(copy)
+        return copy
+    return section
+
+
 def _set_value(tree: Any, dotted_keys: str, value: str) -> None:
-    """Replace the value at some keys by a YAML value. Missing sections are created."""
+    """Replace the value at some keys by a YAML value. Missing sections are created.
+
+    The sections on the way are copied before they change, because other readers of the file share them.
+    """
     change = f"{SET_OPTION} {dotted_keys}={value}"
     *section_keys, last_key = [int(key) if key.isdigit() else key for key in dotted_keys.split(".")]
     section = tree
     for key in section_keys:
-        section = _subsection(section, key)
-        if not isinstance(section, dict | list):
+        subsection = _subsection(section, key)
+        if not isinstance(subsection, dict | list):
             raise SuiteError(f"{change}: there are no keys below {key!r}")
+        section[key] = _shallow_copy(subsection)
+        section = section[key]
     if isinstance(section, list) and (not isinstance(last_key, int) or last_key >= len(section)):
         raise SuiteError(f"{change}: a list of {len(section)} has no entry {last_key!r}")
     try:
@@ -161,7 +177,7 @@ def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistak
             return FileReading(whole, source)
     except ValidationError as error:
         wrong_places += [location(each) for each in error.errors()]
-        all_mistakes += complaints(source, error, json_schema(model), unread)
+        all_mistakes += validation_mistakes(source, error, json_schema(model), unread)
 
     sections, kept = _intact_sections(model, data, wrong_places)
     partial = _partial_model(model, sections)
@@ -180,7 +196,7 @@ def _not_in_json(tree: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
         for index, value in enumerate(tree):
             yield from _not_in_json(value, (*keys, index))
     elif isinstance(tree, float) and not math.isfinite(tree):
-        yield keys, f"{COMPLAINTS['finite_number']} (got {tree})"
+        yield keys, f"{MESSAGES['finite_number']} (got {tree})"
     elif not (tree is None or isinstance(tree, str | bool | int | float)):
         yield keys, f"should be a number, text, a list or keys with values (got {tree})"
 
@@ -234,7 +250,7 @@ def checked_section(kind: type[Model], data: Any, at: FilePlace) -> Model:
         return checked(kind, data)
     except ValidationError as error:
         source = YamlFile(Path(at.file), data)
-        section_mistakes = list(complaints(source, error, json_schema(kind)))
+        section_mistakes = list(validation_mistakes(source, error, json_schema(kind)))
     mistakes = list[Mistake]()
     for mistake in section_mistakes:
         inner = mistake.places[0]
