@@ -4,8 +4,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from vobench.cli.run import SEEDS_PER_DRAW, Changes, Execution, TrialLimits
+from vobench.cli.run import Changes, Execution, TrialLimits
 from vobench.errors import InputError, SuiteError
+from vobench.suite.draw import SEEDS_PER_DRAW
 from vobench.suite.suite import read_plan
 from vobench.suite.suite_spec import LARGEST_BASE_SEED
 
