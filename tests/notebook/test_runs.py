@@ -114,11 +114,22 @@ def test_a_forged_score_of_a_bundle_is_named_and_does_not_count(ran, tmp_path):
 def test_plots_take_the_cases_and_estimators_that_there_are(ran):
     run = vobench.read_run(ran)
     names = [text.get_text() for text in run.plot("short").axes[0].get_legend().get_texts()]
-    assert names == ["ground truth", "start", "wheel_odometry", "stand_still"]
+    assert names == ["ground truth", "start", "stand_still", "wheel_odometry"]
     names = [text.get_text() for text in run.plot(estimators="stand_still").axes[0].get_legend().get_texts()]
     assert names == ["ground truth", "start", "stand_still"]
     with pytest.raises(UnknownNameError, match="no estimator named 'stand_stil'"):
         run.plot(estimators=["stand_stil"])
+
+
+def test_a_plot_has_the_kinds_of_the_command(ran):
+    run = vobench.read_run(ran)
+    matrix = run.plot(kind="matrix", width_inches=5)
+    assert matrix.get_size_inches()[0] == 5
+    assert len(matrix.axes[0].get_yticklabels()) == len(run.cases)
+    over_path = run.plot("short", kind="error", over="path").axes[1]
+    assert over_path.get_xlabel() == "path length (m)"
+    with pytest.raises(UnknownNameError, match="Did you mean 'matrix'"):
+        run.plot(kind="matrx")
 
 
 def test_a_view_without_a_display_says_what_to_do_and_a_saved_one_is_a_file(ran, tmp_path, monkeypatch):

@@ -121,7 +121,8 @@ def test_every_report_says_the_drift_of_a_still_case_and_the_commonest_reason_of
     scores = [scored("still_one", drift_m=0.00234, ate_m=5.0), scored("moving_one", case="ahead")]
     folder = write_run(tmp_path / "suite" / "stamp", scores)
     with new_table(folder.estimate("down", "still_one", 0) / FRAMES, COLUMNS) as table:
-        table.writerows({"frame": k, "t_ns": k, "status": "lost", "reason": f"few <{9 - 2 * k}>"} for k in (1, 2))
+        for k in (1, 2):
+            table.writerow({"frame": k, "t_ns": k, "status": "lost", "reason": f"few <{9 - 2 * k}>"})
     page.write_reports(folder, scores)
     text = (folder.path / f"leaderboard.{form}").read_text(encoding="utf-8")
     if form == "md":

@@ -27,7 +27,8 @@ sky: {illuminance_lx: 8000}
 MAKER = """import numpy as np
 from vobench.asset.shape import at, lathe
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, moved
+from vobench.scene.mesh import moved
+from vobench.scene.triangles import Thing
 
 def make(seed):
     column = lathe([[0, 0], [0.3, 0], [0.3, 2.0], [0, 2.0]])
@@ -205,7 +206,7 @@ def test_a_maker_gets_the_scenes_seed_and_what_it_raises_is_named(yard, tmp_path
 
 TRIMESH_MAKER = """import trimesh
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing
+from vobench.scene.triangles import Thing
 
 def make(seed):
     column = trimesh.creation.cylinder(0.3, 2.0)

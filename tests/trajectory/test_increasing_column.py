@@ -5,7 +5,7 @@ import pytest
 
 from vobench.errors import TrajectoryError
 from vobench.trajectory.any_format import parse_any
-from vobench.trajectory.increasing_column import distinct_rows, require_steps
+from vobench.trajectory.increasing_column import increasing_rows, require_steps
 from vobench.trajectory.text_table import TextTable
 
 TUM = "1.5 1 2 3 0 0 0.6 0.8\n2.5 2 3 4 0 0 0 1\n"
@@ -33,7 +33,7 @@ def test_steps_may_be_no_smaller_than_demanded():
 
 def test_distinct_rows_are_the_first_of_their_number():
     table = TextTable("run.txt", [1, 2, 3, 5], ["7", "7", "8", "8"], np.empty((4, 0)))
-    distinct = distinct_rows(table, np.array([7, 7, 8, 8]), "frame number")
+    distinct = increasing_rows(table, np.array([7, 7, 8, 8]), "frame number")
     assert distinct.numbers.tolist() == [7, 8]
     assert distinct.rows.tolist() == [0, 2]
     assert distinct.notes == (

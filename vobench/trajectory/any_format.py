@@ -7,7 +7,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.trajectory.csv_layout import csv_layout
 from vobench.trajectory.euroc import EUROC_COLUMNS
-from vobench.trajectory.increasing_column import distinct_rows
+from vobench.trajectory.increasing_column import increasing_rows
 from vobench.trajectory.kitti import KITTI_COLUMNS, NUMBERED_COLUMNS, frame_numbers, matrix_poses
 from vobench.trajectory.quaternion_columns import QuaternionOrder, rotations
 from vobench.trajectory.stamp_text import StampUnit, unchecked_stamps_ns
@@ -119,7 +119,7 @@ def _parse_stamped(
 ) -> ParsedTrajectory:
     """The poses of rows with a stamp, a position and a quaternion. `unit` overrides the unit of the format."""
     used_unit = unit or format_unit
-    distinct = distinct_rows(table, unchecked_stamps_ns(table, used_unit), "stamp")
+    distinct = increasing_rows(table, unchecked_stamps_ns(table, used_unit), "stamp")
     R = rotations(table, table.values[:, 4:8], order)
     T = se3.transform(R, table.values[:, 1:4])
     return ParsedTrajectory(
@@ -141,6 +141,6 @@ def _parse_unstamped(table: TextTable, order: QuaternionOrder) -> ParsedTrajecto
 
 def _parse_numbered_matrices(table: TextTable) -> ParsedTrajectory:
     """The poses of rows with a frame number and a matrix."""
-    distinct = distinct_rows(table, frame_numbers(table), "frame number")
+    distinct = increasing_rows(table, frame_numbers(table), "frame number")
     T = matrix_poses(table)[distinct.rows]
     return ParsedTrajectory(None, T, frames=distinct.numbers, notes=distinct.notes)

@@ -11,7 +11,7 @@ from vobench.trajectory.trajectory import Stamps
 
 
 @dataclass(frozen=True, slots=True)
-class DistinctRows:
+class IncreasingRows:
     """The rows of a table after repeated stamps or frame numbers have been removed.
 
     `numbers` (K,) are the stamps or frame numbers of the remaining rows.
@@ -24,7 +24,7 @@ class DistinctRows:
     notes: tuple[str, ...]
 
 
-def distinct_rows(table: TextTable, numbers: Stamps, noun: str) -> DistinctRows:
+def increasing_rows(table: TextTable, numbers: Stamps, noun: str) -> IncreasingRows:
     """The first row of each run of rows with the same number, given the number (N,) of each row.
 
     `noun` is the name of these numbers in messages.
@@ -33,14 +33,14 @@ def distinct_rows(table: TextTable, numbers: Stamps, noun: str) -> DistinctRows:
     require_steps(table, numbers, least_step=0, demand=f"{noun}s must increase")
     repeated_rows = np.flatnonzero(np.diff(numbers) == 0) + 1
     if not repeated_rows.size:
-        return DistinctRows(numbers, np.arange(len(numbers)), ())
+        return IncreasingRows(numbers, np.arange(len(numbers)), ())
 
     rows = np.flatnonzero(np.diff(numbers, prepend=numbers[:1] - 1))
     note = (
         f"rows that repeat the {noun} of the row before were left out: {repeated_rows.size} of {len(numbers)}, "
         f"the first at {table.place(repeated_rows[0])}"
     )
-    return DistinctRows(numbers[rows], rows, (note,))
+    return IncreasingRows(numbers[rows], rows, (note,))
 
 
 def require_steps(table: TextTable, numbers: Stamps, *, least_step: int, demand: str) -> None:
