@@ -5,6 +5,7 @@ import csv
 import numpy as np
 import pytest
 
+from vobench.report.drive_plot import PLAN
 from vobench.trajectory.tum import parse_tum
 
 WAYS = """name: ways
@@ -85,6 +86,24 @@ def test_the_plot_shows_the_floor_and_the_point_that_is_led_where_there_are_such
     legs, spin = ((ways / f"{name}.svg").read_text() for name in ("legs", "spin"))
     assert [word in legs for word in ("point h", "carpet", "u requested")] == [True, False, True]
     assert [word in spin for word in ("point h", "carpet", "u requested")] == [False, True, True]
+
+
+def test_paths_are_drawn_in_the_plan_of_a_place_that_all_their_cases_share(vobench, ways):
+    assert vobench("drive", "ways", "-t", "legs", "--out", "one.svg").code == 0
+    second = (ways / "scenes" / "closet.yaml").read_text().replace("name: closet", "name: cellar")
+    (ways / "scenes" / "cellar.yaml").write_text(second)
+    (ways / "suites" / "ways.yaml").write_text(WAYS.replace("scenes: [closet]", "scenes: [closet, cellar]"))
+    assert vobench("drive", "ways", "-t", "legs", "--out", "two.svg").code == 0
+    assert [f"stroke: {PLAN}" in (ways / f"{name}.svg").read_text() for name in ("one", "two")] == [True, False]
+
+
+def test_a_suite_of_scenarios_is_driven_too_and_each_drive_is_drawn_in_its_own_place(vobench, here):
+    (here / "suites" / "hard.yaml").write_text(
+        "name: hard\nscenarios: {noise: 1, corridor: 1}\nestimators: [stand_still]\n"
+    )
+    said = vobench("drive", "hard", "--out", "it.svg", "--json").json
+    assert [one["trajectory"] for one in said["trajectories"]] == ["noise", "corridor"]
+    assert (here / "it.svg").read_text().count(f"stroke: {PLAN}") == 2
 
 
 @pytest.mark.parametrize("ending", ["svg", "png", "pdf"])

@@ -2,6 +2,7 @@
 
 import pytest
 
+from tests.generated import SCENE
 from vobench.cli import list as listing
 from vobench.suite.catalog import KINDS, CatalogEntry, entries
 
@@ -72,3 +73,15 @@ def test_a_file_of_every_kind_that_is_read_whole_has_the_summary_that_is_read_of
         summary = listing._parsed_summary(entry)
         assert summary
         assert listing._summary(entry) == summary
+
+
+def test_scenes_with_a_generator_have_seeds_and_others_and_other_kinds_have_not(vobench, here):
+    (here / "scenes" / "cell.yaml").write_text(SCENE)
+    (here / "scenes" / "plain.yaml").write_text(SCENE.replace("generator:", "# generator:"))
+    rows = vobench("list", "--json").json["entries"]
+    with_seeds = [row["name"] for row in rows if row["seeds"]]
+    assert with_seeds == ["cell", "flat", "office"]
+    table = vobench("list", "scenes").out
+    line = next(line for line in table.splitlines() if " flat " in line)
+    assert " yes " in line
+    assert " yes " not in next(line for line in table.splitlines() if " closet " in line)

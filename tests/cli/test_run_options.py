@@ -5,7 +5,10 @@ from types import SimpleNamespace
 import pytest
 
 from vobench.cli.run import Changes, Execution, TrialLimits
-from vobench.errors import InputError
+from vobench.errors import InputError, SuiteError
+from vobench.suite.draw import SEEDS_PER_DRAW
+from vobench.suite.suite import read_plan
+from vobench.suite.suite_spec import LARGEST_BASE_SEED
 
 
 @pytest.mark.parametrize(
@@ -70,3 +73,42 @@ def test_changes_are_values_by_key_and_repeats_is_one_of_them(options, values):
 def test_a_change_without_an_equals_sign_is_refused():
     with pytest.raises(InputError, match=r"--set should be key=value, as in rigs\.ahead\.pitch_deg=20, got 'seed'"):
         Changes(changes=["seed"]).values("quickstart")
+
+
+SPREAD = """name: cells
+scenes: [{name: flat, seeds: 4}, room]
+trajectories: {tour: {kind: wander, length_m: 3, seeds: 1}}
+spread: {units: 5, each: 2}
+estimators: [stand_still]
+"""
+
+
+@pytest.fixture
+def spread_suite(tmp_path):
+    path = tmp_path / "cells.yaml"
+    path.write_text(SPREAD)
+    return str(path)
+
+
+def test_more_units_have_more_seeds_of_the_places_and_not_of_other_scenes(spread_suite):
+    changes = Changes(units=10).values(spread_suite)
+    assert changes == {"spread.units": "10", "scenes.0.seeds": "12"}  # eight flats and the room are nine
+    plan = read_plan(spread_suite, changes=changes)
+    assert plan.suite.spread.units == 10
+    assert all(case.scene.generated or case.variant["scene"] == "room" for case in plan.simulated)
+
+
+def test_fewer_units_leave_the_places_as_they_are(spread_suite):
+    assert Changes(units=3).values(spread_suite) == {"spread.units": "3"}
+
+
+def test_units_of_a_suite_without_a_design_are_refused():
+    with pytest.raises(SuiteError, match="--units is for suites with `spread`, and this suite has none"):
+        Changes(units=3).values("quickstart")
+
+
+def test_fresh_units_have_a_base_seed_of_their_own_that_is_far_from_any_other():
+    drawn = [int(Changes(fresh_units=True).values("quickstart")["base_seed"]) for _ in range(20)]
+    assert len(set(drawn)) > 15
+    assert all(seed >= SEEDS_PER_DRAW and seed % SEEDS_PER_DRAW == 0 for seed in drawn)
+    assert max(drawn) <= LARGEST_BASE_SEED

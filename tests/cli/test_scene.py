@@ -1,9 +1,12 @@
 """vobench scene says what is in a scene, and draws it."""
 
+from pathlib import Path
+
 import cv2
 import pytest
 import trimesh
 
+from tests.generated import write_cell
 from vobench.estimator import isolation
 from vobench.estimator.program import sandbox_here
 from vobench.suite import scene_build
@@ -108,3 +111,48 @@ def test_in_the_sandbox_a_strangers_maker_leaves_nothing_and_is_named(vobench, s
     assert not (strange / "ran").exists()
     assert said.err.count(f"runs the program {strange}/maker.py") == 1
     assert "Read-only file system" in said.err + said.out or "Permission denied" in said.err + said.out
+
+
+@pytest.fixture
+def cell(here):
+    """The scene `cell` of a stranger's generator beside the suites."""
+    return write_cell(here / "scenes" / "cell")
+
+
+def test_a_place_of_a_generator_is_surveyed_by_its_seed_and_its_lighting(vobench, cell):
+    said = vobench("scene", "cell", "--seed", 3, "--lighting", "evening")
+    assert said.code == 0
+    assert said.out.splitlines()[0].startswith("cell.3.evening: 6 things, ")
+    assert said.err.count("generator.py") == 1  # it runs in the sandbox, and is named
+    other = vobench("scene", "cell", "--seed", 4, "--lighting", "evening").out
+    assert [line for line in other.splitlines() if line.startswith("size: ")] != [
+        line for line in said.out.splitlines() if line.startswith("size: ")
+    ]
+
+
+def test_a_contact_sheet_has_a_picture_for_each_seed(vobench, cell, here, monkeypatch):
+    asked = []
+    monkeypatch.setattr("vobench.cli.scene.save_place_sheet", lambda *words, **options: asked.append((words, options)))
+    assert vobench("scene", "cell", "--seeds", 3, "--out", "sheet.png").code == 0
+    assert vobench("scene", "cell", "--seeds", 2, "--seed", 7, "--lighting", "night", "--out", "sheet.png").code == 0
+    (words, first), (_, second) = asked
+    assert words == ("cell", Path("sheet.png"))
+    assert (first["seeds"], first["first_seed"], first["lighting"]) == (3, 1, "drawn")
+    assert (second["seeds"], second["first_seed"], second["lighting"]) == (2, 7, "night")
+
+
+@pytest.mark.parametrize(
+    ("words", "sentence"),
+    [
+        (("cell",), "'cell' has only a generator; give it a seed, as in {name: cell, seed: 1}"),
+        (("cell", "--seeds", 2), "--seeds draws a sheet; add --out sheet.png"),
+        (("cell", "--lighting", "night"), "--lighting is for the places of a generator; add --seed"),
+        (("closet", "--seed", 2), "'closet' has no generator, so it has no seeds; leave seed and seeds out"),
+        (("cell", "--seed", 2, "--lighting", "nigth"), "no lighting named 'nigth'. Did you mean 'night'?"),
+    ],
+)
+def test_a_mistake_about_seeds_is_one_line(vobench, cell, words, sentence):
+    said = vobench("scene", *words)
+    assert said.code == 1
+    assert sentence in said.err
+    assert said.err.count("\n") == 1

@@ -70,6 +70,25 @@ def test_patches_of_floor_are_drawn_and_each_surface_is_named_once(log, tmp_path
     assert sorted(named) == ["seam", "wet"]
 
 
+def plan_points_m(path):
+    """The corners of the line of the floor plan in an SVG, in its own units."""
+    text = path.read_text()
+    end = text.index(f"stroke: {drive_plot.PLAN}")
+    start = text.rindex('<path d="', 0, end) + len('<path d="')
+    return text[start:end].count("M ")
+
+
+def test_a_path_is_drawn_in_the_plan_of_its_place_as_far_as_it_is_near(log, tmp_path):
+    wall_m = np.array([[[-50.0, 1.0], [50.0, 1.0]]])  # it passes the path, and ends far away
+    crate_m = np.array([[[1.0, -0.5], [1.2, -0.5]]])
+    far_m = np.array([[[80.0, 80.0], [80.0, 81.0]]])
+    save_drive_plot(tmp_path / "it.svg", [replace(log, outlines_m=np.concatenate([wall_m, crate_m, far_m]))])
+    assert plan_points_m(tmp_path / "it.svg") == 2
+    save_drive_plot(tmp_path / "far.svg", [replace(log, outlines_m=far_m)])
+    save_drive_plot(tmp_path / "none.svg", [log])
+    assert (tmp_path / "far.svg").read_bytes() == (tmp_path / "none.svg").read_bytes()
+
+
 def test_several_logs_are_rows_of_one_figure_and_the_same_file_twice(log, tmp_path):
     logs = [log, replace(log, title="again")]
     for name in ("a.svg", "b.svg"):

@@ -64,8 +64,30 @@ def test_four_seeds_in_a_row_have_the_four_lightings() -> None:
         assert drawn == set(LIGHTINGS)
 
 
-def test_more_units_take_more_seeds_of_places() -> None:
-    suite = {"spread": {"units": 12}, "scenes": [{"name": "flat", "seeds": 6}, "room"]}
-    assert changes_for_units(suite, 24) == {"spread.units": "24", "scenes.0.seeds": "12"}
+TOUR = {"tour": {"kind": "wander", "seeds": 2}}
+
+
+@pytest.mark.parametrize(
+    ("suite", "count", "changes"),
+    [
+        ({"scenes": [{"name": "flat", "seeds": 6}, "room"], "trajectories": TOUR}, 24, {"scenes.0.seeds": "12"}),
+        ({"scenes": [{"name": "flat", "seeds": 6}], "trajectories": TOUR}, 12, {}),
+        ({"scenes": [{"name": "flat", "seeds": 6}], "trajectories": TOUR}, 6, {}),
+        # Twice as many seeds and the room would be nine places.
+        (
+            {"scenes": [{"name": "flat", "seeds": 4}, "room"], "trajectories": {"tour": {}}},
+            10,
+            {"scenes.0.seeds": "12"},
+        ),
+        ({"over": ["trajectory"], "scenes": ["room"], "trajectories": TOUR}, 30, {"trajectories.tour.seeds": "30"}),
+        ({"scenes": ["room"], "trajectories": {"tour": {}}}, 30, {}),
+    ],
+)
+def test_more_units_take_more_seeds_of_places_or_drives(suite, count, changes) -> None:
+    written = {"spread": {"units": 12, "over": suite.pop("over", ["scene", "trajectory"])}, **suite}
+    assert changes_for_units(written, count) == {"spread.units": str(count), **changes}
+
+
+def test_units_of_a_suite_without_a_design_are_refused() -> None:
     with pytest.raises(SuiteError, match="this suite has none"):
         changes_for_units({}, 24)

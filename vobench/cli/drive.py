@@ -35,7 +35,9 @@ def drive_command(
     trajectory: Annotated[
         str | None, typer.Option("--trajectory", "-t", help="Drive only this trajectory of the suite.")
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="Plot paths and speeds to this .svg, .png or .pdf.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Plot paths in the plan of their place, and speeds, to this .svg, .png or .pdf.")
+    ] = None,
     tum: Annotated[
         Path | None, typer.Option(help="Write the true path of the body on one trajectory, in TUM format.")
     ] = None,
@@ -54,7 +56,7 @@ def drive_command(
 
     driven = drive_plan(plan, trajectory=trajectory)
     if out:
-        save_drive_plot(out, [drive_log(drive) for drive in driven.drives])
+        save_drive_plot(out, [drive_log(drive, has_plan=True) for drive in driven.drives])
     if tum:
         tum.write_text(driven.drives[0].tum(), encoding="utf-8")
     if csv:

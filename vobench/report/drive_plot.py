@@ -25,10 +25,14 @@ CELL_INCHES = 2.3
 BODY = "#0072B2"
 POINT = "#009E73"
 REFERENCE = "#D55E00"
+PLAN = "#9c9c9c"  # darker than the grid
 FLOORS = {"wet": "#56B4E9", "carpet": "#CC79A7", "seam": "#E69F00"}
 ARROWS = 24
 LEAST_SPAN_M = 0.1
 LEAST_SPAN_S = 1e-3
+# A floor plan is drawn up to this distance around the path, plus this share of the size of the path.
+PLAN_MARGIN_M = 2.0
+PLAN_SHARE = 0.75
 LEVEL = 1e-6  # metres or radians of a body on a level floor
 
 
@@ -38,7 +42,7 @@ class DriveLog:
 
     A robot with the controller also has point_m (N, 2), the position of the point h; references (N, 2), the requested
     speed and yaw rate; targets_m (K, 2) and reached_s (K,), the end of the leg to each. Patches of floor have a
-    surface and corners (4, 2).
+    surface and corners (4, 2). outlines_m (S, 2, 2) are segments of the floor plan.
     """
 
     title: str
@@ -50,6 +54,7 @@ class DriveLog:
     targets_m: Array | None = None
     reached_s: Array | None = None
     patches: tuple[tuple[str, Array], ...] = ()
+    outlines_m: Array | None = None
 
     @property
     def to_target_m(self) -> Array | None:
@@ -73,8 +78,8 @@ class DriveLog:
         return bool(rise_m > LEVEL or tilt > LEVEL)
 
 
-def drive_log(drive: TrajectoryDrive) -> DriveLog:
-    """The log of a driven trajectory."""
+def drive_log(drive: TrajectoryDrive, *, has_plan: bool = False) -> DriveLog:
+    """The log of a driven trajectory, with the outlines of its place if it `has_plan`."""
     spec = drive.case.trajectory
     simulated = drive.motion.drive
     point_m = None
@@ -93,6 +98,7 @@ def drive_log(drive: TrajectoryDrive) -> DriveLog:
         targets_m=np.array(spec.targets_m) if isinstance(spec, Waypoints) else None,
         reached_s=drive.reached_s,
         patches=patches,
+        outlines_m=drive.outlines_m() if has_plan else None,
     )
 
 
@@ -155,6 +161,8 @@ def _draw(row: "SubFigure", log: DriveLog) -> None:
 def _path(axes: "Axes", log: DriveLog, *, legend: bool = True) -> None:
     """The path in top view, with headings, targets and patches of floor."""
     x, y = log.T_world_body[:, :2, 3].T
+    if log.outlines_m is not None:
+        _plan(axes, log.outlines_m, log.T_world_body[:, :2, 3])
     for surface, corners_m in log.patches:
         color = FLOORS.get(surface, NEUTRAL)
         axes.fill(*corners_m.T, color=color, alpha=0.25, lw=0, label=surface)
@@ -174,6 +182,27 @@ def _path(axes: "Axes", log: DriveLog, *, legend: bool = True) -> None:
         handles, labels = axes.get_legend_handles_labels()
         handle_of = dict(zip(labels, handles, strict=True))  # two patches of one surface have one entry
         axes.legend(handle_of.values(), handle_of.keys(), loc="best")
+
+
+def _plan(axes: "Axes", outlines_m: Array, path_m: Array) -> None:
+    """The floor plan around a path (N, 2). It is cut off where it is far from the path."""
+    from matplotlib.lines import Line2D
+
+    span_m = (path_m.max(0) - path_m.min(0)).max()
+    reach_m = PLAN_MARGIN_M + PLAN_SHARE * span_m
+    low_m = path_m.min(0) - reach_m
+    high_m = path_m.max(0) + reach_m
+    is_near = np.all((outlines_m.max(1) >= low_m) & (outlines_m.min(1) <= high_m), axis=1)
+    near_m = outlines_m[is_near]  # (S, 2, 2)
+    if not len(near_m):
+        return
+
+    # One line with gaps instead of many lines, which makes the file small.
+    gaps_m = np.full((len(near_m), 1, 2), np.nan)
+    points_m = np.concatenate([near_m, gaps_m], axis=1).reshape(-1, 2)
+    axes.add_artist(Line2D(*points_m.T, color=PLAN, lw=0.5))
+    shown_m = np.clip(near_m.reshape(-1, 2), low_m, high_m)
+    axes.update_datalim([shown_m.min(0), shown_m.max(0)])
 
 
 def _headings(axes: "Axes", log: DriveLog, *, length: float) -> None:

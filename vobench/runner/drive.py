@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vobench.errors import InputError, require_known
+from vobench.errors import InputError, VobenchError, require_known
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.drive import Waypoints
@@ -16,7 +16,9 @@ from vobench.runner.data_frame import data_frame
 from vobench.runner.motion import BodyMotion, body_motion, check_cases, motion_name, place_in_suite
 from vobench.runner.sensors import wheel_error_m
 from vobench.suite.case import Case
+from vobench.suite.floor_outline import floor_outlines_m
 from vobench.suite.plan import Plan
+from vobench.suite.scene_spec import SceneFile
 from vobench.trajectory.kinematics import Kinematics
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Trajectory
@@ -40,7 +42,8 @@ class TrajectoryDrive:
     """The drive along one trajectory of a suite.
 
     `body` is the true motion at the stamps of the N frames. `refusals` are the reasons why `vobench run` would refuse
-    cases on this trajectory, for example because a camera leaves the room. `case` is the first of these cases.
+    cases on this trajectory, for example because a camera leaves the room. `case` is the first of these cases, and
+    `place` the scene of all of them; None if they are in several.
     """
 
     name: str
@@ -48,6 +51,7 @@ class TrajectoryDrive:
     motion: BodyMotion
     body: Kinematics
     refusals: tuple[str, ...]
+    place: SceneFile | None = None
 
     @property
     def kind(self) -> str:
@@ -118,6 +122,18 @@ class TrajectoryDrive:
             "reached_s": None if reached_s is None else reached_s.tolist(),
             "refused": list(self.refusals),
         }
+
+    def outlines_m(self) -> Array:
+        """The outlines of the place as segments (S, 2, 2) in the plane; none if the drive is in several places.
+
+        A place that cannot be built has none. `refusals` says why.
+        """
+        if self.place is None:
+            return np.zeros((0, 2, 2))
+        try:
+            return floor_outlines_m(self.place)
+        except VobenchError:
+            return np.zeros((0, 2, 2))
 
     def trajectory(self) -> Trajectory:
         """The true path of the body, with one pose per frame."""
@@ -223,7 +239,9 @@ def drive_trajectory(plan: Plan, name: str) -> TrajectoryDrive:
 
     check_cases(cases, motion, mistakes)
     refusals = dict.fromkeys(str(mistake) for mistake in mistakes.found)
-    return TrajectoryDrive(name, cases[0], motion, motion.at_frames(), tuple(refusals))
+    scenes = {case.scene.place_name: case.scene for case in cases}
+    place = cases[0].scene if len(scenes) == 1 else None
+    return TrajectoryDrive(name, cases[0], motion, motion.at_frames(), tuple(refusals), place)
 
 
 def _step_lengths_m(body: Kinematics) -> Array:

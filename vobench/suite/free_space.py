@@ -96,11 +96,11 @@ def largest_free_circle(faces: Triangles, caster: RayCaster) -> FreeCircle | Non
 
 def floor_map(faces: Triangles, caster: RayCaster, *, body_m: float = BODY_M) -> FloorMap | None:
     """The map of the floor for a body of some height; None if the scene has no level face."""
-    is_level = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
+    is_level = _is_level(faces)
     if not is_level.any():
         return None
     level_corners_m = faces.corners_m[is_level]  # (F, 3, 3)
-    height_steps = np.rint(level_corners_m.mean(1)[:, 2] / FLOOR_STEP_M).astype(int)  # (F,)
+    height_steps = _height_steps(level_corners_m)
     floor_m = _floor_height_m(level_corners_m, height_steps)
 
     # The grid covers the bounds of all faces at the floor's height.
@@ -123,6 +123,25 @@ def floor_map(faces: Triangles, caster: RayCaster, *, body_m: float = BODY_M) ->
     heights_m = [height_m for height_m in WALL_HEIGHTS_M if height_m <= body_m]
     is_free[is_free] = _away_from_walls(centres_m[is_free], floor_m, cell_m, faces, caster, heights_m=heights_m)
     return FloorMap(x_m, y_m, is_free.reshape(len(y_m), len(x_m)), floor_m, cell_m)
+
+
+def floor_height_m(faces: Triangles) -> float | None:
+    """The height of the floor of a scene; None if the scene has no level face."""
+    level_corners_m = faces.corners_m[_is_level(faces)]  # (F, 3, 3)
+    if not len(level_corners_m):
+        return None
+    return _floor_height_m(level_corners_m, _height_steps(level_corners_m))
+
+
+def _is_level(faces: Triangles) -> Mask:
+    """Whether each face is stationary, nearly level, and faces up."""
+    is_level: Mask = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
+    return is_level
+
+
+def _height_steps(level_corners_m: Array) -> NDArray[np.int_]:
+    """The heights (F,) of level faces (F, 3, 3) in units of FLOOR_STEP_M."""
+    return np.rint(level_corners_m.mean(1)[:, 2] / FLOOR_STEP_M).astype(int)
 
 
 def _floor_height_m(level_corners_m: Array, height_steps: NDArray[np.int_]) -> float:

@@ -123,16 +123,43 @@ class Dealer:
 
 
 def changes_for_units(suite: Mapping[str, Any], count: int) -> dict[str, str]:
-    """The changes of a suite, as plain YAML, that give its design a number of units: more seeds of its places.
+    """The changes of a suite, as plain YAML, that give its design a number of units.
+
+    The number of seeds is multiplied, of its places or, if the design is not over scenes, of its drives.
 
     Raises SuiteError if the suite has no design.
     """
     spread = suite.get("spread")
     if not isinstance(spread, Mapping) or not isinstance(spread.get("units"), int):
         raise SuiteError("--units is for suites with `spread`, and this suite has none")
+    over = spread.get("over") or UNIT_AXES
+    scenes = dict(enumerate(suite.get("scenes") or ()))
+    trajectories = suite.get("trajectories") or {}
+
     changes = {"spread.units": str(count)}
-    factor = -(-count // spread["units"])
-    for index, scene in enumerate(suite.get("scenes") or ()):
-        if factor > 1 and isinstance(scene, Mapping) and isinstance(scene.get("seeds"), int):
-            changes[f"scenes.{index}.seeds"] = str(scene["seeds"] * factor)
-    return changes
+    least_factor = -(-count // spread["units"])
+    if "scene" in over:
+        drives = sum(map(_seeds_or_one, trajectories.values())) if "trajectory" in over else 1
+        return changes | _more_seeds("scenes", scenes, least_factor, -(-count // max(drives, 1)))
+    return changes | _more_seeds("trajectories", trajectories, least_factor, count)
+
+
+def _more_seeds(key: str, entries: Mapping[Any, Any], least_factor: int, needed: int) -> dict[str, str]:
+    """The changes of entries of a suite that multiply their seeds by a factor, so that there are enough variants."""
+    seeded = {name: entry["seeds"] for name, entry in entries.items() if _has_seeds(entry)}
+    others = len(entries) - len(seeded)
+    if not seeded:
+        return {}
+    factor = max(least_factor, -(-(needed - others) // sum(seeded.values())))
+    if factor <= 1:
+        return {}
+    return {f"{key}.{name}.seeds": str(seeds * factor) for name, seeds in seeded.items()}
+
+
+def _has_seeds(entry: Any) -> bool:
+    return isinstance(entry, Mapping) and isinstance(entry.get("seeds"), int)
+
+
+def _seeds_or_one(entry: Any) -> int:
+    """The number of variants of an entry."""
+    return entry["seeds"] if _has_seeds(entry) else 1

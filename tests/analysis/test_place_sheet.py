@@ -1,0 +1,47 @@
+"""The contact sheet of a generator: a picture for each seed, in order, in the light of the place."""
+
+import cv2
+import numpy as np
+import pytest
+
+from tests.generated import write_cell
+from vobench.analysis import place_sheet
+from vobench.analysis.place_sheet import save_place_sheet
+from vobench.analysis.scene_sheet import GAP_PX, PLACE_HEIGHT_PX, PLACE_WIDTH_PX
+from vobench.errors import SuiteError, UnknownNameError
+from vobench.rendering.bake import BakeSettings
+
+pytestmark = pytest.mark.slow  # light is computed; run by `pytest -m slow`, and by CI
+CELL_PX = PLACE_WIDTH_PX + PLACE_HEIGHT_PX + GAP_PX  # a view and a plan
+
+
+@pytest.fixture
+def cell(tmp_path, monkeypatch):
+    """The path of the scene, whose light is computed more coarsely than a sheet's."""
+    monkeypatch.setattr(place_sheet, "COARSE", BakeSettings(0.3, 1, 0.5, 4, 0))
+    return str(write_cell(tmp_path / "cell"))
+
+
+def parts(path, count):
+    """The pictures of a sheet in one row, without their labels."""
+    sheet = cv2.imread(str(path)).astype(int)
+    assert sheet.shape == (PLACE_HEIGHT_PX + GAP_PX, count * CELL_PX, 3)
+    return [sheet[GAP_PX:-30, column * CELL_PX + GAP_PX : (column + 1) * CELL_PX] for column in range(count)]
+
+
+def test_each_seed_has_a_picture_of_its_own_and_the_same_seed_the_same(cell, tmp_path):
+    save_place_sheet(cell, tmp_path / "two.png", seeds=2, first_seed=4, lighting="day")
+    save_place_sheet(cell, tmp_path / "next.png", seeds=1, first_seed=5, lighting="day")
+    fourth, fifth = parts(tmp_path / "two.png", 2)
+    (again,) = parts(tmp_path / "next.png", 1)
+    assert np.array_equal(again, fifth)
+    assert np.mean(np.abs(fourth - fifth).max(-1) > 8) > 0.1
+    assert fourth.std() > 10
+
+
+def test_a_scene_without_a_generator_and_an_unknown_one_are_refused(tmp_path):
+    with pytest.raises(SuiteError, match="'room' has no generator"):
+        save_place_sheet("room", tmp_path / "it.png", seeds=2)
+    with pytest.raises(UnknownNameError, match="no scene named 'flatt'"):
+        save_place_sheet("flatt", tmp_path / "it.png", seeds=2)
+    assert not (tmp_path / "it.png").exists()

@@ -1,0 +1,70 @@
+"""The drive of a body that wanders depends on its place and its settings alone, and keeps clear of the place."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.generated import SUITE, write_cell
+from vobench.errors import MotionError
+from vobench.runner import wander
+from vobench.runner.motion import body_motion
+from vobench.runner.wander import clearance_of, wander_motion
+from vobench.suite.suite import read_plan
+
+RADIUS_M = 0.25  # of the pioneer
+
+
+@pytest.fixture
+def cases(tmp_path, monkeypatch):
+    """The cases of the suite of cells by place and drive, with nothing cached."""
+    write_cell(tmp_path / "scenes" / "cell")
+    (tmp_path / "cells.yaml").write_text(SUITE, encoding="utf-8")
+    monkeypatch.setattr(wander, "_drives", type(wander._drives)())
+    monkeypatch.setattr(wander, "_clearances", type(wander._clearances)())
+    plan = read_plan(str(tmp_path / "cells.yaml"))
+    return {(case.variant["scene"], case.variant["trajectory"]): case for case in plan.simulated}
+
+
+def positions_m(case):
+    return body_motion(case).at_frames().T_world_body[:, :3, 3]
+
+
+def test_a_drive_is_found_once_for_a_place_and_is_the_same_when_it_is_found_again(cases):
+    case = cases["cell.1", "tour.1"]
+    first = wander_motion(case, case.trajectory)
+    assert wander_motion(replace(case, name="other", seed=9), case.trajectory) is first
+    before_m = positions_m(case)
+    wander._drives.clear()
+    np.testing.assert_array_equal(positions_m(case), before_m)
+
+
+def test_another_place_and_another_seed_have_other_drives(cases):
+    paths_m = {unit: positions_m(case)[-1] for unit, case in cases.items()}
+    ends = {tuple(end_m.tolist()) for end_m in paths_m.values()}
+    assert len(ends) == len(cases) == 4
+
+
+def test_a_drive_keeps_clear_of_the_walls_and_the_crate_of_its_place(cases):
+    for case in cases.values():
+        path_m = positions_m(case)
+        things = {thing.name: thing.mesh.bounds for thing in wander.build(case.scene, {}).things}
+        low_m, high_m = things["crate"]
+        outside_m = np.maximum(np.maximum(low_m - path_m, path_m - high_m), 0)[:, :2]
+        assert np.linalg.norm(outside_m, axis=1).min() > RADIUS_M
+        assert np.abs(path_m[:, 0]).max() < things["wall_0"][0][0] - RADIUS_M
+        assert body_motion(case).clearance_m > 0
+
+
+def test_no_more_drives_and_places_are_kept_than_stated(cases, monkeypatch):
+    monkeypatch.setattr(wander, "CACHED_DRIVES", 2)
+    monkeypatch.setattr(wander, "CACHED_PLACES", 1)
+    for case in cases.values():
+        wander_motion(case, case.trajectory)
+    assert (len(wander._drives), len(wander._clearances)) == (2, 1)
+
+
+def test_a_place_without_a_floor_is_refused_in_one_line(cases, monkeypatch):
+    monkeypatch.setattr(wander, "floor_map", lambda *_, **__: None)
+    with pytest.raises(MotionError, match="'cell' has no level floor to wander on; is another axis up\\?"):
+        clearance_of(cases["cell.1", "tour.1"].scene, 0.6)
