@@ -141,7 +141,9 @@ def _is_level(faces: Triangles) -> Mask:
 
 def _height_steps(level_corners_m: Array) -> NDArray[np.int_]:
     """The heights (F,) of level faces (F, 3, 3) in units of FLOOR_STEP_M."""
-    return np.rint(level_corners_m.mean(1)[:, 2] / FLOOR_STEP_M).astype(int)
+    heights_m = level_corners_m.mean(1)[:, 2]
+    steps: NDArray[np.int_] = np.rint(heights_m / FLOOR_STEP_M).astype(int)
+    return steps
 
 
 def _floor_height_m(level_corners_m: Array, height_steps: NDArray[np.int_]) -> float:
