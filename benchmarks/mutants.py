@@ -16,9 +16,9 @@ fails. The verdict is
 import argparse
 import ast
 import compileall
+import hashlib
 import json
 import os
-import random
 import re
 import shutil
 import signal
@@ -78,6 +78,10 @@ class Mutant:
 
     def describe(self) -> str:
         """File, line and the line's text with the change in it."""
+        return f"{self.path}:{self.line}: {self.changed_line()}"
+
+    def changed_line(self) -> str:
+        """The line's text with the change in it."""
         source = (ROOT / self.path).read_bytes()
         line_start = source.rfind(b"\n", 0, self.first) + 1
         line_end = source.find(b"\n", self.last)
@@ -85,7 +89,7 @@ class Mutant:
         after = source[self.last : line_end].decode()
         changed = source[self.first : self.last].decode()
         text = f"{before}[[{changed} -> {self.replacement}]]{after}"
-        return f"{self.path}:{self.line}: {' '.join(text.split())}"
+        return " ".join(text.split())
 
 
 class Source:
@@ -169,15 +173,24 @@ def _is_text_or_type(node: ast.BinOp) -> bool:
 
 
 def draw(room: str, count: int, seed: int) -> list[Mutant]:
-    """``count`` mutants of a room: files in proportion to their size, at most one mutant a line."""
-    mutants: list[Mutant] = []
+    """``count`` mutants of a room: files in proportion to their size, at most one mutant a line.
+
+    The order is random and depends on nothing but the seed and the changed lines themselves. So the sample stays the
+    same while other lines are edited, and a line that is rewritten leaves it alone.
+    """
+    in_order: list[tuple[str, Mutant]] = []
     for path in sorted((ROOT / "vobench" / room).glob("*.py")):
-        mutants += Source(path.relative_to(ROOT)).mutants()
-    random.Random(f"{room}-{seed}").shuffle(mutants)
+        occurrences: Counter[str] = Counter()
+        for mutant in Source(path.relative_to(ROOT)).mutants():
+            text = mutant.changed_line()
+            occurrences[text] += 1
+            identity = f"{seed} {path.name} {occurrences[text]} {text}"
+            in_order.append((hashlib.sha256(identity.encode()).hexdigest(), mutant))
+    in_order.sort(key=lambda item: item[0])
 
     chosen: list[Mutant] = []
     lines: set[tuple[Path, int]] = set()
-    for mutant in mutants:
+    for _, mutant in in_order:
         if (mutant.path, mutant.line) in lines or not _still_parses(mutant):
             continue
         lines.add((mutant.path, mutant.line))

@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from vobench.geometry import se3
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 NS_PER_FRAME = 33_333_333
 VOBENCH = (sys.executable, "-c", "from vobench.cli import main; main()")

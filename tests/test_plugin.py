@@ -73,6 +73,7 @@ def test_a_name_that_is_not_offered_is_an_attribute_error() -> None:
     [
         ("Frame, Result, Rig, se3", "cv2 PIL trimesh vobench.asset vobench.dataset vobench.metric vobench.retired"),
         ("StereoTracker, stereo_pair", "PIL trimesh vobench.asset vobench.dataset vobench.metric vobench.runner"),
+        ("GeneratedPlace, Sky, block", "cv2 PIL vobench.dataset vobench.estimator vobench.rendering vobench.runner"),
         ("make_mesh, block, lathe", "cv2 vobench.dataset vobench.estimator vobench.rendering vobench.runner"),
         ("MetricDefinition, POSES", "cv2 vobench.asset vobench.dataset vobench.estimator vobench.rendering"),
         ("Layout, ReadOptions, assemble", "vobench.asset vobench.metric vobench.rendering vobench.runner"),
@@ -84,13 +85,18 @@ def test_a_plugin_loads_nothing_that_it_does_not_ask_for(imported: str, heavy: s
     assert done.stdout.strip() == ""
 
 
-OWN = [*builtin_root().glob("estimators/*/*.py"), *builtin_root().glob("scenes/*/maker.py")]
+OWN = [*builtin_root().glob("estimators/*/*.py"), *builtin_root().glob("scenes/*/*.py")]
 
 
 @pytest.mark.parametrize("path", OWN, ids=lambda path: f"{path.parent.name}/{path.name}")
 def test_built_in_plugins_import_from_the_plugin_module_alone(path: Path) -> None:
     imported = {node.module for node in ast.walk(ast.parse(path.read_text())) if isinstance(node, ast.ImportFrom)}
     assert {module for module in imported if module and module.startswith("vobench")} <= {"vobench.plugin"}
+
+
+def test_makers_and_generators_are_among_the_built_in_plugins() -> None:
+    names = {path.name for path in OWN}
+    assert {"maker.py", "generator.py", "estimator.py"} <= names
 
 
 if __name__ == "__main__":

@@ -100,7 +100,7 @@ MOVED = {
     },
     "vobench.metric.pairs": {"select_pairs": "vobench.metric.rpe.select_pairs"},
     "vobench.metric.statistic": {"statistics": "vobench.metric.score.statistics"},
-    "vobench.trajectory.text": {"format_tum": "vobench.trajectory.formats.format_tum"},
+    "vobench.trajectory.text": {"format_tum": "vobench.trajectory.tum.format_tum"},
 }
 
 # Old module: name: the replacement, as the end of a sentence.

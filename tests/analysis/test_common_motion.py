@@ -6,7 +6,7 @@ import pytest
 from vobench.analysis.common_motion import motion_disagreement
 from vobench.analysis.diagnose import diagnose
 from vobench.geometry import se3
-from vobench.trajectory.formats import TrajectoryReading
+from vobench.runner.trajectory_pair import TrajectoryReading
 from vobench.trajectory.trajectory import Trajectory
 
 STEP_S = 0.1

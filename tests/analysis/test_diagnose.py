@@ -9,7 +9,9 @@ import pytest
 from vobench.analysis.diagnose import _is_clear_gain, _unrelated, _wrong_scale, diagnose
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.trajectory.formats import TrajectoryReading, parse_any, parse_times
+from vobench.runner.trajectory_pair import TrajectoryReading
+from vobench.trajectory.any_format import parse_any
+from vobench.trajectory.kitti import parse_times
 from vobench.trajectory.trajectory import Trajectory, parse_pose_convention
 
 DATA = Path(__file__).parents[2] / ".." / "shared" / "data" / "trajectories"
@@ -249,11 +251,11 @@ def test_an_estimate_that_is_merely_bad_is_not_called_unrelated():
 
 def test_a_unit_and_an_order_that_were_told_are_believed():
     gt, est = loop()
-    assert diagnose(replace(gt, unit="ns", form_unit="ns", is_unit_told=True), est) == ()
+    assert diagnose(replace(gt, unit="ns", format_unit="ns", is_unit_given=True), est) == ()
     slow = replace(gt, trajectory=changed(gt.trajectory, t_ns=gt.trajectory.t_ns * 1000))
     assert diagnose(slow, est)[0].fault == "stamp_unit"
     with pytest.raises(AlignmentError, match="1 match"):
-        diagnose(replace(slow, is_unit_told=True), est)
+        diagnose(replace(slow, is_unit_given=True), est)
     told = replace(est, trajectory=reordered(est.trajectory), order=None)
     assert "quaternion_order" not in [finding.fault for finding in diagnose(replace(gt, order=None), told)]
 
@@ -487,16 +489,16 @@ def test_names_and_an_origin_are_signs_too_and_one_of_them_alone_is_not_enough()
     noisy = with_positions(est, est.trajectory.positions_m + rng.normal(0, 1e-5, (400, 3)))
     begins = replace(gt, trajectory=changed(gt.trajectory, at_origin @ gt.trajectory.T_world_frame))
     assert faults(begins, noisy) == []
-    assert faults(gt, replace(noisy, says_truth=True)) == []
-    finding = assert_named("swapped_inputs", begins, replace(noisy, says_truth=True))
+    assert faults(gt, replace(noisy, mentions_ground_truth=True)) == []
+    finding = assert_named("swapped_inputs", begins, replace(noisy, mentions_ground_truth=True))
     assert finding.sentence == (
         "ground truth and estimate seem to be exchanged; the truth begins at the identity and the estimate does not; "
         "the estimate's file calls itself ground truth"
     )
     # Both that say so, or neither, are no sign.
-    assert faults(replace(begins, says_truth=True), replace(noisy, says_truth=True)) == []
+    assert faults(replace(begins, mentions_ground_truth=True), replace(noisy, mentions_ground_truth=True)) == []
     # Signs against it weigh as much as those for it.
-    assert faults(replace(begins, says_truth=True), noisy) == []
+    assert faults(replace(begins, mentions_ground_truth=True), noisy) == []
 
 
 @pytest.mark.parametrize(("step", "is_sign"), [(3, True), (1, False)])
@@ -505,12 +507,12 @@ def test_more_than_twice_the_rate_is_a_sign_of_a_tracker(step, is_sign):
     rng = np.random.default_rng(1)
     est = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, 1e-6, (1200, 3)))
     sparse = Trajectory(gt.trajectory.t_ns[::step], gt.trajectory.T_world_frame[::step])
-    given = (replace(gt, trajectory=sparse), replace(est, says_truth=True))
+    given = (replace(gt, trajectory=sparse), replace(est, mentions_ground_truth=True))
     assert faults(*given) == (["swapped_inputs"] if is_sign else [])
     if is_sign:  # the same rates the other way round are a sign against it
         begins = se3.inverse(est.trajectory.T_world_frame[0]) @ est.trajectory.T_world_frame
         fine = replace(gt, trajectory=changed(est.trajectory, begins))
-        assert faults(fine, replace(gt, trajectory=sparse, says_truth=True)) == []
+        assert faults(fine, replace(gt, trajectory=sparse, mentions_ground_truth=True)) == []
 
 
 @pytest.mark.parametrize(("sigma_m", "is_sign"), [(3e-4, True), (1e-6, False)])
@@ -520,7 +522,7 @@ def test_noise_is_a_sign_only_where_it_is_more_than_motion(sigma_m, is_sign):
     noisy = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, sigma_m, (1200, 3)))
     smooth = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, sigma_m / 1.7, (1200, 3)))
     # Noise 1.7 times as large is one sign, and the name of the file another.
-    assert faults(noisy, replace(smooth, says_truth=True)) == (["swapped_inputs"] if is_sign else [])
+    assert faults(noisy, replace(smooth, mentions_ground_truth=True)) == (["swapped_inputs"] if is_sign else [])
     smoother = with_positions(gt, gt.trajectory.positions_m + rng.normal(0, sigma_m / 2.5, (1200, 3)))
     # Noise 2.5 times as large at the same instants is two signs.
     assert faults(noisy, smoother) == (["swapped_inputs"] if is_sign else [])

@@ -10,8 +10,8 @@ from vobench.analysis.diagnose import Finding
 from vobench.analysis.diagnose_files import FileDiagnosis, _exchanged, diagnose_files
 from vobench.geometry import se3
 from vobench.runner.trajectory_pair import TrajectorySource
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 OPTICAL = np.array([[0.0, 0, 1], [-1, 0, 0], [0, -1, 0]])
 

@@ -20,8 +20,8 @@ from vobench.runner.folder import RunFolder, read_tum
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.recording import read_recording
 from vobench.suite.suite import read_plan
-from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum, parse_tum
 
 
 @pytest.fixture(scope="module")

@@ -9,6 +9,8 @@ from vobench.analysis.scene_sheet import (
     CELL_HEIGHT_PX,
     CELL_WIDTH_PX,
     CIRCLE_RGB,
+    LENS,
+    VIEWS_DEG,
     _PlanScale,
     _text,
     plan,
@@ -94,6 +96,20 @@ def test_the_free_circle_is_drawn_at_its_radius() -> None:
         nearby = drawn[row - 2 : row + 3, column - 2 : column + 3].reshape(-1, 3).tolist()
         assert list(CIRCLE_RGB) in nearby
     assert drawn[pixel_at(found, free.x_m, free.y_m)].tolist() == [tone(0.5)] * 3
+
+
+def test_the_free_circle_is_green_on_a_plan_that_is_grey() -> None:
+    red, green, blue = CIRCLE_RGB
+    assert green > 2 * max(red, blue)
+
+
+def test_the_four_views_of_a_sheet_are_as_wide_as_their_directions_are_apart() -> None:
+    edges_px = [[-0.5, 159.5], [CELL_WIDTH_PX - 0.5, 159.5]]
+    left, right = LENS.rays(edges_px)
+    assert np.degrees(np.arccos(left @ right)) == pytest.approx(360 / len(VIEWS_DEG))
+    assert np.diff(VIEWS_DEG).tolist() == [360 / len(VIEWS_DEG)] * (len(VIEWS_DEG) - 1)
+    steps = np.diff(LENS.project([[0, 0, 1.0], [0.01, 0.01, 1.0]]), axis=0).ravel()
+    assert steps[0] == pytest.approx(steps[1])
 
 
 def test_without_a_free_circle_none_is_drawn_and_heights_are_from_the_lowest_point() -> None:

@@ -5,7 +5,7 @@ import csv
 import numpy as np
 import pytest
 
-from vobench.trajectory.formats import parse_tum
+from vobench.trajectory.tum import parse_tum
 
 WAYS = """name: ways
 scenes: [closet]

@@ -6,8 +6,8 @@ import sys
 import numpy as np
 import pytest
 
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 # Each costs a tenth of a second or more, and is for pictures, recordings, tables of others or the viewer.
 HEAVY = {

@@ -11,8 +11,8 @@ import pytest
 
 from vobench.geometry import se3
 from vobench.runner.consistency import format_covariances
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory, parse_pose_convention
+from vobench.trajectory.tum import format_tum
 
 TRAJECTORIES = Path(__file__).parents[2] / ".." / "shared" / "data" / "trajectories"
 TUM = ("freiburg1_xyz-groundtruth.txt", "freiburg1_xyz-rgbdslam.txt")

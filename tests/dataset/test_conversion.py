@@ -5,8 +5,8 @@ import pytest
 
 from vobench.dataset.conversion import convert
 from vobench.errors import InputError
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 
 @pytest.fixture

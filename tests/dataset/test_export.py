@@ -21,7 +21,8 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Equirectangular
 from vobench.geometry.rig import PRESETS, CalibrationError, Rig, mounted_rig, side_by_side, true_rig
 from vobench.sequence import Sequence, SequenceWriter
-from vobench.trajectory.formats import parse_any, parse_times
+from vobench.trajectory.any_format import parse_any
+from vobench.trajectory.kitti import parse_times
 from vobench.trajectory.trajectory import Trajectory
 
 Make = Callable[..., Any]

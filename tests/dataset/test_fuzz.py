@@ -14,7 +14,7 @@ from vobench.dataset.picture import read_text
 from vobench.dataset.picture_list import read_list
 from vobench.dataset.truth_file import read_truth_file
 from vobench.errors import VobenchError
-from vobench.trajectory.formats import parse_times
+from vobench.trajectory.kitti import parse_times
 from vobench.trajectory.trajectory import Trajectory
 
 MANY, SOME = (

@@ -8,8 +8,9 @@ from vobench.dataset.recording import ReadOptions
 from vobench.dataset.truth_file import read_truth_file, truth_file
 from vobench.errors import InputError
 from vobench.geometry import se3
-from vobench.trajectory.formats import format_kitti, format_tum
+from vobench.trajectory.kitti import format_kitti
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 FRAMES_NS = np.array([1_000_000_000, 2_000_000_000, 3_000_000_000])
 POSES = se3.transform(

@@ -13,7 +13,7 @@ from vobench.dataset.tum import DEPTH_PER_M, FARTHEST_M, depth_values
 from vobench.errors import VobenchError
 from vobench.geometry.rig import Rig
 from vobench.sequence import Sequence, read_truth
-from vobench.trajectory.formats import parse_tum
+from vobench.trajectory.tum import parse_tum
 
 Make = Callable[..., Any]
 

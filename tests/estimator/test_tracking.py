@@ -24,6 +24,10 @@ def test_every_cell_has_its_corners_and_none_is_near_the_border():
     assert set(np.histogram(corners[:, 0], columns)[0]) == {5 * GRID_ROWS}
 
 
+def test_the_cells_of_a_picture_of_three_to_two_are_squares():
+    assert GRID_COLUMNS / GRID_ROWS == 3 / 2
+
+
 def test_corners_are_found_though_only_one_cell_has_any():
     image = np.full((480, 720), 90, np.uint8)
     image[200:260, 300:360] = texture()[200:260, 300:360]

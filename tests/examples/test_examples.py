@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from vobench.suite.suite import read_plan
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

@@ -11,8 +11,8 @@ from vobench.geometry import se3
 from vobench.metric.score import ScoreSettings, score
 from vobench.metric.segment import devkit_distances, mean_drift, segment_errors
 from vobench.metric.settings import KITTI_LENGTHS_M, LIKE
-from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import parse_tum
 
 DATA = Path(__file__).parents[2] / ".." / "shared" / "data"
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason="no folder ../shared/data with the published trajectories")

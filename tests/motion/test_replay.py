@@ -10,8 +10,9 @@ from vobench.errors import MotionError, SettingError
 from vobench.geometry import se3
 from vobench.motion.replay import AXES, Replay
 from vobench.motion.spline import pose_spline
-from vobench.trajectory.formats import parse_any, parse_tum
+from vobench.trajectory.any_format import parse_any
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import parse_tum
 
 DATA = Path(__file__).parents[2] / ".." / "shared" / "data" / "trajectories"
 WITH_DATA = pytest.mark.skipif(not DATA.is_dir(), reason="no folder ../shared/data with real trajectories")

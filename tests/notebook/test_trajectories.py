@@ -10,7 +10,7 @@ import vobench
 from vobench.errors import InputError
 from vobench.metric.comparison import compare
 from vobench.sequence import Sequence
-from vobench.trajectory.formats import format_tum
+from vobench.trajectory.tum import format_tum
 
 PAGE = Path(__file__).parents[2] / "docs" / "python.md"
 LINE = 120

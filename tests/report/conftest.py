@@ -20,8 +20,8 @@ from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, T
 from vobench.runner.store import write_json
 from vobench.sequence import EncodedFrame
 from vobench.trajectory.align import Alignment
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 IDENTITY = Alignment("none", np.eye(3), np.zeros(3), 1.0, ()).as_dict()
 

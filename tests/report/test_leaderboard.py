@@ -1,12 +1,12 @@
 """The law of ranking: no estimator whose every trial failed ranks before one whose every trial survived."""
 
-import time
-
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.report.boards import CASES, outcomes_of_four, scores_of
+from tests.work import Name, work_of
 from vobench.report.leaderboard import make_board
 from vobench.runner.folder import SURVIVED
 
@@ -79,31 +79,53 @@ def test_a_case_that_stands_still_changes_no_error_and_no_rank(outcomes, drift_m
     assert shown[0] == shown[1]
 
 
-@pytest.mark.parametrize(("cases", "estimators"), [(2500, 4), (5, 2000)])
-def test_the_work_of_a_board_is_no_square_of_its_cases_or_estimators(cases, estimators):
-    """Five times as many take five times as long, with a constant and noise; a square would take 25 times as long."""
-    fewer_cases, fewer_estimators = (cases // 5, estimators) if cases > estimators else (cases, estimators // 5)
-    _, fewer_s = timed_board(fewer_cases, fewer_estimators)
-    made, all_s = timed_board(cases, estimators)
-    assert all_s < 12 * fewer_s
-    assert len(made.totals) == estimators
-    assert len(made.cells) == 10_000
-
-
-def timed_board(cases, estimators):
-    """A board of as many trials, and the CPU seconds that it took."""
+def trials_of(cases, estimators):
+    """One trial for each case and estimator."""
     one = scores_of({"e": [("ok", 0.1)] * len(CASES)})[0]
-    trials = [
-        one.model_copy(
-            update={
-                "case": f"c{k}",
-                "estimator": f"e{n}",
-                "score": {"metrics": [{"name": "ate_trans", "rmse": 0.0001 * (1 + n % 97)}]},
+    trials = []
+    for case in range(cases):
+        for estimator in range(estimators):
+            ate_m = 0.0001 * (1 + estimator % 97)
+            changes = {
+                "case": Name(f"c{case}"),
+                "estimator": Name(f"e{estimator}"),
+                "score": {"metrics": [{"name": "ate_trans", "rmse": ate_m}]},
             }
-        )
-        for k in range(cases)
-        for n in range(estimators)
-    ]
-    began = time.process_time()
-    made = make_board(trials, {})
-    return made, time.process_time() - began
+            trials.append(one.model_copy(update=changes))
+    return trials
+
+
+@pytest.mark.parametrize(("cases", "estimators", "fewer"), [(500, 4, (100, 4)), (5, 400, (5, 80))])
+def test_the_work_of_a_board_is_no_square_of_its_cases_or_estimators(cases, estimators, fewer):
+    """Five times as many cost five times as much work, and sorting a little more; a square would cost 25 times."""
+    more = trials_of(cases, estimators)
+    made = make_board(more, {})
+    assert len(made.totals) == estimators
+    assert len(made.cells) == cases * estimators
+    assert work_of(make_board, more, {}) < 5.2 * work_of(make_board, trials_of(*fewer), {})
+
+
+def listed(names):
+    return [name for name in names if name in names]
+
+
+def compared(names):
+    return [[other for other in names if other == name] for name in names]
+
+
+def hashed(names):
+    return [name for name in names if name in set(names)]
+
+
+def in_arrays(names):
+    def lengths():
+        return np.array([1] * len(names)).cumsum()
+
+    return [lengths()[0] for _ in names]
+
+
+@pytest.mark.parametrize("squared", [listed, compared, hashed, in_arrays])
+def test_the_measure_of_work_sees_squares_of_every_kind(squared):
+    """In comprehensions, in searches through lists, in sets that are made again and again, and in arrays."""
+    names = [Name(f"n{k}") for k in range(500)]
+    assert work_of(squared, names) > 15 * work_of(squared, names[:100])

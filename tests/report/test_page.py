@@ -11,6 +11,7 @@ import pytest
 
 from vobench.report import page
 from vobench.report.practice import PRACTICES
+from vobench.report.thumbnail import Thumbnails
 from vobench.runner.environment import ENVIRONMENT, ENVIRONMENTS, Environment, Processor
 from vobench.runner.folder import CASE, SEQUENCE, SUITE, RunFolder
 from vobench.runner.frames import COLUMNS, FRAMES, TIME_COLUMNS, TIMES, new_table
@@ -160,6 +161,14 @@ def captions(text):
 
 def test_each_rig_is_shown_once_by_its_first_picture(seen):
     assert captions(seen("ahead_1", "ahead_2", "down_1", "down_2")) == ["ahead", "down"]
+
+
+def test_the_picture_of_a_rig_is_the_first_frame_of_its_first_case(seen, tmp_path):
+    text = seen("down_1", "down_2")
+    pictures = Thumbnails(RunFolder(tmp_path / "suite" / "stamp"))
+    first, second = (pictures.get("down_1", frame, page.RIG_WIDTH_PX) for frame in (0, 1))
+    assert first in text
+    assert second not in text
 
 
 def test_at_most_four_rigs_are_shown(seen):

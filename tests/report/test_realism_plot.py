@@ -71,6 +71,17 @@ def test_a_value_is_a_dot_in_its_band_or_an_arrow_at_the_edge(axes, place, shown
     assert text == f"{first.low + place * (first.high - first.low):.2f}"
 
 
+def test_a_number_is_below_its_dot_and_does_not_touch_it(axes):
+    axes.figure.set_size_inches(*realism_plot.SIZE_INCHES)
+    axes.figure.set_dpi(72)  # a pixel is a point
+    realism_plot._bands(axes, {"street": realism()})
+    axes.figure.draw_without_rendering()
+    dots = axes.get_lines()[1:]
+    for dot, number in zip(dots, axes.texts, strict=True):
+        _, centre_px = axes.transData.transform(dot.get_xydata()[0])
+        assert number.get_window_extent().y1 < centre_px - dot.get_markersize() / 2
+
+
 def test_several_recordings_are_side_by_side_and_a_missing_value_has_no_dot(axes):
     partial = realism()
     del partial.values[STATISTICS[0].name]

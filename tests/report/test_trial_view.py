@@ -15,8 +15,8 @@ from vobench.runner.estimate import ESTIMATE, POINTS, TRACKS
 from vobench.runner.folder import SEQUENCE, RunFolder, read_tum
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.trajectory.align import Alignment
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 SHIFT = Alignment("se3", np.eye(3), np.array([1.0, 2.0, 3.0]), 1.0, ()).as_dict()
 METRIC = {"name": "ate_trans", "unit": "m", "rmse": 0.25, "mean": 0.125, "max": 0.5}

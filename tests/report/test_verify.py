@@ -11,8 +11,8 @@ from vobench.runner.estimate import ESTIMATE, REVISED
 from vobench.runner.folder import CASE, SCORE, SEQUENCE, write_hashes
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.score import score_estimate
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 
 def path(error_m):

@@ -22,8 +22,8 @@ from vobench.runner.folder import (
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.runner.score import score_estimate
 from vobench.runner.store import write_json
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 CASES = ("down", "ahead")
 

@@ -10,7 +10,7 @@ from tests.runner.conftest import CLOSET
 from vobench.errors import SuiteError, UnknownNameError
 from vobench.runner.drive import chosen_trajectories, drive_plan
 from vobench.suite.suite import read_plan
-from vobench.trajectory.formats import parse_tum
+from vobench.trajectory.tum import parse_tum
 
 SUITE = """
 name: trajectories

@@ -24,8 +24,8 @@ from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.manifest import read_manifest
 from vobench.suite.plan import Trial
 from vobench.suite.source import RecordedCase, Source
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 ESTIMATORS = "[wheel_odometry, stand_still]"
 EXAMPLES = Path(__file__).parents[2] / "examples"

@@ -8,8 +8,8 @@ from vobench.runner.frames import EXPOSURES, GROUND_TRUTH, read_table
 from vobench.runner.ground_truth import LONGEST_GAP_NS, is_known, left_truth, noisy, write_ground_truth
 from vobench.sequence import Sequence, read_truth
 from vobench.suite.suite_spec import EXACT, TruthNoise
-from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum, parse_tum
 
 N = 400
 

@@ -125,7 +125,7 @@ def test_what_is_kept_of_modules_spares_time_and_changes_nothing(tmp_path, monke
         for each in (key._module, code_digest):
             each.cache_clear()
         read.clear()
-        return {code_digest(*ENTRIES["score"])}
+        return {code_digest("vobench.trajectory.associate")}
 
     digest = anew(tmp_path / "cache")
     assert read

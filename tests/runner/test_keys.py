@@ -10,9 +10,9 @@ from vobench.motion.spline import Pose
 from vobench.runner.motion import body_motion
 from vobench.suite.suite import read_plan
 from vobench.suite.trajectory import KINDS, TrajectorySpec
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.kinematics import level
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 POSES = [{"t_s": t, "position_m": [t / 2, 0, 1], "pitch_deg": 5 * t} for t in (0, 1, 2)]
 POINTS = [[0, 0, 1], [0.5, 0.1, 1.2], [0.6, 0.5, 1]]

@@ -20,8 +20,8 @@ from vobench.runner.score import (
     status_of,
     status_of_handed,
 )
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 POSES = 41
 T_NS = np.arange(POSES, dtype=np.int64) * 50_000_000

@@ -11,8 +11,8 @@ from vobench.metric.settings import ScoreSettings
 from vobench.runner.consistency import format_covariances
 from vobench.runner.score_files import FilePair, read_pair_list, score_files
 from vobench.runner.trajectory_pair import TrajectorySource
-from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum, parse_tum
 
 
 def path_with(noise_m, n=80, seed=1):

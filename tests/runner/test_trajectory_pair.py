@@ -6,8 +6,8 @@ import pytest
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.runner.trajectory_pair import BY_FRAME, BY_ROW, NS_PER_S, TrajectorySource, read_one, read_pair
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 N = 6
 T_NS = np.arange(N, dtype=np.int64) * NS_PER_S // 10 + 5 * NS_PER_S
@@ -127,7 +127,7 @@ def test_a_topic_is_for_a_recording(tmp_path):
 def test_a_file_says_that_it_is_the_truth_by_its_name_or_a_comment(tmp_path, name, comment, is_truth):
     path = tum(tmp_path / name).path
     path.write_text(comment + path.read_text())
-    assert read_one(TrajectorySource(path)).says_truth is is_truth
+    assert read_one(TrajectorySource(path)).mentions_ground_truth is is_truth
 
 
 @pytest.mark.slow

@@ -8,7 +8,7 @@ from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
 from vobench.scene.mesh import Thing, flipped, moved, quad, two_sided
 from vobench.scene.scene import Scene, triangles
-from vobench.suite.default_light import ENOUGH_LIGHT, MOST_LAMPS, ROOM_LX, DefaultLight, default_light
+from vobench.suite.default_light import ENOUGH_LIGHT, LAMP_SIDE, MOST_LAMPS, ROOM_LX, DefaultLight, default_light
 from vobench.suite.scene_spec import PanelLamp
 
 GREY = {"grey": Material(colour=(0.5, 0.5, 0.5))}
@@ -39,6 +39,12 @@ def test_a_small_room_gets_one_lamp_close_to_the_middle_of_its_ceiling() -> None
     (lamp,) = light_of(hall(4, 4)).lamps
     assert np.abs(lamp.center_m[:2]).max() < 1
     assert 2.3 < lamp.center_m[2] < 2.5
+
+
+def test_where_nothing_is_near_a_lamp_its_size_follows_from_the_height_above_the_floor() -> None:
+    lamps = light_of(hall(20, 20, 2.5)).lamps
+    middle = min(lamps, key=lambda lamp: float(np.hypot(*lamp.center_m[:2])))
+    assert middle.size_m == pytest.approx([LAMP_SIDE * 2.5] * 2, abs=0.01)
 
 
 def test_the_power_gives_the_illuminance_of_a_closed_room() -> None:

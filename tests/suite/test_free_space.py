@@ -1,5 +1,7 @@
 """The free circle lies on the floor and holds no thing, and the path in it is a circle at constant speed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,7 @@ from vobench.suite.free_space import (
     FreeCircle,
     circular_path,
     downward_directions,
+    floor_map,
     largest_free_circle,
 )
 
@@ -92,6 +95,16 @@ def test_no_thing_is_in_the_circle() -> None:
     distance_m = float(np.hypot(free.x_m - nearest_m[0], free.y_m - nearest_m[1]))
     assert free.radius_m <= distance_m
     assert 1 < free.radius_m < 3
+
+
+def test_walls_take_as_much_of_the_floor_on_each_of_four_sides() -> None:
+    south = Thing("wall", quad((2, -2, 0), (-4, 0, 0), (0, 0, 2)), "grey")
+    walls = [replace(south, mesh=moved(south.mesh, at(yaw=yaw_deg))) for yaw_deg in (0, 90, 180, 270)]
+    faces = triangles(scene(floor(6, 6), *walls), t_ns=0)
+    free = floor_map(faces, RayCaster(faces)).free
+    assert 0 < np.count_nonzero(~free) < free.size / 4
+    for turned in (np.rot90(free), np.rot90(free, 2), np.flipud(free)):
+        np.testing.assert_array_equal(turned, free)
 
 
 def test_a_body_does_not_fit_into_a_box_that_is_open_below() -> None:

@@ -6,13 +6,14 @@ from pathlib import Path
 
 import pytest
 
+from tests.generated import GENERATOR, write_cell
 from vobench.errors import SuiteError
 from vobench.estimator import isolation
 from vobench.estimator.manifest import Limits
 from vobench.estimator.program import sandbox_here
 from vobench.suite import maker
 from vobench.suite.catalog import builtin_root
-from vobench.suite.maker import made_by
+from vobench.suite.maker import generated_by, made_by
 from vobench.suite.maker_message import encode
 
 pytestmark = pytest.mark.slow  # each starts a process; run by `pytest -m slow`, and by CI
@@ -156,3 +157,73 @@ def test_a_maker_is_trusted_with_every_python_file_of_its_folder(tmp_path) -> No
     names_and_contents = [*maker._sources(path)]
     assert names_and_contents[:2] == [b"maker.py", b"one\n"]
     assert names_and_contents[2:] == [b"parts/maker.py", b"two\n", b"table.py", b"three\n"]
+
+
+@pytest.fixture
+def generate(tmp_path):
+    """Runs the generator of the cell with some text of it replaced."""
+
+    def run(old="", new="", *, seed=3, lighting="day"):
+        assert old in GENERATOR
+        scene = write_cell(tmp_path / "strangers", GENERATOR.replace(old, new, 1) if old else GENERATOR)
+        return generated_by(scene.with_name("generator.py"), seed=seed, lighting=lighting, scene="cell")
+
+    return run
+
+
+def test_a_generator_gets_seed_and_lighting_and_its_place_arrives_with_its_surroundings(generate):
+    place = generate(seed=5, lighting="evening")
+    lamp, sky = place.lights
+    assert [thing.name for thing in place.things] == ["floor", "wall_0", "wall_1", "wall_2", "wall_3", "crate"]
+    assert (lamp.name, lamp.power_lm) == ("lamp", 600.0)
+    assert sky.illuminance_lx == 2000.0
+    assert (sky.panorama.kind, sky.panorama.seed) == ("city", 5)
+
+
+def test_a_seed_gives_the_same_bytes_again_and_another_seed_gives_others(generate):
+    first, again, other = [encode(generate(seed=seed)) for seed in (3, 3, 4)]
+    assert first == again
+    assert first != other
+
+
+def test_a_generator_gives_the_same_bytes_in_the_sandbox_and_in_this_process(generate, monkeypatch, tmp_path):
+    in_the_sandbox = encode(generate(seed=3))
+    monkeypatch.setattr(maker, "builtin_root", lambda: tmp_path)
+    assert encode(generate(seed=3)) == in_the_sandbox
+
+
+def test_a_generator_of_ours_gives_the_same_bytes_in_the_sandbox(monkeypatch):
+    flat = builtin_root() / "scenes" / "flat" / "generator.py"
+    in_this_process = encode(generated_by(flat, seed=2, lighting="overcast", scene="flat"))
+    monkeypatch.setattr(maker, "builtin_root", lambda: Path("/nowhere"))
+    assert encode(generated_by(flat, seed=2, lighting="overcast", scene="flat")) == in_this_process
+
+
+@needs_a_sandbox
+def test_a_generator_reads_no_other_file_of_the_users_and_leaves_none(generate, tmp_path):
+    secret = tmp_path / "secret.txt"
+    secret.write_text("0.75")
+    with pytest.raises(SuiteError, match=r"No such file or directory|Permission denied"):
+        generate('"""The cell of a seed."""', f"open({str(secret)!r}).read()")
+    with suppress(SuiteError):
+        generate('"""The cell of a seed."""', f"open({str(tmp_path / 'left')!r}, 'w').write('x')")
+    assert not (tmp_path / "left").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "sentence"),
+    [
+        ("def generate(", "def make(", r"generator\.py: has no function generate\(seed, lighting\)$"),
+        ("return GeneratedPlace(", "return (", r"should return a GeneratedPlace, not tuple$"),
+        ('"plaster": Material', '"paint": Material', r"returns things without materials: plaster$"),
+        ("lighting], panorama", 'lighting + "s"], panorama', r"KeyError: 'days'$"),
+        ("side_m = float(", "side_m = float('nan') * float(", r"'floor' with a mesh whose .* not finite$"),
+        ("[lamp, sky]", "[lamp, 3]", r"returns a light that is no .*: int$"),
+        ("[lamp, sky]", "7", r"should return a list of lights, not int$"),
+    ],
+)
+def test_whatever_goes_wrong_in_a_generator_is_one_line_that_names_it(generate, old, new, sentence):
+    with pytest.raises(SuiteError, match=sentence) as raised:
+        generate(old, new)
+    assert "generator.py: " in str(raised.value)
+    assert "\n" not in str(raised.value)

@@ -82,6 +82,14 @@ def test_a_scene_in_one_file_is_copied_as_one_file() -> None:
 
 
 @pytest.mark.parametrize("make", [new_suite, new_scene])
+def test_a_second_one_goes_into_the_folder_of_the_first(make) -> None:
+    first = make("mine")
+    second = make("other")
+    assert first.parent == second.parent
+    assert sorted(first.parent.iterdir()) == [first, second]
+
+
+@pytest.mark.parametrize("make", [new_suite, new_scene])
 def test_what_is_there_is_not_written_over(make) -> None:
     path = make("mine")
     before = path.read_bytes()

@@ -1,7 +1,10 @@
 """The cases of scenarios: their names, what they share with the suite, and how often files are read."""
 
+from collections import Counter, defaultdict
+
 import pytest
 
+from tests.generated import write_cell
 from tests.suite.conftest import CLOSET
 from vobench.errors import SuiteError
 from vobench.suite import scene_file
@@ -91,3 +94,103 @@ def test_scenarios_replay_poses_that_lie_beside_them(plan, tmp_path):
     replayed, driven = plan("scenarios: {dusk: 0, dawn: 0}\n").simulated
     assert len(replayed.replayed.splitlines()) == 20
     assert driven.replayed is None
+
+
+NAMES = ("mist", "haze", "dust", "rain", "hail", "frost")
+PLAIN = """name: {name}
+base: {{scene: closet, rig: {{pitch_deg: 90}}, trajectory: {{targets_m: [[0.5, 0]]}}}}
+severity: [{{}}, {{camera: {{gain_db: 6}}}}, {{camera: {{gain_db: 9}}}}, {{camera: {{gain_db: 12}}}},
+  {{camera: {{gain_db: 15}}}}, {{camera: {{gain_db: 18}}}}]
+"""
+SPREAD = """scenes: [{name: cell, seeds: 4}]
+trajectories: {tour: {kind: wander, length_m: 1, seeds: 2}}
+spread: {units: 8, each: 2}
+"""
+
+
+@pytest.fixture
+def spread_plan(plan, tmp_path):
+    """Reads the plan of a suite of scenarios that suit any place, and of `dusk`, which changes its own."""
+    write_cell(tmp_path / "scenes" / "cell")
+    for name in NAMES:
+        (tmp_path / "suites" / "scenarios" / f"{name}.yaml").write_text(PLAIN.format(name=name))
+    listed = ", ".join(f"{name}: [1, 3]" for name in NAMES)
+    return lambda more="": plan(f"{SPREAD}{more}scenarios: {{{listed}, dusk: [0, 5]}}\n")
+
+
+def unit(case):
+    """The place and the drive of a case."""
+    return case.variant["scene"], case.variant["trajectory"]
+
+
+def test_each_scenario_has_its_units_in_two_places_and_each_unit_has_as_many_cases(spread_plan):
+    cases = [case for case in spread_plan().simulated if case.scenario in NAMES]
+    assert len(cases) == len(NAMES) * 2 * 2
+
+    units_of = defaultdict(set)
+    for case in cases:
+        units_of[case.scenario].add(unit(case))
+    for name in NAMES:
+        assert len(units_of[name]) == 2
+        assert len({place for place, _ in units_of[name]}) == 2
+
+    load = Counter(unit(case) for case in cases)
+    places = Counter(case.variant["scene"] for case in cases)
+    drives = Counter(case.variant["trajectory"] for case in cases)
+    assert len(load) == 8
+    assert max(load.values()) - min(load.values()) <= 2  # a scenario has two severities
+    assert max(places.values()) - min(places.values()) <= 2
+    assert max(drives.values()) - min(drives.values()) <= 2
+
+
+def test_severities_of_a_scenario_share_its_units_and_differ_by_severity_alone(spread_plan):
+    cases = spread_plan().simulated
+    for name in NAMES:
+        by_severity = defaultdict(list)
+        for case in cases:
+            if case.scenario == name:
+                by_severity[case.severity].append(case)
+        assert [unit(case) for case in by_severity[1]] == [unit(case) for case in by_severity[3]]
+        for mild, strong in zip(by_severity[1], by_severity[3], strict=True):
+            assert (mild.scene, mild.trajectory, mild.rig, mild.seed) == (
+                strong.scene,
+                strong.trajectory,
+                strong.rig,
+                strong.seed,
+            )
+            assert (mild.camera.gain_db, strong.camera.gain_db) == (6, 12)
+
+
+def test_cases_in_units_are_named_by_scenario_severity_place_and_drive(spread_plan):
+    names = [case.name for case in spread_plan().simulated]
+    assert len(set(names)) == len(names)
+    assert all(name.split("-")[1] in "13" for name in names if name.startswith(NAMES))
+    assert any(name.startswith("mist-1-cell.") and ".1" in name for name in names)
+
+
+def test_a_scenario_that_changes_its_scene_stays_in_its_own_place(spread_plan):
+    cases = [case for case in spread_plan().simulated if case.scenario == "dusk"]
+    assert [case.name for case in cases] == ["dusk-0", "dusk-5"]
+    assert {case.scene.name for case in cases} == {"closet"}
+
+
+def test_the_rig_and_the_camera_of_the_suite_are_those_of_scenarios_in_units(spread_plan):
+    more = "rigs: {ahead: {pitch_deg: 10}}\ncameras: {short: {exposure_ms: 2}}\n"
+    case = next(case for case in spread_plan(more).simulated if case.scenario == "mist")
+    assert case.rig.pitch_deg == 10
+    assert (case.camera.exposure_ms, case.camera.gain_db) == (2, 6)
+
+
+def test_a_base_seed_shifts_places_and_drives_and_keeps_the_design(spread_plan):
+    shifted = spread_plan("base_seed: 500\n").simulated
+    assert {case.scene.generated.seed for case in shifted if case.scene.generated} == {501, 502, 503, 504}
+    assert {case.variant["trajectory"] for case in shifted if case.scene.generated} == {"tour.501", "tour.502"}
+    counts = Counter(case.scenario for case in shifted)
+    assert counts == Counter(case.scenario for case in spread_plan().simulated)
+
+
+def test_more_units_in_each_than_there_are_is_a_mistake_of_spread(spread_plan, plan):
+    del spread_plan  # it writes the files
+    text = SPREAD.replace("each: 2", "each: 9")
+    with pytest.raises(SuiteError, match=r"spread: spread runs each scenario in 9 units, but there are 8"):
+        plan(f"{text}scenarios: {{mist: 1}}\n")

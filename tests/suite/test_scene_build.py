@@ -240,6 +240,20 @@ def test_files_count_by_what_is_in_them_wherever_they_lie(yard, tmp_path: Path) 
     assert scene_content(read_scene(tmp_path / "b" / "yard.yaml")) != said[0]
 
 
+def test_what_moves_stands_in_the_middle_of_its_own_frame_with_its_own_size(yard) -> None:
+    path = "path: [{t_s: 0, position_m: [0, 0, 0]}, {t_s: 1, position_m: [1, 0, 0]}]"
+    box, table = yard(
+        f"movers: [{{name: b, size_m: [1, 2, 0.5], material: stone, {path}}}, {{name: s, kind: table, {path}}}]\n"
+    ).movers
+    (thing,) = box.things
+    np.testing.assert_allclose(thing.mesh.bounds, [[-0.5, -1, -0.25], [0.5, 1, 0.25]])
+    assert thing.mesh.area == pytest.approx(2 * (1 * 2 + 1 * 0.5 + 2 * 0.5))
+    corners_m = np.concatenate([thing.mesh.vertices for thing in table.things])
+    low_m, high_m = corners_m.min(0), corners_m.max(0)
+    assert low_m[2] == pytest.approx(0, abs=1e-6)
+    assert (low_m + high_m)[:2] == pytest.approx([0, 0], abs=0.05)
+
+
 def test_furniture_and_models_can_move(yard, tmp_path: Path) -> None:
     glb(tmp_path / "sail.glb")
     path = "path: [{t_s: 0, position_m: [0, 0, 0]}, {t_s: 1, position_m: [1, 0, 0]}]"

@@ -62,7 +62,6 @@ def test_home_is_found(tmp_path, monkeypatch):
     ("source", "sentence"),
     [
         ("data/none", r":2: source: no folder or file at .*/data/none$"),
-        ("/proc/**/*", r":2: source: more than 10000 files and folders match '/proc/\*\*/\*'$"),
         (
             "'data/a**'",
             r":2: source: 'data/a\*\*' cannot be searched for \(Invalid pattern.*\)$|no folder or file matches",
@@ -78,6 +77,13 @@ def test_home_is_found(tmp_path, monkeypatch):
 def test_what_is_wrong_names_the_place_in_the_suite(suite, source, sentence):
     with pytest.raises(SuiteError, match=sentence):
         suite(source)
+
+
+def test_a_pattern_may_not_match_too_many_files(suite, tmp_path, monkeypatch):
+    monkeypatch.setattr("vobench.suite.source.MOST_MATCHES", 3)
+    assert len(suite("'data/[MV]*'").cases) == 3
+    with pytest.raises(SuiteError, match=r":2: source: more than 3 files and folders match 'data/\*'$"):
+        suite("'data/*'")
 
 
 def test_a_suite_has_all_axes_or_a_source_alone(suite):

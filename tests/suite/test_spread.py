@@ -40,6 +40,17 @@ def test_each_treatment_gets_distinct_units_in_distinct_places_and_units_get_equ
     assert max(load.values()) - min(load.values()) <= 1
 
 
+@pytest.mark.parametrize("treatments", range(1, 25))
+def test_places_and_drives_have_about_equally_many_treatments_after_any_number(treatments: int) -> None:
+    made = units(Spread(units=12), VARIANTS)
+    dealer = Dealer(made, 3, seed=treatments)
+    dealt = [unit for _ in range(treatments) for unit in dealer.deal()]
+    for axis in ("scene", "trajectory"):
+        load = Counter(unit.by_axis[axis] for unit in dealt)
+        counts = [load[name] for name in VARIANTS[axis]]
+        assert max(counts) - min(counts) <= 2
+
+
 def test_the_seed_decides_which_units_a_treatment_gets() -> None:
     made = units(Spread(units=12), VARIANTS)
     first, again, other = ([Dealer(made, 3, seed).deal() for _ in range(1)] for seed in (1, 1, 2))

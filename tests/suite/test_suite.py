@@ -320,7 +320,7 @@ def test_what_is_wrong_with_an_axis_is_said_once_for_all_its_cases(bent, tmp_pat
         (b"hello\n", ": should be keys with values, but is the single value 'hello'"),
         (b"name: [\n", ":2:1: expected the node content, but found '<stream end>'"),
         (b"\xff\xfe\x00", ": not a text file in UTF-8"),
-        (b"a: [" * 3000, ": brackets or indents are nested too deep"),
+        (b"a: [" * 3000, ":1:404: is nested more than 100 deep"),
         (b"name: a\n---\nname: b\n", ":2:1: but found another document"),
     ],
     ids=["empty", "comment", "list", "scalar", "torn", "binary", "deep", "two"],

@@ -15,8 +15,9 @@ from vobench.motion.wheeled import ENCODERS, Wheeled
 from vobench.setting import hints
 from vobench.suite.suite import read_plan
 from vobench.suite.trajectory import KINDS, TrajectorySpec
-from vobench.trajectory.formats import format_kitti, format_tum, parse_tum
+from vobench.trajectory.kitti import format_kitti
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum, parse_tum
 
 # ruff: noqa: E501 - a sentence stands in one line
 

@@ -67,6 +67,20 @@ def test_all_of_an_object_is_in_each_picture_around_it() -> None:
         assert ((pixels > 0) & (pixels < [47, 31])).all()
 
 
+def test_cameras_around_an_object_move_with_it_and_look_at_its_middle_from_slightly_above() -> None:
+    def of_box(x_m: float, y_m: float) -> list[Viewpoint]:
+        faces = faces_of(moved(block((1.0, 0.5, 0.8), bevel_m=0), at(x_m, y_m, 0.4)))
+        return viewpoints(faces, RayCaster(faces))
+
+    middle_m = np.array([7.0, -3.0, 0.4])
+    for view, at_origin in zip(of_box(7.0, -3.0), of_box(0.0, 0.0), strict=True):
+        np.testing.assert_allclose(np.array(view.eye_m) - at_origin.eye_m, [7, -3, 0], atol=1e-9)
+        to_middle = middle_m - view.eye_m
+        ahead = view.T_world_camera()[:3, 2]
+        np.testing.assert_allclose(ahead, to_middle / np.linalg.norm(to_middle), atol=1e-9)
+        assert 10 < np.degrees(np.arcsin(-ahead[2])) < 30
+
+
 def test_a_chair_a_cube_and_a_roof_are_objects_and_a_room_and_a_plain_are_places() -> None:
     def counts_as_place(*meshes) -> bool:
         faces = faces_of(*meshes)

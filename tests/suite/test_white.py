@@ -8,6 +8,7 @@ from vobench.suite.scene_spec import SceneFile
 from vobench.suite.white import (
     BLACK,
     BLACK_DN,
+    LENS,
     SATURATED,
     SATURATED_DN,
     ExposedShares,
@@ -85,6 +86,17 @@ def test_a_stated_white_is_kept_and_a_scene_without_needs_its_light() -> None:
     assert white_of(SceneFile(name="a", maker="a.py", white_cd_m2=7.0), None) == 7
     with pytest.raises(ValueError, match="needs its light"):
         white_of(SceneFile(name="a", maker="a.py"), None)
+
+
+def test_the_small_pictures_have_square_pixels_and_look_92_by_66_degrees_around_their_axes() -> None:
+    edges_px = np.array([[-0.5, 9.5], [31.5, 9.5], [15.5, -0.5], [15.5, 19.5]])
+    left, right, top, bottom = LENS.rays(edges_px)
+    assert np.degrees(np.arccos(left @ right)) == pytest.approx(92, abs=0.5)
+    assert np.degrees(np.arccos(top @ bottom)) == pytest.approx(66, abs=0.5)
+    assert left + right == pytest.approx([0, 0, left[2] + right[2]])
+    assert top + bottom == pytest.approx([0, 0, top[2] + bottom[2]])
+    columns, rows = LENS.project(LENS.rays([[15.5, 9.5], [16.5, 10.5]])).T
+    assert np.diff(columns) == pytest.approx(np.diff(rows))
 
 
 def sentence(remedy: Remedy, luminance_cd_m2=SURFACES, is_source=NO_SOURCE) -> str:

@@ -13,9 +13,10 @@ from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.settings import Side
+from vobench.runner.trajectory_pair import TrajectoryReading
 from vobench.trajectory.align import align
 from vobench.trajectory.associate import MAX_DIFF_NS, associate
-from vobench.trajectory.formats import DIGITS, WORDS, TrajectoryReading, seconds
+from vobench.trajectory.stamp_text import DECIMALS_OF_UNIT, UNIT_NAMES, format_seconds
 from vobench.trajectory.time_offset import estimate_offset, motion_correlation, offsets_in_stretches
 from vobench.trajectory.trajectory import PoseConvention, Trajectory
 
@@ -144,9 +145,9 @@ def _in_right_units(
     """Both trajectories in units in which their durations are similar."""
     gt_in_unit = _in_right_unit(gt, est)
     est_in_unit = _in_right_unit(est, gt)
-    if gt_in_unit.unit != gt.form_unit:
+    if gt_in_unit.unit != gt.format_unit:
         findings.append(_unit_finding("gt", gt, gt_in_unit, est))
-    if est_in_unit.unit != est.form_unit:
+    if est_in_unit.unit != est.format_unit:
         findings.append(_unit_finding("est", est, est_in_unit, gt))
     return gt_in_unit, est_in_unit
 
@@ -156,7 +157,7 @@ def _in_right_unit(reading: TrajectoryReading, other: TrajectoryReading) -> Traj
 
     Lost tracking shortens the duration, and keyframes lengthen the steps, but neither of them does both.
     """
-    if reading.unit is None or reading.is_unit_told:
+    if reading.unit is None or reading.is_unit_given:
         return reading
     duration_ns = _duration_ns(reading)
     other_duration_ns = max(_duration_ns(other), 1)
@@ -166,9 +167,9 @@ def _in_right_unit(reading: TrajectoryReading, other: TrajectoryReading) -> Traj
         return reading
 
     factors = {}
-    for unit, digits in DIGITS.items():
-        if digits < DIGITS[reading.unit]:
-            factors[unit] = 10 ** (DIGITS[reading.unit] - digits)
+    for unit, digits in DECIMALS_OF_UNIT.items():
+        if digits < DECIMALS_OF_UNIT[reading.unit]:
+            factors[unit] = 10 ** (DECIMALS_OF_UNIT[reading.unit] - digits)
     ratios = {unit: duration_ns / factor / other_duration_ns for unit, factor in factors.items()}
     unit_of_best = min(ratios, key=lambda unit: abs(np.log(ratios[unit])), default=None)
     if unit_of_best is None or not 1 / MAX_DURATION_RATIO < ratios[unit_of_best] < MAX_DURATION_RATIO:
@@ -184,10 +185,10 @@ def _unit_finding(
     side: Side, as_read: TrajectoryReading, corrected: TrajectoryReading, other: TrajectoryReading
 ) -> Finding:
     """The finding that time stamps are not in the default unit of their format."""
-    assert as_read.form_unit is not None
+    assert as_read.format_unit is not None
     assert as_read.unit is not None
     assert corrected.unit is not None
-    digits = DIGITS[as_read.form_unit] - DIGITS[as_read.unit]
+    digits = DECIMALS_OF_UNIT[as_read.format_unit] - DECIMALS_OF_UNIT[as_read.unit]
     other_duration_ns = max(_duration_ns(other), 1)
     before = _duration_ns(as_read) * 10.0**digits / other_duration_ns
     after = float(_duration_ns(corrected)) / other_duration_ns
@@ -195,7 +196,7 @@ def _unit_finding(
     other_side: Side = "est" if side == "gt" else "gt"
     return Finding(
         "stamp_unit",
-        f"the {WHO[side]}'s time stamps are {WORDS[corrected.unit]}, not {WORDS[as_read.form_unit]}",
+        f"the {WHO[side]}'s time stamps are {UNIT_NAMES[corrected.unit]}, not {UNIT_NAMES[as_read.format_unit]}",
         (Evidence(f"duration over that of the {WHO[other_side]}", "1", before, after),),
         (f"--{side}-as", corrected.unit),
     )
@@ -228,7 +229,7 @@ def _on_one_clock(gt: TrajectoryReading, est: TrajectoryReading, findings: list[
     if not (_is_clear_gain(before, after) or _is_steady(gt.trajectory, est.trajectory, lag.offset_ns)):
         return est
 
-    offset = seconds(lag.offset_ns).rstrip("0").rstrip(".")
+    offset = format_seconds(lag.offset_ns).rstrip("0").rstrip(".")
     direction = "behind" if lag.offset_ns > 0 else "ahead"
     sentence = f"the estimate's clock is {abs(lag.offset_ns) / 1e9:.3f} s {direction}"
     evidence = Evidence("correlation of the speeds", "1", before, after)
@@ -383,7 +384,7 @@ def _swapped_inputs(gt: TrajectoryReading, est: TrajectoryReading) -> Iterator[F
     noise_ratio = gt_noise / est_noise
     rate_ratio = _step_ns(est) / _step_ns(gt)
     begins_at_identity = (_begins_at_identity(gt.trajectory), _begins_at_identity(est.trajectory))
-    says_truth = (gt.says_truth, est.says_truth)
+    are_named_truth = (gt.mentions_ground_truth, est.mentions_ground_truth)
 
     # Ground truth at exactly the times of the estimate was interpolated, which makes it smooth.
     is_noisy = gt_noise > MIN_NOISE
@@ -393,7 +394,7 @@ def _swapped_inputs(gt: TrajectoryReading, est: TrajectoryReading) -> Iterator[F
         int(is_noisy and noise_ratio > CLEAR_NOISE_RATIO and has_same_times),
         int(rate_ratio < 1 / RATE_RATIO) - int(rate_ratio > RATE_RATIO),
         int(begins_at_identity == (True, False)) - int(begins_at_identity == (False, True)),
-        int(says_truth == (False, True)) - int(says_truth == (True, False)),
+        int(are_named_truth == (False, True)) - int(are_named_truth == (True, False)),
     ]
     if sum(signs) < MIN_SIGNS:
         return
@@ -405,7 +406,7 @@ def _swapped_inputs(gt: TrajectoryReading, est: TrajectoryReading) -> Iterator[F
     clauses = ["ground truth and estimate seem to be exchanged"]
     if begins_at_identity == (True, False):
         clauses.append("the truth begins at the identity and the estimate does not")
-    if says_truth == (False, True):
+    if are_named_truth == (False, True):
         clauses.append("the estimate's file calls itself ground truth")
     yield Finding("swapped_inputs", "; ".join(clauses), evidence)
 

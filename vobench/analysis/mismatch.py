@@ -11,7 +11,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.settings import Side
 from vobench.trajectory.align import align
-from vobench.trajectory.formats import QuaternionOrder
+from vobench.trajectory.quaternion_columns import QuaternionOrder
 from vobench.trajectory.trajectory import Kind as MoveKind
 from vobench.trajectory.trajectory import PoseConvention
 
@@ -362,8 +362,9 @@ def _lever_of_motions(T_gt: Array, T_est: Array, rotation: Array, window: int) -
     # Windows overlap: only every window-th motion is independent.
     residuals_m = values - terms @ (axes @ along_axes)
     noise_m = np.sqrt(np.mean(residuals_m**2) * window)
-    sigmas = np.abs(along_axes) * np.sqrt(strength) / (noise_m + TINY)
-    lever_m = axes @ np.where(sigmas >= SIGNIFICANT_SIGMAS, along_axes, 0.0)
+    sigmas_m = noise_m / np.sqrt(strength)  # of the lever along each axis
+    is_significant = np.abs(along_axes) > SIGNIFICANT_SIGMAS * sigmas_m
+    lever_m = axes @ np.where(is_significant, along_axes, 0.0)
 
     after_m = _rms_length(values - terms @ lever_m)
     scale = float(t_est @ (t_gt - lever_terms @ lever_m)) / t_est_sq

@@ -99,8 +99,7 @@ def agreement(
         taus.append(_tau(first_sample, second_sample))
     low, high = np.quantile(taus, INTERVAL).tolist()
 
-    mean_errors = zip(first_means.tolist(), second_means.tolist(), strict=True)
-    errors = dict(zip(names, mean_errors, strict=True))
+    errors = {name: (float(first_means[row]), float(second_means[row])) for row, name in enumerate(names)}
     return Agreement(_tau(first_means, second_means), low, high, errors)
 
 

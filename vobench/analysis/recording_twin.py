@@ -39,9 +39,9 @@ from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 from vobench.suite.suite import read_plan
 from vobench.suite.yaml_file import plain
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
+from vobench.trajectory.tum import format_tum
 
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame

@@ -60,6 +60,12 @@ FINISHES: dict[str, Callable[[], Material]] = {
 }
 
 
+def piece_rng(name: str, seed: int = 0) -> np.random.Generator:
+    """The random generator of the piece with a name, in a scene with a seed."""
+    name_hash = crc32(name.encode())
+    return np.random.default_rng(np.random.SeedSequence([seed, name_hash]))
+
+
 @dataclass(frozen=True, slots=True)
 class Piece:
     """A piece of furniture of one of KINDS. Its random choices depend only on its name and the seed of the scene."""
@@ -73,8 +79,7 @@ class Piece:
 
     def rng(self, seed: int = 0) -> np.random.Generator:
         """The random generator of the piece."""
-        name_hash = crc32(self.name.encode())
-        return np.random.default_rng(np.random.SeedSequence([seed, name_hash]))
+        return piece_rng(self.name, seed)
 
     def build(self, seed: int = 0) -> Instance:
         """The name of the piece, and its parts in the frame of the scene."""

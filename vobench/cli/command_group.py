@@ -34,6 +34,7 @@ COMMANDS = {
     "verify": "vobench.cli.verify:verify_command",
     "report": "vobench.cli.report:report_command",
     "compare": "vobench.cli.compare:compare_command",
+    "plot": "vobench.cli.plot:plot_command",
     "bundle": "vobench.cli.bundle:bundle_command",
     "view": "vobench.cli.view:view_command",
     "causes": "vobench.cli.causes:causes_command",

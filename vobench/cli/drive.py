@@ -9,7 +9,8 @@ import typer
 from vobench.cli import terminal
 from vobench.cli.option import Json, SuiteName, Trust
 from vobench.errors import InputError
-from vobench.report.drive_plot import ENDINGS, drive_log, save_drive_plot
+from vobench.report.drive_plot import drive_log, save_drive_plot
+from vobench.report.figure_style import ENDINGS
 from vobench.runner.drive import SuiteDrive, chosen_trajectories, drive_plan
 from vobench.suite.suite import read_plan
 

@@ -9,7 +9,7 @@ from vobench.dataset.picture import read_text
 from vobench.errors import InputError
 from vobench.sequence.recording import is_recording, read_poses
 from vobench.sequence.topic import SENSORS_FILE
-from vobench.trajectory.formats import parse_any
+from vobench.trajectory.any_format import parse_any
 from vobench.trajectory.trajectory import Trajectory
 
 

@@ -22,7 +22,9 @@ from vobench.geometry.camera import Camera, DoubleSphere
 from vobench.geometry.rig import ImuCalibration
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
-from vobench.trajectory.formats import NUMBER, content, csv_rows, format_euroc, read_table, stamps_ns
+from vobench.trajectory.euroc import csv_rows, format_euroc
+from vobench.trajectory.stamp_text import stamps_ns
+from vobench.trajectory.text_table import NUMBER, content_lines, read_table
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 MAV = "mav0"
@@ -90,16 +92,16 @@ def read_imu_csv(path: Path) -> ImuReadings:
 
     Raises TrajectoryError with file and line.
     """
-    rows = content(read_text(path))
-    if rows:
-        first_cell = rows[0][1].partition(",")[0].strip()
+    lines = content_lines(read_text(path))
+    if lines:
+        first_cell = lines[0].text.partition(",")[0].strip()
         has_header = not NUMBER.fullmatch(first_cell)  # a header that does not begin with #
         if has_header:
-            rows = rows[1:]
-    if not rows:
+            lines = lines[1:]
+    if not lines:
         raise InputError(f"no reading of the IMU: {path}")
     table = read_table(
-        rows,
+        lines,
         name=str(path),
         columns=IMU_COLUMNS,
         separator=",",
@@ -408,6 +410,7 @@ def _biases(source: ExportSource) -> tuple[list[Array], str]:
 
 
 HEEDS = frozenset({"calibration", "imu", "truth", "within_ns"})
+TRUTH_FOLDERS = rf"[^/]*/(?:{'|'.join((*TRUTHS, POSITIONS))})"
 LAYOUTS = (
     Layout(
         "tumvi",
@@ -415,6 +418,7 @@ LAYOUTS = (
         _is_tumvi,
         partial(read_euroc, form="tumvi"),
         HEEDS,
+        truth=r"dso/gt_[^/]*",
     ),
     Layout(
         "euroc",
@@ -423,5 +427,6 @@ LAYOUTS = (
         read_euroc,
         HEEDS,
         Writing(write_euroc, keeps=("imu",)),
+        TRUTH_FOLDERS,
     ),
 )

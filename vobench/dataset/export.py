@@ -18,8 +18,10 @@ from vobench.dataset.read_back import check_path, check_rig
 from vobench.dataset.source import PNG, ExportSource, Views, open_source
 from vobench.errors import InputError, SequenceError, unknown_name_sentence
 from vobench.geometry.rig import Rig
-from vobench.trajectory.formats import format_euroc, format_kitti, format_times, format_tum
+from vobench.trajectory.euroc import format_euroc
+from vobench.trajectory.kitti import format_kitti, format_times
 from vobench.trajectory.trajectory import Stamps, Trajectory
+from vobench.trajectory.tum import format_tum
 
 
 def _kitti_text(trajectory: Trajectory) -> str:

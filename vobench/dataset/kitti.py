@@ -18,8 +18,9 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import Rig, looking, projection
 from vobench.geometry.se3 import Array
-from vobench.trajectory.formats import content, format_kitti, format_times, parse_times, read_table
+from vobench.trajectory.kitti import format_kitti, format_times, parse_times
 from vobench.trajectory.nanoseconds import NS_PER_MS
+from vobench.trajectory.text_table import Line, content_lines, read_table
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
 GREY_PAIR = ("image_0", "image_1")
@@ -169,23 +170,22 @@ def _rig(
 
 def read_calibration(path: Path) -> dict[str, Array]:
     """The matrices (3, 4) of a calib.txt by name. Raises InputError with the number of an invalid line."""
-    lines_by_name: dict[str, int] = {}
-    rows = []
-    for line, body in content(read_text(path)):
-        label, colon, numbers = body.partition(":")
+    matrix_lines: dict[str, Line] = {}
+    for line in content_lines(read_text(path)):
+        place = f"{path}:{line.number}"
+        label, colon, numbers = line.text.partition(":")
         if not colon:
             example = "`P0: 718.9 0 607.2 ...`"
-            raise InputError(f"{path}:{line}: a line should be a name, a colon and a matrix, as in {example}")
+            raise InputError(f"{place}: a line should be a name, a colon and a matrix, as in {example}")
         name = label.strip()
-        if name in lines_by_name:
-            raise InputError(f"{path}:{line}: {name} should occur once, but is also in line {lines_by_name[name]}")
+        if name in matrix_lines:
+            raise InputError(f"{place}: {name} should occur once, but is also in line {matrix_lines[name].number}")
         if name.startswith(("P", "T")):
-            lines_by_name[name] = line
-            rows.append((line, numbers))
+            matrix_lines[name] = Line(line.number, numbers)
     columns = [f"{row}{column}" for row in range(3) for column in range(4)]
-    table = read_table(rows, name=str(path), columns=tuple(columns), row="a matrix")
+    table = read_table(list(matrix_lines.values()), name=str(path), columns=columns, row="a matrix")
     matrices = table.values.reshape(-1, 3, 4)
-    return dict(zip(lines_by_name, matrices, strict=True))
+    return dict(zip(matrix_lines, matrices, strict=True))
 
 
 def _camera(
@@ -330,6 +330,8 @@ def _path_read_back(
     return Trajectory(path.t_ns, T_BODY_GREY @ path.T_world_frame)
 
 
+# Truth beside the pictures, in a file of that name or of the name of its folder, or in the folder `poses`.
+TRUTH_NAMES = r"[^/]*/poses\.txt|(?P<sequence>[^/]+)/(?P=sequence)\.txt|poses/[^/]*\.txt"
 LAYOUTS = (
     Layout(
         "kitti",
@@ -338,5 +340,6 @@ LAYOUTS = (
         read_kitti,
         frozenset({"calibration", "truth"}),
         Writing(write_kitti, rectified, _exported_stamps, _path_read_back),
+        TRUTH_NAMES,
     ),
 )

@@ -22,7 +22,7 @@ from vobench.sensor.image_sensor import SENSOR_PRESETS
 from vobench.sensor.lens import vignetting
 from vobench.sensor.response import FULL_SCALE_DN, Response, linear_of_grey, response_of
 from vobench.sequence.picture import write_png
-from vobench.trajectory.formats import seconds
+from vobench.trajectory.stamp_text import format_seconds
 from vobench.trajectory.trajectory import Stamps
 
 WHITE_16 = 65535
@@ -193,7 +193,7 @@ def _times(source: ExportSource, stamps: Stamps) -> tuple[str, list[str]]:
     t_ns = stamps.tolist()
     rows = [row_of[t] for t in t_ns if t in row_of]
     if len(rows) < len(t_ns):
-        lines = [f"{index:05d} {seconds(t)}\n" for index, t in enumerate(t_ns)]
+        lines = [f"{index:05d} {format_seconds(t)}\n" for index, t in enumerate(t_ns)]
         return "".join(lines), ["The exposure of some pictures is not known, so times.txt has no third column."]
 
     time_s, gain_db = np.array(rows, float).reshape(-1, 2).T
@@ -206,5 +206,5 @@ def _times(source: ExportSource, stamps: Stamps) -> tuple[str, list[str]]:
     time_ms = (time_s * MS_PER_S).tolist()
     lines = []
     for index, (t, exposure_ms) in enumerate(zip(t_ns, time_ms, strict=True)):
-        lines.append(f"{index:05d} {seconds(t)} {exposure_ms!r}\n")
+        lines.append(f"{index:05d} {format_seconds(t)} {exposure_ms!r}\n")
     return "".join(lines), notes

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from vobench.errors import InputError
 from vobench.sequence.picture import Header, Image, header
-from vobench.trajectory.formats import LFS_POINTER
+from vobench.trajectory.any_format import LFS_POINTER
 
 MOST_NAME = 1024  # the largest number of characters of a path in a list
 MOST_BYTES = 1 << 30  # the largest size of a file; an hour of IMU readings has a tenth of it

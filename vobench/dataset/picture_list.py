@@ -14,8 +14,9 @@ from vobench.dataset.picture import EncodedPicture, inside, listed, read_bytes, 
 from vobench.dataset.recording import Notes, PictureStream, RecordedFrame
 from vobench.errors import InputError
 from vobench.trajectory.associate import associate
-from vobench.trajectory.formats import NUMBER, StampUnit, TrajectoryTable, content, stamps_ns
 from vobench.trajectory.nanoseconds import NS_PER_S
+from vobench.trajectory.stamp_text import StampUnit, stamps_ns
+from vobench.trajectory.text_table import NUMBER, Line, TextTable, content_lines
 from vobench.trajectory.trajectory import Stamps
 
 LONGEST_ROW_SHOWN = 80  # the largest number of characters of a row in a message
@@ -43,20 +44,22 @@ def read_list(
     unit: StampUnit,
 ) -> PictureList:
     """Read a list of stamps and names of pictures below `folder`. Raises InputError with file and line."""
-    rows = content(read_text(path))
-    if not rows:
+    lines = content_lines(read_text(path))
+    if not lines:
         raise InputError(f"the list has no picture: {path}")
-    cells = [_stripped(body.split(separator, 1)) for _, body in rows]
+    cells = [_stripped(line.text.split(separator, 1)) for line in lines]
     has_header = separator == "," and not NUMBER.fullmatch(cells[0][0])  # one that does not begin with #
     if has_header:
-        rows = rows[1:]
+        lines = lines[1:]
         cells = cells[1:]
-    _require_stamps_and_names(path, rows, cells)
+    _require_stamps_and_names(path, lines, cells)
 
-    lines = [line for line, _ in rows]
-    stamps = [row[0] for row in cells]
-    no_values = np.empty((len(rows), 0))
-    table = TrajectoryTable(str(path), lines, stamps, no_values)
+    table = TextTable(
+        file_name=str(path),
+        line_numbers=[line.number for line in lines],
+        first_fields=[row[0] for row in cells],
+        values=np.empty((len(lines), 0)),  # the names of pictures are no numbers
+    )
     t_ns = stamps_ns(table, unit)
     paths = [inside(folder, row[1], table.place(index)) for index, row in enumerate(cells)]
     return PictureList(str(path), t_ns, tuple(paths))
@@ -64,13 +67,14 @@ def read_list(
 
 def _require_stamps_and_names(
     path: Path,
-    rows: list[tuple[int, str]],
+    lines: list[Line],
     cells: list[list[str]],
 ) -> None:
-    for (line, body), row in zip(rows, cells, strict=True):
+    """Raise InputError unless each line has two cells, of which the first is a number."""
+    for line, row in zip(lines, cells, strict=True):
         if len(row) != 2 or not NUMBER.fullmatch(row[0]):
-            start = body[:LONGEST_ROW_SHOWN]
-            raise InputError(f"{path}:{line}: a row should be a stamp and a picture's name, but is {start!r}")
+            start = line.text[:LONGEST_ROW_SHOWN]
+            raise InputError(f"{path}:{line.number}: a row should be a stamp and a picture's name, but is {start!r}")
 
 
 def _stripped(cells: list[str]) -> list[str]:

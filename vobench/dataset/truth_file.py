@@ -10,7 +10,7 @@ from vobench.dataset.recording import Notes, ReadOptions
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.trajectory.formats import ParsedTrajectory, parse_any
+from vobench.trajectory.any_format import ParsedTrajectory, parse_any
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 EXACT = 1e-9  # the largest |RᵀR - I| of a rotation that was written with all digits

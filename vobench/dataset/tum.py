@@ -21,7 +21,8 @@ from vobench.sensor.imu import ImuReadings
 from vobench.sensor.pixel_truth import Floats, Ids
 from vobench.sequence import read_truth_frames
 from vobench.sequence.picture import write_png
-from vobench.trajectory.formats import format_tum, seconds
+from vobench.trajectory.stamp_text import format_seconds
+from vobench.trajectory.tum import format_tum
 
 LIST = "rgb.txt"
 TRUTH = "groundtruth.txt"
@@ -112,7 +113,7 @@ def write_tum(source: ExportSource, views: Views, folder: Path) -> list[str]:
 
 
 def _picture_name(folder_name: str, t_ns: int) -> str:
-    return f"{folder_name}/{seconds(t_ns)}.png"
+    return f"{folder_name}/{format_seconds(t_ns)}.png"
 
 
 def _write_depth(source: ExportSource, folder: Path) -> list[str]:
@@ -176,7 +177,7 @@ def _write_table(
     t_ns: Iterable[int],
     rows: Iterable[str],
 ) -> None:
-    lines = [f"{seconds(t)} {row}\n" for t, row in zip(t_ns, rows, strict=True)]
+    lines = [f"{format_seconds(t)} {row}\n" for t, row in zip(t_ns, rows, strict=True)]
     header = f"# {what}\n# file: vobench\n# timestamp {columns}\n"
     path.write_text(header + "".join(lines), encoding="utf-8")
 
@@ -189,5 +190,6 @@ LAYOUTS = (
         read_tum,
         frozenset({"calibration", "truth"}),
         Writing(write_tum, _left_view, keeps=("imu", DEPTH_TOPIC)),
+        r"[^/]*/groundtruth[^/]*\.txt",
     ),
 )

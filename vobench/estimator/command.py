@@ -18,7 +18,9 @@ from vobench.estimator.protocol import Frame, Result, Status
 from vobench.estimator.sandbox import Sandbox
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
-from vobench.trajectory.formats import ParsedTrajectory, StampUnit, content, parse_any
+from vobench.trajectory.any_format import ParsedTrajectory, parse_any
+from vobench.trajectory.stamp_text import StampUnit
+from vobench.trajectory.text_table import content_lines
 from vobench.trajectory.trajectory import Stamps
 
 UNITS: tuple[StampUnit | None, ...] = (None, "ns", "us", "ms")
@@ -152,7 +154,7 @@ def poses_in(text: str, t_ns: Stamps) -> dict[int, Array]:
     The text can have any format that `vobench score` reads. Without stamps, it must have one pose for each frame. With
     stamps, each must be within half a step of that of a frame. Raises EstimatorFailure.
     """
-    if not content(text):
+    if not content_lines(text):
         raise EstimatorFailure("lost", "it ended well, but {out} is empty")
     errors = list[str]()
     for unit in UNITS:

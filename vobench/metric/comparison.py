@@ -12,7 +12,7 @@ from vobench.geometry.se3 import Array
 from vobench.metric.settings import Plane, ScoreSettings, settled
 from vobench.trajectory.align import Alignment, align, align_positions
 from vobench.trajectory.associate import Matched, match
-from vobench.trajectory.formats import seconds
+from vobench.trajectory.stamp_text import format_seconds
 from vobench.trajectory.trajectory import Trajectory, step_lengths_m
 
 Found = TypeVar("Found")
@@ -236,6 +236,6 @@ def _span(trajectory: Trajectory) -> str:
     """The number of poses and the time that they span, for messages."""
     if not len(trajectory):
         return "no pose"
-    first = seconds(int(trajectory.t_ns[0]))
-    last = seconds(int(trajectory.t_ns[-1]))
+    first = format_seconds(int(trajectory.t_ns[0]))
+    last = format_seconds(int(trajectory.t_ns[-1]))
     return f"{len(trajectory)} poses from {first} s to {last} s"

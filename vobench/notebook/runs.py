@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from vobench.errors import InputError, UnknownNameError, unknown_name_sentence
 from vobench.notebook.class_source import write_estimator
 from vobench.notebook.display import choose_display
+from vobench.report.figure_style import Abscissa
 from vobench.runner.folder import open_run
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
@@ -88,22 +89,37 @@ class Run:
         self._require("case", name, self.cases)
         return self._folder.case(name)
 
-    def plot(self, case: str | None = None, *, estimators: Names | None = None) -> "Figure":
-        """Paths in top view and errors over time on one case, by default the first, of all or some estimators.
+    def plot(
+        self,
+        case: str | None = None,
+        *,
+        kind: str | None = None,
+        estimators: Names | None = None,
+        over: Abscissa = "time",
+        metric: str = "ate",
+        width_inches: float | None = None,
+    ) -> "Figure":
+        """A figure of the run, of all or some estimators.
 
-        Raises UnknownNameError for a name that is not in the run.
+        Without a `kind`, paths in top view and errors over time on one case, by default the first. The kinds are those
+        of `vobench plot`: path, axes, error, segments, cumulative, breakdown, cost, matrix and strip; without `case`
+        they show all cases, or the one that is most worth a look. `over` is what errors are drawn over, time or path,
+        and `metric` that of the matrix.
+
+        Raises UnknownNameError for a name that the run does not have, and InputError if there is nothing to draw.
         """
+        from vobench.report.figure_kind import FigureOptions, RunFigures
         from vobench.report.trial_plot import plot_case
 
-        chosen = self._require("case", case or self.cases[0], self.cases)
-        names = self.estimators if estimators is None else listed(estimators)
+        names = () if estimators is None else listed(estimators)
         for name in names:
             self._require("estimator", name, self.estimators)
-        place_of = {name: place for place, name in enumerate(names)}
-        trials = [score for score in self._scores if score.case == chosen and score.repeat == 0]
-        shown = [trial for trial in trials if trial.estimator in place_of]
-        shown.sort(key=lambda trial: place_of[trial.estimator])
-        return plot_case(self._folder, shown)
+        chosen = case if kind else case or self.cases[0]
+        if chosen is not None:
+            self._require("case", chosen, self.cases)
+        options = FigureOptions(width_inches=width_inches, over=over, metric=metric)
+        figures = RunFigures(self._folder, cases=() if chosen is None else [chosen], estimators=names, options=options)
+        return figures.draw(kind) if kind else plot_case(figures.case())
 
     def view(
         self,

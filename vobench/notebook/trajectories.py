@@ -10,8 +10,7 @@ from vobench.metric import score as scoring
 from vobench.metric.comparison import DEFAULTS
 from vobench.metric.score import Score
 from vobench.metric.settings import ScoreSettings
-from vobench.runner.trajectory_pair import TrajectoryPair, TrajectorySource, read_one, read_pair
-from vobench.trajectory.formats import TrajectoryReading
+from vobench.runner.trajectory_pair import TrajectoryPair, TrajectoryReading, TrajectorySource, read_one, read_pair
 from vobench.trajectory.trajectory import Trajectory
 
 Given = Trajectory | Path | str
@@ -64,7 +63,7 @@ def _pair(gt: Given, est: Given, times: Path | str | None, *, any_unit: bool = F
 
 def _reading(given: Given, times: Path | str | None, *, any_unit: bool) -> TrajectoryReading:
     if isinstance(given, Trajectory):
-        return TrajectoryReading(given, unit="ns", form_unit="ns", order=None)
+        return TrajectoryReading(given, unit="ns", format_unit="ns", order=None)
     source = TrajectorySource(Path(given))
     return read_one(source, times=_paths(times), any_unit=any_unit)
 

@@ -4,11 +4,20 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from math import isnan
 from statistics import median
+from typing import NamedTuple
 
 from vobench.report.cell import Cell
 
 # The lost-aware score of an estimator that survives with half of the error that counts as failed.
 BREAKDOWN_SCORE = 0.75
+
+
+class CurveKey(NamedTuple):
+    """What a breakdown curve is of."""
+
+    group: str
+    scenario: str
+    estimator: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,26 +41,34 @@ class BreakdownCurve:
         return f"{group}{scenario}: {self.estimator} {breakdown} (scores {scores})"
 
 
-def breakdown_curves(cells: Iterable[Cell]) -> list[BreakdownCurve]:
-    """The curve of each estimator on each scenario of which it has at least two severities."""
-    scores_by_severity: dict[tuple[str, str, str], dict[int, list[float]]] = {}
+def scores_by_severity(cells: Iterable[Cell]) -> dict[CurveKey, dict[int, list[float]]]:
+    """The lost-aware scores of all trials by severity, for each group, scenario and estimator, in sorted order."""
+    scores: dict[CurveKey, dict[int, list[float]]] = {}
     for cell in cells:
         facts = cell.facts
         if not facts.scenario or facts.severity is None:
             continue
-        curve_key = facts.group, facts.scenario, cell.estimator
-        severities = scores_by_severity.setdefault(curve_key, {})
+        curve_key = CurveKey(facts.group, facts.scenario, cell.estimator)
+        severities = scores.setdefault(curve_key, {})
         known = [1.0 - loss for loss in cell.losses if not isnan(loss)]
         severities.setdefault(facts.severity, []).extend(known)
 
+    complete = {}
+    for curve_key in sorted(scores):
+        by_severity = scores[curve_key]
+        complete[curve_key] = {severity: by_severity[severity] for severity in sorted(by_severity)}
+    return complete
+
+
+def breakdown_curves(cells: Iterable[Cell]) -> list[BreakdownCurve]:
+    """The curve of each estimator on each scenario of which it has at least two severities."""
     curves = []
-    for (group, scenario, estimator), by_severity in sorted(scores_by_severity.items()):
-        severities_with_score = sorted(severity for severity, scores in by_severity.items() if scores)
+    for curve_key, by_severity in scores_by_severity(cells).items():
+        severities_with_score = [severity for severity, scores in by_severity.items() if scores]
         medians = [median(by_severity[severity]) for severity in severities_with_score]
         if len(medians) > 1:
             breaks_at = _first_below(severities_with_score, medians)
-            severity_axis = tuple(severities_with_score)
-            curves.append(BreakdownCurve(group, scenario, estimator, severity_axis, tuple(medians), breaks_at))
+            curves.append(BreakdownCurve(*curve_key, tuple(severities_with_score), tuple(medians), breaks_at))
     return curves
 
 

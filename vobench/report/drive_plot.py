@@ -3,15 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vobench.errors import InputError
 from vobench.geometry.se3 import Array
 from vobench.motion.course import Unled
 from vobench.motion.drive import Waypoints
 from vobench.motion.wheeled import Wheeled
+from vobench.report.figure_style import DPI, NEUTRAL, SETTINGS, check_ending, undated
 from vobench.runner.drive import TrajectoryDrive
 from vobench.trajectory.nanoseconds import NS_PER_S
 
@@ -19,30 +19,17 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure, SubFigure
 
-ENDINGS = (".svg", ".png", ".pdf")
 ROW_INCHES = (9.0, 3.6)
 CELL_INCHES = 2.3
 # Okabe and Ito (2008): colours that colour-blind readers tell apart.
 BODY = "#0072B2"
 POINT = "#009E73"
 REFERENCE = "#D55E00"
-NEUTRAL = "#7f7f7f"
 FLOORS = {"wet": "#56B4E9", "carpet": "#CC79A7", "seam": "#E69F00"}
-# Equal drives give equal files: no dates, and ids that depend on content only.
-SETTINGS: Any = {
-    "svg.hashsalt": "vobench",
-    "font.size": 8,
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "axes.axisbelow": True,
-    "legend.fontsize": 7,
-    "legend.framealpha": 0.8,
-}
 ARROWS = 24
 LEAST_SPAN_M = 0.1
 LEAST_SPAN_S = 1e-3
 LEVEL = 1e-6  # metres or radians of a body on a level floor
-DPI = 110
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,12 +125,6 @@ def save_sheet(path: Path, logs: Sequence[DriveLog], *, columns: int = 5) -> Non
         figure.savefig(path, dpi=DPI, metadata=undated(path.suffix))
 
 
-def check_ending(path: Path) -> None:
-    """Raise InputError unless the path ends like an SVG, PNG or PDF file."""
-    if path.suffix not in ENDINGS:
-        raise InputError(f"the name of a plot should end in {', '.join(ENDINGS)}, got {path}")
-
-
 def _figure(width: float, height: float) -> "Figure":
     """An empty figure, size in inches, whose gaps do not grow with it."""
     from matplotlib.figure import Figure
@@ -151,11 +132,6 @@ def _figure(width: float, height: float) -> "Figure":
 
     layout = ConstrainedLayoutEngine(h_pad=0.05, w_pad=0.05, hspace=0, wspace=0)
     return Figure(figsize=(width, height), layout=layout)
-
-
-def undated(suffix: str) -> dict[str, None]:
-    """The metadata that keeps dates out of a plot with this suffix."""
-    return {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(suffix, {})
 
 
 def _draw(row: "SubFigure", log: DriveLog) -> None:

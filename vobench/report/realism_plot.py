@@ -11,7 +11,7 @@ from vobench.analysis.image_statistics import CYCLES
 from vobench.analysis.realism import STATISTICS, Realism, Statistic
 from vobench.analysis.stereo_fit import StereoFit, row_error
 from vobench.geometry.se3 import Array
-from vobench.report.drive_plot import DPI, SETTINGS, check_ending, undated
+from vobench.report.figure_style import DPI, SETTINGS, check_ending, undated
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -108,7 +108,8 @@ def _totals(
     is_sequential: bool,
 ) -> list[Total]:
     """The totals of the ranked estimators in their order, then those of the others by score."""
-    by_estimator = _grouped([cell for cell in cells if cell.case in set(cases)], lambda cell: cell.estimator)
+    shared = set(cases)
+    by_estimator = _grouped([cell for cell in cells if cell.case in shared], lambda cell: cell.estimator)
 
     def total_of(name: str, standing: ranking.Standing, *, has_rank: bool) -> Total:
         return _total(label, by_estimator[name], standing, design, has_rank=has_rank)

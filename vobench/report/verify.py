@@ -16,7 +16,7 @@ from vobench.runner.ground_truth import left_truth, noisy
 from vobench.runner.rescore import brief_value
 from vobench.runner.score import score_estimate
 from vobench.suite.suite_spec import TruthNoise
-from vobench.trajectory.formats import format_tum
+from vobench.trajectory.tum import format_tum
 
 NOT_IN_CACHE = "no longer in the cache; run the suite again to recreate it"
 

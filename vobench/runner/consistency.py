@@ -11,7 +11,8 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.nees import consistency, independent_samples, median_interval
 from vobench.trajectory.align import Alignment
-from vobench.trajectory.formats import content, read_table, seconds, stamps_ns
+from vobench.trajectory.stamp_text import format_seconds, stamps_ns
+from vobench.trajectory.text_table import content_lines, read_table
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 COVARIANCE = "covariance.txt"
@@ -30,20 +31,20 @@ def format_covariances(rows: Iterable[tuple[int, Array]]) -> str:
     lines = [HEAD]
     for t_ns, covariance in rows:
         entries = " ".join(map(repr, covariance[UPPER].tolist()))
-        lines.append(f"{seconds(t_ns)} {entries}\n")
+        lines.append(f"{format_seconds(t_ns)} {entries}\n")
     return "".join(lines)
 
 
 def read_covariances(path: Path, t_ns: Stamps) -> Array:
     """The covariances (N, 6, 6) of poses with stamps t_ns (N,), NaN for a pose without one. Raises InputError."""
     try:
-        rows = content(path.read_text(encoding="utf-8"))
+        lines = content_lines(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"cannot read {path}: {error}") from None
     covariances = np.full((len(t_ns), 6, 6), np.nan)
-    if not rows:
+    if not lines:
         return covariances
-    table = read_table(rows, name=str(path), columns=COLUMNS, row="a covariance")
+    table = read_table(lines, name=str(path), columns=COLUMNS, row="a covariance")
     entries = dict(zip(stamps_ns(table, "s").tolist(), table.values[:, 1:], strict=True))
     if entries.keys().isdisjoint(t_ns.tolist()):
         raise InputError(f"none of {len(entries)} covariances has the stamp of a pose: {path}")

@@ -17,10 +17,10 @@ from vobench.runner.motion import BodyMotion, body_motion, check_cases, motion_n
 from vobench.runner.sensors import wheel_error_m
 from vobench.suite.case import Case
 from vobench.suite.plan import Plan
-from vobench.trajectory.formats import format_tum
 from vobench.trajectory.kinematics import Kinematics
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import format_tum
 
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame

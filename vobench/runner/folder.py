@@ -18,8 +18,8 @@ from vobench.runner.consistency import CovarianceConsistency
 from vobench.runner.entry import file_hash
 from vobench.runner.frames import TIMES
 from vobench.runner.store import sweep, unfinished, write_json
-from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import parse_tum
 
 CASE = "case.json"
 SCORE = "score.json"

@@ -13,8 +13,8 @@ from vobench.sequence import Sequence, read_truth
 from vobench.suite.case import Case
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite_spec import EXACT, TruthNoise, Window
-from vobench.trajectory.formats import format_tum, parse_tum
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
+from vobench.trajectory.tum import format_tum, parse_tum
 
 NOISE_STREAM = 9_173  # separates the noise of the truth from the other random streams of a seed
 LONGEST_GAP_NS = 200_000_000  # the truth is not interpolated over longer gaps

@@ -17,8 +17,8 @@ from vobench.runner.folder import SCORE, SURVIVED, TrialScore, TrialStatus, read
 from vobench.runner.frames import ANSWERS, EXPOSURES, GROUND_TRUTH, read_table, write_frames
 from vobench.runner.ground_truth import scored_truth
 from vobench.runner.store import write_json
-from vobench.trajectory.formats import parse_tum
 from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.tum import parse_tum
 
 if TYPE_CHECKING:
     from vobench.suite.plan import Trial

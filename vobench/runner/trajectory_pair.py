@@ -10,15 +10,11 @@ from typing import get_args
 import numpy as np
 
 from vobench.errors import InputError, TrajectoryError
-from vobench.trajectory.formats import (
-    ParsedTrajectory,
-    QuaternionOrder,
-    StampUnit,
-    TrajectoryReading,
-    parse_any,
-    parse_times,
-)
+from vobench.trajectory.any_format import ParsedTrajectory, parse_any
+from vobench.trajectory.kitti import parse_times
 from vobench.trajectory.nanoseconds import NS_PER_S
+from vobench.trajectory.quaternion_columns import QuaternionOrder
+from vobench.trajectory.stamp_text import StampUnit
 from vobench.trajectory.trajectory import PoseConvention, Trajectory, parse_pose_convention
 
 UNITS: tuple[StampUnit, ...] = get_args(StampUnit)
@@ -26,7 +22,7 @@ ORDERS: tuple[QuaternionOrder, ...] = get_args(QuaternionOrder)
 TRUTH = "truth.mcap"
 SENSORS = "sensors.mcap"
 HEAD_BYTES = 4096  # enough to distinguish text from a recording
-SAYS_TRUTH = re.compile(r"(?<![a-z])(gt|ground[ _-]?truth|truth|reference)(?![a-z])", re.IGNORECASE)
+TRUTH_WORDS = re.compile(r"(?<![a-z])(gt|ground[ _-]?truth|truth|reference)(?![a-z])", re.IGNORECASE)
 BY_ROW = "neither file has stamps: poses are paired by row, and a second is a row; --times names a file with stamps"
 BY_FRAME = (
     "neither file has stamps: poses are paired by frame, and a second is a frame; --times names a file with stamps"
@@ -46,6 +42,25 @@ class TrajectorySource:
 
 
 @dataclass(frozen=True, slots=True)
+class TrajectoryReading:
+    """A trajectory, and how its file was read.
+
+    `unit` is the unit in which the stamps were read, None if the file has no stamps.
+    `format_unit` is the default unit of the file's format, None for a format without stamps.
+    `order` is the order in which quaternions were read, None if the file has none.
+    `mentions_ground_truth` is whether the file's name or a comment in it mentions ground truth.
+    `is_unit_given` is whether the user specified the unit.
+    """
+
+    trajectory: Trajectory
+    unit: StampUnit | None = "s"
+    format_unit: StampUnit | None = "s"
+    order: QuaternionOrder | None = "xyzw"
+    mentions_ground_truth: bool = False
+    is_unit_given: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class TrajectoryPair:
     """The ground truth, the estimate, notes on how they were read, and their pairing if neither file has stamps."""
 
@@ -60,7 +75,7 @@ class _Read:
     parsed: ParsedTrajectory
     path: Path
     moves: tuple[PoseConvention, ...]
-    says_truth: bool
+    mentions_ground_truth: bool
     unit: StampUnit | None = None  # as specified by the user; it overrides the file
     order: QuaternionOrder | None = None
 
@@ -142,11 +157,11 @@ def _reading(read: _Read) -> TrajectoryReading:
         T = move.apply(T)
     return TrajectoryReading(
         Trajectory(parsed.t_ns, T),
-        parsed.unit,
-        read.unit or parsed.form_unit,
-        None if read.order else parsed.order,
-        read.says_truth,
-        is_unit_told=read.unit is not None,
+        unit=parsed.unit,
+        format_unit=read.unit or parsed.format_unit,
+        order=None if read.order else parsed.order,
+        mentions_ground_truth=read.mentions_ground_truth,
+        is_unit_given=read.unit is not None,
     )
 
 
@@ -170,7 +185,7 @@ def _stamp(read: _Read, times: Sequence[Path]) -> _Read:
     if any(not np.array_equal(stamps, first) for stamps in others):
         names = " and ".join(map(str, fitting))
         raise InputError(f"one file of times should fit the {len(parsed.T)} poses in {read.path}, but {names} do")
-    return replace(read, parsed=replace(parsed, t_ns=first, unit="s", form_unit="s"))
+    return replace(read, parsed=replace(parsed, t_ns=first, unit="s", format_unit="s"))
 
 
 def _numbered(read: _Read) -> _Read:
@@ -193,13 +208,13 @@ def _read(source: TrajectorySource, *, any_unit: bool) -> _Read:
         raise InputError(f"a topic is for a recording, but this is a text file: {path}")
     text = _text(path)
     comments = [line for line in text[:HEAD_BYTES].splitlines() if line.startswith("#")]
-    says_truth = any(SAYS_TRUTH.search(line) for line in (path.stem, *comments))
+    mentions_ground_truth = any(TRUTH_WORDS.search(line) for line in (path.stem, *comments))
     parsed = _parse(text, str(path), unit, order, any_unit=any_unit)
     if unit and parsed.t_ns is None:
         raise InputError(f"no stamps to read as {unit} in {path}")
     if order and parsed.order is None:
         raise InputError(f"no quaternions to read as {order} in {path}")
-    return _Read(parsed, path, moves, says_truth, unit, order)
+    return _Read(parsed, path, moves, mentions_ground_truth, unit, order)
 
 
 def _read_recording(source: TrajectorySource) -> _Read:
@@ -208,7 +223,7 @@ def _read_recording(source: TrajectorySource) -> _Read:
         raise InputError(f"a recording states its stamps' unit and quaternions' order itself: {source.path}")
     trajectory = _recorded(source.path, source.topic)
     parsed = ParsedTrajectory(trajectory.t_ns, trajectory.T_world_frame, "ns", "ns")
-    return _Read(parsed, source.path, moves, says_truth=False)
+    return _Read(parsed, source.path, moves, mentions_ground_truth=False)
 
 
 def _parse(

@@ -15,7 +15,7 @@ import numpy as np
 from vobench.asset.furniture import Part
 from vobench.asset.outdoors import walker
 from vobench.asset.panorama import Surroundings
-from vobench.asset.room import FINISHES, OUTWARD, Instance, Opening, Piece, shell, things
+from vobench.asset.room import FINISHES, OUTWARD, Instance, Opening, Piece, piece_rng, shell, things
 from vobench.asset.shape import at, block, card
 from vobench.errors import SuiteError, VobenchError, error_sentence
 from vobench.geometry import se3
@@ -327,7 +327,7 @@ def _mover_contents(mover: MoverSpec, spec: SceneFile) -> Contents:
 
 def _walker(name: str, motion: scripted.WaypointMotion, seed: int) -> Contents:
     """A person who walks along a path: one mover per limb, all with the same name."""
-    person = walker(Piece("person", name, (0.0, 0.0, 0.0)).rng(seed))
+    person = walker(piece_rng(name, seed))
     limb_names = [f"{name}.{index}" for index in range(len(person.limbs))]
     limb_parts = [(limb_name, limb.parts) for limb_name, limb in zip(limb_names, person.limbs, strict=True)]
     all_things, materials = things(limb_parts)

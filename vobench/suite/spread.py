@@ -86,7 +86,8 @@ def _diagonals(variants: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
 class Dealer:
     """Deals units to treatments one after the other, such as scenarios, so that units have about equally many.
 
-    A treatment gets different units, if possible in different places; the rest is drawn by the seed.
+    A treatment gets different units, if possible in different places. Among units that have equally many treatments,
+    those of the places and drives that have the fewest come first; the rest is drawn by the seed.
     """
 
     units: Sequence[Unit]
@@ -94,6 +95,7 @@ class Dealer:
     seed: int
     _rng: np.random.Generator = field(init=False)
     _dealt: Counter[str] = field(init=False, default_factory=Counter)
+    _dealt_by_variant: Counter[tuple[str, str]] = field(init=False, default_factory=Counter)
 
     def __post_init__(self) -> None:
         if self.each > len(self.units):
@@ -107,11 +109,17 @@ class Dealer:
         order = self._rng.permutation(len(self.units)).tolist()
         for _ in range(self.each):
             candidates = [self.units[index] for index in order if self.units[index] not in chosen]
-            unit = min(candidates, key=lambda unit: (self._dealt[unit.name], places[unit.place]))
+            unit = min(candidates, key=lambda unit: (self._dealt[unit.name], places[unit.place], self._load(unit)))
             chosen.append(unit)
             places[unit.place] += 1
             self._dealt[unit.name] += runs
+            for variant in unit.by_axis.items():
+                self._dealt_by_variant[variant] += runs
         return sorted(chosen, key=self.units.index)
+
+    def _load(self, unit: Unit) -> int:
+        """The number of runs that have been dealt to the place of a unit, plus that to its drive."""
+        return sum(self._dealt_by_variant[variant] for variant in unit.by_axis.items())
 
 
 def changes_for_units(suite: Mapping[str, Any], count: int) -> dict[str, str]:

@@ -18,9 +18,11 @@ from vobench.motion.spline import PoseSpline
 from vobench.motion.wander import Wander
 from vobench.motion.wheeled import MOVER_KEYS, Wheeled
 from vobench.setting import ByKind, hints
-from vobench.trajectory.formats import ParsedTrajectory, format_tum, parse_any, parse_times
+from vobench.trajectory.any_format import ParsedTrajectory, parse_any
+from vobench.trajectory.kitti import parse_times
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
+from vobench.trajectory.tum import format_tum
 
 Spatial = PoseSpline | Handheld | Rail | Quadrotor
 AnyTrajectory = Waypoints | Planar | Spatial | Wander | Replay

@@ -15,7 +15,7 @@ from vobench.suite.scene_build import listed_lights
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.viewpoint import viewpoints
 
-# A small picture from each viewpoint: 92 x 67 degrees.
+# A small picture from each viewpoint: 92 x 66 degrees.
 LENS = Pinhole(32, 20, 15.5, 15.5, 15.5, 9.5)
 
 # The exposure of a camera with white at grey value 200 and an sRGB response; see vobench.sensor.image_sensor.

@@ -4,7 +4,6 @@ import json
 import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
-from copy import deepcopy
 from dataclasses import MISSING, dataclass, fields, replace
 from functools import cache
 from pathlib import Path
@@ -12,7 +11,7 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
-from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from vobench.errors import FilePlace, Mistake, SuiteError, VobenchError
 from vobench.setting import COMPLAINTS, hints, unit_of
@@ -113,21 +112,37 @@ def _read_with_included(path: Path, kind: Kind, including: tuple[Path, ...]) -> 
 
 def _changed(source: YamlFile, changes: Mapping[str, str]) -> YamlFile:
     """The content of a file with other values. Raises SuiteError for an impossible key or value."""
-    tree = deepcopy(source.marked)
+    tree = _shallow_copy(source.marked)
     for dotted_keys, value in changes.items():
         _set_value(tree, dotted_keys, value)
     return replace(source, marked=tree)
 
 
+def _shallow_copy(section: Any) -> Any:
+    """A mapping or list of a file with the same values and line numbers; another one is not shared, so it is itself."""
+    if isinstance(section, CommentedMap):
+        return section.copy()
+    if isinstance(section, CommentedSeq):
+        copy = CommentedSeq(section)
+        section.copy_attributes(copy)
+        return copy
+    return section
+
+
 def _set_value(tree: Any, dotted_keys: str, value: str) -> None:
-    """Replace the value at some keys by a YAML value. Missing sections are created."""
+    """Replace the value at some keys by a YAML value. Missing sections are created.
+
+    The sections on the way are copied before they change, because other readers of the file share them.
+    """
     change = f"{SET_OPTION} {dotted_keys}={value}"
     *section_keys, last_key = [int(key) if key.isdigit() else key for key in dotted_keys.split(".")]
     section = tree
     for key in section_keys:
-        section = _subsection(section, key)
-        if not isinstance(section, dict | list):
+        subsection = _subsection(section, key)
+        if not isinstance(subsection, dict | list):
             raise SuiteError(f"{change}: there are no keys below {key!r}")
+        section[key] = _shallow_copy(subsection)
+        section = section[key]
     if isinstance(section, list) and (not isinstance(last_key, int) or last_key >= len(section)):
         raise SuiteError(f"{change}: a list of {len(section)} has no entry {last_key!r}")
     try:

@@ -9,6 +9,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.constructor import ConstructorError, RoundTripConstructor
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, Node, ScalarNode, SequenceNode
+from ruamel.yaml.scanner import RoundTripScanner, ScannerError
 
 from vobench.errors import FilePlace, Mistake, SuiteError
 from vobench.regular_file import read_regular
@@ -63,6 +64,7 @@ def parse_text(path: Path, text: str) -> ParsedYaml:
     """
     # In YAML 1.2, 1e-3 is a number and 'no' is text.
     yaml = YAML(typ="rt", pure=True)
+    yaml.Scanner = _Scanner
     yaml.Constructor = _Constructor
     try:
         tree = yaml.load(text)
@@ -85,6 +87,16 @@ def _mistake_at(path: Path, mark: Any, sentence: str) -> Mistake:
     """A mistake at a mark of the parser, which may be None."""
     place = FilePlace(str(path), mark.line + 1, mark.column + 1) if mark else FilePlace(str(path))
     return Mistake(sentence, (place,))
+
+
+class _Scanner(RoundTripScanner):
+    """Splits a file into tokens. It refuses deep brackets at once, as its time grows with the square of their depth."""
+
+    def fetch_flow_collection_start(self, *args: Any, **options: Any) -> None:
+        """Read an opening bracket. Raises ScannerError if it is nested too deep."""
+        if self.flow_level >= MOST_DEPTH:
+            raise ScannerError(None, None, _depth_sentence(), self.reader.get_mark())
+        super().fetch_flow_collection_start(*args, **options)
 
 
 class _Constructor(RoundTripConstructor):
@@ -151,10 +163,14 @@ def _subtree_size(node: Node, children: list[Node], size_by_id: dict[int, int]) 
 def _require_node_limits(node: Node, *, depth: int) -> None:
     """Raise ConstructorError if a node is nested too deep, or is a number that is too long."""
     if depth >= MOST_DEPTH:
-        raise _refusal(f"is nested more than {MOST_DEPTH} deep", node)
+        raise _refusal(_depth_sentence(), node)
     is_number = isinstance(node, ScalarNode) and node.tag in NUMBER_TAGS
     if is_number and len(node.value) > MOST_DIGITS:
         raise _refusal(f"a number has more than {MOST_DIGITS} characters", node)
+
+
+def _depth_sentence() -> str:
+    return f"is nested more than {MOST_DEPTH} deep"
 
 
 def _children(node: Node) -> list[Node]:

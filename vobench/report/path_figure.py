@@ -1,0 +1,123 @@
+"""Figures of trajectories: from above, and as x, y and z over time."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from vobench.geometry.se3 import Array
+from vobench.report.figure_style import LINE_WIDTH, line_style
+from vobench.report.inline_figure import new_figure
+from vobench.report.scored_case import ScoredCase, ScoredEstimate
+from vobench.trajectory.nanoseconds import NS_PER_S
+from vobench.trajectory.trajectory import Stamps, Trajectory
+
+RELATIVE_SIZE = 1.5  # side of the square from above, relative to the longer side of the ground truth
+LEAST_HALF_SIDE_M = 0.05  # of that square, for a stationary robot
+LEGEND_INCHES = 0.5  # the height of a legend below the axes
+ROW_HEIGHT = 0.32  # of one of three axes, relative to the width of the figure
+RELATIVE_MARGIN = 0.25  # of a coordinate over time, beyond the range of the ground truth
+LEAST_MARGIN = 0.05  # the same, relative to the largest range of the three coordinates
+LEAST_RANGE_M = 0.1  # of the coordinates of a stationary robot
+TRUTH_STYLE: Any = {"color": "black", "lw": 2.2, "alpha": 0.45}
+
+
+def path_figure(case: ScoredCase, width_inches: float) -> Figure:
+    """The ground truth and the aligned estimates of a case from above."""
+    with new_figure(width_inches, width_inches + LEGEND_INCHES) as figure:
+        axes = figure.subplots()
+        draw_paths(axes, case)
+        axes.set_title(case.name)
+        figure.legend(loc="outside lower center", ncols=2)
+    return figure
+
+
+def draw_paths(axes: Axes, case: ScoredCase) -> None:
+    """Draw a case from above. An estimate without a score appears in the legend only.
+
+    The axes are a square around the ground truth. A diverged estimate leaves it instead of shrinking the other paths.
+    """
+    x_m, y_m, _ = case.truth.positions_m.T
+    axes.plot(x_m, y_m, **TRUTH_STYLE, label="ground truth")
+    axes.plot(x_m[:1], y_m[:1], "o", color="black", ms=4, label="start")
+    for estimate in case.estimates:
+        estimate_m = _positions_with_gaps(estimate)
+        axes.plot(*estimate_m[:, :2].T, lw=LINE_WIDTH, label=estimate.label, **line_style(estimate.index))
+        _mark_end(axes, estimate)
+    axes.set(xlabel="x (m)", ylabel="y (m)")
+    _limit_to_truth(axes, case.truth)
+
+
+def _mark_end(axes: Axes, estimate: ScoredEstimate) -> None:
+    """Mark the last pose of an estimate that ends before the ground truth does."""
+    score = estimate.score
+    if score is None or not score.coverage.ends_lost:
+        return
+    x_m, y_m, _ = score.aligned_positions_m[-1]
+    colour = line_style(estimate.index)["color"]
+    axes.plot([x_m], [y_m], "x", color=colour, ms=6, mew=1.6)
+
+
+def _limit_to_truth(axes: Axes, truth: Trajectory) -> None:
+    low_m = truth.positions_m[:, :2].min(axis=0)  # (2,)
+    high_m = truth.positions_m[:, :2].max(axis=0)
+    centre_x_m, centre_y_m = (low_m + high_m) / 2
+    longer_side_m = float((high_m - low_m).max())
+    half_side_m = max(longer_side_m * RELATIVE_SIZE / 2, LEAST_HALF_SIDE_M)
+    axes.set_xlim(centre_x_m - half_side_m, centre_x_m + half_side_m)
+    axes.set_ylim(centre_y_m - half_side_m, centre_y_m + half_side_m)
+    axes.set_aspect("equal", adjustable="box")
+
+
+def axes_figure(case: ScoredCase, width_inches: float) -> Figure:
+    """The x, y and z of the ground truth and of the aligned estimates of a case over time."""
+    with new_figure(width_inches, 3 * ROW_HEIGHT * width_inches + LEGEND_INCHES) as figure:
+        rows = figure.subplots(3, 1, sharex=True)
+        for axis, axes in enumerate(rows):
+            _draw_coordinate(axes, case, axis)
+        rows[-1].set_xlabel("time (s)")
+        figure.suptitle(case.name)
+        handles, labels = rows[0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+    return figure
+
+
+def _draw_coordinate(axes: Axes, case: ScoredCase, axis: int) -> None:
+    """Draw one coordinate over time, within a range around that of the ground truth."""
+    start_ns = case.truth.t_ns[0]
+    truth_s = (case.truth.t_ns - start_ns) / NS_PER_S
+    truth_m = case.truth.positions_m[:, axis]
+    axes.plot(truth_s, truth_m, **TRUTH_STYLE, label="ground truth")
+    for estimate in case.estimates:
+        coordinate_m = _positions_with_gaps(estimate)[:, axis]
+        time_s = _times_with_gaps_s(estimate, start_ns)
+        axes.plot(time_s, coordinate_m, lw=LINE_WIDTH, label=estimate.label, **line_style(estimate.index))
+    low_m = float(truth_m.min())
+    high_m = float(truth_m.max())
+    largest_range_m = max(float(np.ptp(case.truth.positions_m, axis=0).max()), LEAST_RANGE_M)
+    margin_m = max(RELATIVE_MARGIN * (high_m - low_m), LEAST_MARGIN * largest_range_m)
+    axes.set_ylim(low_m - margin_m, high_m + margin_m)
+    axes.set_ylabel(f"{'xyz'[axis]} (m)")
+
+
+def _positions_with_gaps(estimate: ScoredEstimate) -> Array:
+    """The aligned positions (N, 3), with a row of NaN where frames have no pose; empty without a score."""
+    if estimate.score is None:
+        return np.zeros((0, 3))
+    return with_gaps(estimate.score.aligned_positions_m, estimate.score.gt_frames)
+
+
+def _times_with_gaps_s(estimate: ScoredEstimate, start_ns: int) -> Array:
+    """The times (N,) of the positions since the start of the case."""
+    if estimate.score is None:
+        return np.zeros(0)
+    time_s = (estimate.score.gt_t_ns - start_ns) / NS_PER_S
+    return with_gaps(time_s, estimate.score.gt_frames)
+
+
+def with_gaps(values: Array, frames: Stamps) -> Array:
+    """Values (K, ...) of frames (K,), with a row of NaN wherever frames are missing, so that a line is interrupted."""
+    after_gap = np.flatnonzero(np.diff(frames) > 1) + 1
+    interrupted: Array = np.insert(np.asarray(values, float), after_gap, np.nan, axis=0)
+    return interrupted
