@@ -347,7 +347,8 @@ def _print_board(board: "Board", *, as_json: bool) -> None:
 
 def _print_remarks(folder: "RunFolder", scores: "Sequence[TrialScore]", *, shares_time: bool) -> None:
     """Print where the results of a run are, what affects its CPU times, and which trial to look at."""
-    from vobench.report.trial_choice import pick, sentence
+    from vobench.report.case_facts import case_facts
+    from vobench.report.trial_choice import pick, story
     from vobench.runner.run import BESIDE
 
     console = terminal.console()
@@ -359,9 +360,10 @@ def _print_remarks(folder: "RunFolder", scores: "Sequence[TrialScore]", *, share
     if with_sequence(scores):
         trial = pick(scores, case=None, estimator=None)
         name = f"{folder.path}/{trial.case}/{trial.estimator}"
-        console.print(f"{sentence(trial)}\nSee it: {command} view {name}")
-        if "scene" in trial.variant:  # a recording cannot be simulated again
-            console.print(f"Ask why: {command} explain {name}")
+        see = f"see it (`{command} view {name}`)"
+        # A recording cannot be simulated again.
+        ask = f", ask why (`{command} explain {name}`)" if "scene" in trial.variant else ""
+        console.print(f"{story(trial, case_facts(folder, trial.case))}: {see}{ask}")
 
 
 def _split_assignments(assignments: Sequence[str]) -> dict[str, str]:
