@@ -31,8 +31,9 @@ from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import single_instant
 from vobench.scene.light import Flicker, Sun
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, moved
+from vobench.scene.mesh import moved
 from vobench.scene.scene import Mover, Scene, WaypointMotion
+from vobench.scene.triangles import Thing
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene

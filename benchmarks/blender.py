@@ -27,7 +27,8 @@ from vobench.rendering.path import PathRenderer
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.material import reflectance
-from vobench.scene.mesh import MeshArrays, arrays, joined_arrays
+from vobench.scene.mesh import as_arrays
+from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 from vobench.scene.scene import Scene
 from vobench.suite import catalog
 from vobench.suite.scene_build import build
@@ -46,10 +47,10 @@ def job(scene: Scene, camera: Pinhole, poses: Sequence[Array]) -> dict[str, Any]
     for name in used:
         material = scene.materials[name]
         content[f"tile.{name}"] = reflectance(material)
-        content |= _triangles(name, [arrays(t.mesh) for t in scene.things if t.material == name], material.tile_m)
+        content |= _triangles(name, [as_arrays(t.mesh) for t in scene.things if t.material == name], material.tile_m)
     for panel in scene.panels:
         content[f"luminance.{panel.name}"] = panel.luminance_cd_m2
-        content |= _triangles(panel.name, [arrays(panel.mesh)], 1.0)
+        content |= _triangles(panel.name, [as_arrays(panel.mesh)], 1.0)
     return content | {"materials": [*used, *(panel.name for panel in scene.panels)]}
 
 

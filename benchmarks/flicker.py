@@ -30,8 +30,8 @@ from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import single_instant
 from vobench.scene.material import Material
-from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.suite import catalog
 from vobench.suite.scene_build import build

@@ -21,13 +21,13 @@ from vobench.analysis.scene_report import SceneReport, survey_scene
 from vobench.analysis.scene_sheet import sheet
 from vobench.errors import VobenchError
 from vobench.geometry.camera import Pinhole
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering.bake import BakedScene, BakeSettings, bake
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import single_instant
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import LUMINANCE, srgb
-from vobench.scene.mesh import areas_m2
 from vobench.scene.scene import Scene, triangles
 from vobench.sequence.picture import write_png
 from vobench.suite.viewpoint import viewpoints

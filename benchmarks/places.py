@@ -16,7 +16,7 @@ import numpy as np
 from vobench.asset import home, place_check, workplace
 from vobench.asset.daylight import LIGHTINGS
 from vobench.asset.interior import Interior
-from vobench.scene.mesh import areas_m2
+from vobench.geometry.triangle import areas_m2
 
 MAKERS = {"flat": home.furnished_flat, "office": workplace.furnished_office}
 PLACE_M = 1e-3  # faces are the same if their corners are as near as this

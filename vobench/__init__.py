@@ -17,9 +17,11 @@ if TYPE_CHECKING:
 
     from vobench.metric.settings import LIKE, ScoreSettings
     from vobench.notebook.class_source import write_estimator
+    from vobench.notebook.pictures import render
     from vobench.notebook.questions import causes, drive, explain, realism, shrink, twin
     from vobench.notebook.runs import Check, Run, bundle, check, compare, read_board, read_run, run
-    from vobench.notebook.simulation import Simulation, read_sequence, render, simulate
+    from vobench.notebook.sequences import read_sequence
+    from vobench.notebook.simulation import Simulation, simulate
     from vobench.notebook.trajectories import diagnose, read_trajectory, score
     from vobench.sequence import Sequence
     from vobench.trajectory.trajectory import Trajectory
@@ -47,8 +49,8 @@ _HOMES = {
     "read_run": "vobench.notebook.runs",
     "run": "vobench.notebook.runs",
     "Simulation": "vobench.notebook.simulation",
-    "read_sequence": "vobench.notebook.simulation",
-    "render": "vobench.notebook.simulation",
+    "read_sequence": "vobench.notebook.sequences",
+    "render": "vobench.notebook.pictures",
     "simulate": "vobench.notebook.simulation",
     "diagnose": "vobench.notebook.trajectories",
     "read_trajectory": "vobench.notebook.trajectories",

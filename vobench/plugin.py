@@ -139,7 +139,8 @@ if TYPE_CHECKING:
         Switched,
     )
     from vobench.scene.material import Material, Picture
-    from vobench.scene.mesh import Thing, copies, flipped, joined, make_mesh, moved, quad, textured, two_sided
+    from vobench.scene.mesh import copies, flipped, joined, make_mesh, moved, quad, textured, two_sided
+    from vobench.scene.triangles import Thing
     from vobench.sensor.imu import ImuReadings
     from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2
     from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -282,7 +283,7 @@ HOMES = {
     "Switched": "vobench.scene.light",
     "Material": "vobench.scene.material",
     "Picture": "vobench.scene.material",
-    "Thing": "vobench.scene.mesh",
+    "Thing": "vobench.scene.triangles",
     "copies": "vobench.scene.mesh",
     "flipped": "vobench.scene.mesh",
     "joined": "vobench.scene.mesh",

@@ -22,8 +22,8 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen, MinLen
 
 from vobench.errors import SettingError, unknown_name_sentence
 
-# Sentences about wrong values for those who write YAML, by pydantic's type of the error; {} are filled in.
-COMPLAINTS = {
+# Messages about wrong values for those who write YAML, by pydantic's type of the error; {} are filled in.
+MESSAGES = {
     "missing": "this key is missing",
     "string_type": "should be text (a number or a date needs quotes)",
     "int_type": "should be a whole number",
@@ -357,7 +357,7 @@ def _checked_entries(entries: tuple[Any, ...], entry_hints: tuple[Any, ...]) -> 
     if entry_hints[1:] == (...,):
         entry_hints = entry_hints[:1] * len(entries)
     if len(entries) < len(entry_hints):
-        raise SettingError(COMPLAINTS["missing"], len(entries))
+        raise SettingError(MESSAGES["missing"], len(entries))
     if len(entries) > len(entry_hints):
         raise _error("too_long", entries, max_length=len(entry_hints), actual_length=len(entries))
     checked = list[Any]()
@@ -422,11 +422,11 @@ def _require_mark(mark: Any, value: Any) -> None:
 
 
 def _error(error_type: str, value: Any, **context: Any) -> SettingError:
-    return SettingError(complaint(COMPLAINTS[error_type], value, context))
+    return SettingError(wrong_value_message(MESSAGES[error_type], value, context))
 
 
-def complaint(template: str, value: Any, context: Mapping[str, Any]) -> str:
-    """The sentence of a template, with the value unless that is a whole section."""
+def wrong_value_message(template: str, value: Any, context: Mapping[str, Any]) -> str:
+    """The message of a template, with the value unless that is a whole section."""
     sentence = template.format(**{key: _format_number(each) for key, each in context.items()})
     if isinstance(value, dict | list | tuple):
         return sentence

@@ -24,8 +24,9 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking, stereo_rig
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flat, flipped
+from vobench.scene.mesh import flat, flipped
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Thing
 
 LENS = Pinhole(160, 120, 150.0, 150.0, 79.5, 59.5)
 PAIR = stereo_pair(stereo_rig(LENS, pitch_deg=0, baseline_m=0.2), "test")

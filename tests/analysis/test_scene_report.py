@@ -3,11 +3,13 @@
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 
 from tests.cli.conftest import CLOSET, make_cheap
-from vobench.analysis.scene_report import SceneReport, survey_scene
+from vobench.analysis.scene_report import SceneReport, strength, survey_scene
 from vobench.errors import UnknownNameError
+from vobench.scene.light import PointLight, Sky
 
 
 @pytest.fixture
@@ -72,5 +74,10 @@ def test_a_wrong_white_is_doubted_once_the_light_is_computed(tmp_path: Path, mon
 def test_an_object_is_called_one(tmp_path: Path) -> None:
     (tmp_path / "tile.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 0 -1\nv 0 0 -1\nf 1 2 3\nf 1 3 4\n")
     report = survey_scene(str(tmp_path / "tile.obj"))
-    assert not report.found.is_place
+    assert not report.survey.is_place
     assert any(line.startswith("an object rather than a place") for line in report.lines())
+
+
+def test_the_strength_of_a_light_has_its_unit() -> None:
+    assert strength(PointLight("bulb", np.zeros(3), 500.0)) == "500 lm"
+    assert strength(Sky("sky", 1234.5)) == "1234 lx"

@@ -12,7 +12,7 @@ import pytest
 
 from vobench.asset import household, outdoors, picture
 from vobench.asset.room import FINISHES, KINDS
-from vobench.scene.mesh import areas_m2
+from vobench.geometry.triangle import areas_m2
 
 FROZEN = Path(__file__).with_name("frozen.json")
 PICTURES = {

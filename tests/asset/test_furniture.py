@@ -8,7 +8,7 @@ import pytest
 
 from vobench.asset.furniture import Part
 from vobench.asset.room import KINDS
-from vobench.scene.mesh import face_normals
+from vobench.geometry.triangle import face_normals
 
 FLOOR_KINDS = ("desk", "chair", "shelf", "plant", "carton", "crate", "sofa", "cabinet", "bench", "pillar", "monitor")
 SIZED = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.asset.glb import CORNERS, Glb, Reader, only, triangle
-from vobench.scene.mesh import face_normals
+from vobench.geometry.triangle import face_normals
 
 
 def test_faces_without_area_are_dropped_and_counted(read: Reader) -> None:

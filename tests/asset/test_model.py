@@ -15,9 +15,9 @@ from tests.asset.glb import CORNERS, Glb, Json, Reader, only, triangle, z_up
 from vobench.asset import gltf_material
 from vobench.asset.model import read_model
 from vobench.errors import ModelError
+from vobench.geometry.triangle import face_normals
 from vobench.scene.light import PointLight, SpotLight, Sun
 from vobench.scene.material import linear
-from vobench.scene.mesh import face_normals
 
 # Nodes and faces
 

@@ -10,7 +10,8 @@ from ruamel.yaml import YAML
 import vobench
 from vobench.asset.furniture import matt
 from vobench.asset.room import FINISHES, KINDS, OUTWARD, Opening, Piece, shell, things
-from vobench.scene.mesh import face_normals, joined
+from vobench.geometry.triangle import face_normals
+from vobench.scene.mesh import joined
 
 SCENES = Path(vobench.__file__).parents[1] / "scenes"
 WHITE = matt()

@@ -8,7 +8,8 @@ from trimesh import Trimesh
 
 from vobench.asset import shape
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import face_normals, joined, moved, two_sided
+from vobench.geometry.triangle import face_normals
+from vobench.scene.mesh import joined, moved, two_sided
 
 SQUARE = np.array([[0, 0], [4, 0], [4, 4], [0, 4]], float)
 HOLES = [SQUARE / 4 + 0.5, SQUARE / 4 + 2.5, SQUARE / 8 + [3, 1]]

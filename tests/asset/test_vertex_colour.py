@@ -7,7 +7,7 @@ from vobench.asset import vertex_colour
 from vobench.asset.gltf_material import Look
 from vobench.asset.vertex_colour import painted
 from vobench.scene.material import Material, Picture, linear
-from vobench.scene.mesh import MeshArrays
+from vobench.scene.mesh_arrays import MeshArrays
 
 RNG = np.random.default_rng(2)
 WEIGHTS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0], [1 / 3, 1 / 3, 1 / 3], [0.6, 0.2, 0.2]])

@@ -15,13 +15,13 @@ from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.bake import BakedScene, Patches
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import STEADY, Level, PointLight
 from vobench.scene.material import Material, reflectance
-from vobench.scene.mesh import areas_m2
 from vobench.scene.scene import Scene, triangles
 
 EvenLight = Callable[..., BakedScene]

@@ -7,7 +7,8 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
-from vobench.scene.mesh import Thing, moved, quad
+from vobench.scene.mesh import moved, quad
+from vobench.scene.triangles import Thing
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -13,6 +13,7 @@ from vobench.asset.texture import Procedural
 from vobench.errors import RenderError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering.bake import (
     LIGHT,
     PLACES,
@@ -33,9 +34,10 @@ from vobench.rendering.texel_owner import owners
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Flicker, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Material, Picture, fresnel
-from vobench.scene.mesh import Thing, areas_m2, flat, flipped, make_mesh, moved, quad
+from vobench.scene.mesh import flat, flipped, make_mesh, moved, quad
 from vobench.scene.panorama import PanoramaMap
 from vobench.scene.scene import Scene, ceiling_light, triangles
+from vobench.scene.triangles import Thing
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
 BODY = ("plain", 0.5, 0.0, 1.0, 8, 0)

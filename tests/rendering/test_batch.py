@@ -5,9 +5,10 @@ import pytest
 
 from tests.rendering.rectangles import box, room
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering.batch import VERTEX_FLOATS, Batch, Geometry, depends_on_view, geometry
 from vobench.scene.material import Material
-from vobench.scene.mesh import Triangles, areas_m2, table
+from vobench.scene.triangles import Triangles, triangle_table
 
 MATERIALS = {
     "plain": Material(),
@@ -17,7 +18,7 @@ MATERIALS = {
 }
 SIDES = room((4, 5, 3), floor="mirror", wall="plain", ceiling="wax")
 CART = box(np.array([0.5, 0.2, 0.4]), (0.4, 0.5, 0.6), yaw_deg=20, material="wax")
-FACES = table([*SIDES, *CART], [-1] * len(SIDES) + [0] * len(CART), [-1] * (len(SIDES) + len(CART)))
+FACES = triangle_table([*SIDES, *CART], [-1] * len(SIDES) + [0] * len(CART), [-1] * (len(SIDES) + len(CART)))
 
 
 def drawn(faces: Triangles) -> Geometry:

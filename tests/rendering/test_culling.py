@@ -22,8 +22,9 @@ from vobench.rendering.renderer import single_instant
 from vobench.rendering.view import NEAR_M, PinholeView, Plane, pinhole_view
 from vobench.scene.light import Sky
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, make_mesh, quad, table
+from vobench.scene.mesh import make_mesh, quad
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing, triangle_table
 from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 
@@ -40,7 +41,7 @@ def random_quads(rng: np.random.Generator, count: int) -> tuple[Geometry, Array]
     corner, along, up = rng.normal(0, 3, (count, 3)), *rng.normal(0, 0.7, (2, count, 3))
     materials = {str(i): replace(MATERIALS[i % 2], tint=1 - i / 1e4) for i in range(count)}
     things = [Thing(str(i), quad(corner[i], along[i], up[i]), str(i)) for i in range(count)]
-    faces = table(things, [-1 + (i % 3 == 0) for i in range(count)], [-1] * count)
+    faces = triangle_table(things, [-1 + (i % 3 == 0) for i in range(count)], [-1] * count)
     drawn = geometry(faces, np.zeros((2 * count, 3, 2), np.float32), materials)
     return drawn, np.stack([corner, corner + along, corner + along + up, corner + up], 1)
 
@@ -89,7 +90,7 @@ def test_no_face_that_can_be_seen_is_left_out_and_most_others_are(mirrors: int, 
 
 
 def test_the_runs_of_visible_clusters_hold_every_face_once() -> None:
-    ball = table([Thing("ball", sphere(60), "body")], [-1], [-1])
+    ball = triangle_table([Thing("ball", sphere(60), "body")], [-1], [-1])
     drawn = geometry(ball, np.zeros((len(ball), 3, 2), np.float32), {"body": MATERIALS[0]})
     T = looking(pitch_deg=0, position_m=(-3.0, 0, 0))
     view = pinhole_view(CAMERA, T, [], np.zeros((0, 4, 4)), ambient_cd_m2=np.zeros(3))

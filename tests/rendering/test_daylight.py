@@ -12,8 +12,9 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene, BakeSettings, bake
 from vobench.scene.light import SUN_RADIUS_RAD, Light, Sky, Sun
 from vobench.scene.material import Material, pane_reflectance
-from vobench.scene.mesh import Thing, quad, two_sided
+from vobench.scene.mesh import quad, two_sided
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=4, bounces=0)
 FINER = replace(DIRECT, spacing_m=0.05)  # the sky's light lies between every other sample

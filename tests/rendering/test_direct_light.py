@@ -14,8 +14,8 @@ from vobench.rendering.unwrap import unwrap
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, table
 from vobench.scene.scene import ceiling_light
+from vobench.scene.triangles import Thing, triangle_table
 
 MATERIALS = {"a": Material(), "mirror": Material("mirror", tint=0.8)}
 X, Y, Z = np.eye(3)
@@ -26,7 +26,7 @@ PANEL = ceiling_light("panel", np.array([0.2, 0.1, 2.0]), (0.4, 0.3), power_lm=5
 
 def open_floor(*more: Thing) -> tuple[Texels, TexelLayout, Visibility]:
     things = [FLOOR, *more]
-    faces = table(things, [-1] * len(things), [-1] * len(things))
+    faces = triangle_table(things, [-1] * len(things), [-1] * len(things))
     lit = faces.thing == 0
     atlas = unwrap(faces, np.full(len(faces), 0.1), lit)
     visibility = Visibility(faces, MATERIALS, np.arange(len(faces)))

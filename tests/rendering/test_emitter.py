@@ -11,8 +11,8 @@ from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Sky
 from vobench.scene.material import Material
-from vobench.scene.mesh import table
 from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.triangles import triangle_table
 
 LAMP = ceiling_light("lamp", np.array([0.2, 0.1, 2.0]), (0.8, 0.5), power_lm=1000)
 FLOOR = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "floor")
@@ -71,7 +71,7 @@ def test_a_panels_open_light_is_the_sum_over_its_places(
 def test_the_open_skys_light_is_the_sum_over_its_places(
     kind: str, eta: float, tilt: tuple[float, float, float]
 ) -> None:
-    faces = table([FLOOR], [-1], [-1])
+    faces = triangle_table([FLOOR], [-1], [-1])
     sky = Sky("sky", 10_000.0, kind, np.array([0.5, 0.3, np.sqrt(0.66)]))
     (emitter,) = emitters(sky, Visibility(faces, {"floor": Material()}, np.arange(len(faces))))
     texels = receivers(eta=eta, tilt=tilt).take(slice(0, 1))

@@ -16,8 +16,9 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import AreaLight, Sky
 from vobench.scene.material import LUMINANCE, Material, Picture, linear
-from vobench.scene.mesh import Thing, flat, make_mesh, quad, textured
+from vobench.scene.mesh import flat, make_mesh, quad, textured
 from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.triangles import Thing
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 FISHEYE = KannalaBrandt(120, 90, 60.0, 60.0, 59.5, 44.5, 0.0, 0.0, 0.0, 0.0)

@@ -7,12 +7,14 @@ import numpy as np
 from tests.rendering.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import RayCaster, bounding_sphere, planar_patches, sample_points
 from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material, pane_reflectance
-from vobench.scene.mesh import Thing, areas_m2, quad, table
+from vobench.scene.mesh import quad
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
+from vobench.scene.triangles import Thing, triangle_table
 
 MATERIALS: dict[str, Material] = {
     "a": Material(texture=Procedural("plain", 0.5, 0.0, 1.0, 8, 0)),
@@ -96,7 +98,7 @@ def test_no_ray_slips_between_two_faces_that_share_an_edge() -> None:
     rng = np.random.default_rng(2)
     shared = rng.uniform(-3, 3, (200_000, 1)) * [1, 0, 0] + [0, 0, 0]
     corners = quad([-4, -3, 0], [8, 0, 0], [0, 6, 0])
-    faces = table([Thing("floor", corners, "a")], [-1], [-1])
+    faces = triangle_table([Thing("floor", corners, "a")], [-1], [-1])
     on_diagonal = corners.vertices[0] + (shared[:, :1] / 8 + 0.5) * (corners.vertices[2] - corners.vertices[0])
     start = on_diagonal + rng.standard_normal((len(shared), 3)) * [1, 1, 0] + [0, 0, 2.0]
     assert RayCaster(faces).stops(start, 2 * (on_diagonal - start)).all()
@@ -138,7 +140,7 @@ def test_spots_are_spread_evenly_over_triangles() -> None:
 
 def test_panes_one_behind_the_other_multiply_and_from_either_side() -> None:
     panes = [Thing("p", quad([-1, -1, z], [2, 0, 0], [0, 2, 0]), "pane") for z in (0.0, 0.5, 1.0)]
-    faces = table(panes, [-1] * 3, [-1] * 3)
+    faces = triangle_table(panes, [-1] * 3, [-1] * 3)
     seen = Visibility(faces, {"pane": replace(MATERIALS["pane"], tint=0.9)}, np.arange(len(faces)))
     start, way = np.array([[0.2, 0.1, -1.0]], np.float32), np.array([[0.3, 0.4, 3.0]], np.float32)
     once = 0.9 * (1 - pane_reflectance(np.array(3 / np.sqrt(9.25)), 1.5))

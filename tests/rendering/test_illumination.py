@@ -13,8 +13,9 @@ from vobench.rendering.bake import SUN_STEP_RAD, BakedScene, BakeSettings, bake,
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sun, Switched
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, moved, quad
+from vobench.scene.mesh import moved, quad
 from vobench.scene.scene import Mover, Scene, ceiling_light
+from vobench.scene.triangles import Thing
 
 COARSE = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=0.3, indirect_rays=64, bounces=3)
 DIRECT = replace(COARSE, bounces=0)

@@ -8,7 +8,7 @@ from vobench.rendering.lamp import Lamp, lamp_groups, lamp_of, lamps_on
 from vobench.rendering.occlusion import Bodies
 from vobench.scene.light import PointLight, Sky, SpotLight, Steady, Sun
 from vobench.scene.material import Material
-from vobench.scene.mesh import corners
+from vobench.scene.mesh import face_corners
 from vobench.scene.scene import Scene, ceiling_light
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -39,7 +39,7 @@ def test_the_sun_is_in_one_direction_from_everywhere_and_shines_on_what_faces_it
 
 def test_a_flat_panel_shines_only_to_its_front() -> None:
     panel = ceiling_light("lamp", np.array([0.0, 0, 2.0]), (1.0, 0.5), power_lm=1)
-    lamp = lamp_of(corners(panel.mesh))
+    lamp = lamp_of(face_corners(panel.mesh))
     np.testing.assert_allclose(lamp.center_m, [0, 0, 2.0], atol=1e-9)
     np.testing.assert_allclose(lamp.axis, DOWN, atol=1e-12)
     points = np.array([[0.3, 0.1, 1.0], [0.3, 0.1, 3.0]], np.float32)

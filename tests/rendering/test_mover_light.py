@@ -12,6 +12,7 @@ from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering.bake import BakedScene, BakeSettings, bake
 from vobench.rendering.emitter import Emitter, bulb_emitter, panel_emitter
 from vobench.rendering.geometry import BoundingSphere, RayCaster
@@ -19,15 +20,16 @@ from vobench.rendering.mover_light import may_shade, occluder
 from vobench.rendering.renderer import single_instant
 from vobench.scene.light import PointLight, Sky
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, areas_m2, moved, quad, table
+from vobench.scene.mesh import moved, quad
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
+from vobench.scene.triangles import Thing, triangle_table
 
 PILLAR = moved(block((0.5, 0.3, 1.8), bevel_m=0), at(0.4, -0.2, 0.9, yaw=25))
 FLOOR = quad((-2, -2, 0), (4, 0, 0), (0, 4, 0))
 LAMP = ceiling_light("panel", np.array([1.0, 0.3, 2.4]), (0.8, 0.4), power_lm=1000)
 PANEL = panel_emitter(LAMP)
 BULB = bulb_emitter(PointLight("bulb", np.array([-1.0, 0.5, 2.0]), 500.0))
-CASTER = RayCaster(table([Thing("pillar", PILLAR, "grey")], [-1], [-1]))
+CASTER = RayCaster(triangle_table([Thing("pillar", PILLAR, "grey")], [-1], [-1]))
 
 
 def test_a_convex_thing_casts_the_shade_of_its_hull_and_a_sheet_its_own() -> None:
@@ -40,7 +42,7 @@ def test_a_convex_thing_casts_the_shade_of_its_hull_and_a_sheet_its_own() -> Non
 def test_a_shape_that_its_hull_would_fill_keeps_its_gap() -> None:
     """Two pillars of one thing: a hull would close what is between them."""
     pair = np.concatenate([PILLAR.triangles, PILLAR.triangles + np.array([2.0, 0, 0])])
-    caster = RayCaster(table([Thing("pair", PILLAR, "grey")], [-1], [-1]))
+    caster = RayCaster(triangle_table([Thing("pair", PILLAR, "grey")], [-1], [-1]))
     assert caster.occluded(np.array([[0.4, -5, 1.0]]), np.array([[0.4, 5, 1.0]])).all()
     middles = occluder(pair).mean(1)
     assert not ((middles[:, 0] > 0.9) & (middles[:, 0] < 1.9)).any()

@@ -12,8 +12,9 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.occlusion import Bodies, back_faces, dot
 from vobench.rendering.shot import CameraShot, shot_transforms
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flipped, make_mesh, moved, quad, table, texture_coordinates, two_sided
+from vobench.scene.mesh import flipped, make_mesh, moved, quad, texture_coordinates, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion
+from vobench.scene.triangles import Thing, triangle_table
 
 MATERIALS = {"a": Material(), "glass": Material("pane", eta=1.5)}
 WALK = WaypointMotion(np.array([0.0, 2.0]), np.array([[1.0, 0, 0], [2.0, 1.0, 0]]), np.array([0.0, 90.0]))
@@ -121,9 +122,9 @@ def test_the_back_of_a_face_has_its_corners_in_any_order_and_belongs_to_the_same
     rolled = make_mesh(back.vertices, np.roll(back.faces, 1, axis=1), texture_coordinates(back), back.vertex_normals)
     sheet = Thing("sheet", front, "a")
     for mesh in (back, rolled):
-        both = table([replace(sheet, mesh=front), replace(sheet, mesh=mesh)], [-1, -1], [-1, -1])
+        both = triangle_table([replace(sheet, mesh=front), replace(sheet, mesh=mesh)], [-1, -1], [-1, -1])
         assert (back_faces(both) == -1).all()
-    both_sides = table([replace(sheet, mesh=two_sided(front))], [-1], [-1])
+    both_sides = triangle_table([replace(sheet, mesh=two_sided(front))], [-1], [-1])
     back_of = back_faces(both_sides)
     assert back_of[-1] == -1
     np.testing.assert_array_equal(back_of[back_of[:-1]], np.arange(len(both_sides)))

@@ -20,8 +20,9 @@ from vobench.rendering.path import PathRenderer
 from vobench.rendering.renderer import View, single_instant
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import LUMINANCE, Material, Picture, fresnel, linear, pane_reflectance, under_coat
-from vobench.scene.mesh import Thing, arrays, quad, two_sided
+from vobench.scene.mesh import as_arrays, quad, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
+from vobench.scene.triangles import Thing
 
 X, Y, Z = np.eye(3)
 SMALL = Pinhole(12, 8, 200.0, 200.0, 5.5, 3.5)
@@ -440,7 +441,7 @@ def test_holes_are_seen_through_and_let_light_through(trace):
 def test_smooth_normals_shade_and_flat_faces_hide(trace):
     tilted = unit(np.array([0.5, 0.0, 1.0]))
     sun = Sun("sun", 1000.0, (0.0,), (0.0,), (90.0,))
-    level = arrays(quad([-4, -4, 0], 8 * X, 8 * Y))
+    level = as_arrays(quad([-4, -4, 0], 8 * X, 8 * Y))
     shaded = replace(level, normals=np.tile(tilted, (4, 1)))
     floor = Thing("floor", shaded.mesh(), "floor")
     scene = Scene("f", (floor,), {"floor": Material(colour=(0.5,) * 3)}, (sun,))

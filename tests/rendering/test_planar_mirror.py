@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
+from vobench.geometry.triangle import areas_m2, face_normals
 from vobench.rendering.planar_mirror import LEAST_M2, MirrorFaces, planar_mirrors, sharpness
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import MeshArrays, areas_m2, face_normals
-from vobench.scene.mesh import quad_arrays as quad
+from vobench.scene.mesh_arrays import MeshArrays
+from vobench.scene.mesh_arrays import quad_arrays as quad
 
 RNG = np.random.default_rng(0)
 

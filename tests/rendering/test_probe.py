@@ -16,8 +16,9 @@ from vobench.rendering.probe import FACES, LEVELS, glints, level_of, roughness_o
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import Flicker, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Material, inner_reflectance
-from vobench.scene.mesh import Thing, make_mesh, quad
+from vobench.scene.mesh import make_mesh, quad
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 AHEAD = looking(pitch_deg=0, position_m=(-2.0, 0, 1.5))

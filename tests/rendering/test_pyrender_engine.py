@@ -18,8 +18,9 @@ from vobench.rendering.pyrender_engine import PyrenderRenderer
 from vobench.rendering.renderer import Radiance, View, single_instant
 from vobench.scene.light import AreaLight, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Thing, quad, two_sided
+from vobench.scene.mesh import quad, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
+from vobench.scene.triangles import Thing
 
 X, Y, Z = np.eye(3)
 CAMERA = Pinhole(161, 121, 120.0, 118.0, 78.0, 62.5)

@@ -16,8 +16,9 @@ from vobench.rendering.renderer import single_instant
 from vobench.rendering.seen_light import SeenLight, read_seen_light, seen_light
 from vobench.scene.light import PointLight, Sky, Steady
 from vobench.scene.material import LUMINANCE, Material, fresnel, pane_reflectance
-from vobench.scene.mesh import Thing, moved, quad
+from vobench.scene.mesh import moved, quad
 from vobench.scene.scene import Scene, ceiling_light
+from vobench.scene.triangles import Thing
 
 LENS = Pinhole(64, 48, 40.0, 40.0, 31.5, 23.5)
 FLOOR = quad((-2, -2, 0), (4, 0, 0), (0, 4, 0))

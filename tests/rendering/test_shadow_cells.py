@@ -16,8 +16,9 @@ from vobench.rendering.occlusion import Occluders
 from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.light import AreaLight, Light, PointLight, SpotLight, Sun
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flat
+from vobench.scene.mesh import flat
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
+from vobench.scene.triangles import Thing
 
 
 def icosphere(center_m: Sequence[float], radius_m: float, *, splits: int) -> Trimesh:

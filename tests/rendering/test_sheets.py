@@ -12,8 +12,9 @@ from vobench.rendering.geometry import RayCaster, reversed_faces
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import PointLight
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flipped, joined, moved, quad, table, two_sided
+from vobench.scene.mesh import flipped, joined, moved, quad, two_sided
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Thing, triangle_table
 
 GREY = {"grey": Material(texture=Procedural("plain", 0.5, 0.0, 1.0, 8, 0))}
 SETTINGS = BakeSettings(spacing_m=0.1, light_rays=4, indirect_spacing_m=0.2, indirect_rays=144, bounces=12)
@@ -24,7 +25,7 @@ SHEET = quad((0, -0.5, -0.6), (0, 1.0, 0), (0, 0, 1.2))  # seen from +x
 @pytest.mark.parametrize("back_first", [False, True])
 def test_a_ray_meets_the_side_of_a_sheet_that_it_comes_from(back_first: bool) -> None:
     both = joined([SHEET, flipped(SHEET)][:: -1 if back_first else 1])
-    faces = table([Thing("sheet", both, "grey")], [-1], [-1])
+    faces = triangle_table([Thing("sheet", both, "grey")], [-1], [-1])
     rng = np.random.default_rng(0)
     ends = np.column_stack([np.zeros(200), rng.uniform(-0.4, 0.4, 200), rng.uniform(-0.5, 0.5, 200)])
     starts = rng.uniform(0.2, 1, (200, 3)) * rng.choice([-1, 1], (200, 1))

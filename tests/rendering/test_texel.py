@@ -10,10 +10,11 @@ from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Thing, Triangles, flat, make_mesh, quad, table, two_sided
+from vobench.scene.mesh import flat, make_mesh, quad, two_sided
+from vobench.scene.triangles import Thing, Triangles, triangle_table
 
 MATERIALS = {"grey": Material(), "wax": Material(eta=1.5)}
-BOARD = table([Thing("board", quad([1, 2, 3], [0.7, 0, 0], [0, 0.5, 0]), "wax")], [-1], [-1])
+BOARD = triangle_table([Thing("board", quad([1, 2, 3], [0.7, 0, 0], [0, 0.5, 0]), "wax")], [-1], [-1])
 
 
 def points_of(faces: Triangles, spacing_m: float, *, seed: int = 0) -> tuple[Texels, TexelLayout]:
@@ -85,7 +86,7 @@ def test_where_things_touch_neither_side_has_light_of_its_own():
         "sheet": two_sided(quad([-0.6, 0, 0.3], [0.2, 0, 0], [0, 0.2, 0])),
     }
     things = [Thing(name, mesh, "grey") for name, mesh in meshes.items()]
-    faces = table(things, [-1] * len(things), [-1] * len(things))
+    faces = triangle_table(things, [-1] * len(things), [-1] * len(things))
     lit = np.ones(len(faces), bool)
     atlas = unwrap(faces, np.full(len(faces), 0.025), lit)
     visibility = Visibility(faces, MATERIALS, np.arange(len(faces)))

@@ -8,7 +8,8 @@ from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, quad, table
+from vobench.scene.mesh import quad
+from vobench.scene.triangles import Thing, triangle_table
 
 MATERIALS = {"grey": Material()}
 LEFT, RIGHT, ABOVE, BELOW = range(4)
@@ -17,7 +18,7 @@ LEFT, RIGHT, ABOVE, BELOW = range(4)
 def board(wide: int, high: int) -> tuple[Texels, TexelLayout]:
     """Points 10 cm apart."""
     things = [Thing("board", quad([0, 0, 0], [0.1 * (wide - 1), 0, 0], [0, 0.1 * (high - 1), 0]), "grey")]
-    faces, lit = table(things, [-1], [-1]), np.ones(2, bool)
+    faces, lit = triangle_table(things, [-1], [-1]), np.ones(2, bool)
     atlas = unwrap(faces, np.full(2, 0.1), lit)
     return texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0)
 

@@ -25,8 +25,9 @@ from vobench.rendering.lamp import lamp_of
 from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Thing, Triangles, flat, flipped, joined, moved, quad, two_sided
+from vobench.scene.mesh import flat, flipped, joined, moved, quad, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
+from vobench.scene.triangles import Thing, Triangles
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
 
 PLAIN = ("plain", 0.5, 0.0, 1.0, 8, 0)

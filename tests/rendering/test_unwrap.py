@@ -9,6 +9,7 @@ from trimesh import Trimesh
 
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering import unwrap as unwrapping
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.texel import Texels, texels
@@ -16,7 +17,8 @@ from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, Triangles, areas_m2, flat, joined, make_mesh, quad, table, two_sided
+from vobench.scene.mesh import flat, joined, make_mesh, quad, two_sided
+from vobench.scene.triangles import Thing, Triangles, triangle_table
 
 MATERIALS = {"grey": Material()}
 
@@ -43,7 +45,7 @@ def zoo() -> Triangles:
         needle,
     ]
     things = [Thing(f"thing {nth}", mesh, "grey") for nth, mesh in enumerate(meshes)]
-    return table(things, [-1] * len(things), [-1] * len(things))
+    return triangle_table(things, [-1] * len(things), [-1] * len(things))
 
 
 FACES = zoo()
@@ -124,7 +126,7 @@ def test_a_map_is_the_same_bytes_twice() -> None:
 
 def test_lamps_share_a_block_each_and_what_has_no_light_another() -> None:
     lamp = Thing("lamp", quad([0, 0, 2], [0, 1, 0], [1, 0, 0]), "")
-    faces = table([FACES.things[0], lamp, lamp, FACES.things[5]], [-1] * 4, [-1, 0, 1, -1])
+    faces = triangle_table([FACES.things[0], lamp, lamp, FACES.things[5]], [-1] * 4, [-1, 0, 1, -1])
     lit = faces.thing == 0
     atlas = unwrap(faces, np.full(len(faces), 0.1), lit)
     taken = np.zeros((atlas.height, atlas.width), int)

@@ -6,7 +6,7 @@ import pytest
 from tests.rendering.rectangles import rectangle
 from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material, pane_reflectance
-from vobench.scene.mesh import table
+from vobench.scene.triangles import triangle_table
 
 MATERIALS = {
     "wall": Material(),
@@ -20,7 +20,7 @@ U, V = np.array([0, 4.0, 0]), np.array([0, 0, 4.0])
 def seen(*places: tuple[float, str]) -> Visibility:
     """Large squares across the x axis, each at a place."""
     things = [rectangle(np.array([x, 0, 0]), U, V, material, f"{nth}") for nth, (x, material) in enumerate(places)]
-    faces = table(things, [-1] * len(things), [-1] * len(things))
+    faces = triangle_table(things, [-1] * len(things), [-1] * len(things))
     return Visibility(faces, MATERIALS, np.arange(len(faces)))
 
 

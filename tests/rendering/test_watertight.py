@@ -7,8 +7,8 @@ import pytest
 
 from vobench.geometry.se3 import Array
 from vobench.rendering.watertight import watertight
-from vobench.scene.mesh import MeshArrays
-from vobench.scene.mesh import quad_arrays as quad
+from vobench.scene.mesh_arrays import MeshArrays
+from vobench.scene.mesh_arrays import quad_arrays as quad
 
 
 def sphere(count: int) -> MeshArrays:

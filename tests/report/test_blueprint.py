@@ -67,7 +67,8 @@ def test_grid_has_three_to_thirty_lines(extent_m):
     ("name", "hue_deg"), [("orange", 32), ("blue", 212), ("violet", 285), ("yellow", 52), ("cyan", 180)]
 )
 def test_each_colour_is_what_it_is_called(name, hue_deg):
-    red, green, blue = (value / 255 for value in bp.ESTIMATOR_COLORS[name])
+    (rgb,) = [colour.rgb for colour in bp.ESTIMATOR_COLOURS if colour.name == name]
+    red, green, blue = (value / 255 for value in rgb)
     hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
     assert 360 * hue == pytest.approx(hue_deg, abs=3)
     assert 0.5 < lightness < 0.75
@@ -94,3 +95,11 @@ def test_an_estimate_counts_up_to_twice_the_radius_from_the_middle():
     near, far = np.array([[14.9, 0, 0.4]]), np.array([[15.1, 0, 0.4]])
     assert len(bp._near_truth(truth, near)) == len(truth) + 1
     assert len(bp._near_truth(truth, far)) == len(truth)
+
+
+def test_a_sixth_estimator_is_in_the_legend_with_the_first_colour():
+    labels = [f"vo_{number}" for number in range(6)]
+    view = bp._paths_view(PATHS["circle"], PATHS["circle"], labels)
+    assert view.name == (
+        "Truth green, vo_0 orange, vo_1 blue, vo_2 violet, vo_3 yellow, vo_4 cyan, vo_5 orange, error red"
+    )

@@ -95,6 +95,12 @@ def test_a_noisy_pair_of_pictures_takes_sixty_kilobytes_at_most(run_viewer, tmp_
         assert sum(sizes) <= 60_000
 
 
+def test_a_sixth_estimator_is_in_the_recording_too(run_viewer, tmp_path):
+    others = [replace(run_viewer, label=f"vo_{number}") for number in range(5)]
+    save_trial(tmp_path / "six.rrd", run_viewer, *others)
+    assert len(rows(tmp_path / "six.rrd", "/world/vo_4/path", static=True)) == 1
+
+
 def test_two_estimators_are_in_one_recording_each_with_entities_and_a_left_picture_of_its_own(run_viewer, tmp_path):
     other = replace(run_viewer, label="other", title="other on room", rotation_deg=np.full(12, 2.0))
     save_trial(tmp_path / "two.rrd", run_viewer, other)
@@ -252,10 +258,10 @@ def test_a_recording_opens_at_the_first_failure_of_any_trial_or_where_one_goes_w
     fine = replace(run_viewer, statuses=["ok"] * 60, first=100)
     failed = replace(fine, statuses=["ok"] * 40 + ["lost"] + ["ok"] * 19)
     wrong = replace(fine, wrong_at=50)
-    assert rerun._focus([fine]) is None
-    assert rerun._focus([fine, failed]) == (125, 155)
-    assert rerun._focus([fine, wrong]) == (135, 159)
-    assert rerun._focus([wrong, failed]) == (125, 155)
+    assert rerun._replayed_frames([fine]) is None
+    assert rerun._replayed_frames([fine, failed]) == (125, 155)
+    assert rerun._replayed_frames([fine, wrong]) == (135, 159)
+    assert rerun._replayed_frames([wrong, failed]) == (125, 155)
 
 
 def test_a_layout_has_a_plot_of_numbers_and_of_costs_where_there_are_some(run_viewer, tmp_path):

@@ -45,7 +45,7 @@ for suite in sys.argv[2:]:
     plan = read_plan(suite)
     case = plan.simulated[0]
     forget_peak()
-    for task in sequence_tasks(case, {}):
+    for task in sequence_tasks(case):
         sequence = perform(task, store)
     simulating = peak_mb()
     forget_peak()

@@ -58,12 +58,12 @@ def test_an_import_is_made_once_and_again_when_a_file_changes(bench, layouts, tm
     suite = tmp_path / "one.yaml"
     suite.write_text(f"name: one\nsource: {layouts / 'euroc'}\nestimators: [stand_still]\n")
     plan, store = read_plan(str(suite)), bench.folder / "once"
-    (task,) = sequence_tasks(plan.recorded[0], read_all(plan))
+    (task,) = sequence_tasks(plan.recorded[0])
     before = perform(task, store)
     assert perform(task, store) == before
     calibration = layouts / "euroc" / "mav0" / "cam0" / "sensor.yaml"
     calibration.write_text(calibration.read_text() + "# looked at\n")
-    (changed,) = sequence_tasks(plan.recorded[0], read_all(plan))
+    (changed,) = sequence_tasks(plan.recorded[0])
     assert is_done(task, store)
     assert not is_done(changed, store)
     assert perform(changed, store) != before

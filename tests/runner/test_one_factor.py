@@ -99,7 +99,7 @@ def recorded(folder: Path, *, cache: Path | None = None, **factors: str) -> Path
         text = text.replace(key, value)
     (folder / "one.yaml").write_text(text)
     (case,) = read_plan(str(folder / "one.yaml")).cases
-    tasks, store = sequence_tasks(case, {}), cache or folder / "cache"
+    tasks, store = sequence_tasks(case), cache or folder / "cache"
     for task in missing(tasks, store):
         perform(task, store)
     return store / tasks[-1].key

@@ -30,7 +30,7 @@ def contents(run, *names):
 
 
 def sequence_key(case):
-    return sequence_tasks(case, {})[-1].key
+    return sequence_tasks(case)[-1].key
 
 
 def never(*_, **__):

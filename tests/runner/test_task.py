@@ -86,8 +86,8 @@ def test_a_case_of_stock_pyrender_needs_no_light_and_counts_its_release(bench):
 @pytest.mark.parametrize("engine", ["path", "pyrender"])
 def test_whatever_the_engine_a_scene_without_white_needs_its_light(bench, engine):
     drawn = bench.plan(("seed: 1", f"seed: 1\nrendering: {{engine: {engine}}}")).simulated[0]
-    assert [task.stage for task in sequence_tasks(drawn, {})] == ["sequence"]
+    assert [task.stage for task in sequence_tasks(drawn)] == ["sequence"]
     unstated = replace(drawn, scene=replace(drawn.scene, white_cd_m2=None))
-    bake, sequence = sequence_tasks(unstated, {})
+    bake, sequence = sequence_tasks(unstated)
     assert bake.stage == "bake"
     assert sequence.needs == (bake.key,)

@@ -6,6 +6,7 @@ from trimesh import Trimesh
 
 from vobench.asset.shape import at, block, cushion
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2, face_normals
 from vobench.scene.light import (
     NS_PER_S,
     SKIES,
@@ -22,7 +23,7 @@ from vobench.scene.light import (
     Switched,
     scaled,
 )
-from vobench.scene.mesh import areas_m2, face_normals, moved, quad
+from vobench.scene.mesh import moved, quad
 from vobench.scene.scene import ceiling_light
 
 LEVELS: dict[str, Level] = {

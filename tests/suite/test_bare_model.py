@@ -9,7 +9,8 @@ from vobench.asset import model as model_module
 from vobench.asset.shape import at, block
 from vobench.scene.light import PointLight, Sky, Sun
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flipped, moved, quad
+from vobench.scene.mesh import flipped, moved, quad
+from vobench.scene.triangles import Thing
 from vobench.suite.bare_model import bare_model_scene
 from vobench.suite.default_light import DAYLIGHT_SKY, DAYLIGHT_SUN
 

@@ -6,8 +6,9 @@ import pytest
 from vobench.asset.shape import at, block
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flipped, moved, quad, two_sided
+from vobench.scene.mesh import flipped, moved, quad, two_sided
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Thing
 from vobench.suite.default_light import ENOUGH_LIGHT, LAMP_SIDE, MOST_LAMPS, ROOM_LX, DefaultLight, default_light
 from vobench.suite.scene_spec import PanelLamp
 

@@ -52,15 +52,15 @@ def said(read, path: Path) -> str:
 def test_a_mark_is_a_key_of_its_own_kind_and_of_no_other(kind: file_kind.Kind) -> None:
     keys = {each: {"class" if f.name == "class_path" else f.name for f in fields(MODELS[each])} for each in MODELS}
     others = set().union(*(keys[each] for each in MODELS if each != kind))
-    assert file_kind.MARKS[kind] <= keys[kind]
-    assert not file_kind.MARKS[kind] & others
+    assert file_kind.DISTINCTIVE_KEYS[kind] <= keys[kind]
+    assert not file_kind.DISTINCTIVE_KEYS[kind] & others
 
 
 @pytest.mark.parametrize("kind", catalog.KINDS)
 def test_all_that_vobench_brings_along_is_of_its_kind(kind: file_kind.Kind) -> None:
     for entry in catalog.entries(kind):
         path = entry.path / "estimator.yaml" if kind == "estimator" else entry.path
-        assert file_kind.kind_in(path) == kind or "include:" in path.read_text()
+        assert file_kind.guessed_kind(path) == kind or "include:" in path.read_text()
 
 
 def test_a_scene_where_a_suite_belongs(here: Path) -> None:

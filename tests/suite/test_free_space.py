@@ -9,8 +9,9 @@ from vobench.asset.shape import at, block
 from vobench.errors import SuiteError
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, moved, quad
+from vobench.scene.mesh import moved, quad
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Thing
 from vobench.suite.free_space import (
     CELL_M,
     FLOOR_STEP_M,

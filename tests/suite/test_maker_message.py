@@ -10,7 +10,8 @@ from vobench.asset.texture import Procedural
 from vobench.errors import SuiteError
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Scaled, Sky, SpotLight, Steady, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import Thing, make_mesh, quad
+from vobench.scene.mesh import make_mesh, quad
+from vobench.scene.triangles import Thing
 from vobench.suite.maker_message import LENGTH, GeneratedPlace, checked, decode, encode
 
 WALL = quad((0, 0, 0), (1, 0, 0), (0, 1, 0))

@@ -6,9 +6,10 @@ import pytest
 
 from vobench.errors import SuiteError
 from vobench.suite import catalog, yaml_file
+from vobench.suite.axis import AXES
 from vobench.suite.catalog import builtin_root
 from vobench.suite.plan import Plan
-from vobench.suite.scenario import SETUP_AXES, read_scenario
+from vobench.suite.scenario import read_scenario
 from vobench.suite.suite import read_plan
 from vobench.suite.suite_spec import Suite
 
@@ -69,7 +70,7 @@ def test_a_severity_changes_the_keys_it_names_and_no_others(plan):
     assert (first.scene.materials["grain"].albedo, fourth.scene.materials["grain"].albedo) == (0.5, 0.1)
     assert fifth.trajectory.rate_hz == 5
     changed = [
-        [axis for axis in ("scene", *SETUP_AXES) if getattr(case, axis) != getattr(first, axis)]
+        [axis for axis in AXES if getattr(case, axis) != getattr(first, axis)]
         for case in (second, third, fourth, fifth)
     ]
     assert changed == [["camera"], ["lighting"], ["scene"], ["trajectory"]]
@@ -93,7 +94,7 @@ def test_a_scenario_has_the_base_of_what_it_includes_with_its_own_keys_over_it(p
 
 def test_variants_of_an_axis_are_called_alike_just_where_they_are(plan):
     cases = plan().cases
-    for axis in ("scene", *SETUP_AXES):
+    for axis in AXES:
         names = [case.variant[axis] for case in cases]
         values = [getattr(case, axis) for case in cases]
         assert [[a == b for a in names] for b in names] == [[a == b for a in values] for b in values]
@@ -160,11 +161,7 @@ def test_a_stock_scenario_changes_something_at_every_severity_and_nothing_at_sev
     assert scenario.name == entry.name
     assert len({repr(setup) for setup in scenario.setups}) == len(scenario.setups)
     changed = {
-        tuple(
-            axis
-            for axis in ("scene", "scene_changes", *SETUP_AXES)
-            if getattr(setup, axis) != getattr(scenario.setup(0), axis)
-        )
+        tuple(axis for axis in ("scene_changes", *AXES) if getattr(setup, axis) != getattr(scenario.setups[0], axis))
         for setup in scenario.setups[1:]
     }
     assert len(changed) == 1, "one factor, on one axis"

@@ -7,7 +7,7 @@ import pytest
 from vobench.errors import MOST_SAID, FilePlace, SuiteError, VobenchError
 from vobench.runner.motion import body_motions
 from vobench.suite import catalog, estimator_entry, scene_build, scene_file
-from vobench.suite.case import AXES
+from vobench.suite.axis import AXES
 from vobench.suite.catalog import builtin_root
 from vobench.suite.suite import read_plan
 from vobench.suite.yaml_file import checked, plain

@@ -107,7 +107,7 @@ WRONG = [
     ("{kind: circle, radius_m: -1}", ".radius_m: should be greater than 0 (got -1)"),
     ("{kind: rail, points_m: [[0, 0, 1], [1, 0, 1]], speed: 1}", ".speed: unknown key. Did you mean 'speed_mps'? Known: accel_mps2, kind, points_m, rate_hz, speed_mps"),
     ("{kind: rail, points_m: [[0, 0, 1], [1, 0, 1]], slip: none}", ".slip: belongs to circle, figure_8, lissajous, pure_rotation, reverse, square, stop_and_go, waypoints; this is rail"),
-    ("{radius_m: 1, targets_m: [[1, 1]]}", ".radius_m: belongs to circle, reverse; without a kind this is waypoints"),
+    ("{radius_m: 1, targets_m: [[1, 1]]}", ".radius_m: belongs to circle, reverse; the kind is waypoints by default"),
     ("{kind: circle, radius_m: 1, targets_m: [[1, 1]]}", ".targets_m: belongs to waypoints; this is circle"),
     ("{kind: circle, radius_m: 1, side_m: 2}", ".side_m: belongs to square; this is circle"),
     ("{kind: circle, radius_m: 1, mover: unicycle, slip: none}", ".slip: does not belong to mover 'unicycle', which has accel_mps2, clockwise, encoders, kind, laps, mover, radius_m, rate_hz, speed_mps, start_heading_deg, start_m"),

@@ -6,7 +6,8 @@ import pytest
 from vobench.asset.shape import at, block
 from vobench.geometry.camera import Pinhole
 from vobench.rendering.geometry import RayCaster
-from vobench.scene.mesh import Thing, Triangles, flipped, moved, quad, table
+from vobench.scene.mesh import flipped, moved, quad
+from vobench.scene.triangles import Thing, Triangles, triangle_table
 from vobench.suite.free_space import largest_free_circle
 from vobench.suite.viewpoint import EYE_SHARE, Viewpoint, around, is_place, viewpoints
 
@@ -16,7 +17,7 @@ LENS = Pinhole(8, 6, 4.0, 4.0, 3.5, 2.5)
 def faces_of(*meshes) -> Triangles:
     things = [Thing("thing", mesh, "grey") for mesh in meshes]
     none = [-1] * len(things)
-    return table(things, none, none)
+    return triangle_table(things, none, none)
 
 
 def room(height_m: float = 2.5):

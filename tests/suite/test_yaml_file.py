@@ -90,7 +90,7 @@ WRONG = [
     ("courses: {a: {kind: 3}}", f"courses.a.kind: no kind of course named '3'. {COURSES}"),
     ("courses: {a: {}}", "courses.a.radius_m: this key is missing"),
     ("courses: {a: {radius: 1}}", "courses.a.radius: unknown key. Did you mean 'radius_m'? Known: kind, radius_m"),
-    ("courses: {a: {radius_m: 1, side_m: 1}}", "courses.a.side_m: belongs to square; without a kind this is circle"),
+    ("courses: {a: {radius_m: 1, side_m: 1}}", "courses.a.side_m: belongs to square; the kind is circle by default"),
     ("courses: {a: {kind: square, side_m: 1, radius_m: 1}}", "courses.a.radius_m: belongs to circle; this is square"),
     ("courses: {a: 3}", "courses.a: should be keys with values (got 3)"),
 ]  # fmt: skip

@@ -4,8 +4,8 @@ from contextlib import closing
 from pathlib import Path
 
 from vobench import stop
-from vobench.analysis.scene import survey
 from vobench.analysis.scene_sheet import Rgb8, contact_sheet, place_picture
+from vobench.analysis.scene_survey import scene_survey
 from vobench.rendering.bake import BakeSettings, bake
 from vobench.rendering.raster import RasterRenderer
 from vobench.runner.store import SILENT, Progress
@@ -46,4 +46,4 @@ def _picture(place: SceneFile) -> Rgb8:
     scene = build(place, {})
     baked = bake(scene, COARSE)
     with closing(RasterRenderer(baked)) as renderer:
-        return place_picture(baked, survey(scene), renderer, place.place_name)
+        return place_picture(baked, scene_survey(scene), renderer, place.place_name)

@@ -6,14 +6,15 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from vobench.analysis.scene import SceneSurvey, strength, survey
 from vobench.analysis.scene_sheet import sheet
+from vobench.analysis.scene_survey import SceneSurvey, scene_survey
 from vobench.asset import MODEL_SUFFIXES
 from vobench.runner.exposure_doubt import exposure_doubts
 from vobench.runner.key import cache_folder
 from vobench.runner.simulate import open_renderer
 from vobench.runner.store import SILENT, Progress
 from vobench.runner.task import bake_task, is_done, perform
+from vobench.scene.light import Light, Sky, Sun
 from vobench.scene.scene import Scene
 from vobench.sequence.picture import write_png
 from vobench.suite.scene_build import build
@@ -26,40 +27,57 @@ from vobench.suite.white import white_of
 
 @dataclass(frozen=True, slots=True)
 class SceneReport:
-    """A survey of a scene: its file, the scene that was built from it, the findings, and notes about its models."""
+    """The survey of a scene, with its file, the scene that was built from it, and notes about its models."""
 
     spec: SceneFile
     scene: Scene
-    found: SceneSurvey
+    survey: SceneSurvey
     notes: tuple[str, ...]
 
     def lines(self) -> list[str]:
         """The contents of the scene, one line each, without the notes."""
-        found = self.found
-        corners_m = zip(found.low_m, found.high_m, strict=True)
+        survey = self.survey
+        corners_m = zip(survey.low_m, survey.high_m, strict=True)
         size = " x ".join(f"{high_m - low_m:.2f}" for low_m, high_m in corners_m)
+        contents = f"{survey.thing_count} things, {survey.face_count:,} faces, {survey.material_count} materials"
         lines = [
-            f"{self.spec.place_name}: {found.things} things, {found.faces:,} faces, {found.materials} materials",
+            f"{self.spec.place_name}: {contents}",
             f"size: {size} m",
-            f"textures: {found.textures_mb:.0f} MB",
-            f"open edges: {found.open_edges:,}; faces on a face: {found.twins:,}",
-            f"backs seen: {found.backs:.1%}",
+            f"textures: {survey.textures_mb:.0f} MB",
+            f"open edges: {survey.open_edge_count:,}; faces on a face: {survey.duplicate_face_count:,}",
+            f"backs seen: {survey.back_facing_share:.1%}",
             f"free circle: {self._free_circle()}",
         ]
-        if not found.is_place:
+        if not survey.is_place:
             lines.append("an object rather than a place to drive in: put it into a scene's YAML as one of its meshes")
-        lines += [f"light: {light}, {strength(self.scene, light)}" for light in found.lights]
+        lines += [f"light: {light.name}, {strength(light)}" for light in self.scene.lights]
         return lines
 
     def _free_circle(self) -> str:
-        free = self.found.free
-        if free is None:
+        circle = self.survey.free_circle
+        if circle is None:
             return "none"
-        return f"{free.radius_m:.1f} m around ({free.x_m:.1f}, {free.y_m:.1f}), floor at {free.floor_m:.2f} m"
+        return f"{circle.radius_m:.1f} m around ({circle.x_m:.1f}, {circle.y_m:.1f}), floor at {circle.floor_m:.2f} m"
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, as `vobench scene --json` prints them."""
-        return {**asdict(self.found), "notes": list(self.notes), "white_cd_m2": self.white_cd_m2()}
+        survey = self.survey
+        return {
+            "things": survey.thing_count,
+            "faces": survey.face_count,
+            "materials": survey.material_count,
+            "textures_mb": survey.textures_mb,
+            "low_m": survey.low_m,
+            "high_m": survey.high_m,
+            "lights": survey.light_names,
+            "open_edges": survey.open_edge_count,
+            "twins": survey.duplicate_face_count,
+            "backs": survey.back_facing_share,
+            "free": asdict(survey.free_circle) if survey.free_circle else None,
+            "is_place": survey.is_place,
+            "notes": list(self.notes),
+            "white_cd_m2": self.white_cd_m2(),
+        }
 
     def white_cd_m2(self) -> float | None:
         """The white that cameras are exposed for; None if the scene does not state it and its light is not computed."""
@@ -82,8 +100,15 @@ class SceneReport:
         """Draw a plan, the lines of text and four views to a PNG. The light is computed unless it is cached."""
         light = perform(bake_task(self.spec), cache_folder(), progress=progress)
         with closing(open_renderer(self.scene, Rendering(), light)) as renderer:
-            picture = sheet(self.scene, self.found, renderer, white_of(self.spec, light), self.lines())
+            picture = sheet(self.scene, self.survey, renderer, white_of(self.spec, light), self.lines())
         write_png(path, picture)
+
+
+def strength(light: Light) -> str:
+    """The illuminance or power of a light, as text with its unit."""
+    if isinstance(light, Sky | Sun):
+        return f"{light.illuminance_lx:.0f} lx"
+    return f"{light.power_lm:.0f} lm"
 
 
 def survey_scene(scene: str, *, seed: int | None = None, lighting: str = DRAWN) -> SceneReport:
@@ -95,7 +120,7 @@ def survey_scene(scene: str, *, seed: int | None = None, lighting: str = DRAWN) 
     """
     spec = read_place(scene, seed=seed, lighting=lighting)
     built = build(spec, {})
-    return SceneReport(spec, built, survey(built), tuple(_notes(spec.meshes)))
+    return SceneReport(spec, built, scene_survey(built), tuple(_notes(spec.meshes)))
 
 
 def _notes(models: Sequence[ModelSpec]) -> list[str]:

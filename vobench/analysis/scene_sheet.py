@@ -6,15 +6,15 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.analysis.scene import EYE_HEIGHT_M, SceneSurvey
+from vobench.analysis.scene_survey import EYE_HEIGHT_M, SceneSurvey
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.renderer import Renderer, single_instant
 from vobench.scene.material import reflectance, srgb
-from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
 from vobench.suite.free_space import downward_directions
 from vobench.suite.viewpoint import COARSE_LENS, Viewpoint, around
 from vobench.suite.white import fitting_white_cd_m2, look_around
@@ -30,7 +30,7 @@ LENS = Pinhole(CELL_WIDTH_PX, CELL_HEIGHT_PX, 240.0, 240.0, 239.5, 159.5)
 
 def sheet(
     scene: Scene,
-    found: SceneSurvey,
+    survey: SceneSurvey,
     renderer: Renderer,
     white_cd_m2: float,
     lines: Sequence[str],
@@ -39,16 +39,16 @@ def sheet(
 
     They are in four directions from the free circle, or from around a scene that has none.
     """
-    views = [_view(renderer, viewpoint, white_cd_m2) for viewpoint in _viewpoints(found)]
-    upper = np.hstack([plan(scene, found), views[0], views[1]])
+    views = [_view(renderer, viewpoint, white_cd_m2) for viewpoint in _viewpoints(survey)]
+    upper = np.hstack([plan(scene, survey), views[0], views[1]])
     lower = np.hstack([_text(lines), views[2], views[3]])
     return np.vstack([upper, lower])
 
 
-def _viewpoints(found: SceneSurvey) -> list[Viewpoint]:
-    free = found.free
-    if free is None or not found.is_place:
-        return around(found.low_m, found.high_m, count=len(VIEWS_DEG))
+def _viewpoints(survey: SceneSurvey) -> list[Viewpoint]:
+    free = survey.free_circle
+    if free is None or not survey.is_place:
+        return around(survey.low_m, survey.high_m, count=len(VIEWS_DEG))
     eye_m = (free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M)
     return [Viewpoint(eye_m, yaw_deg, VIEW_PITCH_DEG) for yaw_deg in VIEWS_DEG]
 
@@ -73,9 +73,9 @@ CIRCLE_WIDTH_PX = 2
 class _PlanScale:
     """Maps positions in the plane to pixels of the plan."""
 
-    def __init__(self, found: SceneSurvey) -> None:
-        low_m = np.array(found.low_m[:2])
-        high_m = np.array(found.high_m[:2])
+    def __init__(self, survey: SceneSurvey) -> None:
+        low_m = np.array(survey.low_m[:2])
+        high_m = np.array(survey.high_m[:2])
         extent_m = max((high_m - low_m).max(), MIN_EXTENT_M)
         self.px_per_m = min(CELL_WIDTH_PX, CELL_HEIGHT_PX) / extent_m * PLAN_MARGIN
         self._centre_m = (low_m + high_m) / 2
@@ -96,22 +96,22 @@ class _PlanScale:
         return column, row
 
 
-def plan(scene: Scene, found: SceneSurvey) -> Rgb8:
+def plan(scene: Scene, survey: SceneSurvey) -> Rgb8:
     """Draw a scene from above (H, W, 3), cut below lamps and ceilings, with the free circle."""
     faces = triangles(scene, t_ns=0)
-    scale = _PlanScale(found)
+    scale = _PlanScale(survey)
     column, row = np.meshgrid(np.arange(CELL_WIDTH_PX), np.arange(CELL_HEIGHT_PX))
     centres_px = np.stack([column, row], -1).reshape(-1, 2).astype(float) + 0.5
-    floor_m = found.free.floor_m if found.free else found.low_m[2]
+    floor_m = survey.free_circle.floor_m if survey.free_circle else survey.low_m[2]
     heights_m = np.full(len(centres_px), floor_m + PLAN_HEIGHT_M)
     origins_m = np.column_stack([scale.positions_m(centres_px), heights_m])
 
     grey = _shaded(scene, faces, origins_m)
     rgb = srgb(grey[:, None].repeat(3, 1).astype(np.float32))
     picture = rgb.reshape(CELL_HEIGHT_PX, CELL_WIDTH_PX, 3).copy()
-    if found.free:
-        centre_px = scale.pixel(found.free.x_m, found.free.y_m)
-        radius_px = round(found.free.radius_m * scale.px_per_m)
+    if survey.free_circle:
+        centre_px = scale.pixel(survey.free_circle.x_m, survey.free_circle.y_m)
+        radius_px = round(survey.free_circle.radius_m * scale.px_per_m)
         cv2.circle(picture, centre_px, radius_px, CIRCLE_RGB, CIRCLE_WIDTH_PX, cv2.LINE_AA)
     return picture
 
@@ -138,14 +138,14 @@ PLACE_LENS = Pinhole(PLACE_WIDTH_PX, PLACE_HEIGHT_PX, 190.0, 190.0, 169.5, 111.5
 DIRECTIONS = 16  # in which a view may look
 
 
-def place_picture(baked: BakedScene, found: SceneSurvey, renderer: Renderer, label: str) -> Rgb8:
+def place_picture(baked: BakedScene, survey: SceneSurvey, renderer: Renderer, label: str) -> Rgb8:
     """A view (H, W, 3) of a place from its free circle, in the direction in which most is seen, beside its plan."""
     seen = look_around(baked)
     white_cd_m2 = fitting_white_cd_m2(seen.luminance(), seen.is_source)
-    viewpoint = _widest_view(baked.faces, found)
+    viewpoint = _widest_view(baked.faces, survey)
     radiance = renderer.radiance(PLACE_LENS, single_instant(PLACE_LENS, viewpoint.T_world_camera()), weights=None)
     view = srgb(radiance / (VIEW_WHITE * white_cd_m2))
-    whole_plan = plan(baked.scene, found)
+    whole_plan = plan(baked.scene, survey)
     left_px = (CELL_WIDTH_PX - CELL_HEIGHT_PX) // 2
     square = whole_plan[:, left_px : left_px + CELL_HEIGHT_PX]
     small_plan = cv2.resize(square, (PLACE_HEIGHT_PX, PLACE_HEIGHT_PX), interpolation=cv2.INTER_AREA)
@@ -156,11 +156,11 @@ def place_picture(baked: BakedScene, found: SceneSurvey, renderer: Renderer, lab
     return picture
 
 
-def _widest_view(faces: Triangles, found: SceneSurvey) -> Viewpoint:
+def _widest_view(faces: Triangles, survey: SceneSurvey) -> Viewpoint:
     """The viewpoint from which the surfaces in view are farthest away; without a free circle, one from around."""
-    free = found.free
-    if free is None or not found.is_place:
-        return around(found.low_m, found.high_m, count=1)[0]
+    free = survey.free_circle
+    if free is None or not survey.is_place:
+        return around(survey.low_m, survey.high_m, count=1)[0]
     eye_m = (free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M)
     caster = RayCaster(faces)
     best = Viewpoint(eye_m, 0.0, VIEW_PITCH_DEG)

@@ -1,19 +1,20 @@
-"""Bedrooms and halls of homes: beds, bedside tables, wardrobes, coats. They stand with their backs at x = 0, face x."""
+"""Furniture of bedrooms and halls: beds, bedside tables, wardrobes, coats. The back is at x = 0; the front faces x."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vobench.asset.furniture import BLACK, CHROME, DARK, STEEL, Part, cloth, coated, mm, put, stood, wood
+from vobench.asset.furniture import BLACK, CHROME, DARK, SIDES, STEEL, Part, cloth, coated, mm, put, stood, wood
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.shape import at, block, cushion, lathe, sheet, spline, tube
+from vobench.scene.material import Material
 from vobench.scene.mesh import joined, moved, two_sided
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
 BED_LENGTH_M = 2.08
-RACK_M = 0.5  # of the board of a coat rack above the middle of what hangs on it
+RACK_M = 0.5  # the height of the board of a coat rack above the middle of the coats
 
 
 def bed(
@@ -24,48 +25,73 @@ def bed(
     cover: str = "#8a9a7b",
 ) -> list[Part]:
     """A made bed with its headboard at the wall, pillows, a duvet that hangs over its sides, and a blanket."""
-    look = wood(tones)
-    w = width_m
-    length = BED_LENGTH_M
-    head_m = float(rng.choice([0.85, 1.0, 1.15]))
-    parts = [stood((0.05, w + 0.06, head_m), look, 0.035, 0, bevel=0.008, u=rng.uniform(0, 2))]
-    parts += [
-        stood((length - 0.08, 0.03, 0.18), look, length / 2 + 0.02, side * (w / 2 - 0.015), 0.14) for side in (-1, 1)
-    ]
-    parts.append(stood((0.03, w, 0.18), look, length - 0.03, 0, 0.14))
-    legs = [(x, side * (w / 2 - 0.06)) for x in (0.12, length - 0.08) for side in (-1, 1)]
-    parts += [stood((0.06, 0.06, 0.15), look, x, y) for x, y in legs]
-    mattress = cushion((length - 0.1, w - 0.06, 0.22), power=9, cells=4)
-    parts.append(put(mattress, cloth(linen), length / 2 + 0.01, 0, 0.4))
+    parts = _bed_frame(rng, width_m, wood(tones))
+    mattress = cushion((BED_LENGTH_M - 0.1, width_m - 0.06, 0.22), power=9, cells=4)
+    parts.append(put(mattress, cloth(linen), x=BED_LENGTH_M / 2 + 0.01, z=0.4))
+    parts += _pillows(rng, width_m, cloth(linen))
+    parts.append(put(_quilt(rng, width_m), cloth(cover)))
 
-    count = 1 if w < 1.2 else 2
-    pillow = cushion((0.42, 0.68 if w > 1.3 else 0.55, 0.16), power=2.8, cells=4)
-    for k in range(count):
-        y = (k - (count - 1) / 2) * 0.5 * w
-        lean = rng.uniform(-24, -14)
-        parts.append(put(pillow, cloth(linen), 0.3, y, 0.585, pitch=lean, yaw=rng.normal(0, 4)))
-    parts.append(put(_duvet(rng, w), cloth(cover)))
     has_blanket = rng.random() < 0.5
     if has_blanket:
         colour = one_of(rng, "#b4533a", "#d39a3c", "#6b4353", "#27445c", "#d8c3a0")
-        parts.append(put(_duvet(rng, w + 0.02, first_m=1.45, last_m=1.95, rise_m=0.014), cloth(colour)))
+        blanket = _quilt(rng, width_m + 0.02, first_m=1.45, last_m=1.95, rise_m=0.014)
+        parts.append(put(blanket, cloth(colour)))
     return parts
 
 
-def _duvet(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2.07, rise_m: float = 0.0) -> "Trimesh":
-    """A quilt over a mattress: it lies on top, and hangs down at both sides."""
-    along = np.linspace(first_m, last_m, 15)
-    half = width_m / 2
-    profile = np.array([-half - 0.035, -half - 0.03, -half + 0.02, -0.6 * half, -0.2 * half, 0.2 * half, 0.6 * half])
-    profile = np.append(profile, [half - 0.02, half + 0.03, half + 0.035])
-    height = np.array([0.3, 0.42, 0.545, 0.565, 0.57, 0.57, 0.565, 0.545, 0.42, 0.3]) + rise_m
-    x, y = np.meshgrid(along, profile, indexing="ij")
+def _bed_frame(rng: Rng, width_m: float, look: Material) -> list[Part]:
+    """The headboard, two side boards, the foot board and four legs."""
+    head_height_m = float(rng.choice([0.85, 1.0, 1.15]))
+    head_m = (0.05, width_m + 0.06, head_height_m)
+    side_m = (BED_LENGTH_M - 0.08, 0.03, 0.18)
+    foot_m = (0.03, width_m, 0.18)
+    leg_m = (0.06, 0.06, 0.15)
+
+    parts = [stood(head_m, look, x=0.035, bevel=0.008, u=rng.uniform(0, 2))]
+    for side in SIDES:
+        y = side * (width_m / 2 - 0.015)
+        parts.append(stood(side_m, look, BED_LENGTH_M / 2 + 0.02, y, 0.14))
+    parts.append(stood(foot_m, look, x=BED_LENGTH_M - 0.03, z=0.14))
+    for x in (0.12, BED_LENGTH_M - 0.08):
+        for side in SIDES:
+            y = side * (width_m / 2 - 0.06)
+            parts.append(stood(leg_m, look, x, y))
+    return parts
+
+
+def _pillows(rng: Rng, width_m: float, linen: Material) -> list[Part]:
+    """Two pillows side by side, or one on a narrow bed, which lean against the headboard."""
+    count = 1 if width_m < 1.2 else 2
+    pillow_width_m = 0.68 if width_m > 1.3 else 0.55
+    pillow = cushion((0.42, pillow_width_m, 0.16), power=2.8, cells=4)
+    parts = []
+    for index in range(count):
+        from_middle = index - (count - 1) / 2
+        y = from_middle * 0.5 * width_m
+        lean_deg = rng.uniform(-24, -14)
+        parts.append(put(pillow, linen, 0.3, y, 0.585, pitch=lean_deg, yaw=rng.normal(0, 4)))
+    return parts
+
+
+def _quilt(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2.07, rise_m: float = 0.0) -> "Trimesh":
+    """A duvet or blanket over a mattress from `first_m` to `last_m`: it lies on top, and hangs down at both sides."""
+    half_m = width_m / 2
+    along_m = np.linspace(first_m, last_m, 15)
+    # The profile across the bed, from the lower edge on one side to that on the other.
+    left_m = [-half_m - 0.035, -half_m - 0.03, -half_m + 0.02, -0.6 * half_m, -0.2 * half_m]
+    right_m = [0.2 * half_m, 0.6 * half_m, half_m - 0.02, half_m + 0.03, half_m + 0.035]
+    across_m = np.array([*left_m, *right_m])
+    height_m = np.array([0.3, 0.42, 0.545, 0.565, 0.57, 0.57, 0.565, 0.545, 0.42, 0.3]) + rise_m
+
+    x, y = np.meshgrid(along_m, across_m, indexing="ij")
     phases = rng.uniform(0, 6, 3)
     folds = 0.008 * np.sin(9 * x + 4 * y + phases[0]) + 0.006 * np.sin(17 * y - 6 * x + phases[1])
-    is_edge = (along < first_m + 0.05) | (along > last_m - 0.05)
-    z = np.broadcast_to(height, x.shape) + folds - 0.03 * is_edge[:, None]
-    hanging = np.abs(y) > half
-    y = y + np.where(hanging, 0.012 * np.sin(14 * x + phases[2]) * np.sign(y), 0)
+    is_edge = (along_m < first_m + 0.05) | (along_m > last_m - 0.05)
+    z = np.broadcast_to(height_m, x.shape) + folds - 0.03 * is_edge[:, None]
+
+    is_hanging = np.abs(y) > half_m
+    waves = 0.012 * np.sin(14 * x + phases[2]) * np.sign(y)
+    y = y + np.where(is_hanging, waves, 0)
     return two_sided(sheet(np.stack([x, y, z], axis=-1)))
 
 
@@ -73,18 +99,19 @@ def bedside_table(rng: Rng, width_m: float = 0.45, tones: str = "oak") -> list[P
     """A small cupboard with a drawer above an open shelf, 0.5 m high."""
     look = wood(tones)
     depth_m = 0.38
-    x = depth_m / 2
+    middle_x = depth_m / 2
     u = rng.uniform(0, 2)
+
+    top = stood((depth_m, width_m, 0.022), look, middle_x, z=0.478, u=u)
+    shelf = stood((depth_m, width_m, 0.02), look, middle_x, z=0.1, u=u)
+    back = stood((0.012, width_m - 0.03, 0.36), look, 0.008, z=0.12, bevel=0)
+    side_m = (depth_m - 0.01, 0.02, 0.478)
+    side_y = width_m / 2 - 0.012
+    sides = [stood(side_m, look, middle_x, side * side_y) for side in SIDES]
+    drawer = stood((depth_m - 0.03, width_m - 0.05, 0.15), look, middle_x - 0.005, z=0.322, bevel=0)
+    front = stood((0.018, width_m - 0.05, 0.145), look, depth_m - 0.012, z=0.325, u=u + 1)
     knob = cushion((0.024, 0.024, 0.024), power=2, cells=3)
-    return [
-        stood((depth_m, width_m, 0.022), look, x, 0, 0.478, u=u),
-        stood((depth_m, width_m, 0.02), look, x, 0, 0.1, u=u),
-        stood((0.012, width_m - 0.03, 0.36), look, 0.008, 0, 0.12, bevel=0),
-        *(stood((depth_m - 0.01, 0.02, 0.478), look, x, side * (width_m / 2 - 0.012)) for side in (-1, 1)),
-        stood((depth_m - 0.03, width_m - 0.05, 0.15), look, x - 0.005, 0, 0.322, bevel=0),
-        stood((0.018, width_m - 0.05, 0.145), look, depth_m - 0.012, 0, 0.325, u=u + 1),
-        put(knob, DARK, depth_m + 0.006, 0, 0.4),
-    ]
+    return [top, shelf, back, *sides, drawer, front, put(knob, DARK, depth_m + 0.006, z=0.4)]
 
 
 def wardrobe(
@@ -94,74 +121,88 @@ def wardrobe(
     colour: str = "",
     tones: str = "oak",
 ) -> list[Part]:
-    """A wardrobe with doors, painted in a colour or of wood."""
+    """A wardrobe with doors, painted in a colour or of wood, often with a box on top."""
     look = coated(colour, roughness=0.35) if colour else wood(tones)
     depth_m = 0.58
     body_m = (depth_m - 0.02, width_m, height_m - 0.06)
+    plinth_m = (depth_m - 0.06, width_m - 0.02, 0.06)
+    cornice_m = (depth_m + 0.01, width_m + 0.02, 0.03)
     parts = [
-        stood(body_m, look, depth_m / 2 - 0.01, 0, 0.06, bevel=0.003),
-        stood((depth_m - 0.06, width_m - 0.02, 0.06), DARK, depth_m / 2 - 0.02),
-        stood((depth_m + 0.01, width_m + 0.02, 0.03), look, depth_m / 2, 0, height_m - 0.03, bevel=0.004),
+        stood(body_m, look, depth_m / 2 - 0.01, z=0.06, bevel=0.003),
+        stood(plinth_m, DARK, depth_m / 2 - 0.02),
+        stood(cornice_m, look, depth_m / 2, z=height_m - 0.03, bevel=0.004),
     ]
-    doors = max(2, round(width_m / 0.48))
-    door_m = width_m / doors
+
+    door_count = max(2, round(width_m / 0.48))
+    door_m = width_m / door_count
+    front_m = (0.02, door_m - 0.006, height_m - 0.11)
     grip = tube(mm("0 0 -90, 28 0 -90, 28 0 90, 0 0 90"), 0.006, sections=6)
-    for k in range(doors):
-        y = (k + 0.5) * door_m - width_m / 2
-        front_m = (0.02, door_m - 0.006, height_m - 0.11)
-        parts.append(stood(front_m, look, depth_m - 0.008, y, 0.07, bevel=0.003, u=0.7 * k))
-        side = 1 if k % 2 == 0 else -1
-        parts.append(put(grip, STEEL, depth_m, y + side * (door_m / 2 - 0.05), 1.05))
-    if rng.random() < 0.4:
-        box_m = (0.4, 0.5, 0.24)
-        parts.append(stood(box_m, cloth(one_of(rng, "#a67d52", "#8a9a7b", "#c9c2b4")), 0.28, 0.2 * width_m, height_m))
+    for index in range(door_count):
+        y = (index + 0.5) * door_m - width_m / 2
+        parts.append(stood(front_m, look, depth_m - 0.008, y, 0.07, bevel=0.003, u=0.7 * index))
+        # The grips of two neighbouring doors are beside each other.
+        grip_side = 1 if index % 2 == 0 else -1
+        parts.append(put(grip, STEEL, depth_m, y + grip_side * (door_m / 2 - 0.05), 1.05))
+
+    has_box = rng.random() < 0.4
+    if has_box:
+        box_colour = one_of(rng, "#a67d52", "#8a9a7b", "#c9c2b4")
+        parts.append(stood((0.4, 0.5, 0.24), cloth(box_colour), 0.28, 0.2 * width_m, height_m))
     return parts
 
 
 def armchair(rng: Rng, colour: str = "#8a9a7b", tones: str = "oak") -> list[Part]:
-    """An armchair on wooden legs; its middle is at the origin."""
+    """An armchair on wooden legs, often with a cushion; its middle is at the origin."""
     cover = cloth(colour)
-    parts = [
-        put(cushion((0.66, 0.6, 0.18), power=6, cells=4), cover, 0.04, 0, 0.36),
-        put(cushion((0.16, 0.62, 0.62), power=5, cells=4), cover, -0.3, 0, 0.64, pitch=-12),
-    ]
-    rest = cushion((0.64, 0.11, 0.3), power=6, cells=4)
-    parts += [put(rest, cover, 0.02, side * 0.34, 0.47) for side in (-1, 1)]
-    legs = [(x, side * 0.29) for x in (-0.26, 0.28) for side in (-1, 1)]
-    parts += [put(lathe(mm("0 0, 14 0, 22 280, 0 280"), sections=10), wood(tones), x, y) for x, y in legs]
-    if rng.random() < 0.6:
+    seat = cushion((0.66, 0.6, 0.18), power=6, cells=4)
+    back = cushion((0.16, 0.62, 0.62), power=5, cells=4)
+    parts = [put(seat, cover, 0.04, z=0.36), put(back, cover, -0.3, z=0.64, pitch=-12)]
+
+    arm_rest = cushion((0.64, 0.11, 0.3), power=6, cells=4)
+    parts += [put(arm_rest, cover, 0.02, side * 0.34, 0.47) for side in SIDES]
+    for x in (-0.26, 0.28):
+        for side in SIDES:
+            leg = lathe(mm("0 0, 14 0, 22 280, 0 280"), sections=10)
+            parts.append(put(leg, wood(tones), x, side * 0.29))
+
+    has_cushion = rng.random() < 0.6
+    if has_cushion:
         accent = cloth(one_of(rng, "#d39a3c", "#b4533a", "#27445c", "#f1ece0"))
-        parts.append(put(cushion((0.12, 0.4, 0.38), power=2.8, cells=5), accent, -0.16, 0, 0.62, pitch=-16))
+        small = cushion((0.12, 0.4, 0.38), power=2.8, cells=5)
+        parts.append(put(small, accent, -0.16, z=0.62, pitch=-16))
     return parts
 
 
 def coat_rack(rng: Rng, width_m: float = 0.9, tones: str = "oak") -> list[Part]:
     """A board with hooks and coats on a wall; with the coats, it reaches from -0.65 m to 0.65 m about z = 0."""
-    parts = [stood((0.02, width_m, 0.1), wood(tones), 0.011, 0, RACK_M - 0.05, bevel=0.004)]
-    count = max(3, round(width_m / 0.18))
+    board = stood((0.02, width_m, 0.1), wood(tones), 0.011, z=RACK_M - 0.05, bevel=0.004)
+
+    hook_count = max(3, round(width_m / 0.18))
+    hooks_y = (np.arange(hook_count) + 0.5) * width_m / hook_count - width_m / 2
     hook = tube(spline(mm("15 0 20, 60 0 10, 70 0 40"), 6), 0.006, sections=6)
-    hooks_y = (np.arange(count) + 0.5) * width_m / count - width_m / 2
-    parts.append(put(joined([moved(hook, at(0, y, RACK_M)) for y in hooks_y.tolist()]), CHROME))
-    for k, y in enumerate(hooks_y.tolist()):
-        if k % 2 == 0 and rng.random() < 0.8:
-            parts.append(
-                put(_coat(rng), cloth(one_of(rng, "#27445c", "#3a3c3e", "#6b4353", "#6a6a4c", "#8f6b4d")), 0, y, RACK_M)
-            )
+    hooks = [moved(hook, at(0, y, RACK_M)) for y in hooks_y.tolist()]
+
+    parts = [board, put(joined(hooks), CHROME)]
+    for y in hooks_y[::2].tolist():
+        is_used = rng.random() < 0.8
+        if is_used:
+            coat = _coat(rng)
+            colour = one_of(rng, "#27445c", "#3a3c3e", "#6b4353", "#6a6a4c", "#8f6b4d")
+            parts.append(put(coat, cloth(colour), 0, y, RACK_M))
     return parts
 
 
 def _coat(rng: Rng) -> "Trimesh":
     """A coat on a hook: a closed surface in folds, narrow at its collar."""
     length_m = rng.uniform(0.75, 1.05)
-    down = np.linspace(0, 1, 6)[:, None]
+    down = np.linspace(0, 1, 6)[:, None]  # from the collar to the hem
     angle = np.linspace(0, 2 * np.pi, 19)[None]
-    spread = 0.35 + 0.65 * np.minimum(1, 3.2 * down)
+    width = 0.35 + 0.65 * np.minimum(1, 3.2 * down)
     folds = 1 + 0.16 * down * np.sin(5 * angle + rng.uniform(0, 6))
-    x = 0.085 + 0.062 * spread * folds * np.cos(angle)
-    y = 0.155 * spread * folds * np.sin(angle)
+    x = 0.085 + 0.062 * width * folds * np.cos(angle)
+    y = 0.155 * width * folds * np.sin(angle)
     z = 0.02 - length_m * down + 0 * angle
-    coat = sheet(np.stack([x, y, z], axis=-1))
-    return two_sided(coat)
+    return two_sided(sheet(np.stack([x, y, z], axis=-1)))
 
 
 def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> list[Part]:
@@ -169,13 +210,16 @@ def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> lis
     paint = coated(colour, roughness=0.35)
     depth_m = 0.26
     body_m = (depth_m, width_m, 0.85)
-    slot = stood((0.012, 0.14, 0.02), BLACK, depth_m + 0.008, 0, 0, bevel=0.002)
-    parts = [stood(body_m, paint, depth_m / 2, 0, bevel=0.004)]
-    parts.append(
-        stood((depth_m + 0.03, width_m + 0.01, 0.02), wood("oak"), depth_m / 2 + 0.01, 0, 0.85, u=rng.uniform(0, 2))
-    )
+    top_m = (depth_m + 0.03, width_m + 0.01, 0.02)
+    front_m = (0.018, width_m - 0.02, 0.385)
+    slot_m = (0.012, 0.14, 0.02)
+    parts = [
+        stood(body_m, paint, depth_m / 2, bevel=0.004),
+        stood(top_m, wood("oak"), depth_m / 2 + 0.01, z=0.85, u=rng.uniform(0, 2)),
+    ]
+    slot = stood(slot_m, BLACK, depth_m + 0.008, bevel=0.002)
     for z in (0.05, 0.445):
-        parts.append(stood((0.018, width_m - 0.02, 0.385), paint, depth_m + 0.002, 0, z, bevel=0.003))
+        parts.append(stood(front_m, paint, depth_m + 0.002, z=z, bevel=0.003))
         parts.append(slot.moved(at(0, 0, z + 0.34)))
     return parts
 
@@ -183,12 +227,13 @@ def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> lis
 def shoes(rng: Rng) -> list[Part]:
     """A pair of shoes."""
     colour = one_of(rng, "#2b2622", "#5a3a26", "#c9c5bb", "#3a4a5a")
+    leather = coated(colour, roughness=0.4)
     upper = cushion((0.27, 0.1, 0.1), power=3.0, cells=4)
     sole = block((0.28, 0.1, 0.02), bevel_m=0.008)
     parts = []
-    for side in (-1, 1):
+    for side in SIDES:
         y = 0.065 * side
-        turn = rng.normal(0, 7)
-        parts.append(put(upper, coated(colour, roughness=0.4), 0.14, y, 0.055, yaw=turn))
-        parts.append(put(sole, BLACK, 0.14, y, 0.011, yaw=turn))
+        yaw_deg = rng.normal(0, 7)
+        parts.append(put(upper, leather, 0.14, y, 0.055, yaw=yaw_deg))
+        parts.append(put(sole, BLACK, 0.14, y, 0.011, yaw=yaw_deg))
     return parts

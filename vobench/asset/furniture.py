@@ -37,7 +37,8 @@ from vobench.asset.shape import (
 )
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material, Texture, linear
-from vobench.scene.mesh import MeshArrays, arrays, joined, joined_arrays, moved, textured
+from vobench.scene.mesh import as_arrays, as_mesh, joined, moved, textured
+from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -56,12 +57,12 @@ class Part:
     @property
     def arrays(self) -> MeshArrays:
         """The geometry as arrays."""
-        return self.geometry if isinstance(self.geometry, MeshArrays) else arrays(self.geometry)
+        return self.geometry if isinstance(self.geometry, MeshArrays) else as_arrays(self.geometry)
 
     @property
     def mesh(self) -> "Trimesh":
         """The geometry as a mesh."""
-        return self.geometry.mesh() if isinstance(self.geometry, MeshArrays) else self.geometry
+        return as_mesh(self.geometry) if isinstance(self.geometry, MeshArrays) else self.geometry
 
     def moved(self, T_a_b: Array) -> "Part":
         """The part transformed from frame b to frame a by T_a_b (4, 4)."""
@@ -80,6 +81,7 @@ def coated(colour: str = "#ffffff", texture: Texture | None = None, roughness: f
     return replace(matt(colour, texture), eta=1.5, roughness=roughness)
 
 
+SIDES = (-1, 1)  # left and right, as factors of y
 STEEL = Material(colour=(0.52, 0.53, 0.54), metal=1.0, roughness=0.25)
 CHROME = Material(colour=(0.65, 0.66, 0.67), metal=1.0, roughness=0.06)
 BLACK = coated("#26282a")

@@ -20,7 +20,7 @@ from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.scene.light import PointLight, SpotLight, Sun
 from vobench.scene.material import WHITE, linear
-from vobench.scene.mesh import MeshArrays
+from vobench.scene.mesh_arrays import MeshArrays
 
 ModelLight = PointLight | SpotLight | Sun
 MOST_INSTANCES = 100_000

@@ -206,7 +206,7 @@ def _threshold(passage: Passage, material: Material) -> Part:
 
 def _window(plan: FloorPlan, window: Window, reveals: Material) -> list[Part]:
     """The reveals and the pane of a window."""
-    from vobench.scene.mesh import quad_arrays
+    from vobench.scene.mesh_arrays import quad_arrays
 
     room = plan.room(window.room)
     frame = _WallFrame(room, room.side_at(window.rect), plan.height_m)

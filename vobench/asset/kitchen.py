@@ -1,7 +1,8 @@
-"""Kitchens: units, appliances and what stands on worktops. They stand on z = 0 at the origin and face x."""
+"""Furniture of kitchens: units, appliances and what stands on worktops. They stand on z = 0 and face x."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from vobench.asset.furniture import (
     BLACK,
     CHROME,
     DARK,
+    SIDES,
     STEEL,
     WHITE,
     Part,
@@ -25,8 +27,12 @@ from vobench.asset.shape import at, block, card, cushion, extrusion, lathe, spli
 from vobench.scene.material import Material
 from vobench.scene.mesh import flipped, joined, moved, quad
 
+if TYPE_CHECKING:
+    from trimesh import Trimesh
+
 WORKTOP_M = 0.9
 FRONTS = "#7f9182"
+SQUARE = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])  # the corners of a square with sides of 2
 
 
 def cupboard(
@@ -41,33 +47,43 @@ def cupboard(
     """A cupboard with drawers of given heights, from below, or with doors."""
     paint = coated(colour, roughness=0.35)
     grip = tube(mm("0 -60 0, 22 -60 0, 22 60 0, 0 60 0"), 0.005)
-    parts = [stood((depth_m, width_m - 0.002, height_m), paint, 0, 0, 0, bevel=0.001)]
-    z = 0.004
-    for drawer_m in drawers:
-        parts.append(stood((0.02, width_m - 0.006, drawer_m - 0.006), paint, depth_m / 2 + 0.01, 0, z))
-        parts.append(put(grip, STEEL, depth_m / 2 + 0.02, 0, z + drawer_m - 0.05))
-        z += drawer_m
-    for k in () if drawers else range(doors):
-        door_m = width_m / doors
-        y = (k + 0.5) * width_m / doors - width_m / 2
-        parts.append(stood((0.02, door_m - 0.006, height_m - 0.008), paint, depth_m / 2 + 0.01, y, 0.004))
-        side = 1 if k % 2 == 0 else -1
-        grip_m = height_m - 0.12 if depth_m > 0.4 else 0.12
-        parts.append(put(grip, STEEL, depth_m / 2 + 0.02, y + side * (door_m / 2 - 0.05), grip_m, roll=90))
+    front_x = depth_m / 2 + 0.01
+    grip_x = depth_m / 2 + 0.02
+    parts = [stood((depth_m, width_m - 0.002, height_m), paint, bevel=0.001)]
+    if drawers:
+        z = 0.004
+        for drawer_m in drawers:
+            parts.append(stood((0.02, width_m - 0.006, drawer_m - 0.006), paint, front_x, z=z))
+            parts.append(put(grip, STEEL, grip_x, z=z + drawer_m - 0.05))
+            z += drawer_m
+        return parts
+
+    door_m = width_m / doors
+    is_wall_cupboard = depth_m <= 0.4
+    grip_z = 0.12 if is_wall_cupboard else height_m - 0.12
+    for index in range(doors):
+        y = (index + 0.5) * width_m / doors - width_m / 2
+        # The grips of two neighbouring doors are beside each other.
+        grip_side = 1 if index % 2 == 0 else -1
+        grip_y = y + grip_side * (door_m / 2 - 0.05)
+        parts.append(stood((0.02, door_m - 0.006, height_m - 0.008), paint, front_x, y, 0.004))
+        parts.append(put(grip, STEEL, grip_x, grip_y, grip_z, roll=90))
     return parts
 
 
 def oven() -> list[Part]:
     """An oven with a window and knobs, in a unit 0.6 m wide."""
     glass = coated("#0d0f10", roughness=0.05)
+    body = stood((0.56, 0.598, 0.77), WHITE)
+    plinth = stood((0.02, 0.594, 0.135), DARK, 0.29, z=0.008)
+    front = stood((0.02, 0.594, 0.6), STEEL, 0.29, z=0.15)
+    window = put(block((0.006, 0.48, 0.36), bevel_m=0.002), glass, 0.301, z=0.38)
+    bar = put(tube(mm("0 -240 0, 40 -240 0, 40 240 0, 0 240 0"), 0.008), CHROME, 0.3, z=0.6)
     knob = lathe(mm("0 0, 20 0, 18 22, 0 22"), sections=20)
-    front = stood((0.02, 0.594, 0.6), STEEL, 0.29, 0, 0.15)
-    window = put(block((0.006, 0.48, 0.36), bevel_m=0.002), glass, 0.301, 0, 0.38)
-    bar = put(tube(mm("0 -240 0, 40 -240 0, 40 240 0, 0 240 0"), 0.008), CHROME, 0.3, 0, 0.6)
     knobs = [put(knob, BLACK, 0.3, y, 0.69, pitch=90) for y in (-0.22, -0.14, 0.14, 0.22)]
-    clock = put(card((0.12, 0.05)), matt("#1d3b2c", picture.sign("12:04", "#101312")), 0.3012, 0, 0.69)
-    body = [stood((0.56, 0.598, 0.77), WHITE), stood((0.02, 0.594, 0.135), DARK, 0.29, 0, 0.008)]
-    return [*body, front, window, bar, *knobs, clock]
+    time = matt("#1d3b2c", picture.sign("12:04", "#101312"))
+    clock = put(card((0.12, 0.05)), time, 0.3012, z=0.69)
+    return [body, plinth, front, window, bar, *knobs, clock]
 
 
 def sink() -> list[Part]:
@@ -84,8 +100,7 @@ def sink() -> list[Part]:
         flipped(quad((-x, y, -depth_m), (0, 0, depth_m), (width_m, 0, 0))),
         quad((-x, -y, -depth_m), (width_m, 0, 0), (0, length_m, 0)),
     ]
-    ring = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
-    rim = extrusion(ring * [x + 0.025, y + 0.025], 0.004, holes_m=[ring * [x, y]])
+    rim = extrusion(SQUARE * [x + 0.025, y + 0.025], 0.004, holes_m=[SQUARE * [x, y]])
     tap = tube(spline(mm("-255 0 0, -255 0 240, -200 0 330, -110 0 300, -95 0 230"), 24), 0.013, sections=12)
     lever = tube(mm("-255 20 60, -255 60 90"), 0.008)
     plug = lathe(mm("0 0, 40 0, 38 3, 0 3"))
@@ -96,36 +111,64 @@ def fridge() -> list[Part]:
     """A fridge 1.85 m high with two doors, and notes on it."""
     paint = coated("#c9cdcc", roughness=0.2)
     grip = tube(mm("0 0 -200, 40 0 -200, 40 0 200, 0 0 200"), 0.009)
-    doors = [stood((0.05, 0.594, high), paint, 0.3, 0, z, bevel=0.012) for z, high in ((0.06, 0.62), (0.69, 1.16))]
+    freezer_door = stood((0.05, 0.594, 0.62), paint, 0.3, z=0.06, bevel=0.012)
+    fridge_door = stood((0.05, 0.594, 1.16), paint, 0.3, z=0.69, bevel=0.012)
     grips = [put(grip, STEEL, 0.325, -0.25, z) for z in (0.48, 0.98)]
+    # Each note shows another cell of the same picture of pages.
     notes = [
-        put(card((w, h), cell=cell), matt(texture=picture.pages(3)), 0.3262, y, z, roll=turn)
-        for w, h, cell, y, z, turn in (
-            (0.15, 0.21, (0, 1 / 3, 0, 0.5), 0.08, 1.5, 4), (0.1, 0.14, (1 / 3, 2 / 3, 0, 0.5), -0.1, 1.42, -6),
-            (0.12, 0.17, (2 / 3, 1, 0.5, 1), 0.15, 1.2, 2),
-        )
-    ]  # fmt: skip
-    dots = [put(cushion((0.012, 0.03, 0.03), power=2, cells=4), coated(c), 0.328, y, z)
-            for c, y, z in ((BRICK, 0.08, 1.59), (OCHRE, -0.1, 1.48), (TEAL, 0.15, 1.275))]  # fmt: skip
-    return [stood((0.56, 0.596, 1.85), paint, 0, 0, 0, bevel=0.01), *doors, *grips, *notes, *dots]
+        _note((0.15, 0.21), (0, 1 / 3, 0, 0.5), y=0.08, z=1.5, roll_deg=4),
+        _note((0.1, 0.14), (1 / 3, 2 / 3, 0, 0.5), y=-0.1, z=1.42, roll_deg=-6),
+        _note((0.12, 0.17), (2 / 3, 1, 0.5, 1), y=0.15, z=1.2, roll_deg=2),
+    ]
+    magnet = cushion((0.012, 0.03, 0.03), power=2, cells=4)
+    magnets = [
+        put(magnet, coated(BRICK), 0.328, 0.08, 1.59),
+        put(magnet, coated(OCHRE), 0.328, -0.1, 1.48),
+        put(magnet, coated(TEAL), 0.328, 0.15, 1.275),
+    ]
+    body = stood((0.56, 0.596, 1.85), paint, bevel=0.01)
+    return [body, freezer_door, fridge_door, *grips, *notes, *magnets]
+
+
+def _note(
+    size_m: tuple[float, float],
+    cell: tuple[float, float, float, float],
+    *,
+    y: float,
+    z: float,
+    roll_deg: float,
+) -> Part:
+    """A note on the door of the fridge."""
+    return put(card(size_m, cell=cell), matt(texture=picture.pages(3)), 0.3262, y, z, roll=roll_deg)
 
 
 def hob() -> list[Part]:
     """A glass hob with three rings."""
-    places = ((-0.14, -0.12, 0.1), (0.14, -0.12, 0.08), (0.14, 0.13, 0.11))
-    rings = [moved(lathe(np.array([[0, 0], [r, 0], [r, 0.001], [0, 0.001]])), at(x, y, 0.008)) for x, y, r in places]
-    plate = put(block((0.58, 0.51, 0.008), bevel_m=0.002), coated("#0e0f10", roughness=0.04), z=0.004)
-    return [plate, put(joined(rings), coated("#3a3c3e", roughness=0.2))]
+    rings = [_hob_ring(-0.14, -0.12, 0.1), _hob_ring(0.14, -0.12, 0.08), _hob_ring(0.14, 0.13, 0.11)]
+    plate = block((0.58, 0.51, 0.008), bevel_m=0.002)
+    return [
+        put(plate, coated("#0e0f10", roughness=0.04), z=0.004),
+        put(joined(rings), coated("#3a3c3e", roughness=0.2)),
+    ]
+
+
+def _hob_ring(x: float, y: float, radius_m: float) -> "Trimesh":
+    profile = np.array([[0, 0], [radius_m, 0], [radius_m, 0.001], [0, 0.001]])
+    return moved(lathe(profile), at(x, y, 0.008))
 
 
 def pot(x_m: float = 0.0, y_m: float = 0.0, z_m: float = 0.0, *, colour: str = BRICK) -> list[Part]:
     """A pot with a lid and two handles."""
     body = lathe(mm("0 0, 105 0, 110 6, 110 130, 113 132, 0 138, 0 140"), sections=32)
-    ears = [tube(spline(mm(f"{s * 108} -35 110, {s * 145} -25 115, {s * 145} 25 115, {s * 108} 35 110"), 10), 0.007)
-            for s in (-1, 1)]  # fmt: skip
+    handles = []
+    for side in SIDES:
+        inner_mm = side * 108
+        outer_mm = side * 145
+        path = mm(f"{inner_mm} -35 110, {outer_mm} -25 115, {outer_mm} 25 115, {inner_mm} 35 110")
+        handles.append(tube(spline(path, 10), 0.007))
     knob = moved(lathe(mm("0 0, 10 0, 18 20, 0 24")), at(z_m=0.138))
     enamel = coated(colour, roughness=0.12)
-    return [put(joined([body, *ears]), enamel, x_m, y_m, z_m), put(knob, BLACK, x_m, y_m, z_m)]
+    return [put(joined([body, *handles]), enamel, x_m, y_m, z_m), put(knob, BLACK, x_m, y_m, z_m)]
 
 
 def kettle(x_m: float = 0.0, y_m: float = 0.0, z_m: float = 0.0, *, yaw_deg: float = 0.0) -> list[Part]:
@@ -197,20 +240,23 @@ def row(
 ) -> list[Part]:
     """A row of units with a worktop and wall cupboards. Its back is at x = 0, and its middle at y = 0.
 
-    window: the first and last y of a window above the worktop, which wall cupboards and hood leave free.
+    `window` is the first and the last y of a window above the worktop, which wall cupboards and hood leave free.
     """
     units = _units(rng, length_m)
-    if rng.random() < 0.5:
+    is_mirrored = rng.random() < 0.5
+    if is_mirrored:
         units = [_Unit(unit.kind, -unit.y, unit.width_m) for unit in reversed(units)]
-    below = [unit for unit in units if unit.kind != "fridge"]
-    first_m = below[0].y - below[0].width_m / 2
-    last_m = below[-1].y + below[-1].width_m / 2
+    sink_y = next(unit.y for unit in units if unit.kind == "sink")
+    oven_y = next(unit.y for unit in units if unit.kind == "oven")
+
     parts = list[Part]()
     for unit in units:
         T_row_unit = at(0.3, unit.y, 0.0 if unit.kind == "fridge" else 0.1)
         parts += [part.moved(T_row_unit) for part in _unit_parts(unit, style)]
-    sink_y = next(unit.y for unit in units if unit.kind == "sink")
-    oven_y = next(unit.y for unit in units if unit.kind == "oven")
+
+    below_worktop = [unit for unit in units if unit.kind != "fridge"]
+    first_m = below_worktop[0].y - below_worktop[0].width_m / 2
+    last_m = below_worktop[-1].y + below_worktop[-1].width_m / 2
     parts += _worktop(first_m, last_m, sink_y, style, tiles_m=0.12 if window else 0.56)
     parts += _cooker(rng, oven_y, ceiling_m, has_hood=_is_free(window, oven_y, 0.3))
     parts += _wall_cupboards(first_m, last_m, oven_y, style, window)
@@ -220,15 +266,17 @@ def row(
 
 def _units(rng: Rng, length_m: float) -> list[_Unit]:
     """The units of a row: a fridge at its first end, sink and oven apart from each other."""
-    spare_m = length_m - 3 * UNIT_M
-    others = list[tuple[str, float]]()
+    spare_m = length_m - 3 * UNIT_M  # without fridge, sink and oven
+    cupboards = list[tuple[str, float]]()
     while spare_m >= 0.4:
         width_m = spare_m if spare_m < 0.95 else float(rng.choice([0.45, 0.6]))
-        others.append((one_of(rng, "drawers", "doors", "dishwasher" if width_m == UNIT_M else "doors"), width_m))
+        third_kind = "dishwasher" if width_m == UNIT_M else "doors"
+        cupboards.append((one_of(rng, "drawers", "doors", third_kind), width_m))
         spare_m -= width_m
-    split = int(rng.integers(1, len(others) + 1)) if others else 0
+    split = int(rng.integers(1, len(cupboards) + 1)) if cupboards else 0
     sink_m = UNIT_M + max(spare_m, 0.0)
-    row = [("fridge", UNIT_M), *others[split:], ("sink", sink_m), *others[:split], ("oven", UNIT_M)]
+    row = [("fridge", UNIT_M), *cupboards[split:], ("sink", sink_m), *cupboards[:split], ("oven", UNIT_M)]
+
     units = []
     y = -length_m / 2
     for kind, width_m in row:
@@ -251,10 +299,9 @@ def _unit_parts(unit: _Unit, style: KitchenStyle) -> list[Part]:
 
 def _worktop(first_m: float, last_m: float, sink_y: float, style: KitchenStyle, *, tiles_m: float) -> list[Part]:
     """The worktop with the sink in it, the plinth, and the tiles behind."""
-    depth_m = ROW_DEPTH_M
-    outline = [(0.0, first_m), (depth_m, first_m), (depth_m, last_m), (0.0, last_m)]
-    hole = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [0.21, 0.28] + [0.32, sink_y]
+    outline = [(0.0, first_m), (ROW_DEPTH_M, first_m), (ROW_DEPTH_M, last_m), (0.0, last_m)]
     plinth = [(0.0, first_m), (0.54, first_m), (0.54, last_m), (0.0, last_m)]
+    hole = SQUARE * [0.21, 0.28] + [0.32, sink_y]  # as large as the basin of `sink`
     tiles = block((0.008, last_m - first_m, tiles_m), bevel_m=0.001)
     return [
         put(extrusion(outline, 0.03, holes_m=[hole]), style.worktop, z=WORKTOP_M - 0.03),
@@ -267,7 +314,8 @@ def _worktop(first_m: float, last_m: float, sink_y: float, style: KitchenStyle, 
 def _cooker(rng: Rng, y: float, ceiling_m: float, *, has_hood: bool) -> list[Part]:
     """The hob above the oven, mostly with a pot on it, and the hood above the hob."""
     parts = [part.moved(at(0.31, y, WORKTOP_M)) for part in hob()]
-    if rng.random() < 0.7:
+    has_pot = rng.random() < 0.7
+    if has_pot:
         colour = one_of(rng, BRICK, TEAL, "#2b2d2f", "#c7c9c8", OCHRE)
         parts += pot(0.18, y + 0.13, WORKTOP_M + 0.009, colour=colour)
     if has_hood:
@@ -294,9 +342,9 @@ def _wall_cupboards(
     parts = list[Part]()
     for start_m, end_m in ((first_m, oven_y - 0.31), (oven_y + 0.31, last_m)):
         count = int((end_m - start_m) / 0.42)
-        for k in range(count):
+        for index in range(count):
             width_m = (end_m - start_m) / count
-            y = start_m + (k + 0.5) * width_m
+            y = start_m + (index + 0.5) * width_m
             if _is_free(window, y, width_m / 2):
                 wall_unit = cupboard(width_m, height_m=0.72, depth_m=0.33, colour=style.wall_fronts)
                 parts += [part.moved(at(0.166, y, 1.46)) for part in wall_unit]
@@ -338,5 +386,9 @@ def _chopping_board() -> list[Part]:
 def _knives() -> list[Part]:
     """A block of knives."""
     handle = block((0.02, 0.026, 0.11), bevel_m=0.006)
-    handles = [put(handle, BLACK, 0.03 - 0.022 * k, 0.03 * (k % 2) - 0.02, 0.26) for k in range(4)]
+    handles = []
+    for index in range(4):  # in two rows
+        x = 0.03 - 0.022 * index
+        y = 0.03 * (index % 2) - 0.02
+        handles.append(put(handle, BLACK, x, y, 0.26))
     return [stood((0.12, 0.1, 0.22), wood("walnut"), bevel=0.01), *handles]

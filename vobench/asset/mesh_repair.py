@@ -7,7 +7,9 @@ import numpy as np
 from vobench.asset.gltf import Primitive
 from vobench.asset.vertex_colour import painted
 from vobench.errors import ModelError
-from vobench.scene.mesh import Faces, MeshArrays, areas_m2, face_normals, is_closed_body
+from vobench.geometry.triangle import areas_m2, face_normals
+from vobench.scene.mesh_arrays import Faces, MeshArrays
+from vobench.scene.weld import is_closed_body
 
 LEAST_M2 = 1e-12  # the smallest area of a face; smaller faces are removed
 LARGEST_CLOSED_M = 1.0  # a closed body of at most this extent contains no camera, so its back faces are never visible

@@ -24,7 +24,8 @@ from vobench.asset.node_role import (
 from vobench.errors import ModelError
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, arrays, corners
+from vobench.scene.mesh import as_arrays, as_mesh, face_corners
+from vobench.scene.triangles import Thing
 
 Key = TypeVar("Key")
 GLTF_SUFFIXES = (".glb", ".gltf")
@@ -119,7 +120,7 @@ def read_model(
         model = _model(content, roles)
 
         notes += _notes_on_reading(gltf, content.primitives)
-        corners_m = np.concatenate([corners(thing.mesh) for thing in model.everything])  # (F, 3, 3)
+        corners_m = np.concatenate([face_corners(thing.mesh) for thing in model.everything])  # (F, 3, 3)
         if not up:  # otherwise the user has chosen the axis
             notes += axis_notes(corners_m, file_name=path.name, up_axis=up_axis)
         notes += unit_notes(corners_m)
@@ -212,7 +213,7 @@ def _parts(primitives: Sequence[Primitive], roles: RoleByGlob) -> tuple[list[_Pa
     parts = []
     for primitive, named in zip(primitives, named_materials, strict=True):
         node = primitive.node
-        thing = Thing(node_names[node], primitive.mesh.mesh(), material_names[named])
+        thing = Thing(node_names[node], as_mesh(primitive.mesh), material_names[named])
         emits_light = max(named.material.emission_cd_m2) > 0
         parts.append(_Part(node, role_by_node[node], thing, emits_light))
     return parts, {name: named.material for named, name in material_names.items()}
@@ -253,9 +254,9 @@ def _movers(parts: Sequence[_Part]) -> tuple[ModelMover, ...]:
 
 
 def _shifted(thing: Thing, offset_m: Array) -> Thing:
-    original = arrays(thing.mesh)
+    original = as_arrays(thing.mesh)
     shifted = replace(original, vertices_m=original.vertices_m + offset_m)
-    return replace(thing, mesh=shifted.mesh())
+    return replace(thing, mesh=as_mesh(shifted))
 
 
 def _unique_names(wanted: Mapping[Key, str]) -> dict[Key, str]:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import areas_m2, face_normals
+from vobench.geometry.triangle import areas_m2, face_normals
 
 SMALLEST_M = 0.05  # a smaller model is probably in another unit
 LARGEST_M = 500.0  # a larger model is probably in another unit

@@ -8,6 +8,7 @@ from vobench.asset.furniture import (
     BLACK,
     DARK,
     GREY,
+    SIDES,
     STEEL,
     WHITE,
     Part,
@@ -20,72 +21,86 @@ from vobench.asset.furniture import (
     wood,
 )
 from vobench.asset.picture import Rng
-from vobench.asset.shape import at, block, block_arrays, card, cushion, lathe, spline, tube, tube_arrays
+from vobench.asset.shape import at, block, block_arrays, card, cushion, lathe, sheet_arrays, spline, tube, tube_arrays
 from vobench.scene.material import Material
-from vobench.scene.mesh import joined_arrays
+from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 
 
 def task_chair(rng: Rng, colour: str = "#27445c") -> list[Part]:
     """A swivel chair on five castors, with or without arms; a person on it looks along x."""
     column = lathe(mm("0 70, 42 70, 34 120, 20 130, 20 420, 0 420"), sections=8)
-    turn_deg = rng.uniform(0, 72)
-    metal = []
-    for k in range(5):
-        leg = tube_arrays(mm("20 0 95, 300 0 62"), 0.017, sections=5)
-        wheel = block_arrays((0.05, 0.045, 0.05), bevel_m=0.014).moved(at(0.29, 0, 0.026))
-        metal += [part.moved(at(yaw=turn_deg + 72 * k)) for part in (leg, wheel)]
+    base_and_arms = _castor_base(yaw_deg=rng.uniform(0, 72))
     has_arms = rng.random() < 0.6
     if has_arms:
-        for side in (-1, 1):
-            post = tube_arrays(
-                mm(f"-20 {side * 200} 440, -30 {side * 290} 470, -30 {side * 290} 660"), 0.014, sections=5
-            )
-            rest = block_arrays((0.24, 0.07, 0.025), bevel_m=0.01).moved(at(-0.01, side * 0.29, 0.67))
-            metal += [post, rest]
+        base_and_arms += _chair_arms()
+    has_mesh_back = rng.random() < 0.4
+
     fabric = cloth(colour)
-    is_mesh = rng.random() < 0.4
-    back = cushion((0.06, 0.45, 0.56), power=4.5, cells=4)
     support = tube(mm("-20 0 430, -250 0 440, -285 0 600, -275 0 760"), 0.018, sections=5)
+    seat = cushion((0.47, 0.48, 0.085), power=4.5, cells=4)
+    back = cushion((0.06, 0.45, 0.56), power=4.5, cells=4)
     return [
         put(column, BLACK),
-        Part(joined_arrays(metal), BLACK),
+        Part(joined_arrays(base_and_arms), BLACK),
         put(support, BLACK),
-        put(cushion((0.47, 0.48, 0.085), power=4.5, cells=4), fabric, 0.02, 0, 0.475),
-        put(back, DARK if is_mesh else fabric, -0.235, 0, 0.85, pitch=-9),
+        put(seat, fabric, 0.02, z=0.475),
+        put(back, DARK if has_mesh_back else fabric, -0.235, z=0.85, pitch=-9),
     ]
+
+
+def _castor_base(yaw_deg: float) -> list[MeshArrays]:
+    """Five legs with castors."""
+    leg = tube_arrays(mm("20 0 95, 300 0 62"), 0.017, sections=5)
+    castor = block_arrays((0.05, 0.045, 0.05), bevel_m=0.014).moved(at(0.29, 0, 0.026))
+    base = []
+    for index in range(5):
+        T_base_leg = at(yaw=yaw_deg + 72 * index)
+        base += [leg.moved(T_base_leg), castor.moved(T_base_leg)]
+    return base
+
+
+def _chair_arms() -> list[MeshArrays]:
+    """An arm rest on a bent post on each side of a chair."""
+    arms = []
+    for side in SIDES:
+        inner_mm = side * 200
+        outer_mm = side * 290
+        post = mm(f"-20 {inner_mm} 440, -30 {outer_mm} 470, -30 {outer_mm} 660")
+        rest = block_arrays((0.24, 0.07, 0.025), bevel_m=0.01)
+        arms += [tube_arrays(post, 0.014, sections=5), rest.moved(at(-0.01, side * 0.29, 0.67))]
+    return arms
 
 
 def plain_desk(
     rng: Rng, width_m: float = 1.6, depth_m: float = 0.8, height_m: float = 0.74, look: Material = WHITE
 ) -> list[Part]:
     """A desk top on a steel frame."""
-    y = width_m / 2 - 0.06
-    x = depth_m / 2 - 0.06
-    legs = [
-        stood((0.05, 0.05, height_m - 0.025), STEEL, sx * x, sy * y, bevel=0.003) for sx in (-1, 1) for sy in (-1, 1)
-    ]
-    rail = stood((0.03, 2 * y, 0.05), STEEL, -x + 0.1, 0, height_m - 0.08, bevel=0)
-    top = stood((depth_m, width_m, 0.025), look, 0, 0, height_m - 0.025, bevel=0.004, u=rng.uniform(0, 2))
+    leg_x = depth_m / 2 - 0.06
+    leg_y = width_m / 2 - 0.06
+    leg_m = (0.05, 0.05, height_m - 0.025)
+    legs = [stood(leg_m, STEEL, x, side * leg_y, bevel=0.003) for x in (-leg_x, leg_x) for side in SIDES]
+    rail = stood((0.03, 2 * leg_y, 0.05), STEEL, -leg_x + 0.1, z=height_m - 0.08, bevel=0)
+    top = stood((depth_m, width_m, 0.025), look, z=height_m - 0.025, bevel=0.004, u=rng.uniform(0, 2))
     return [*legs, rail, top]
 
 
 def pedestal(_: Rng, height_m: float = 0.56) -> list[Part]:
     """A steel pedestal of three drawers on castors."""
-    parts = [stood((0.55, 0.4, height_m - 0.04), GREY, 0, 0, 0.04, bevel=0.004)]
+    parts = [stood((0.55, 0.4, height_m - 0.04), GREY, z=0.04, bevel=0.004)]
     parts.append(stood((0.45, 0.32, 0.04), BLACK, bevel=0))
     for z in (0.06, 0.22, 0.38):
-        parts.append(stood((0.016, 0.385, 0.15), GREY, 0.28, 0, z, bevel=0.003))
-        parts.append(stood((0.012, 0.12, 0.012), STEEL, 0.291, 0, z + 0.11, bevel=0))
+        front = stood((0.016, 0.385, 0.15), GREY, 0.28, z=z, bevel=0.003)
+        grip = stood((0.012, 0.12, 0.012), STEEL, 0.291, z=z + 0.11, bevel=0)
+        parts += [front, grip]
     return parts
 
 
 def desk_screen(_: Rng, width_m: float = 1.6, height_m: float = 0.42, colour: str = "#8a9a7b") -> list[Part]:
     """A screen of cloth in a frame, which stands on the edge between two desks."""
     panel_m = (0.022, width_m - 0.03, height_m - 0.03)
-    return [
-        stood(panel_m, cloth(colour), 0, 0, 0.015, bevel=0.004),
-        put(bars(width_m - 0.03, height_m - 0.03, 0.012, 0.028, bevel_m=0), GREY, 0, 0, height_m / 2),
-    ]
+    panel = stood(panel_m, cloth(colour), z=0.015, bevel=0.004)
+    frame = bars(width_m - 0.03, height_m - 0.03, 0.012, 0.028, bevel_m=0)
+    return [panel, put(frame, GREY, z=height_m / 2)]
 
 
 def laptop(rng: Rng, seed: int = 0) -> list[Part]:
@@ -96,67 +111,82 @@ def laptop(rng: Rng, seed: int = 0) -> list[Part]:
         emission_cd_m2=(140.0, 143.0, 150.0),
         emission_texture=picture.screen(seed),
     )
-    tilt = float(rng.uniform(-24, -10))
-    lid = [put(block((0.008, 0.33, 0.22), bevel_m=0.002), shell, 0, 0, 0.11)]
-    lid.append(put(card((0.31, 0.195)), glow, 0.0046, 0, 0.112))
-    keys = [stood((0.014, 0.29, 0.002), BLACK, 0.005 - 0.017 * k, 0, 0.016, bevel=0) for k in range(5)]
-    return [
-        stood((0.23, 0.33, 0.016), shell, 0, 0, 0, bevel=0.003),
-        *keys,
-        *(part.moved(at(-0.11, 0, 0.014, pitch=tilt)) for part in lid),
-    ]
+    body = stood((0.23, 0.33, 0.016), shell, bevel=0.003)
+    key_row_m = (0.014, 0.29, 0.002)
+    key_rows = [stood(key_row_m, BLACK, 0.005 - 0.017 * index, z=0.016, bevel=0) for index in range(5)]
+
+    T_body_lid = at(-0.11, 0, 0.014, pitch=float(rng.uniform(-24, -10)))
+    lid = put(block((0.008, 0.33, 0.22), bevel_m=0.002), shell, z=0.11)
+    screen = put(card((0.31, 0.195)), glow, 0.0046, z=0.112)
+    return [body, *key_rows, lid.moved(T_body_lid), screen.moved(T_body_lid)]
 
 
 def copier(_: Rng) -> list[Part]:
     """A copier 1.05 m high with paper trays and a display."""
-    parts = [stood((0.6, 0.58, 0.62), coated("#c9cac6"), 0, 0, 0.04, bevel=0.01)]
-    parts.append(stood((0.5, 0.5, 0.04), BLACK, bevel=0))
-    parts.append(stood((0.56, 0.58, 0.2), coated("#d8d8d3"), 0, 0, 0.68, bevel=0.015))
-    parts.append(stood((0.52, 0.58, 0.15), coated("#5b5f62"), -0.03, 0, 0.89, bevel=0.02))
+    pale = coated("#d8d8d3")
+    parts = [
+        stood((0.6, 0.58, 0.62), coated("#c9cac6"), z=0.04, bevel=0.01),
+        stood((0.5, 0.5, 0.04), BLACK, bevel=0),
+        stood((0.56, 0.58, 0.2), pale, z=0.68, bevel=0.015),
+        stood((0.52, 0.58, 0.15), coated("#5b5f62"), -0.03, z=0.89, bevel=0.02),
+    ]
     for z in (0.08, 0.26, 0.44):
-        parts.append(stood((0.016, 0.54, 0.16), coated("#d8d8d3"), 0.305, 0, z, bevel=0.004))
-        parts.append(stood((0.012, 0.16, 0.018), DARK, 0.314, 0, z + 0.12, bevel=0))
-    plate = matt(texture=picture.sign("READY", "#26404c"))
-    parts.append(put(card((0.2, 0.1)), plate, 0.3, 0.1, 0.93, pitch=-40))
+        tray = stood((0.016, 0.54, 0.16), pale, 0.305, z=z, bevel=0.004)
+        grip = stood((0.012, 0.16, 0.018), DARK, 0.314, z=z + 0.12, bevel=0)
+        parts += [tray, grip]
+    display = matt(texture=picture.sign("READY", "#26404c"))
+    parts.append(put(card((0.2, 0.1)), display, 0.3, 0.1, 0.93, pitch=-40))
     parts.append(stood((0.05, 0.24, 0.03), DARK, 0.285, 0.1, 0.9, bevel=0.004))
     return parts
 
 
 def meeting_table(rng: Rng, length_m: float = 2.4, width_m: float = 1.1, look: Material = WHITE) -> list[Part]:
     """A table top on two panels; its length is along y."""
-    top = stood((width_m, length_m, 0.032), look, 0, 0, 0.708, bevel=0.006, u=rng.uniform(0, 2))
-    panels = [stood((0.7 * width_m, 0.04, 0.708), look, 0, side * 0.32 * length_m, bevel=0.003) for side in (-1, 1)]
-    beam = stood((0.04, 0.64 * length_m, 0.12), look, 0, 0, 0.5, bevel=0.003)
+    panel_m = (0.7 * width_m, 0.04, 0.708)
+    panel_y = 0.32 * length_m
+    top = stood((width_m, length_m, 0.032), look, z=0.708, bevel=0.006, u=rng.uniform(0, 2))
+    panels = [stood(panel_m, look, 0, side * panel_y, bevel=0.003) for side in SIDES]
+    beam = stood((0.04, 0.64 * length_m, 0.12), look, z=0.5, bevel=0.003)
     return [top, *panels, beam]
 
 
 def coat_stand(rng: Rng, tones: str = "beech") -> list[Part]:
     """A stand with four hooks, mostly with a coat on one of them."""
     look = wood(tones)
-    foot = lathe(mm("0 0, 190 0, 185 20, 30 40, 20 60, 20 1750, 0 1760"), sections=12)
+    post = lathe(mm("0 0, 190 0, 185 20, 30 40, 20 60, 20 1750, 0 1760"), sections=12)
     hook = tube(spline(mm("0 0 1620, 70 0 1640, 110 0 1720"), 5), 0.01, sections=5)
-    parts = [put(foot, look), *(put(hook, look, yaw=90 * k + 20) for k in range(4))]
-    if rng.random() < 0.7:
-        angle = np.linspace(0, 2 * np.pi, 13)[None]
-        down = np.linspace(0, 1, 5)[:, None]
-        spread = 0.3 + 0.7 * np.minimum(1, 3 * down)
-        x = 0.1 + 0.075 * spread * np.cos(angle)
-        y = 0.15 * spread * np.sin(angle) * (1 + 0.12 * np.sin(5 * angle))
-        z = 1.66 - 0.85 * down + 0 * angle
-        from vobench.asset.shape import sheet_arrays
-
-        coat = sheet_arrays(np.stack([x, y, z], axis=-1)).two_sided()
+    hooks = [put(hook, look, yaw=90 * index + 20) for index in range(4)]
+    parts = [put(post, look), *hooks]
+    has_coat = rng.random() < 0.7
+    if has_coat:
         colours = ("#27445c", "#3a3c3e", "#6b4353", "#8f6b4d")
-        parts.append(put(coat, cloth(str(rng.choice(colours))), yaw=20))
+        parts.append(put(_coat(), cloth(str(rng.choice(colours))), yaw=20))
     return parts
+
+
+def _coat() -> MeshArrays:
+    """A coat on a hook of a stand, narrow at its collar, in five folds."""
+    angle = np.linspace(0, 2 * np.pi, 13)[None]
+    down = np.linspace(0, 1, 5)[:, None]  # from the collar to the hem
+    width = 0.3 + 0.7 * np.minimum(1, 3 * down)
+    folds = 1 + 0.12 * np.sin(5 * angle)
+    x = 0.1 + 0.075 * width * np.cos(angle)
+    y = 0.15 * width * np.sin(angle) * folds
+    z = 1.66 - 0.85 * down + 0 * angle
+    return sheet_arrays(np.stack([x, y, z], axis=-1)).two_sided()
 
 
 def glazing(_: Rng, width_m: float, height_m: float, frame: Material = BLACK) -> list[Part]:
     """A pane in a frame that fills a hole, centred at the origin, with one bar for each metre of its width."""
-    border = bars(width_m - 0.08, height_m - 0.08, 0.04, 0.06, bevel_m=0)
-    count = max(1, round(width_m / 1.0))
+    pane_width_m = width_m - 0.08
+    pane_height_m = height_m - 0.08
+    pane = put(card((pane_width_m, pane_height_m)), PANE)
+    border = put(bars(pane_width_m, pane_height_m, 0.04, 0.06, bevel_m=0), frame)
+
+    section_count = max(1, round(width_m / 1.0))
+    post = block((0.05, 0.03, pane_height_m), bevel_m=0)
     posts = []
-    for k in range(1, count):
-        y = k * width_m / count - width_m / 2
-        posts.append(put(block((0.05, 0.03, height_m - 0.08), bevel_m=0), frame, 0, y))
-    return [put(card((width_m - 0.08, height_m - 0.08)), PANE), put(border, frame), *posts]
+    for index in range(1, section_count):
+        y = index * width_m / section_count - width_m / 2
+        posts.append(put(post, frame, 0, y))
+    return [pane, border, *posts]

@@ -48,7 +48,7 @@ from vobench.asset.shape import (
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import arrays, corners, flat, flipped, joined, make_mesh, moved, texture_coordinates
+from vobench.scene.mesh import as_arrays, face_corners, flat, flipped, joined, make_mesh, moved, texture_coordinates
 from vobench.scene.scene import jointed
 
 if TYPE_CHECKING:
@@ -165,7 +165,7 @@ def _cap(ring_m: Array, side: float) -> "Trimesh":
 
 def _outward(mesh: "Trimesh") -> "Trimesh":
     """The mesh with its front towards the outside, away from the centre of the car."""
-    corners_m = corners(mesh)
+    corners_m = face_corners(mesh)
     from_center = corners_m.mean(axis=1) - [0, 0, 0.6]
     a, b, c = corners_m.swapaxes(0, 1)
     area_vectors = np.cross(b - a, c - a)
@@ -584,7 +584,7 @@ def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
     """A boulder with flat breaks, a third of it in the ground."""
     extent_m = size_m * rng.uniform([0.8, 0.6, 0.5], [1.2, 1.0, 0.8])
     mesh = cushion(extent_m, power=2.4, cells=9)
-    points_m = arrays(mesh).vertices_m
+    points_m = as_arrays(mesh).vertices_m
 
     flat_breaks = 9
     for _ in range(flat_breaks):

@@ -15,7 +15,9 @@ from vobench.asset.shape import at
 from vobench.asset.wall import Hole, pierced, planked, reveal
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Material
-from vobench.scene.mesh import MeshArrays, Thing, joined_arrays, quad_arrays
+from vobench.scene.mesh import as_mesh
+from vobench.scene.mesh_arrays import MeshArrays, joined_arrays, quad_arrays
+from vobench.scene.triangles import Thing
 from vobench.setting import Triple
 
 if TYPE_CHECKING:
@@ -102,7 +104,7 @@ def things(
     for name, parts in instances:
         for k, (material, meshes) in enumerate(_by_material(parts).items()):
             material_name = names.setdefault(material, f"{name}.{k}")
-            result.append(Thing(name, joined_arrays(meshes).mesh(), material_name))
+            result.append(Thing(name, as_mesh(joined_arrays(meshes)), material_name))
     return tuple(result), {name: material for material, name in names.items()}
 
 

@@ -13,8 +13,10 @@ from vobench.asset.polygon import oriented, triangulated
 from vobench.asset.wall import Hole
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import face_normals
 from vobench.geometry.vector import cross, unit
-from vobench.scene.mesh import Faces, MeshArrays, face_normals, joined_arrays, quad_arrays
+from vobench.scene.mesh import as_mesh
+from vobench.scene.mesh_arrays import Faces, MeshArrays, joined_arrays, quad_arrays
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -60,7 +62,7 @@ def block(
     printed carton. transform: the pose (4, 4) of the box; the identity by default.
     """
     arrays = block_arrays(size_m, bevel_m=bevel_m, uv_m=uv_m, upright=upright)
-    return arrays.mesh() if transform is None else arrays.moved(transform).mesh()
+    return as_mesh(arrays if transform is None else arrays.moved(transform))
 
 
 def block_arrays(
@@ -281,7 +283,7 @@ def lathe(profile_m: ArrayLike, *, sections: int = 24) -> "Trimesh":
     level_uv = points[..., :2]
     is_level = np.abs(outward[:, 1]) > LEVEL_COSINE
     uv = np.where(is_level[:, None, None, None], level_uv, wrapped_uv)
-    return _grids(points, normals, uv).mesh()
+    return as_mesh(_grids(points, normals, uv))
 
 
 def _profile_normals(outward: Array) -> Array:
@@ -334,7 +336,7 @@ def tube(
     sections: int = 8,
 ) -> "Trimesh":
     """A round rod along a polyline (N, 3), closed by flat ends."""
-    return tube_arrays(path_m, radius_m, sections=sections).mesh()
+    return as_mesh(tube_arrays(path_m, radius_m, sections=sections))
 
 
 def tube_arrays(
@@ -426,12 +428,12 @@ def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimes
     for k, side_m in enumerate(points_m):
         axis = k // 2
         uv.append(np.roll(side_m, -axis, axis=-1)[..., :2])
-    return _grids(points_m, unit(gradient), np.stack(uv)).mesh()
+    return as_mesh(_grids(points_m, unit(gradient), np.stack(uv)))
 
 
 def sheet(points_m: ArrayLike) -> "Trimesh":
     """A smooth surface through a grid of points (R, C, 3). It is visible from the side of column × row direction."""
-    return sheet_arrays(points_m).mesh()
+    return as_mesh(sheet_arrays(points_m))
 
 
 def sheet_arrays(points_m: ArrayLike) -> MeshArrays:
@@ -457,7 +459,7 @@ def card(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> "Trimesh
 
     `cell` is the first and last u, and the first and last v, as shares of the picture.
     """
-    return card_arrays(size_m, cell=cell).mesh()
+    return as_mesh(card_arrays(size_m, cell=cell))
 
 
 def card_arrays(
@@ -475,7 +477,7 @@ def card_arrays(
 
 def cards(sizes_m: ArrayLike, poses: ArrayLike) -> "Trimesh":
     """One mesh of rectangles with sizes (N, 2) at rigid poses (N, 4, 4), visible from both sides; see `card`."""
-    return cards_arrays(sizes_m, poses).mesh()
+    return as_mesh(cards_arrays(sizes_m, poses))
 
 
 def cards_arrays(sizes_m: ArrayLike, poses: ArrayLike) -> MeshArrays:
@@ -524,7 +526,7 @@ def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayL
         for start, end in pairwise([*ring, ring[0]]):
             edge = end - start
             parts.append(quad_arrays((*start, 0), (*edge, 0), (0, 0, height_m)))
-    return joined_arrays(parts).mesh()
+    return as_mesh(joined_arrays(parts))
 
 
 def _cap(corners_m: Array) -> MeshArrays:

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from vobench.asset.gltf_material import Look
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Map, Material, Picture, srgb
-from vobench.scene.mesh import MeshArrays
+from vobench.scene.mesh_arrays import MeshArrays
 
 EVEN = 1 / 255  # a mesh whose colours differ by less counts as having one colour
 LEVELS = 4095  # colours are rounded to this many levels to find faces that can share a patch

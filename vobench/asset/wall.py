@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import cross, unit
-from vobench.scene.mesh import MeshArrays, joined_arrays, quad_arrays
+from vobench.scene.mesh import as_mesh
+from vobench.scene.mesh_arrays import MeshArrays, joined_arrays, quad_arrays
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
@@ -41,7 +42,7 @@ def pierced(
     height_m = float(np.linalg.norm(v))
 
     rectangles = [_rectangle(corner, u, v, cell) for cell in _solid_cells(width_m, height_m, [*holes, *doors])]
-    return joined_arrays(rectangles + _laps(corner, u, v, doors)).mesh()
+    return as_mesh(joined_arrays(rectangles + _laps(corner, u, v, doors)))
 
 
 def _laps(corner: Array, u: Array, v: Array, doors: Sequence[Hole] = ()) -> list[MeshArrays]:
@@ -118,7 +119,7 @@ def reveal(corner_m: ArrayLike, edge_u_m: ArrayLike, edge_v_m: ArrayLike, hole: 
         quad_arrays(corner, across, inwards),
         quad_arrays(corner + along, inwards, across),
     ]
-    return joined_arrays(sides).mesh()
+    return as_mesh(joined_arrays(sides))
 
 
 # --- Planks ---
@@ -177,7 +178,7 @@ def planked(
     faces = np.arange(len(places_uv)).reshape(-1, 3)
     normals = np.tile(unit(cross(u, v)), (len(places_uv), 1))
     floor = MeshArrays(vertices_m, faces, np.concatenate(texture_uv), normals)
-    return joined_arrays([floor, *_laps(corner, u, v)]).mesh()
+    return as_mesh(joined_arrays([floor, *_laps(corner, u, v)]))
 
 
 def _ends(row: Sequence[_Plank]) -> Array:

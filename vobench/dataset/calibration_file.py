@@ -20,7 +20,7 @@ from vobench.dataset.picture import read_text
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.setting import COMPLAINTS
+from vobench.setting import MESSAGES as SETTING_MESSAGES
 
 MOST_CHARACTERS = 1 << 16  # a typical calibration file has 1000 to 2000 characters
 OPENCV_HEAD = re.compile(r"\A%YAML:1\.0[^\n]*")  # OpenCV requires this first line, which YAML forbids
@@ -128,7 +128,7 @@ class CalibrationFile:
 
 # The complaint for each of pydantic's error types. The fields in braces are filled in from the context of the error.
 WORDS = {
-    **COMPLAINTS,
+    **SETTING_MESSAGES,
     "float_type": "should be a finite number",
     "finite_number": "should be a finite number",
     "multiple_of": "should be a whole number",

@@ -15,6 +15,7 @@ from annotated_types import Ge
 from vobench import stop
 from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.direct_light import direct_light, mirror_images
@@ -40,9 +41,10 @@ from vobench.rendering.unwrap import unwrap
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Light, Sky, Sun
 from vobench.scene.material import LUMINANCE, Material, Picture, Texture
-from vobench.scene.mesh import Triangles, areas_m2, distinct
 from vobench.scene.panorama import PanoramaMap
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
+from vobench.scene.weld import distinct_rows
 from vobench.setting import Positive, settings
 from vobench.trajectory.nanoseconds import NS_PER_S
 
@@ -205,7 +207,7 @@ def _sunlit(scene: Scene, faces: Triangles) -> Mask:
     offset = np.rint(offset_m * 1e3)
     normal = np.rint(faces.plane * 1e3)
     plane_keys = [np.where(is_small, 0, column) for column in (*normal.T, offset)]
-    group = distinct(np.column_stack([faces.thing, *plane_keys]))[1]
+    group = distinct_rows(np.column_stack([faces.thing, *plane_keys])).inverse
     has_lit_face = np.bincount(group, is_lit) > 0
     return np.asarray(has_lit_face[group])
 

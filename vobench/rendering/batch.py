@@ -14,7 +14,8 @@ from vobench.rendering.culling import Clusters
 from vobench.rendering.planar_mirror import MirrorFaces, PlanarMirror, planar_mirrors, sharpness
 from vobench.rendering.watertight import WatertightMesh, watertight
 from vobench.scene.material import Material
-from vobench.scene.mesh import WELD_M, Triangles, distinct
+from vobench.scene.triangles import Triangles
+from vobench.scene.weld import WELD_M, distinct_rows
 
 Indices = NDArray[np.int64]
 
@@ -162,7 +163,7 @@ def _batches(
     """The batch that each triangle (T,) is drawn with, and the batches."""
     number = {id(material): nth for nth, material in enumerate(of_things)}
     material = np.array([number[id(material)] for material in of_things])[parts.thing]
-    first, batch = distinct(np.column_stack([parts.mover, parts.is_lamp, mirror, material]))
+    first, batch = distinct_rows(np.column_stack([parts.mover, parts.is_lamp, mirror, material]))
     area_m2 = np.bincount(batch, parts.area_m2)
     batches = []
     for index, triangle in enumerate(first.tolist()):

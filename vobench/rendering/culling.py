@@ -11,7 +11,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Mask
 from vobench.rendering.view import Box, PinholeView
-from vobench.scene.mesh import WELD_M
+from vobench.scene.weld import WELD_M
 
 Indices = NDArray[np.int64]
 Runs = dict[int, list[tuple[int, int]]]
@@ -118,5 +118,5 @@ def bounds(view: PinholeView, box: Box) -> Array:
     sides = [x - left * w, right * w - x, y - bottom * w, top * w - y]
     planes = [*sides, w - nearness]
     if view.mirror is not None:
-        planes.append(np.array([*view.mirror.normal, view.mirror.offset_m]))
+        planes.append(view.mirror.coefficients)
     return np.array(planes)

@@ -8,21 +8,21 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.embree import Hits
 from vobench.scene.material import Material
-from vobench.scene.mesh import Triangles
+from vobench.scene.triangles import Triangles
 
 
 class CutOuts:
     """Finds the hits that lie in the hole of a cut-out.
 
-    `material` (F + 1,) is the index of each face's material among those with cut-outs, or -1. The last element is for
-    rays that hit no face, whose face is -1.
+    `material_of_face` (F + 1,) is the index of each face's material among those with cut-outs, or -1. The last element
+    is -1, so that a ray that hits no face, whose face is -1, finds no material.
     """
 
     def __init__(self, faces: Triangles, materials: dict[str, Material]) -> None:
         self._with_holes = {name: material for name, material in materials.items() if _has_holes(material)}
         index_by_name = {name: index for index, name in enumerate(self._with_holes)}
         index_by_thing = np.array([index_by_name.get(thing.material, -1) for thing in faces.things], np.int32)
-        self.material = np.append(index_by_thing[faces.thing], -1)
+        self.material_of_face = np.append(index_by_thing[faces.thing], -1)
         self._uv = faces.uv
 
     def holes(self, hits: Hits) -> Mask:
@@ -30,15 +30,16 @@ class CutOuts:
         is_hole = np.zeros(len(hits.face), bool)
         if not self._with_holes:
             return is_hole
-        material_of_hit = self.material[hits.face]
+        material_of_hit = self.material_of_face[hits.face]
         for index, material in enumerate(self._with_holes.values()):
             rows = np.flatnonzero(material_of_hit == index)
-            u = hits.u[rows, None]
-            v = hits.v[rows, None]
+            second_weight = hits.u[rows, None]
+            third_weight = hits.v[rows, None]
+            first_weight = 1 - second_weight - third_weight
             corners_uv_m = self._uv[hits.face[rows]]  # (K, 3, 2), of the K hits on this material
-            a, b, c = np.moveaxis(corners_uv_m, 1, 0)
-            uv_m = (1 - u - v) * a + u * b + v * c
-            is_hole[rows] = ~opaque(material, uv_m / material.tile_m)
+            first_uv_m, second_uv_m, third_uv_m = np.moveaxis(corners_uv_m, 1, 0)
+            uv_m = first_weight * first_uv_m + second_weight * second_uv_m + third_weight * third_uv_m
+            is_hole[rows] = ~is_opaque(material, uv_m / material.tile_m)
         return is_hole
 
 
@@ -47,13 +48,16 @@ def _has_holes(material: Material) -> bool:
     return material.cutout is not None and material.texture is not None
 
 
-def opaque(material: Material, places: Array) -> Mask:
-    """Whether a material is opaque at texture coordinates `places` (R, 2), in tiles.
+def is_opaque(material: Material, uv_tiles: Array) -> Mask:
+    """Whether a material is opaque at texture coordinates (R, 2), in tiles.
 
-    It is opaque where the opacity of its texture is at least the threshold `material.cutout`.
+    It is opaque where the opacity of its texture is at least the threshold `material.cutout`, and everywhere if it has
+    no threshold.
     """
-    opacity = _opacity(material)
-    return np.asarray(_sampled(opacity, places) >= (material.cutout or 0.0))
+    if material.cutout is None:
+        return np.ones(len(uv_tiles), bool)
+    opacity = _sampled(_opacity(material), uv_tiles)
+    return np.asarray(opacity >= material.cutout)
 
 
 @lru_cache(maxsize=64)
@@ -68,14 +72,14 @@ def _opacity(material: Material) -> Floats:
     return np.asarray(pixels[..., 3] / 255, np.float32)
 
 
-def _sampled(tile: Floats, places: Array) -> Array:
-    """The values (R,) of a repeated image `tile` (H, W) at texture coordinates `places` (R, 2), in tiles.
+def _sampled(tile: Floats, uv_tiles: Array) -> Array:
+    """The values (R,) of a repeated image `tile` (H, W) at texture coordinates (R, 2), in tiles.
 
     Values are interpolated bilinearly between pixel centres.
     """
     height, width = tile.shape
-    x = places[:, 0] * width - 0.5
-    y = places[:, 1] * height - 0.5
+    x = uv_tiles[:, 0] * width - 0.5
+    y = uv_tiles[:, 1] * height - 0.5
     x0 = np.floor(x).astype(np.int64)
     y0 = np.floor(y).astype(np.int64)
     x_fraction = x - x0

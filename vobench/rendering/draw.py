@@ -3,15 +3,17 @@
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from OpenGL import GL
 
 from vobench.geometry import se3
 from vobench.rendering.batch import Batch, Geometry
 from vobench.rendering.culling import CullingSet, Runs
-from vobench.rendering.draw_call import LAYERS, LAYERS_UNIT, DrawCalls, probe_share
+from vobench.rendering.draw_call import LAYERS_UNIT, DrawCalls
 from vobench.rendering.opengl import Canvas, FlatTarget, PanoramaTexture, bind
 from vobench.rendering.planar_mirror import PlanarMirror
-from vobench.rendering.probe import Probe
+from vobench.rendering.probe import Probe, probe_share
 from vobench.rendering.render_target import MIRRORS, RenderTarget
+from vobench.rendering.shader_define import ShaderDefine
 from vobench.rendering.view import Box, PinholeView, Plane, visible_boxes, within
 
 FOLLOWED = (6, 3, 2)  # planes at each depth, those that show most; the others mirror by the probe
@@ -48,10 +50,10 @@ class BatchDraw:
     @property
     def mirrors_in_colour(self) -> bool:
         """Whether some surface tints what it mirrors or what is seen through it."""
-        for names in self._calls.abilities:
-            shows_others = "IS_PLANAR" in names or "IS_PANE" in names
-            is_tinting = any(name in names for name in ("IS_MIRROR", "IS_PANE", "HAS_METAL"))
-            if shows_others and is_tinting and "IS_GREY" not in names:
+        for defines in self._calls.shader_defines:
+            shows_others = bool(defines & {ShaderDefine.IS_PLANAR, ShaderDefine.IS_PANE})
+            is_tinting = bool(defines & {ShaderDefine.IS_MIRROR, ShaderDefine.IS_PANE, ShaderDefine.HAS_METAL})
+            if shows_others and is_tinting and ShaderDefine.IS_GREY not in defines:
                 return True
         return False
 
@@ -75,7 +77,7 @@ class BatchDraw:
         """Fill a box of the target's canvas for as many mirrors as the view goes by, which must be clear there."""
         visible = self._culling.visible(view, box)
         canvas = self._begin(view, target, box)
-        self._draw_unmirrored(self._with_holes, visible, view, canvas, "IS_SOLID")
+        self._draw_unmirrored(self._with_holes, visible, view, canvas, ShaderDefine.IS_SOLID)
         self._draw_unmirrored(self._opaque, visible, view, canvas)
 
         boxes = self._boxes(view, visible)
@@ -88,7 +90,7 @@ class BatchDraw:
 
         self._calls.background(view, canvas, target.weights)
         # How much of what is behind passes between leaves does not depend on the order in which rims are blended.
-        self._draw_unmirrored(self._with_holes, visible, view, canvas, "IS_RIM")
+        self._draw_unmirrored(self._with_holes, visible, view, canvas, ShaderDefine.IS_RIM)
         self._draw_unmirrored(self._panes, visible, view, canvas)
         panes = [mirror for mirror in mirrors if mirror.is_pane]
         for mirror in sorted(panes, key=lambda pane: -_distance_m(pane, view)):
@@ -117,17 +119,17 @@ class BatchDraw:
         visible: Runs,
         view: PinholeView,
         canvas: Canvas,
-        *abilities: str,
+        *defines: ShaderDefine,
     ) -> None:
         """Draw batches that lie in no mirror's plane, with what the probe shows.
 
-        `abilities` are further preprocessor names for the shader.
+        `defines` are further preprocessor names for the shader.
         """
         for batch in batches:
             if batch.index in visible:
-                shows_probe = self._probe and batch.has_gloss and probe_share(batch) > 0
-                probe_abilities = ("HAS_PROBE",) if shows_probe else ()
-                self._calls.surface(batch, visible, view, canvas, *probe_abilities, *abilities)
+                shows_probe = self._probe and batch.has_gloss and probe_share(batch.material) > 0
+                probe_defines = [ShaderDefine.HAS_PROBE] if shows_probe else []
+                self._calls.surface(batch, visible, view, canvas, frozenset([*probe_defines, *defines]))
 
     def _boxes(self, view: PinholeView, visible: Runs) -> dict[int, Box]:
         """Mirrors whose mirroring side is seen, all or those of which something is visible: boxes in the picture.
@@ -196,17 +198,17 @@ class BatchDraw:
         canvas = target.canvases[view.depth]
         plane = _plane_towards(mirror, view)
         is_last = view.depth == MIRRORS or not self._probe
-        abilities = ("IS_LAST",) if is_last else ("HAS_PROBE",)
+        reflected = ShaderDefine.IS_LAST if is_last else ShaderDefine.HAS_PROBE
         if part and plane:
             reflections = target.canvases[view.depth + 1]
             reflections.clear(part)
             self.draw(view.through(plane), target, part)
             self._begin(view, target, box)
-            bind(LAYERS_UNIT, reflections.colour, LAYERS)
-            abilities = ("HAS_REFLECTION",)
+            bind(LAYERS_UNIT, reflections.colour, GL.GL_TEXTURE_2D_ARRAY)
+            reflected = ShaderDefine.HAS_REFLECTION
         for batch in self._batches_of[mirror.index]:
             if batch.index in visible:
-                self._calls.surface(batch, visible, view, canvas, *abilities)
+                self._calls.surface(batch, visible, view, canvas, frozenset({reflected}))
 
 
 def _plane_towards(mirror: PlanarMirror, view: PinholeView) -> Plane | None:

@@ -9,6 +9,7 @@ import numpy as np
 import scipy
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2, face_normals
 from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.geometry import (
     FAR_M,
@@ -26,8 +27,7 @@ from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import fresnel
-from vobench.scene.mesh import areas_m2, face_normals
-from vobench.scene.mesh import corners as mesh_corners
+from vobench.scene.mesh import face_corners
 
 
 class Occluder(Protocol):
@@ -212,7 +212,7 @@ class MeshPanel(Emitter):
 
 def panel_emitter(light: AreaLight) -> Panel | MeshPanel:
     """A lamp's faces: as a rectangle if they fill one, or as a mesh."""
-    corners_m = mesh_corners(light.mesh)
+    corners_m = face_corners(light.mesh)
     ball = bounding_sphere(corners_m)
     face = rectangle(corners_m)
     if face is not None:

@@ -9,10 +9,11 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
+from vobench.rendering.background import Background
 from vobench.rendering.bake import BakedScene
 from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
-from vobench.rendering.illumination import AmbientLight, Background, Illumination
+from vobench.rendering.illumination import AmbientLight, Illumination
 from vobench.rendering.mover_shade import ShadedLight
 from vobench.rendering.opengl import CENTRE, HALVES, TURNED, LightTexture, PanoramaTexture
 from vobench.rendering.probe import Probe, glints, room_probe
@@ -22,7 +23,7 @@ from vobench.rendering.view import NO_GLINTS, Box, PinholeView, pinhole_view
 from vobench.rendering.warp import Warp, warp
 from vobench.scene.light import STEADY, Light, Steady
 from vobench.scene.material import Rgb
-from vobench.scene.mesh import Triangles
+from vobench.scene.triangles import Triangles
 
 AWAY_M = 1e6  # where movers are while the probe is drawn
 HALVED_FRAMES = 4  # sub-frames, of which each may have half of the samples
@@ -81,7 +82,7 @@ class FrameRenderer:
     def _room_probe(self, baked: BakedScene, faces: Triangles) -> Probe:
         """The probe of what is stationary, with every lamp that varies at level 1."""
         lights = tuple(_steady(light) for light in self._lights)
-        skies = _skies(Background(lights), 0, 0)
+        skies = Background(lights).skies(0, 0)
         if all(isinstance(light.level, Steady) for light in self._lights):
             light_map = self._illumination.at(0, 0)
         else:
@@ -166,7 +167,7 @@ class FrameRenderer:
             camera,
             T_world_camera,
             T_world_movers,
-            _skies(self._background, start_ns, end_ns),
+            self._background.skies(start_ns, end_ns),
             ambient_cd_m2=np.broadcast_to(self._ambient.cd_m2(light), 3),
             glints=shown_glints,
         )
@@ -181,13 +182,6 @@ class FrameRenderer:
 def _steady(light: Light) -> Light:
     """A light at level 1 if it varies."""
     return light if isinstance(light.level, Steady) else replace(light, level=STEADY)
-
-
-def _skies(background: Background, start_ns: int, end_ns: int) -> Array:
-    """The shader's coefficients (S, 4, 4) of every sky, its colour the last."""
-    rows = [[*sky.colour, 0.0] for sky in background.skies]
-    colours = np.array(rows).reshape(-1, 1, 4)
-    return np.concatenate([background.coefficients(start_ns, end_ns), colours], 1)
 
 
 def _require_tiling(camera: Camera, views: Sequence[View]) -> None:

@@ -8,11 +8,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.embree import Hits, TriangleCaster
 from vobench.scene.material import Material
-from vobench.scene.mesh import Triangles, areas_m2, distinct
+from vobench.scene.triangles import Triangles
+from vobench.scene.weld import distinct_rows
 
 T = TypeVar("T")
 
@@ -83,7 +85,7 @@ def planar_patches(
     offset = np.einsum("ij,ij->i", faces.plane[rows], faces.corners_m[rows, 0])
     normal_cells = faces.plane[rows] / FLAT_RAD
     cells = np.column_stack([normal_cells, offset / FLAT_M, faces.thing[rows]])
-    group = distinct(np.rint(cells).astype(np.int64))[1]
+    group = distinct_rows(np.rint(cells).astype(np.int64)).inverse
     patches = []
     for number in range(group.max(initial=-1) + 1):
         members = rows[group == number]

@@ -1,7 +1,7 @@
-"""The light on every face over an interval, the sky behind it, and the mean luminance of a scene."""
+"""The light on every face over an interval, and the mean luminance of a scene."""
 
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable
 from typing import TypeVar
 
 import numpy as np
@@ -9,11 +9,9 @@ import numpy as np
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats
 from vobench.rendering.bake import BakedScene, SunTrack, direct_layer, direct_points, static_scene, travelled_rad
-from vobench.scene.light import SKIES, Light, Sky, Steady, Sun
-from vobench.scene.panorama import PanoramaMap, lamp_share
+from vobench.scene.light import Light, Steady, Sun
 from vobench.trajectory.nanoseconds import NS_PER_S
 
-ZENITH = np.array([0.0, 0.0, 1.0])
 SUN_TURN_RAD = 1e-4  # a moving sun counts as still within less than a fiftieth of its disc
 CACHED = 16  # maps and moments: enough for the strips of a stereo pair
 
@@ -45,50 +43,6 @@ class AmbientLight:
             self._light = light
             self._mean_cd_m2 = np.sum(self._weights * light, axis=(0, 1), dtype=np.float64)
         return self._mean_cd_m2
-
-
-class Background:
-    """The skies among a scene's lights, with the maps of those that have a panorama, by their index."""
-
-    def __init__(self, lights: Sequence[Light]) -> None:
-        self.skies = [light for light in lights if isinstance(light, Sky)]
-        self.panoramas = dict[int, PanoramaMap]()
-        for index, sky in enumerate(self.skies):
-            if sky.panorama is not None:
-                self.panoramas[index] = sky.panorama.map_under(sky)
-        nominal = [_coefficients(sky) for sky in self.skies]
-        self._nominal = np.array(nominal).reshape(-1, 3, 4)
-
-    def coefficients(self, start_ns: int, end_ns: int) -> Array:
-        """(S, 3, 4): `gradation`, `scatter` and `sun` of the shader, with the mean level over an interval.
-
-        Of a sky with a panorama, `gradation` ends in its illuminance and in the share of the panorama's lamps.
-        """
-        coefficients = self._nominal.copy()
-        levels = [sky.level.mean(start_ns, end_ns) for sky in self.skies]
-        coefficients[:, 0, 2:] *= np.reshape(levels, (-1, 1))
-        for index in self.panoramas:
-            illuminance_lx = levels[index] * self.skies[index].illuminance_lx
-            coefficients[index, 0, 2:] = (illuminance_lx, lamp_share(illuminance_lx))
-        return coefficients
-
-
-def _coefficients(sky: Sky) -> Array:
-    """Source: ISO 15469:2004, eqs 1 to 7; the scale follows from the luminance at the zenith."""
-    a, b, c, d, e = SKIES[sky.kind]
-    scatter_across = np.exp(d * np.pi / 2)
-    cosine = np.clip(ZENITH @ sky.sun_direction, -1, 1)
-    chi = np.arccos(cosine)  # from the sun to the zenith
-    gradation = 1 + a * np.exp(b)
-    scatter = 1 + c * (np.exp(d * chi) - scatter_across) + e * np.cos(chi) ** 2
-    zenith, ground = sky.standard_cd_m2(np.stack([ZENITH, -ZENITH]))
-    return np.array(
-        [
-            [a, b, zenith / (gradation * scatter), ground],
-            [c, d, e, scatter_across],
-            [*sky.sun_direction, 0],
-        ]
-    )
 
 
 T = TypeVar("T")

@@ -21,7 +21,7 @@ from vobench.rendering.unwrap import nearest_axis
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Sky
 from vobench.scene.material import LUMINANCE, Material, fresnel, linear_texture, under_coat
-from vobench.scene.mesh import Triangles
+from vobench.scene.triangles import Triangles
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix

@@ -19,12 +19,12 @@ from vobench import stop
 from vobench.errors import MissingDependencyError
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Pixels
-from vobench.rendering.cutout import opaque
+from vobench.rendering.cutout import is_opaque
 from vobench.rendering.occlusion import back_faces
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Map, Material, Rgb, Texture, linear_texture
-from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
 from vobench.temporary import temporary_folder
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
@@ -226,7 +226,7 @@ def load(mi: Any, scene: Scene) -> Any:
     """Mitsuba's scene at the first instant, every light at level 1."""
     body_faces = triangles(scene)
     poses = [mover.path.pose(0) for mover in scene.movers]
-    faces = body_faces.moved(poses)
+    faces = body_faces.with_movers_at(poses)
     register()
     world: Plugin = {"type": "scene"}
     bsdfs = cache(lambda name, two_sided: mi.load_dict(_bsdf(mi, scene.materials[name], two_sided=two_sided)))
@@ -356,7 +356,7 @@ def _bsdf(mi: Any, material: Material, *, two_sided: bool) -> Plugin:
     v = (np.arange(rows) + 0.5) / rows
     u = (np.arange(columns) + 0.5) / columns
     places = np.stack(np.meshgrid(u, v), -1).reshape(-1, 2)
-    is_solid = opaque(material, places).reshape(rows, columns)
+    is_solid = is_opaque(material, places).reshape(rows, columns)
     opacity = _bitmap(mi, is_solid.astype(np.float32), filter_type="nearest")
     return {"type": "mask", "opacity": opacity, "bsdf": bsdf}
 

@@ -9,6 +9,7 @@ import scipy
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2, face_normals
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.bake import BakedScene, bodies
@@ -21,9 +22,10 @@ from vobench.rendering.texel_owner import Owners
 from vobench.rendering.uniform_block import MOST_MAPS, MOST_REACHES, MOST_SAMPLES
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.mesh import Triangles, areas_m2, distinct, face_normals
-from vobench.scene.mesh import corners as mesh_corners
+from vobench.scene.mesh import face_corners
 from vobench.scene.scene import Mover
+from vobench.scene.triangles import Triangles
+from vobench.scene.weld import distinct_rows
 
 STEEPEST = 0.999  # the largest sine of the half-angle of a frustum, for points near the emitter
 SKY_REACH = 10  # the distance, in radii of a body, beyond which the body hides less than 1 % of an open sky
@@ -84,7 +86,7 @@ def _merged(corners_m: Array) -> Array:
     """Triangles (K, 3, 3) with all vertices in a grid cell merged at their mean, without those that have no area."""
     points_m = corners_m.reshape(-1, 3)
     cell_m = max(float(np.ptp(points_m, axis=0).max()) * CELL, 1e-6)
-    cell = distinct(np.rint(points_m / cell_m).astype(np.int64))[1]
+    cell = distinct_rows(np.rint(points_m / cell_m).astype(np.int64)).inverse
     count = np.bincount(cell)
     sums_m = np.stack([np.bincount(cell, column) for column in points_m.T], -1)
     merged_m = (sums_m / count[:, None])[cell].reshape(-1, 3, 3)
@@ -296,7 +298,7 @@ def _ball(corners_m: Array) -> BoundingSphere:
 
 def _sampled_panel(index: int, light: AreaLight) -> SampledEmitter:
     """An area light as an emitter; each sample has the normal of the nearest face."""
-    corners_m = mesh_corners(light.mesh)
+    corners_m = face_corners(light.mesh)
     ball = _ball(corners_m)
     points_m = _spread(corners_m, _sample_count(PER_RADIUS_M * ball.radius_m))
     count = len(points_m)

@@ -290,9 +290,9 @@ class ShadedLight:
             if isinstance(light.level, Steady) and not light.moves:
                 self._steady_lx += np.float32(light.level.mean(0, 0)) * layer
 
-        self._shade = ShaderProgram("shade", "shade", "IS_SHADE")
-        self._show = ShaderProgram("shade", "shade", "IS_MOVER")
-        self._give = ShaderProgram("shade", "shade", "IS_GIVEN")
+        self._shade = ShaderProgram("shade", "shade", ["IS_SHADE"])
+        self._show = ShaderProgram("shade", "shade", ["IS_MOVER"])
+        self._give = ShaderProgram("shade", "shade", ["IS_GIVEN"])
         self._atlas = _ShadowAtlas()
         self._block = Blocks(SHADE.binding, np.zeros(max(len(sampled), 1), SHADE.dtype))
         self._site_buffers = [self._site_vertices(sites) for sites in self._site_sets]

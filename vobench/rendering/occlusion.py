@@ -14,8 +14,8 @@ from vobench.rendering.cutout import CutOuts
 from vobench.rendering.embree import Hits, TriangleCaster
 from vobench.rendering.geometry import RAY_OFFSET_M
 from vobench.rendering.shot import moved, rays_in, turn
-from vobench.scene.mesh import Triangles
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
 
 REACH_M = 1e8  # beyond every scene
 MOST_PASSED = 64  # backs and holes that a ray passes before it counts as lost between faces that touch
@@ -161,7 +161,7 @@ class Bodies:
     def stationary_occluders(self) -> Occluders:
         """All stationary triangles that can stop light."""
         rows = np.flatnonzero(self._is_solid & (self.body[:-1] == 0) & (self._height_m[:-1] > 0))
-        is_cut_out = self._cut_outs.material[rows] >= 0
+        is_cut_out = self._cut_outs.material_of_face[rows] >= 0
         return Occluders(self.faces.corners_m[rows], ~is_cut_out)
 
     def _body(self, index: int, is_pane: Mask) -> Body:
@@ -179,7 +179,7 @@ class Bodies:
             return TriangleCaster(self.faces.corners_m, rows, robust=False)
 
         is_solid = self._is_solid
-        is_cut_out = self._cut_outs.material[:-1] >= 0
+        is_cut_out = self._cut_outs.material_of_face[:-1] >= 0
         has_holes = is_member & is_solid & is_cut_out
         is_glass = is_member & is_pane
         visible = caster(is_solid)

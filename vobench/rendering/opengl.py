@@ -1,7 +1,7 @@
 """Objects of OpenGL: shader programs, textures, buffers, framebuffers."""
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -220,7 +220,7 @@ class ShaderProgram:
         self,
         vertex: str,
         fragment: str,
-        *defines: str,
+        defines: Collection[str] = (),
     ) -> None:
         # Core contexts check a program against a vertex array, whichever it is.
         GL.glBindVertexArray(GL.glGenVertexArrays(1))
@@ -265,7 +265,7 @@ class ShaderProgram:
             upload(location, 1, GL.GL_TRUE, value)
 
 
-def _source(name: str, defines: Sequence[str]) -> str:
+def _source(name: str, defines: Collection[str]) -> str:
     """The text of a shader's file, with its uniform blocks declared and names defined.
 
     The names follow the first line, that of the version; a line `#include <Pass>` becomes the block of that name.
@@ -360,9 +360,9 @@ class Canvas:
     depth: Any
 
     @property
-    def abilities(self) -> tuple[str, ...]:
-        """What shaders need to know of it."""
-        return ("IS_MONO",) if self.channels == 1 else ()
+    def is_mono(self) -> bool:
+        """Whether it has one channel."""
+        return self.channels == 1
 
     @property
     def layers(self) -> int:

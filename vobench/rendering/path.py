@@ -95,7 +95,7 @@ class MitsubaScene:
 
     def _move(self, t_ns: float) -> None:
         poses = [mover.path.pose(t_ns) for mover in self._scene.movers]
-        faces = self._faces.moved(poses)
+        faces = self._faces.with_movers_at(poses)
         for group in groups(self._scene, self._faces):
             if group.mover < 0:
                 continue

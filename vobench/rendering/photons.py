@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from vobench import stop
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering.array_types import Floats, Indices, Rows
 from vobench.rendering.emitter import Emitter
 from vobench.rendering.geometry import offset_from_surface, reversed_faces, sample_points
@@ -12,7 +13,6 @@ from vobench.rendering.indirect_light import Gatherer, Photons
 from vobench.rendering.ray_kernels import FAINT, facet_normals
 from vobench.rendering.texel import Texels
 from vobench.rendering.thread_pool import in_chunks
-from vobench.scene.mesh import areas_m2
 
 PHOTONS = 1 << 21  # the number of photons of all lights together
 FEWEST = 1 << 14  # the smallest number of photons of an emitter

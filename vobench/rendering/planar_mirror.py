@@ -12,7 +12,7 @@ from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Mask
 from vobench.rendering.view import Plane
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import distinct
+from vobench.scene.weld import distinct_rows
 
 Indices = NDArray[np.int64]
 
@@ -79,7 +79,7 @@ def planar_mirrors(faces: MirrorFaces) -> tuple[Indices, list[PlanarMirror]]:
     index = np.full(len(faces.area_m2), -1)
     mirrors = list[PlanarMirror]()
     keys = np.column_stack([CELLS * normal, CELLS * offset_m, faces.mover, faces.is_pane])
-    cell = distinct(np.round(keys))[1]
+    cell = distinct_rows(np.round(keys)).inverse
     cell_areas_m2 = np.bincount(cell, faces.area_m2 * is_free)
     largest_first = np.argsort(-cell_areas_m2, kind="stable")
     for nth in largest_first[: 4 * MOST_MIRRORS].tolist():

@@ -13,9 +13,10 @@ from vobench.rendering.renderer import Radiance
 from vobench.rendering.uniform_block import MOST_GLINTS
 from vobench.rendering.view import NEAR_M
 from vobench.scene.light import Light, PointLight, SpotLight, Sun
-from vobench.scene.material import LUMINANCE
+from vobench.scene.material import LUMINANCE, Material
 
 PROBE_MOST = 0.4  # roughness above which what is mirrored looks like what lights the place
+FADE = 0.1  # the width of the range of roughness below PROBE_MOST in which the share of the probe decreases to 0
 SIZE_PX = 256
 CAMERA = Pinhole(SIZE_PX, SIZE_PX, SIZE_PX / 2, SIZE_PX / 2, (SIZE_PX - 1) / 2, (SIZE_PX - 1) / 2)
 LEVELS = 6
@@ -84,6 +85,14 @@ def level_of(roughness: float) -> float:
 def roughness_of(level: int) -> float:
     """The roughness that a level of the cube map is blurred by."""
     return float(PROBE_MOST * 2.0 ** (level - LEVELS + 1)) if level else 0.0
+
+
+def probe_share(material: Material) -> float:
+    """The share of a surface's reflections that is read from the probe; 0 for a roughness of PROBE_MOST or more."""
+    if material.kind != "body":
+        return 1.0
+    margin = PROBE_MOST - material.roughness
+    return float(np.clip(margin / FADE, 0, 1))
 
 
 CLEAR_M = 0.5  # from the probe to what is next to it

@@ -7,11 +7,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.geometry.vector import unit
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.light import AreaLight, Light, Sky, Sun
 from vobench.scene.material import Material, reflectance
-from vobench.scene.mesh import areas_m2, corners
+from vobench.scene.mesh import face_corners
 from vobench.scene.scene import Scene, triangles
 
 POINTS = 1024
@@ -129,7 +130,7 @@ def _mean_direct_lx(light: Light, surfaces: SurfacePoints) -> float:
     if isinstance(light, Sky):
         raise ValueError("the sky surrounds the scene and has no middle")
     if isinstance(light, AreaLight):
-        corners_m = corners(light.mesh)
+        corners_m = face_corners(light.mesh)
         areas = areas_m2(corners_m)
         middle_m = areas @ corners_m.mean(1) / areas.sum()
         nearest_m = float(np.sqrt(areas.sum()))
@@ -148,7 +149,7 @@ def _mean_direct_lx(light: Light, surfaces: SurfacePoints) -> float:
 def _intensity_cd(light: Light, directions: Array) -> Array:
     """Luminous intensity (N,) of a lamp towards unit directions (N, 3)."""
     if isinstance(light, AreaLight):
-        corners_m = corners(light.mesh)
+        corners_m = face_corners(light.mesh)
         edges = corners_m[:, 1:] - corners_m[:, :1]
         facing_m2 = np.cross(edges[:, 0], edges[:, 1]) / 2  # (F, 3): normals as long as faces are large
         seen_m2 = np.maximum(directions @ facing_m2.T, 0).sum(1)

@@ -16,6 +16,7 @@ from vobench.errors import MissingDependencyError
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2, face_normals
 from vobench.geometry.vector import cross, unit
 from vobench.rendering.context import create_context
 from vobench.rendering.pyrender_ambient import MeanLight, mean_light
@@ -31,18 +32,11 @@ from vobench.rendering.view import NEAR_M, T_CV_GL, Box
 from vobench.rendering.warp import warp
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Rgb
-from vobench.scene.mesh import (
-    MeshArrays,
-    Thing,
-    areas_m2,
-    arrays,
-    corners,
-    face_normals,
-    joined_arrays,
-    open_edges,
-    welded,
-)
+from vobench.scene.mesh import as_arrays, face_corners
+from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing
+from vobench.scene.weld import open_edges, welded
 
 GAMMA = 2.2  # pyrender stores linear ** (1 / 2.2)
 DECODED = ((np.arange(256) / 255) ** GAMMA).astype(np.float32)
@@ -256,7 +250,7 @@ class PyrenderScene:
         """One node for each material of things, in their common frame; panes let the sun (3,) through."""
         by_material = dict[str, list[MeshArrays]]()
         for thing in things:
-            by_material.setdefault(thing.material, []).append(arrays(thing.mesh))
+            by_material.setdefault(thing.material, []).append(as_arrays(thing.mesh))
         nodes = []
         for name, meshes in by_material.items():
             tile_m = texture_tile_m(self._scene.materials[name])
@@ -271,7 +265,7 @@ class PyrenderScene:
         import pyrender
 
         solid = [thing for thing in things if self._scene.materials[thing.material].kind != "pane"]
-        sheets = [arrays(thing.mesh).flipped() for thing in solid if _is_open(arrays(thing.mesh))]
+        sheets = [as_arrays(thing.mesh).flipped() for thing in solid if _is_open(as_arrays(thing.mesh))]
         material = pyrender.MetallicRoughnessMaterial(
             baseColorFactor=[0.2, 0.2, 0.2, 1.0], metallicFactor=0.0, roughnessFactor=1.0
         )
@@ -303,7 +297,7 @@ class PyrenderScene:
         """The faces of a lamp, their material, and what they emit (3,) at level 1, white at 1."""
         look = self._scene.materials.get(light.material)
         material, emitted, tile_m = lamp_material(light, look)
-        self._add_mesh(arrays(light.mesh), material, tile_m)
+        self._add_mesh(as_arrays(light.mesh), material, tile_m)
         return material, emitted / self._white_cd_m2
 
     def _add_light(self, light: Light) -> Any:
@@ -359,7 +353,7 @@ def _turned_away(mesh: MeshArrays, sun: Array) -> MeshArrays:
 
 def _is_open(mesh: MeshArrays) -> bool:
     """Whether a mesh has an edge with a face on one side only, as a sheet has and a box has not."""
-    point = welded(mesh.vertices_m)[1]
+    point = welded(mesh.vertices_m).inverse
     return len(open_edges(point[mesh.faces])) > 0
 
 
@@ -404,14 +398,14 @@ def _mean_normal(light: AreaLight) -> Array:
 
 def _summed_normal(light: AreaLight) -> Array:
     """The mean (3,) of a panel's normals by area, shorter than 1 where they differ."""
-    corners_m = corners(light.mesh)
+    corners_m = face_corners(light.mesh)
     areas = areas_m2(corners_m)
     return np.asarray(areas @ face_normals(corners_m) / areas.sum())
 
 
 def _middle_m(light: AreaLight) -> Array:
     """The centroid (3,) of a panel's faces."""
-    corners_m = corners(light.mesh)
+    corners_m = face_corners(light.mesh)
     areas = areas_m2(corners_m)
     return np.asarray(areas @ corners_m.mean(1) / areas.sum())
 

@@ -16,8 +16,9 @@ from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import PointLight
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, quad
+from vobench.scene.mesh import quad
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing
 
 CAMERA = Pinhole(96, 64, 80.0, 80.0, 47.5, 31.5)
 CAMERA_M = (0.1, -0.05, 0.8)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas, doubled_areas_px2
@@ -15,7 +16,7 @@ from vobench.rendering.texel_owner import Owners, claimed
 from vobench.rendering.thread_pool import chunked, in_chunks
 from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import Triangles, areas_m2
+from vobench.scene.triangles import Triangles
 
 TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of rays that search a way out
 PULLED_M = 1e-3  # points at a chart's rim lie so far inwards, where they see past the neighbour

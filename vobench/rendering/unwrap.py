@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from vobench import stop
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.rendering.array_types import Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas, doubled_areas_px2
-from vobench.scene.mesh import WELD_M, Triangles, areas_m2, distinct
+from vobench.scene.triangles import Triangles
+from vobench.scene.weld import WELD_M, distinct_rows
 
 TEXELS = 16_000_000  # at most in one map: some 100 bytes each, and 4 more for each light
 FINENESS = 4096  # steps a texel: places that are meant to be at the middle of texels are so to the last bit
@@ -152,7 +154,7 @@ def _welded(
     """Of corners (F, 3, 3) the first (V,) of those at one place, and which each is (F, 3); `also` (F,) keeps apart."""
     keys = np.rint(corners_m / WELD_M).astype(np.int64).reshape(-1, 3)
     keys = np.column_stack([keys, *(np.repeat(other, 3) for other in also)])
-    first, of = distinct(keys)
+    first, of = distinct_rows(keys)
     return first, of.reshape(-1, 3)
 
 

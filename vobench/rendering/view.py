@@ -8,6 +8,7 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
+from vobench.rendering.background import PanoramaSky, StandardSky
 
 Box = tuple[int, int, int, int]
 
@@ -33,6 +34,11 @@ class Plane:
         return Plane(normal, self.offset_m - float(normal @ T_world_mover[:3, 3]))
 
     @property
+    def coefficients(self) -> Array:
+        """The normal, then the offset in metres, in one array (4,)."""
+        return np.array([*self.normal, self.offset_m])
+
+    @property
     def reflection(self) -> Array:
         """Matrix (4, 4) that takes each point to its image behind the plane (Householder, 1958)."""
         reflection = np.eye(4)
@@ -43,7 +49,7 @@ class Plane:
     @property
     def key(self) -> tuple[float, ...]:
         """Equal for planes that coincide to 10 µm."""
-        coefficients = np.round([*self.normal, self.offset_m], 5)
+        coefficients = np.round(self.coefficients, 5)
         return tuple(float(coefficient) + 0.0 for coefficient in coefficients)
 
 
@@ -98,9 +104,9 @@ T_CV_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 class PinholeView:
     """A pinhole at a place and time, perhaps by way of mirrors: then the picture is what the last one shows.
 
-    Movers' poses T_world_mover, the skies' coefficients (S, 4, 4), ambient_cd_m2 (3,) for mirrors that are not
-    followed further. view_projection (4, 4): from the world to OpenGL's screen, nearness from 1 at NEAR_M to 0;
-    `direct` (4, 4) as if there were no mirrors.
+    T_world_movers: the movers' poses. ambient_cd_m2 (3,) for mirrors that are not followed further.
+    view_projection (4, 4): from the world to OpenGL's screen, nearness from 1 at NEAR_M to 0; `direct` (4, 4) as if
+    there were no mirrors.
     eye_m (3,) is behind the last mirror, if any.
     images (4, 4) takes what the last mirror shows to where the camera sees it. glints (G, 3, 4) as in `probe`.
     """
@@ -108,7 +114,7 @@ class PinholeView:
     camera: Pinhole
     T_world_camera: Array
     T_world_movers: Sequence[Array]
-    skies: Array
+    skies: Sequence[StandardSky | PanoramaSky]
     ambient_cd_m2: Array
     eye_m: Array
     direct: Array
@@ -163,7 +169,7 @@ def pinhole_view(
     camera: Pinhole,
     T_world_camera: Array,
     T_world_movers: Sequence[Array],
-    skies: Array,
+    skies: Sequence[StandardSky | PanoramaSky],
     *,
     ambient_cd_m2: Array,
     glints: Array = NO_GLINTS,

@@ -22,7 +22,7 @@ from vobench.rendering.geometry import (
 )
 from vobench.rendering.shadow_kernels import meet_boxes
 from vobench.scene.material import Material, pane_reflectance
-from vobench.scene.mesh import Triangles
+from vobench.scene.triangles import Triangles
 
 MOST_PANES = 16  # crossed by one ray
 WIDE_M2 = 0.05  # of mirrors that show lamps and of panes that show the sky

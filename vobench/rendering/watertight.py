@@ -10,7 +10,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from vobench.geometry.se3 import Array
-from vobench.scene.mesh import WELD_M, distinct
+from vobench.scene.weld import WELD_M, distinct_rows
 
 Indices = NDArray[np.int64]
 
@@ -75,8 +75,8 @@ def _welded(points_m: Array) -> tuple[Array, Indices]:
 def _open_edges(faces: Indices) -> Indices:
     """The edges (E, 2), lower end first, that a single one of the faces (F, 3) has; a face and its back are one."""
     faces = np.sort(faces, 1)
-    edges = faces[distinct(faces)[0]][:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
-    first, which = distinct(edges)
+    edges = faces[distinct_rows(faces)[0]][:, [[0, 1], [1, 2], [0, 2]]].reshape(-1, 2)
+    first, which = distinct_rows(edges)
     alone = edges[first[np.bincount(which) == 1]]
     return np.asarray(alone[alone[:, 0] < alone[:, 1]])
 

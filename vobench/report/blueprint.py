@@ -1,7 +1,9 @@
 """The initial layout of a recording in Rerun: its views, and the viewpoint of the 3-D view."""
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from itertools import cycle
+from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -26,15 +28,23 @@ SUMMARY = "summary"
 STATS = "stats"
 COSTS = "costs"
 
-# The names and RGB values of the estimators' colours; the first estimator has the first colour.
-ESTIMATOR_COLORS = {
-    "orange": (255, 150, 40),
-    "blue": (80, 160, 255),
-    "violet": (200, 110, 230),
-    "yellow": (240, 220, 90),
-    "cyan": (120, 220, 220),
-}
-GRID_COLOR = (255, 255, 255, 24)
+
+class Colour(NamedTuple):
+    """The colour of an estimator, with its name in the legend."""
+
+    name: str
+    rgb: tuple[int, int, int]
+
+
+# The first estimator has the first colour. Further estimators have the same colours again.
+ESTIMATOR_COLOURS = (
+    Colour("orange", (255, 150, 40)),
+    Colour("blue", (80, 160, 255)),
+    Colour("violet", (200, 110, 230)),
+    Colour("yellow", (240, 220, 90)),
+    Colour("cyan", (120, 220, 220)),
+)
+GRID_COLOUR = (255, 255, 255, 24)
 EYE_PITCH_DEG = 38.0
 EYE_DISTANCE_PER_RADIUS = 1.6  # paths and camera frusta fill Rerun's default field of view
 FRUSTUM_PER_RADIUS = 0.16
@@ -53,21 +63,66 @@ SUMMARY_SHARE = 2.6
 COLUMN_SHARES = [3, 2]
 
 
+@dataclass(frozen=True, slots=True)
 class Entities:
     """The paths of the entities of one estimator; `label` is the estimator's name in the recording."""
 
-    def __init__(self, label: str) -> None:
-        self.path = f"{WORLD}/{label}/path"
-        self.left = f"{WORLD}/{label}/left"
-        self.points = f"{WORLD}/{label}/points"
-        self.error_line = f"{ERROR}/{label}"
-        self.tracks = f"{TRACKS}/{label}"
-        self.tails = f"{self.tracks}/tails"
-        self.epipolar = f"{self.tracks}/epipolar_lines"
-        self.position_error = f"{POSITION_ERROR}/{label}"
-        self.rotation_error = f"{ROTATION_ERROR}/{label}"
-        self.status = f"{STATUS}/{label}"
-        self.summary = f"{SUMMARY}/{label}"
+    label: str
+
+    @property
+    def path(self) -> str:
+        """The estimated path."""
+        return f"{WORLD}/{self.label}/path"
+
+    @property
+    def left(self) -> str:
+        """The estimated left camera."""
+        return f"{WORLD}/{self.label}/left"
+
+    @property
+    def points(self) -> str:
+        """The estimator's 3-D points."""
+        return f"{WORLD}/{self.label}/points"
+
+    @property
+    def error_line(self) -> str:
+        """The line between the true and the estimated position."""
+        return f"{ERROR}/{self.label}"
+
+    @property
+    def tracks(self) -> str:
+        """The tracked points in the left picture."""
+        return f"{TRACKS}/{self.label}"
+
+    @property
+    def tails(self) -> str:
+        """The lines from each tracked point to where it was in earlier frames."""
+        return f"{self.tracks}/tails"
+
+    @property
+    def epipolar_lines(self) -> str:
+        """The true epipolar lines of the tracks."""
+        return f"{self.tracks}/epipolar_lines"
+
+    @property
+    def position_error(self) -> str:
+        """The curve of the position error."""
+        return f"{POSITION_ERROR}/{self.label}"
+
+    @property
+    def rotation_error(self) -> str:
+        """The curve of the rotation error."""
+        return f"{ROTATION_ERROR}/{self.label}"
+
+    @property
+    def status(self) -> str:
+        """The status of each frame."""
+        return f"{STATUS}/{self.label}"
+
+    @property
+    def summary(self) -> str:
+        """The text with the score."""
+        return f"{SUMMARY}/{self.label}"
 
 
 def truth_entity(side: str, channel: str) -> str:
@@ -82,15 +137,16 @@ def layout(
     truth_m: Array,
     estimate_m: Array,
     *,
-    focus: tuple[int, int] | None,
+    replayed_frames: tuple[int, int] | None,
     labels: Sequence[str] = ("estimate",),
     channels: Sequence[str] = (),
     has_stats: bool = False,
     has_costs: bool = False,
 ) -> rrb.Blueprint:
-    """The default blueprint for a true path (N, 3) and an estimated path (M, 3).
+    """The default blueprint for a true path (N, 3) and the points (M, 3) of all estimated paths.
 
-    `focus` is the range of frames that is replayed at first; without it, the recording starts paused.
+    `replayed_frames` are the first and the last frame that are replayed at first. Without them, the recording starts
+    paused.
     `labels` are the names of the estimators. Each has a picture with its tracks.
     `channels` are the channels of per-pixel ground truth. They are shown in one tab per camera.
     `has_stats` and `has_costs` add a plot of the numbers that an estimator reports, and of the cost of each frame.
@@ -104,7 +160,7 @@ def layout(
         truth_tabs = [_truth_tab(side, channels) for side in ("left", "right")]
         views = rrb.Tabs(rrb.Horizontal(views, name="Run"), *truth_tabs, active_tab=0)
     return rrb.Blueprint(
-        views, _time_panel(focus), rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden")
+        views, _time_panel(replayed_frames), rrb.SelectionPanel(state="hidden"), rrb.BlueprintPanel(state="hidden")
     )
 
 
@@ -115,7 +171,7 @@ def _paths_column(
     shown_m = _near_truth(truth_m, estimate_m)
     status_share = STATUS_SHARE + STATUS_SHARE_PER_ESTIMATOR * (len(labels) - 1)
     views: list[rrb.View | rrb.Container] = [
-        _space(truth_m, shown_m, labels),
+        _paths_view(truth_m, shown_m, labels),
         rrb.Horizontal(_plot(POSITION_ERROR, "Position error"), _plot(ROTATION_ERROR, "Rotation error")),
         rrb.StateTimelineView(origin=STATUS, name="Status of each frame"),
     ]
@@ -162,18 +218,19 @@ def _truth_tab(side: str, channels: Sequence[str]) -> rrb.Grid:
     return rrb.Grid(*views, name=f"Truth, {side}")
 
 
-def _space(truth_m: Array, shown_m: Array, labels: Sequence[str]) -> rrb.Spatial3DView:
+def _paths_view(truth_m: Array, shown_m: Array, labels: Sequence[str]) -> rrb.Spatial3DView:
     """The 3-D view of the paths, from a viewpoint at which the points `shown_m` (K, 3) fill it.
 
     Its name is a legend of the colours.
     """
     eye_m, target_m = eye_and_target(shown_m)
-    estimates = [f"{label} {color}" for label, color in zip(labels, ESTIMATOR_COLORS, strict=False)]
-    grid: Any = rrb.LineGrid3D(
+    colours = cycle(ESTIMATOR_COLOURS)
+    estimates = [f"{label} {colour.name}" for label, colour in zip(labels, colours, strict=False)]
+    grid = rrb.LineGrid3D(
         visible=True,
         spacing=grid_spacing_m(2 * _radius_m(truth_m)),
         plane=rr.components.Plane3D.XY,
-        color=GRID_COLOR,
+        color=GRID_COLOUR,
     )
     return rrb.Spatial3DView(
         origin=WORLD,
@@ -184,14 +241,14 @@ def _space(truth_m: Array, shown_m: Array, labels: Sequence[str]) -> rrb.Spatial
     )
 
 
-def _time_panel(focus: tuple[int, int] | None) -> rrb.TimePanel:
-    """The panel of the timeline `frame`, which is paused at its start or replays the frames of `focus`.
+def _time_panel(replayed_frames: tuple[int, int] | None) -> rrb.TimePanel:
+    """The panel of the timeline `frame`, which is paused at its start or replays frames.
 
     A blueprint cannot set the time cursor. A loop that plays moves it to the loop's start.
     """
-    if focus is None:
+    if replayed_frames is None:
         return rrb.TimePanel(timeline=FRAME_TIMELINE, play_state="paused", state="collapsed")
-    first, last = focus
+    first, last = replayed_frames
     return rrb.TimePanel(
         timeline=FRAME_TIMELINE,
         play_state="playing",
@@ -244,7 +301,7 @@ def _radius_m(points_m: Array) -> float:
 
 
 def _near_truth(truth_m: Array, estimate_m: Array) -> Array:
-    """The true path (N, 3) and the nearby points of the estimated path (M, 3), together (K, 3).
+    """The true path (N, 3) and the nearby points of the estimated paths (M, 3), together (K, 3).
 
     Distant points are left out, so that a diverged estimate does not shrink the other paths in the view.
     """

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import Literal
 
@@ -15,7 +16,7 @@ from vobench import stop
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 from vobench.report import blueprint
-from vobench.report.blueprint import ESTIMATOR_COLORS, Entities
+from vobench.report.blueprint import ESTIMATOR_COLOURS, Entities
 from vobench.report.rerun_scene import log_scene
 from vobench.report.rerun_stream import (
     GREEN,
@@ -74,8 +75,8 @@ def save_trial(path: Path, trial: TrialView, *others: TrialView, form: PictureFo
         if trial.scene is not None:
             log_scene(log, trial.scene)
         unit = _unit(trials)
-        for view, color in zip(trials, ESTIMATOR_COLORS.values(), strict=False):
-            _log_trial(log, view, color, unit)
+        for view, colour in zip(trials, cycle(ESTIMATOR_COLOURS), strict=False):
+            _log_trial(log, view, colour.rgb, unit)
         if trial.truth is not None:
             log_truth(stream, trial.truth)
         stream.send_blueprint(_layout(trials))
@@ -93,7 +94,7 @@ def _layout(trials: Sequence[TrialView]) -> rrb.Blueprint:
     return blueprint.layout(
         first.ground_truth.positions_m,
         np.concatenate([view.estimate.positions_m for view in trials]),
-        focus=_focus(trials),
+        replayed_frames=_replayed_frames(trials),
         labels=[view.label for view in trials],
         channels=first.truth.channels if first.truth else (),
         has_stats=any(view.stats for view in trials),
@@ -101,7 +102,7 @@ def _layout(trials: Sequence[TrialView]) -> rrb.Blueprint:
     )
 
 
-def _focus(trials: Sequence[TrialView]) -> FrameRange | None:
+def _replayed_frames(trials: Sequence[TrialView]) -> FrameRange | None:
     """The numbers of the first and the last frame around the first failure of any trial, None if none failed."""
     for trial in trials:
         around_failure = first_failure(trial.statuses)

@@ -73,8 +73,8 @@ def log_epipolar_lines(
         lengths.append(len(lines))
     columns = rr.LineStrips2D.columns(strips=strips)
     style = rr.LineStrips2D.from_fields(colors=EPIPOLAR, radii=EPIPOLAR_RADIUS)
-    log.static(entities.epipolar, style)
-    log.every(entities.epipolar, columns.partition(lengths))
+    log.static(entities.epipolar_lines, style)
+    log.every(entities.epipolar_lines, columns.partition(lengths))
 
 
 def track_tails(

@@ -10,7 +10,7 @@ from vobench.errors import SequenceError
 from vobench.geometry import se3
 from vobench.runner.frames import EXPOSURE_COLUMNS, EXPOSURES, GROUND_TRUTH, new_table
 from vobench.sequence import Sequence, read_truth
-from vobench.suite.case import Case
+from vobench.suite.plan import AnyCase
 from vobench.suite.source import RecordedCase
 from vobench.suite.suite_spec import EXACT, TruthNoise, Window
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
@@ -39,7 +39,7 @@ def left_truth(folder: Path) -> Trajectory:
     return truth.of_mounted(sequence.rig.T_body_left)
 
 
-def scored_truth(exact: str, case: Case | RecordedCase) -> str:
+def scored_truth(exact: str, case: AnyCase) -> str:
     """The truth for scoring estimates on a case, as TUM text: the exact truth with the noise of the case."""
     if isinstance(case, RecordedCase):
         return exact

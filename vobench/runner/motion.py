@@ -27,8 +27,8 @@ from vobench.motion.wander import Wander
 from vobench.motion.wheeled import Wheeled
 from vobench.rendering.geometry import RayCaster
 from vobench.runner.wander import wander_motion
-from vobench.scene.mesh import Thing, Triangles, table
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing, Triangles, triangle_table
 from vobench.suite.case import Case
 from vobench.suite.plan import Plan
 from vobench.suite.trajectory import TrajectorySpec
@@ -413,7 +413,7 @@ def _met_faces(things: tuple[Thing, ...], positions_m: Array) -> NDArray[np.int3
 def _faces_and_caster(things: tuple[Thing, ...]) -> tuple[Triangles, RayCaster]:
     """The faces of things and their ray caster. They are cached, because many cases share a scene."""
     no_index = [-1] * len(things)
-    faces = table(things, no_index, no_index)
+    faces = triangle_table(things, no_index, no_index)
     return faces, RayCaster(faces, np.arange(len(faces)))
 
 

@@ -8,8 +8,7 @@ from vobench.runner.exposure_doubt import doubts_of_plan
 from vobench.runner.key import cache_folder
 from vobench.runner.motion import BodyMotion, body_motions, motion_name
 from vobench.runner.task import is_done, plan, sequence_tasks
-from vobench.suite.case import Case
-from vobench.suite.plan import Plan
+from vobench.suite.plan import AnyCase, Plan
 from vobench.suite.source import RecordedCase
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
@@ -128,7 +127,7 @@ def preflight(planned: Plan, *, only_missing: bool = False, runs_generators: boo
         if not runs_generators:
             simulated = tuple(case for case in simulated if case.scene.generated is None)
         if only_missing:
-            simulated = tuple(case for case in simulated if not is_in_cache(case, {}))
+            simulated = tuple(case for case in simulated if not is_in_cache(case))
         motions = body_motions(replace(planned, simulated=simulated))
     with wrong.at():
         if planned.recorded:
@@ -156,13 +155,13 @@ def summarize(planned: Plan, *, with_stages: bool = False) -> PlanSummary:
     return PlanSummary(planned, cases, tuple(stages), doubts)
 
 
-def is_in_cache(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> bool:
+def is_in_cache(case: AnyCase, recording: "Recording | None" = None) -> bool:
     """Whether the sequence of a case is cached."""
-    return is_done(sequence_tasks(case, recordings)[-1], cache_folder())
+    return is_done(sequence_tasks(case, recording)[-1], cache_folder())
 
 
-def _case_summary(case: Case | RecordedCase, checked: Preflight) -> CaseSummary:
-    is_made = is_in_cache(case, checked.recordings)
+def _case_summary(case: AnyCase, checked: Preflight) -> CaseSummary:
+    is_made = is_in_cache(case, checked.recordings.get(case.name))
     sequence = IN_CACHE if is_made else TO_SIMULATE
     if not isinstance(case, RecordedCase):
         motion = checked.motions.get(motion_name(case))

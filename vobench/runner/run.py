@@ -38,9 +38,8 @@ from vobench.runner.key import digest, folder_digest
 from vobench.runner.store import Store, Tell, write_json
 from vobench.runner.task import Task, missing, plan
 from vobench.sequence import read_import_notes
-from vobench.suite.case import Case
 from vobench.suite.estimator_entry import EstimatorEntry
-from vobench.suite.plan import Plan
+from vobench.suite.plan import AnyCase, Plan
 from vobench.suite.source import RecordedCase
 from vobench.suite.yaml_file import plain
 
@@ -201,7 +200,7 @@ def _require_sequences(unmade: Mapping[str, _Failure], cases: Collection[str], *
 
 
 def _gather(
-    task: Task, cases: Mapping[str, Case | RecordedCase], store: Path, folder: RunFolder, failure: _Failure | None
+    task: Task, cases: Mapping[str, AnyCase], store: Path, folder: RunFolder, failure: _Failure | None
 ) -> TrialScore:
     """Copy the files of a trial from the store, and before the first trial of a case, those of the case."""
     stop.check()
@@ -249,7 +248,7 @@ def _write_failed(task: Task, failure: _Failure, folder: RunFolder) -> TrialScor
     return score
 
 
-def _gather_case(case: Case | RecordedCase, sequence: Path, target: Path) -> None:
+def _gather_case(case: AnyCase, sequence: Path, target: Path) -> None:
     target.mkdir(parents=True)
     is_made = sequence.is_dir()
     settings = plain(case)

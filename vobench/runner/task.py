@@ -17,7 +17,7 @@ from vobench.runner.simulate import content, libraries
 from vobench.runner.store import Progress, SilentProgress, Store, write_json
 from vobench.suite.case import Case
 from vobench.suite.estimator_entry import EstimatorEntry
-from vobench.suite.plan import Plan, Trial
+from vobench.suite.plan import AnyCase, Plan, Trial
 from vobench.suite.scene_file import scene_content
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.source import RecordedCase
@@ -66,7 +66,7 @@ class Task:
     """
 
     stage: Stage
-    subject: "SceneFile | Case | RecordedCase | Trial"
+    subject: SceneFile | AnyCase | Trial
     inputs: Mapping[str, Any]
     needs: tuple[str, ...]
 
@@ -98,19 +98,20 @@ def plan(suite: Plan, recordings: "Mapping[str, Recording]") -> list[Task]:
 
     code = {estimator_entry.label: estimator_code(estimator_entry) for estimator_entry in suite.estimator_entries}
     for case in suite.cases:
-        sequence = add(*sequence_tasks(case, recordings))
+        sequence = add(*sequence_tasks(case, recordings.get(case.name)))
         for trial in suite.trials(case):
             add(score_task(trial, sequence, add(estimate_task(trial, sequence, code[trial.estimator_entry.label]))))
     return list(tasks.values())
 
 
-def sequence_tasks(case: Case | RecordedCase, recordings: "Mapping[str, Recording]") -> list[Task]:
+def sequence_tasks(case: AnyCase, recording: "Recording | None" = None) -> list[Task]:
     """The tasks that create the sequence of a case.
 
     If its engine needs the light of the scene, that task comes first.
+    `recording` is the recording of a recorded case if it has been read already.
     """
     if isinstance(case, RecordedCase):
-        return [_import_task(case, recordings[case.name])]
+        return [_import_task(case, recording)]
     needs_light = case.rendering.needs_bake or case.scene.white_cd_m2 is None
     before = [bake_task(case.scene)] if needs_light else []
     needs = tuple(task.key for task in before)
@@ -140,9 +141,11 @@ def _imported_code(folder: Path) -> str:
     return code_digest(*imported_by(folder))
 
 
-def _import_task(case: RecordedCase, recording: "Recording") -> Task:
+def _import_task(case: RecordedCase, recording: "Recording | None") -> Task:
     from vobench.runner import import_recording
 
+    if recording is None:
+        recording = import_recording.read_case(case)
     libraries = library_versions(*import_recording.LIBRARIES)
     inputs = {**import_recording.content(case, recording), **_made_by("import"), "libraries": libraries}
     return Task("import", case, inputs, ())
@@ -187,7 +190,7 @@ def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
     return Task("score", trial, inputs, (sequence, estimate))
 
 
-def _noise(case: Case | RecordedCase) -> dict[str, Any]:
+def _noise(case: AnyCase) -> dict[str, Any]:
     """The settings on which the scored truth of a case depends, besides the exact truth."""
     if isinstance(case, RecordedCase) or case.truth_noise == EXACT:
         return {}

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 from vobench.scene.light import Light
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing
+from vobench.scene.triangles import Thing
 
 
 @dataclass(frozen=True, slots=True)

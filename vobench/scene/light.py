@@ -11,8 +11,9 @@ from annotated_types import MinLen
 
 from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.scene.material import WHITE, Rgb
-from vobench.scene.mesh import areas_m2, corners
+from vobench.scene.mesh import face_corners
 from vobench.scene.panorama import PanoramaMap
 from vobench.setting import Positive, Share, settings
 from vobench.trajectory.nanoseconds import NS_PER_S
@@ -148,7 +149,7 @@ class AreaLight:
     @property
     def luminance_cd_m2(self) -> float:
         """Luminance of the faces: power / (π area)."""
-        area_m2 = float(areas_m2(corners(self.mesh)).sum())
+        area_m2 = float(areas_m2(face_corners(self.mesh)).sum())
         return self.power_lm / (np.pi * area_m2)
 
 

@@ -9,7 +9,8 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Light, PointLight, SpotLight
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, Triangles, moved, quad, table
+from vobench.scene.mesh import moved, quad
+from vobench.scene.triangles import Thing, Triangles, triangle_table
 from vobench.trajectory.nanoseconds import NS_PER_S
 
 
@@ -150,8 +151,8 @@ def triangles(
         mover += [nth] * len(body.things)
         lamp += [-1] * len(body.things)
 
-    faces = table(things, mover, lamp)
-    return faces if t_ns is None else faces.moved([body.path.pose(t_ns) for body in scene.movers])
+    faces = triangle_table(things, mover, lamp)
+    return faces if t_ns is None else faces.with_movers_at([body.path.pose(t_ns) for body in scene.movers])
 
 
 def ceiling_light(

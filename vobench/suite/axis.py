@@ -1,4 +1,4 @@
-"""The settings of rigs and cameras, which are axes of a suite."""
+"""The axes of a suite, and the settings of two of them: rigs and cameras."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +21,7 @@ from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
 from vobench.sensor.imu import IMUS, ImuSettings
 from vobench.setting import FromPreset, OneOf, Positive, ShortForm, settings
 
+AXES = ("scene", "lighting", "rig", "trajectory", "camera")
 LENS_KEYS = ("own", "calib", "camchain")  # replace the preset
 EXACT_CALIBRATION = CalibrationError()
 Camera = Annotated[CameraSettings, SENSOR_PRESETS]

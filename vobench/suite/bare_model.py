@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from vobench.geometry.triangle import areas_m2
 from vobench.scene.light import Light, Sky, Sun
 from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2, reflectance
-from vobench.scene.mesh import areas_m2, corners
+from vobench.scene.mesh import face_corners
 from vobench.scene.scene import Scene
 from vobench.suite.scene_spec import ModelSpec, SceneFile
 
@@ -48,7 +49,7 @@ def bare_model_scene(path: Path) -> SceneFile:
     absorption = 1 - properties_by_thing[:, 1]
     light = default_light(Scene(name, tuple(model.everything), {}, ()), absorption)
 
-    area_m2 = np.array([areas_m2(corners(thing.mesh)).sum() for thing in model.everything])  # (T,)
+    area_m2 = np.array([areas_m2(face_corners(thing.mesh)).sum() for thing in model.everything])  # (T,)
     emitted_lm = _lamp_power_lm(model.lights) + float(np.pi * area_m2 @ emission_cd_m2)
     own_lx = _daylight_lx(model.lights) + emitted_lm / light.absorption_m2
     if own_lx >= LEAST_LX:

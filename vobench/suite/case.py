@@ -17,18 +17,17 @@ from vobench.suite.suite_spec import EXACT, Rendering, TruthNoise, Window
 from vobench.suite.trajectory import TrajectorySpec
 
 NOISE_SEED_STEP = 1_000_000  # between the seeds of two draws of noise for one case
-AXES = ("scene", "lighting", "rig", "trajectory", "camera")
-CALIBRATION_STREAM = 7_301  # separates calibration errors from the other random streams of a seed
+CALIBRATION_STREAM = 7_301  # an arbitrary number that separates calibration errors from a seed's other random streams
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Case:
     """One sequence to simulate, with all settings that determine it.
 
-    `name` is unique within the suite and valid as the name of a folder. It joins the values of `variant` that differ
+    `name` is unique within the suite and valid as the name of a folder. It joins the names in `variant` that differ
     within the suite.
-    `variant` maps each of AXES to the name of the scene, lighting, rig, trajectory or camera.
-    `replayed` is the replayed trajectory as TUM text, None for a trajectory that is generated.
+    `variant` maps each axis to the name of the scene, lighting, rig, trajectory or camera.
+    `replayed` is the text of the replayed trajectory in TUM format, None for a trajectory that is generated.
     `truth` lists the channels of per-pixel ground truth to record, such as depth.
     `truth_noise` is the error that is added to the ground-truth trajectory; it is EXACT by default.
     `frames` (first, end) is the range of frames that the sequence contains, without `end`; None means all frames.
@@ -67,7 +66,8 @@ class Case:
     def build_true_rig(self) -> Rig:
         """The sensors with the true calibration that images are rendered with.
 
-        Raises VobenchError under the same conditions as `true_rig`.
+        Raises VobenchError if the calibration error needs a property that the cameras lack: `distortion_ratio` a lens
+        with distortion, and `focal_ratio` or `center_px` a lens with a focal length.
         """
         nominal_rig = self.build_rig()
         rng = np.random.default_rng([self.seed, CALIBRATION_STREAM])

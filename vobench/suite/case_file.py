@@ -9,7 +9,8 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from vobench.motion.replay import Replay
-from vobench.suite.case import AXES, Case
+from vobench.suite.axis import AXES
+from vobench.suite.case import Case
 from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.yaml_file import plain
 from vobench.suite.yaml_source import without_nothing

@@ -23,7 +23,8 @@ from pathlib import Path
 from vobench.asset import MODEL_SUFFIXES
 from vobench.errors import UnknownNameError, unknown_name_sentence
 from vobench.regular_file import read_regular
-from vobench.suite.file_kind import MOST_BYTES, Kind, display_path, kind_in
+from vobench.suite.display_path import display_path
+from vobench.suite.file_kind import MOST_BYTES, Kind, guessed_kind
 
 KINDS: tuple[Kind, ...] = ("suite", "scenario", "scene", "estimator")
 # The possible paths of an entry in a folder of its kind; {} is the name.
@@ -129,7 +130,7 @@ def _is_of_kind(kind: Kind, path: Path) -> bool:
     """Whether the keys of a file are those of a kind."""
     if path.is_dir() or path.suffix.lower() in MODEL_SUFFIXES:
         return True
-    return kind_in(path) == kind
+    return guessed_kind(path) == kind
 
 
 def _entry_at(kind: Kind, path: Path, suite: Path | None) -> CatalogEntry:

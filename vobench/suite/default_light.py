@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Indices
 from vobench.rendering.geometry import RayCaster
-from vobench.scene.mesh import areas_m2
 from vobench.scene.scene import Scene, triangles
 from vobench.suite.free_space import BODY_M, FloorMap, at_height, downward_directions, floor_map
 from vobench.suite.scene_spec import PanelLamp, SkySpec, SunSpec

@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 
 from vobench.errors import SuiteError
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.motion.spline import Pose, PoseSpline
 from vobench.motion.wander import Clearance
 from vobench.rendering.geometry import RayCaster
-from vobench.scene.mesh import Triangles, areas_m2
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
 
 Mask = NDArray[np.bool_]
 

@@ -37,7 +37,9 @@ from vobench.scene.light import (
     Switched,
 )
 from vobench.scene.material import Material, Picture, Texture
-from vobench.scene.mesh import MeshArrays, Thing, arrays, has_texture_coordinates, is_mesh
+from vobench.scene.mesh import as_arrays, as_mesh, has_texture_coordinates, is_mesh
+from vobench.scene.mesh_arrays import MeshArrays
+from vobench.scene.triangles import Thing
 
 LIGHTS = (AreaLight, PointLight, SpotLight, Sun, Sky)
 LEVELS = (Steady, Flicker, Dimmer, Switched, Scaled)
@@ -112,7 +114,7 @@ def _require_drawable(thing: Thing, material: Material) -> None:
         advice = "set mesh.visual = trimesh.visual.TextureVisuals(uv=...)"
         raise SuiteError(f"returns '{thing.name}' with a texture but without texture coordinates; {advice}")
     try:
-        _require_sound(arrays(thing.mesh))
+        _require_sound(as_arrays(thing.mesh))
     except SuiteError as error:
         raise SuiteError(f"returns '{thing.name}' with a mesh whose {error}") from None
 
@@ -171,7 +173,7 @@ class _Writer:
         kind: type = type(thing)
         if is_mesh(thing):
             kind = MeshArrays
-            entry = self._fields(arrays(thing))
+            entry = self._fields(as_arrays(thing))
         elif CLASSES.get(kind.__name__) is kind and is_dataclass(thing):
             entry = self._fields(thing)
         elif callable(getattr(thing, "pixels", None)):  # a texture of a class of the maker is sent as its picture
@@ -252,7 +254,7 @@ def _object(entry: Any, earlier: Sequence[Any], arrays: memoryview) -> Any:
         _require_picture(made)
     if isinstance(made, MeshArrays):
         _require_sound(made)
-        return made.mesh()
+        return as_mesh(made)
     return made
 
 

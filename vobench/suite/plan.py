@@ -14,12 +14,14 @@ from vobench.suite.source import RecordedCase
 from vobench.suite.suite_spec import Suite
 from vobench.suite.yaml_source import Mistakes, YamlFile
 
+AnyCase = Case | RecordedCase  # a case that is simulated, or one that is a recording
+
 
 @dataclass(frozen=True, slots=True)
 class Trial:
     """One run of one estimator on one case. `repeat` counts from 0, and `hidden` is that of the plan."""
 
-    case: Case | RecordedCase
+    case: AnyCase
     estimator_entry: EstimatorEntry
     repeat: int
     hidden: tuple[Path, ...] = ()
@@ -48,11 +50,11 @@ class Plan:
     hidden: tuple[Path, ...] = ()
 
     @property
-    def cases(self) -> tuple[Case | RecordedCase, ...]:
+    def cases(self) -> tuple[AnyCase, ...]:
         """All cases, simulated ones first."""
         return *self.simulated, *self.recorded
 
-    def trials(self, case: Case | RecordedCase) -> list[Trial]:
+    def trials(self, case: AnyCase) -> list[Trial]:
         """Every trial on one case."""
         repeats = range(self.suite.repeats)
         return [Trial(case, entry, repeat, self.hidden) for entry in self.estimator_entries for repeat in repeats]
@@ -66,7 +68,7 @@ class Plan:
         _require_matches("case", cases, (case.name for case in self.cases))
         _require_matches("scene", scenes, (_scene_name(case) for case in self.cases))
 
-        def is_selected(case: Case | RecordedCase) -> bool:
+        def is_selected(case: AnyCase) -> bool:
             return _matches_any(case.name, cases) and _matches_any(_scene_name(case), scenes)
 
         simulated = tuple(filter(is_selected, self.simulated))
@@ -85,7 +87,7 @@ class Plan:
         return Mistakes(self.source)
 
 
-def _scene_name(case: Case | RecordedCase) -> str:
+def _scene_name(case: AnyCase) -> str:
     return case.variant.get("scene", "")
 
 

@@ -12,14 +12,14 @@ from vobench.errors import Mistake, SuiteError
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.setting import Name, merged_over, settings
 from vobench.suite import yaml_file
-from vobench.suite.axis import Camera, RigSettings
+from vobench.suite.axis import AXES, Camera, RigSettings
 from vobench.suite.scene_lighting import Lighting
 from vobench.suite.trajectory import TrajectorySpec
 
 MOST_SEVERE = 5
-SETUP_AXES = ("lighting", "rig", "trajectory", "camera")
+SEVERITY_COUNT = MOST_SEVERE + 1  # with severity 0, the base
 PLACE_KEYS = ("scene", "scene_changes", "lighting", "trajectory")  # of a setup, which belong to a place and a drive
-NO_CAMERA = CameraSettings()
+DEFAULT_CAMERA = CameraSettings()
 
 
 @settings()
@@ -34,7 +34,7 @@ class Setup:
     lighting: Lighting = field(default_factory=dict)
     rig: RigSettings
     trajectory: TrajectorySpec
-    camera: Camera = NO_CAMERA
+    camera: Camera = DEFAULT_CAMERA
 
 
 @settings()
@@ -50,12 +50,12 @@ class ScenarioFile:
     name: Name
     summary: str = ""
     base: Setup
-    severity: Annotated[tuple[dict[str, Any], ...], MinLen(MOST_SEVERE + 1), MaxLen(MOST_SEVERE + 1)]
+    severity: Annotated[tuple[dict[str, Any], ...], MinLen(SEVERITY_COUNT), MaxLen(SEVERITY_COUNT)]
 
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A scenario: its name, its file, and the setup of each severity."""
+    """A scenario: its name, its file, and the setup of each severity from 0."""
 
     name: str
     path: Path
@@ -69,41 +69,43 @@ class Scenario:
             getattr(setup, key) == getattr(first, key) for setup in self.setups for key in PLACE_KEYS
         )
 
-    def setup(self, severity: int) -> Setup:
-        """The setup of a case of this severity."""
-        return self.setups[severity]
-
-    def variant(self, severity: int, scene: str) -> dict[str, str]:
+    def variant_names(self, severity: int, scene: str) -> dict[str, str]:
         """The name of the variant on each axis, as in `Case.variant`; `scene` is the name of the scene.
 
-        A name ends with the severity if the setup of this severity differs on the axis from that of severity 0.
+        A name ends with the severity if the setup of this severity differs on the axis from that of severity 0. So
+        severity 3 of a scenario `dim` that only dims the lamps has {"scene": "office", "lighting": "dim.3", "rig":
+        "dim", "trajectory": "dim", "camera": "dim"}.
         """
-        names = {axis: self._name_on(axis, severity, self.name) for axis in SETUP_AXES}
-        scene_name = scene
-        if self.setups[severity].scene_changes:
-            scene_name = self._name_on("scene_changes", severity, f"{scene}.{self.name}")
-        return {"scene": scene_name, **names}
+        names = {axis: self._with_severity(self.name, severity, field=axis) for axis in AXES}
+        return {**names, "scene": self._scene_name(severity, scene)}
 
-    def _name_on(self, axis: str, severity: int, name: str) -> str:
+    def _scene_name(self, severity: int, scene: str) -> str:
+        """The name of the scene; with changes, it is followed by the name of the scenario, as in office.dim.3."""
+        if not self.setups[severity].scene_changes:
+            return scene
+        return self._with_severity(f"{scene}.{self.name}", severity, field="scene_changes")
+
+    def _with_severity(self, name: str, severity: int, *, field: str) -> str:
         """The name, followed by the severity if it changes this field of the setup."""
-        is_unchanged = getattr(self.setups[severity], axis) == getattr(self.setups[0], axis)
+        is_unchanged = getattr(self.setups[severity], field) == getattr(self.setups[0], field)
         return name if is_unchanged else f"{name}.{severity}"
 
 
 def read_scenario(path: Path, replaced: Mapping[str, Any] = MappingProxyType({})) -> Scenario:
     """The scenario in a file. Raises SuiteError with all mistakes in it.
 
-    `replaced` are keys of its base with other values, as plain YAML, to which its changes are applied instead.
+    `replaced` are plain YAML values that replace those of its base.
     """
     reading = yaml_file.read_all(path, ScenarioFile, kind="scenario")
     if reading.mistakes:
         raise SuiteError(*reading.mistakes)
-    base = {**reading.source.plain["base"], **replaced}
+    # The changes are applied to the base as written, so that they can change single keys of its sections.
+    written_base = {**reading.source.plain["base"], **replaced}
     setups: list[Setup] = []
     mistakes: list[Mistake] = []
     for severity, changes in enumerate(reading.model.severity):
         place = reading.source.place(("severity", severity))
-        merged = merged_over(base, changes)
+        merged = merged_over(written_base, changes)
         try:
             setup = yaml_file.checked_section(Setup, merged, place)
         except SuiteError as error:

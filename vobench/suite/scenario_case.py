@@ -82,7 +82,7 @@ class ScenarioCases:
         runs = sum(len(self._calibration_levels(severity)) for severity in severities)
         chosen = dealer.deal(runs)
         for severity in severities:
-            setup = scenario.setup(severity)
+            setup = scenario.setups[severity]
             for unit in chosen:
                 by_axis: dict[str, str] = {
                     axis: unit.by_axis.get(axis) or next(iter(self.axes[axis])) for axis in UNIT_AXES
@@ -93,7 +93,7 @@ class ScenarioCases:
                     scene=self.axes["scene"][by_axis["scene"]],
                     trajectory=self.axes["trajectory"][by_axis["trajectory"]],
                     replayed=self.replayed.get(by_axis["trajectory"]),
-                    variant={**scenario.variant(severity, by_axis["scene"]), **by_axis},
+                    variant={**scenario.variant_names(severity, by_axis["scene"]), **by_axis},
                     rig=setup.rig.read(self._folder_of_rig(scenario)),
                     unit=unit.name,
                 )
@@ -104,7 +104,7 @@ class ScenarioCases:
 
     def _at_severity(self, scenario: Scenario, severity: int) -> Iterator[Case]:
         """The cases of a scenario in its own place, one for each calibration level. Raises VobenchError."""
-        setup = scenario.setup(severity)
+        setup = scenario.setups[severity]
         scene_entry = self.lookup.find_for(scenario.path, setup.scene)
         scene = self._read_scene(scene_entry.path, setup.scene_changes)
         if setup.lighting:
@@ -115,7 +115,7 @@ class ScenarioCases:
             scene=scene,
             trajectory=setup.trajectory,
             replayed=_replayed_poses(setup, scenario.path.parent),
-            variant=scenario.variant(severity, scene_entry.name),
+            variant=scenario.variant_names(severity, scene_entry.name),
             rig=setup.rig.read(scenario.path.parent),
         )
 
@@ -132,7 +132,7 @@ class ScenarioCases:
         unit: str = "",
     ) -> Iterator[Case]:
         """One case for each calibration level. Raises VobenchError."""
-        setup = scenario.setup(severity)
+        setup = scenario.setups[severity]
         levels = self._calibration_levels(severity)
         has_several_levels = len(self.suite.calibrations or ()) > 1
         in_unit = f"-{unit}" if unit else ""

@@ -20,12 +20,14 @@ from vobench.asset.shape import at, block, card
 from vobench.errors import SuiteError, VobenchError, error_sentence
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import areas_m2
 from vobench.scene import scene as scripted
 from vobench.scene.generated_place import GeneratedPlace
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, WHITE, Material, emitted_cd_m2
-from vobench.scene.mesh import Thing, areas_m2, corners, moved
+from vobench.scene.mesh import face_corners, moved
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing
 from vobench.suite.scene_check import materials_used
 from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_file import scene_content
@@ -289,7 +291,7 @@ def _area_lights(things: Sequence[Thing], materials: Mapping[str, Material]) -> 
         number = counts[thing.name]
         counts[thing.name] += 1
         name = f"{thing.name}.{number}" if number else thing.name
-        power_lm = luminance * np.pi * areas_m2(corners(thing.mesh)).sum()
+        power_lm = luminance * np.pi * areas_m2(face_corners(thing.mesh)).sum()
         red, green, blue = (emission / luminance).tolist()
         yield AreaLight(name, thing.mesh, power_lm, colour=(red, green, blue), material=thing.material)
 

@@ -12,8 +12,8 @@ from vobench.motion.replay import Replay
 from vobench.motion.wander import Wander
 from vobench.scene.light import Light
 from vobench.suite import scene_file, scene_lighting
-from vobench.suite.axis import RigSettings
-from vobench.suite.case import AXES, Case
+from vobench.suite.axis import AXES, RigSettings
+from vobench.suite.case import Case
 from vobench.suite.lookup import Lookup
 from vobench.suite.scene_entry import places
 from vobench.suite.scene_spec import SceneFile

@@ -13,7 +13,7 @@ from vobench.sensor.image_sensor import CameraSettings
 from vobench.sensor.pixel_truth import CHANNELS
 from vobench.setting import Name, OneOf, ShortForm, hints, settings
 from vobench.suite.axis import Camera, RigSettings
-from vobench.suite.scenario import MOST_SEVERE
+from vobench.suite.scenario import MOST_SEVERE, SEVERITY_COUNT
 from vobench.suite.scene_entry import NamedScene
 from vobench.suite.scene_lighting import Lighting
 from vobench.suite.source import SOURCES, Source
@@ -87,7 +87,7 @@ def _at_all_severities(value: Any) -> Any:
         return value
     if not all(isinstance(level, str) for level in value):
         return value
-    severities = range(MOST_SEVERE + 1)
+    severities = range(SEVERITY_COUNT)
     return {level: list(severities) for level in value}
 
 

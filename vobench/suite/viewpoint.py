@@ -10,7 +10,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.geometry import RayCaster
-from vobench.scene.mesh import Triangles
+from vobench.scene.triangles import Triangles
 from vobench.suite.free_space import (
     LEAST_PLACE_M,
     LEAST_RADIUS_M,

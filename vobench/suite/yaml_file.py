@@ -14,10 +14,11 @@ from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from vobench.errors import FilePlace, Mistake, SuiteError, VobenchError
-from vobench.setting import COMPLAINTS, hints, unit_of
+from vobench.setting import MESSAGES, hints, unit_of
 from vobench.suite import catalog, file_kind
+from vobench.suite.display_path import display_path
 from vobench.suite.file_kind import Kind
-from vobench.suite.yaml_complaint import complaints, location
+from vobench.suite.validation_message import location, validation_mistakes
 from vobench.suite.yaml_parser import parse_file, parse_text
 from vobench.suite.yaml_source import Keys, YamlFile, line_of, plain_tree
 
@@ -60,11 +61,11 @@ def read_all(
     Raises SuiteError if the file is not YAML, or is evidently of another kind.
     """
     if kind:
-        _refuse(path, file_kind.about_model(kind, path))
+        _refuse(path, file_kind.model_sentence(kind, path))
     has_include = INCLUDE in hints(model)
     source, duplicates = _read_with_included(path, kind or "suite", ()) if has_include else _read_mapping(path)
     if kind:
-        _refuse(path, file_kind.about_other_kind(kind, path, [*source.plain]))
+        _refuse(path, file_kind.wrong_kind_sentence(kind, path, [*source.plain]))
     if changes:
         source = _changed(source, changes)
     return _checked_reading(model, source, duplicates)
@@ -72,7 +73,7 @@ def read_all(
 
 def _refuse(path: Path, sentence: str | None) -> None:
     if sentence:
-        raise SuiteError(Mistake(sentence, (FilePlace(file_kind.display_path(path)),)))
+        raise SuiteError(Mistake(sentence, (FilePlace(display_path(path)),)))
 
 
 def _read_mapping(path: Path) -> tuple[YamlFile, list[Mistake]]:
@@ -176,7 +177,7 @@ def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistak
             return FileReading(whole, source)
     except ValidationError as error:
         wrong_places += [location(each) for each in error.errors()]
-        all_mistakes += complaints(source, error, json_schema(model), unread)
+        all_mistakes += validation_mistakes(source, error, json_schema(model), unread)
 
     sections, kept = _intact_sections(model, data, wrong_places)
     partial = _partial_model(model, sections)
@@ -195,7 +196,7 @@ def _not_in_json(tree: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
         for index, value in enumerate(tree):
             yield from _not_in_json(value, (*keys, index))
     elif isinstance(tree, float) and not math.isfinite(tree):
-        yield keys, f"{COMPLAINTS['finite_number']} (got {tree})"
+        yield keys, f"{MESSAGES['finite_number']} (got {tree})"
     elif not (tree is None or isinstance(tree, str | bool | int | float)):
         yield keys, f"should be a number, text, a list or keys with values (got {tree})"
 
@@ -249,7 +250,7 @@ def checked_section(kind: type[Model], data: Any, at: FilePlace) -> Model:
         return checked(kind, data)
     except ValidationError as error:
         source = YamlFile(Path(at.file), data)
-        section_mistakes = list(complaints(source, error, json_schema(kind)))
+        section_mistakes = list(validation_mistakes(source, error, json_schema(kind)))
     mistakes = list[Mistake]()
     for mistake in section_mistakes:
         inner = mistake.places[0]

@@ -7,10 +7,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from vobench.geometry.vector import unit
 from vobench.rendering.geometry import RayCaster
-from vobench.scene.light import Sky, Sun
 from vobench.scene.material import Texture
-from vobench.scene.mesh import Triangles, distinct, open_edges, welded
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
+from vobench.scene.weld import distinct_rows, open_edges, welded
 from vobench.suite.free_space import FreeCircle, largest_free_circle
 from vobench.suite.viewpoint import is_place
 
@@ -25,53 +25,57 @@ class SceneSurvey:
 
     `textures_mb` is the size of all textures in memory, in megabytes.
     `low_m` and `high_m` are opposite corners of the bounding box.
-    `open_edges` is the number of edges that belong to only one face; those of rectangles are not counted.
-    `twins` is the number of faces with the same corners as an earlier face.
-    `backs` is the share of view directions in which the nearest face shows its back, which is not drawn. The viewer is
-    in the free circle; without one, it is in the centre of the scene.
-    `free` is the largest circle of free floor, None if there is no floor.
+    `light_names` are the names of all lights.
+    `open_edge_count` is the number of edges that belong to only one face; those of rectangles are not counted.
+    `duplicate_face_count` is the number of faces with the same corners as an earlier face.
+    `back_facing_share` is the share of view directions in which the nearest face shows its back, which is not drawn.
+    The viewer is in the free circle; without one, it is in the centre of the scene.
+    `free_circle` is the largest circle of free floor, None if there is no floor.
     `is_place` is whether a robot can drive in the scene; otherwise the scene is an object.
     """
 
-    things: int
-    faces: int
-    materials: int
+    thing_count: int
+    face_count: int
+    material_count: int
     textures_mb: float
     low_m: tuple[float, float, float]
     high_m: tuple[float, float, float]
-    lights: tuple[str, ...]
-    open_edges: int
-    twins: int
-    backs: float
-    free: FreeCircle | None
+    light_names: tuple[str, ...]
+    open_edge_count: int
+    duplicate_face_count: int
+    back_facing_share: float
+    free_circle: FreeCircle | None
     is_place: bool
 
 
-def survey(scene: Scene) -> SceneSurvey:
+def scene_survey(scene: Scene) -> SceneSurvey:
     """The survey of a scene at its start. Its lighting is not computed."""
     faces = triangles(scene, t_ns=0)
     caster = RayCaster(faces)
-    point_ids = _point_ids(faces)
     corners_m = faces.corners_m.reshape(-1, 3)
     low_m = corners_m.min(0)
     high_m = corners_m.max(0)
-    free = largest_free_circle(faces, caster)
+
+    free_circle = largest_free_circle(faces, caster)
     eye_m = (low_m + high_m) / 2
-    if free:
-        eye_m = np.array([free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M])
+    if free_circle:
+        eye_m = np.array([free_circle.x_m, free_circle.y_m, free_circle.floor_m + EYE_HEIGHT_M])
+
+    point_ids = _point_ids(faces)
+    texture_bytes = sum(texture.pixels().nbytes for texture in _textures(scene))
     return SceneSurvey(
-        things=len({thing.name for thing in faces.things}),
-        faces=len(faces),
-        materials=len(scene.materials),
-        textures_mb=sum(texture.pixels().nbytes for texture in _textures(scene)) / 1e6,
+        thing_count=len({thing.name for thing in faces.things}),
+        face_count=len(faces),
+        material_count=len(scene.materials),
+        textures_mb=texture_bytes / 1e6,
         low_m=_rounded(low_m),
         high_m=_rounded(high_m),
-        lights=tuple(light.name for light in scene.lights),
-        open_edges=_open_edges(faces, point_ids),
-        twins=_twins(point_ids),
-        backs=_share_of_backs(faces, caster, eye_m),
-        free=free,
-        is_place=is_place(faces, caster, free),
+        light_names=tuple(light.name for light in scene.lights),
+        open_edge_count=_open_edge_count(faces, point_ids),
+        duplicate_face_count=_duplicate_face_count(point_ids),
+        back_facing_share=_back_facing_share(faces, caster, eye_m),
+        free_circle=free_circle,
+        is_place=is_place(faces, caster, free_circle),
     )
 
 
@@ -90,11 +94,11 @@ def _rounded(point_m: ArrayLike) -> tuple[float, float, float]:
 
 def _point_ids(faces: Triangles) -> NDArray[np.intp]:
     """The index (F, 3) of the point at each corner; corners at the same position have the same index."""
-    _, point_ids = welded(faces.corners_m.reshape(-1, 3))
+    point_ids = welded(faces.corners_m.reshape(-1, 3)).inverse
     return point_ids.reshape(-1, 3)
 
 
-def _open_edges(faces: Triangles, point_ids: NDArray[np.intp]) -> int:
+def _open_edge_count(faces: Triangles, point_ids: NDArray[np.intp]) -> int:
     """The number of edges that belong to a single face, without those of rectangles."""
     face_counts = np.bincount(faces.thing, minlength=len(faces.things))
     solid_things = np.flatnonzero(face_counts > MAX_FACES_OF_RECTANGLE)
@@ -105,24 +109,16 @@ def _open_edges(faces: Triangles, point_ids: NDArray[np.intp]) -> int:
     return len(open_edges(point_ids[is_solid] + id_offset))
 
 
-def _twins(point_ids: NDArray[np.intp]) -> int:
+def _duplicate_face_count(point_ids: NDArray[np.intp]) -> int:
     """The number of faces whose three points are those of an earlier face, in any order."""
     sorted_corners = np.sort(point_ids, axis=1)
-    first_faces, _ = distinct(sorted_corners)
+    first_faces = distinct_rows(sorted_corners).first_index
     return len(point_ids) - len(first_faces)
 
 
-def _share_of_backs(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:
+def _back_facing_share(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:
     """The share of directions from a viewpoint (3,) in which the nearest face shows its back."""
     directions = unit(np.random.default_rng(0).standard_normal((DIRECTIONS, 3)))
     hits = caster.hits(np.tile(eye_m, (DIRECTIONS, 1)), directions)
     is_back = np.einsum("ij,ij->i", faces.plane[hits.face], directions) > 0
     return float(((hits.face >= 0) & is_back).mean())
-
-
-def strength(scene: Scene, name: str) -> str:
-    """The illuminance or power of a light, as text with its unit."""
-    light = next(light for light in scene.lights if light.name == name)
-    if isinstance(light, Sky | Sun):
-        return f"{light.illuminance_lx:.0f} lx"
-    return f"{light.power_lm:.0f} lm"

@@ -3,12 +3,13 @@
 import numpy as np
 import pytest
 
-from vobench.analysis.scene import strength, survey
+from vobench.analysis.scene_survey import scene_survey
 from vobench.asset.shape import at, block
-from vobench.scene.light import PointLight, Sky
+from vobench.scene.light import PointLight
 from vobench.scene.material import Material
-from vobench.scene.mesh import Thing, flipped, joined, make_mesh, moved, quad
+from vobench.scene.mesh import flipped, joined, make_mesh, moved, quad
 from vobench.scene.scene import Scene
+from vobench.scene.triangles import Thing
 
 GREY = {"grey": Material(colour=(0.5, 0.5, 0.5))}
 FLOOR = Thing("floor", quad((-4, -3, 0), (8, 0, 0), (0, 6, 0)), "grey")
@@ -25,10 +26,10 @@ def crate(x_m: float, y_m: float, *, size_m: float = 1.0) -> Thing:
 
 
 def test_the_largest_free_circle_touches_the_floors_edge_or_a_thing() -> None:
-    free = survey(scene(FLOOR)).free
+    free = scene_survey(scene(FLOOR)).free_circle
     assert free is not None
     assert (free.floor_m, free.radius_m) == (0, pytest.approx(3.0, abs=0.1))
-    beside = survey(scene(FLOOR, crate(1.0, 0.0))).free
+    beside = scene_survey(scene(FLOOR, crate(1.0, 0.0))).free_circle
     assert beside is not None
     # Between the left edge and the crate's side, and away from its corners.
     assert np.hypot(beside.x_m - 0.5, beside.y_m) >= beside.radius_m - 0.1
@@ -38,7 +39,7 @@ def test_the_largest_free_circle_touches_the_floors_edge_or_a_thing() -> None:
 
 def test_what_hangs_higher_than_a_body_leaves_the_floor_free() -> None:
     shelf = Thing("shelf", moved(block((8, 6, 0.05), bevel_m=0), at(z_m=1.2)), "grey")
-    free = survey(scene(FLOOR, shelf)).free
+    free = scene_survey(scene(FLOOR, shelf)).free_circle
     assert free is not None
     assert (free.floor_m, free.radius_m) == (0, pytest.approx(3.0, abs=0.1))
 
@@ -49,48 +50,50 @@ def test_a_wall_that_stands_on_the_floor_and_ends_at_the_ceiling_is_no_way() -> 
         moved(block((0.14, 6, 2.5), bevel_m=0), at(0.04, 0, 1.25)),  # its ends lie in floor and ceiling
         quad((0.04, -3, 0), (0, 6, 0), (0, 0, 2.5)),  # a sheet, between two looks down
     ):
-        free = survey(scene(FLOOR, ceiling, Thing("wall", wall, "grey"))).free
+        free = scene_survey(scene(FLOOR, ceiling, Thing("wall", wall, "grey"))).free_circle
         assert free is not None
         assert abs(free.x_m - 0.04) > free.radius_m - 0.05
 
 
 def test_the_floor_is_below_a_roof_that_is_larger() -> None:
     roof = Thing("roof", quad((-6, -4, 3), (12, 0, 0), (0, 8, 0)), "grey")
-    free = survey(scene(FLOOR, roof)).free
+    free = scene_survey(scene(FLOOR, roof)).free_circle
     assert free is not None
     assert free.floor_m == 0
 
 
 def test_faces_sizes_and_lights_are_counted() -> None:
-    found = survey(scene(FLOOR, crate(1.0, 0.0)))
-    assert (found.things, found.faces, found.materials, found.lights) == (2, 14, 1, ("bulb",))
+    found = scene_survey(scene(FLOOR, crate(1.0, 0.0)))
+    assert (found.thing_count, found.face_count, found.material_count, found.light_names) == (2, 14, 1, ("bulb",))
     assert (found.low_m, found.high_m) == ((-4, -3, 0), (4, 3, 1))
 
 
 def test_open_edges_and_faces_on_a_face_are_found() -> None:
     solid = crate(1.0, 0.0)
-    assert survey(scene(FLOOR, solid)).open_edges == 0
+    assert scene_survey(scene(FLOOR, solid)).open_edge_count == 0
     faces = solid.mesh.faces
     torn = Thing(
         "torn",
         make_mesh(solid.mesh.vertices, faces[1:], solid.mesh.visual.uv, solid.mesh.vertex_normals),
         "grey",
     )
-    assert survey(scene(FLOOR, torn)).open_edges == 3
-    assert survey(scene(FLOOR, Thing("twice", joined([solid.mesh, solid.mesh]), "grey"))).twins == 12
+    assert scene_survey(scene(FLOOR, torn)).open_edge_count == 3
+    assert (
+        scene_survey(scene(FLOOR, Thing("twice", joined([solid.mesh, solid.mesh]), "grey"))).duplicate_face_count == 12
+    )
 
 
 def test_backs_are_seen_from_inside_a_thing_that_looks_outwards() -> None:
     hall = moved(block((7.9, 5.9, 3), bevel_m=0), at(z_m=1.4))
-    inwards = survey(scene(FLOOR, Thing("hall", flipped(hall), "grey")))
-    outwards = survey(scene(FLOOR, Thing("hall", hall, "grey")))
-    assert inwards.backs == 0
-    assert outwards.backs > 0.5
+    inwards = scene_survey(scene(FLOOR, Thing("hall", flipped(hall), "grey")))
+    outwards = scene_survey(scene(FLOOR, Thing("hall", hall, "grey")))
+    assert inwards.back_facing_share == 0
+    assert outwards.back_facing_share > 0.5
 
 
 def test_a_scene_without_a_floor_has_no_free_circle() -> None:
     wall = Thing("wall", quad((0, 0, 0), (1, 0, 0), (0, 0, 1)), "grey")
-    assert survey(scene(wall)).free is None
+    assert scene_survey(scene(wall)).free_circle is None
 
 
 def test_textures_are_counted_once_each_in_megabytes() -> None:
@@ -101,17 +104,10 @@ def test_textures_are_counted_once_each_in_megabytes() -> None:
         "grey": Material(colour=(0.5, 0.5, 0.5), texture=texture),
         "again": Material(colour=(0.2, 0.5, 0.5), texture=texture),
     }
-    found = survey(Scene("s", (FLOOR,), materials, (LIGHT,)))
+    found = scene_survey(Scene("s", (FLOOR,), materials, (LIGHT,)))
     assert found.textures_mb == pytest.approx(texture.pixels().nbytes / 1e6)
-    assert found.materials == 2
-    assert survey(scene(FLOOR)).textures_mb == 0
-
-
-def test_the_strength_of_a_light_has_its_unit() -> None:
-    sky = Sky("sky", 1234.5)
-    room = Scene("s", (FLOOR,), GREY, (LIGHT, sky))
-    assert strength(room, "bulb") == "500 lm"
-    assert strength(room, "sky") == "1234 lx"
+    assert found.material_count == 2
+    assert scene_survey(scene(FLOOR)).textures_mb == 0
 
 
 def test_corners_nearer_than_a_hundredth_of_a_millimetre_are_one_point() -> None:
@@ -123,7 +119,7 @@ def test_corners_nearer_than_a_hundredth_of_a_millimetre_are_one_point() -> None
         uv = np.zeros((len(vertices), 2))
         normals = np.repeat(np.array([[0.0, 0.0, 1.0]]), len(vertices), axis=0)
         apart = Thing("apart", make_mesh(vertices, faces, uv, normals), "grey")
-        found = survey(scene(FLOOR, apart)).open_edges
+        found = scene_survey(scene(FLOOR, apart)).open_edge_count
         assert found == 0 if open_edges == 0 else found >= open_edges
 
 
@@ -135,14 +131,14 @@ def test_a_face_that_stands_twice_in_another_order_of_corners_is_a_twin() -> Non
         np.zeros((len(solid.mesh.vertices), 2)),
         solid.mesh.vertex_normals,
     )
-    assert survey(scene(FLOOR, solid)).twins == 0
-    assert survey(scene(FLOOR, Thing("turned", turned, "grey"))).twins == 2
+    assert scene_survey(scene(FLOOR, solid)).duplicate_face_count == 0
+    assert scene_survey(scene(FLOOR, Thing("turned", turned, "grey"))).duplicate_face_count == 2
 
 
 def test_backs_are_looked_for_from_the_middle_where_there_is_no_floor() -> None:
     roof = Thing("roof", quad((-4, 3, 2), (8, 0, 0), (0, -6, 0)), "grey")  # faces down
     lower = Thing("lower", quad((-4, -3, 0), (0, 6, 0), (8, 0, 0)), "grey")  # faces down, too: no floor
-    found = survey(scene(roof, lower))
-    assert found.free is None
+    found = scene_survey(scene(roof, lower))
+    assert found.free_circle is None
     # From 1 m above it the back of the lower one is all that is below, but for what passes beside it.
-    assert 0.3 < found.backs < 0.5
+    assert 0.3 < found.back_facing_share < 0.5

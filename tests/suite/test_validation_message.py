@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from vobench.errors import SettingError
 from vobench.setting import settings
-from vobench.suite.yaml_complaint import complaints, location
+from vobench.suite.validation_message import location, validation_mistakes
 from vobench.suite.yaml_file import checked, json_schema
 from vobench.suite.yaml_parser import parse_text
 from vobench.suite.yaml_source import YamlFile
@@ -49,7 +49,7 @@ def error_of(text):
 def said(text, unread=()):
     """The mistakes of a file with this text, as lines without the name of the file."""
     error, source = error_of(text)
-    mistakes = complaints(source, error, json_schema(Body), unread)
+    mistakes = validation_mistakes(source, error, json_schema(Body), unread)
     return [str(mistake).removeprefix("file.yaml:") for mistake in mistakes]
 
 

@@ -1,0 +1,204 @@
+"""Turns pydantic's validation errors into messages for the authors of YAML files.
+
+A place has three forms here. A `loc` is a place in pydantic's data, which can contain parts that are not keys of the
+file. A `key_path` has the keys of the file only. A FilePlace also has the line, and is made by the file itself.
+"""
+
+from collections.abc import Collection, Iterator
+from difflib import get_close_matches
+from typing import Any, NamedTuple
+
+from pydantic import ValidationError
+from pydantic_core import ErrorDetails
+
+from vobench.errors import Mistake, SettingError
+from vobench.setting import MESSAGES, wrong_value_message
+from vobench.suite.yaml_source import Keys, YamlFile
+
+Schema = dict[str, Any]  # a JSON Schema or a section of one
+Loc = Keys
+UNKNOWN_KEY = "unexpected_keyword_argument"  # pydantic's type of the error
+
+
+def validation_mistakes(
+    source: YamlFile, error: ValidationError, schema: Schema, unread: Collection[Keys] = ()
+) -> Iterator[Mistake]:
+    """The mistakes in a file that caused a validation error, with unknown keys first.
+
+    An error that only follows from another mistake is omitted: a required key that is missing because it is misspelt,
+    and a list that is too short because some of its entries are wrong.
+    `unread` lists the key paths of values that could not be read. Errors there are omitted, because the mistakes have
+    already been reported.
+    """
+    errors = sorted(error.errors(), key=lambda details: details["type"] != UNKNOWN_KEY)
+    wrong_locs = [*unread, *map(location, errors)]
+    misspelt_locs = _misspelt_locs(errors, schema)
+
+    for details in errors:
+        loc = location(details)
+        key_path = _schema_place(schema, loc).key_path
+        if key_path in unread:
+            continue
+        is_key_misspelt = details["type"] == "missing" and loc in misspelt_locs
+        if is_key_misspelt:
+            continue
+        is_list_with_wrong_entries = details["type"] == "too_short" and _contains_any(loc, wrong_locs)
+        if is_list_with_wrong_entries:
+            continue
+        yield Mistake(_message(details, schema, source), (source.place(key_path),))
+
+
+def location(details: ErrorDetails) -> Loc:
+    """The place of one of pydantic's errors. If a SettingError caused it, the keys that it names are appended."""
+    cause = details.get("ctx", {}).get("error")
+    if isinstance(cause, SettingError):
+        return (*details["loc"], *cause.keys)
+    return details["loc"]
+
+
+def _misspelt_locs(errors: Collection[ErrorDetails], schema: Schema) -> set[Loc]:
+    """The place of the known key that each unknown key probably stands for."""
+    locs: set[Loc] = set()
+    for details in errors:
+        if details["type"] != UNKNOWN_KEY:
+            continue
+        *section_loc, unknown_key = location(details)
+        nearest_key = _nearest_key(str(unknown_key), _known_keys(details, schema))
+        if nearest_key:
+            locs.add((*section_loc, nearest_key))
+    return locs
+
+
+def _contains_any(loc: Loc, others: Collection[Loc]) -> bool:
+    """Whether one of the other places is inside the section at this place."""
+    return any(len(other) > len(loc) and other[: len(loc)] == loc for other in others)
+
+
+def _nearest_key(unknown_key: str, known_keys: Collection[str]) -> str | None:
+    """The known key that is most similar to an unknown key; None if no key is similar."""
+    nearest = get_close_matches(unknown_key, known_keys, n=1)
+    return nearest[0] if nearest else None
+
+
+def _known_keys(details: ErrorDetails, schema: Schema) -> list[str]:
+    """The keys that are allowed in the section that contains an unknown key, sorted."""
+    section_loc = location(details)[:-1]
+    return sorted(_schema_place(schema, section_loc).schema.get("properties", {}))
+
+
+def _message(details: ErrorDetails, schema: Schema, source: YamlFile) -> str:
+    """The message about one of pydantic's errors."""
+    if details["type"] == UNKNOWN_KEY:
+        return _unknown_key_message(details, schema, source)
+    context = details.get("ctx", {})
+    cause = context.get("error")
+    if isinstance(cause, SettingError):  # its sentence already contains the wrong value
+        return cause.sentence
+    template = MESSAGES.get(details["type"])
+    if template is None:
+        return wrong_value_message(details["msg"], details["input"], {})
+    return wrong_value_message(template, details["input"], context)
+
+
+def _unknown_key_message(details: ErrorDetails, schema: Schema, source: YamlFile) -> str:
+    """The message about an unknown key, with the most similar known key and a list of all known keys."""
+    other_kinds_message = _other_kinds_message(details, schema, source)
+    if other_kinds_message is not None:
+        return other_kinds_message
+    known_keys = _known_keys(details, schema)
+    nearest_key = _nearest_key(str(location(details)[-1]), known_keys)
+    guess = f" Did you mean {nearest_key!r}?" if nearest_key else ""
+    return f"unknown key.{guess} Known: {', '.join(known_keys)}"
+
+
+def _other_kinds_message(details: ErrorDetails, schema: Schema, source: YamlFile) -> str | None:
+    """The message about a key that this kind of section does not have, but other kinds of it have.
+
+    For example, a lamp of the kind `point` has no `size_m`, but a `panel` has.
+    None if no kind has the key, or if only the unit is missing in the key, as in `power` for `power_lm`.
+    """
+    loc = location(details)
+    if len(loc) < 2:
+        return None
+    *section_loc, kind, key = loc
+    section = _schema_place(schema, tuple(section_loc))
+    if str(kind) not in _references_by_kind(section.schema):
+        return None
+    kinds_with_key = _kinds_with_key(schema, section.schema, key)
+    lacks_unit = any(known_key.startswith(f"{key}_") for known_key in _known_keys(details, schema))
+    if not kinds_with_key or lacks_unit:
+        return None
+
+    is_kind_written = source.place((*section.key_path, "kind")).value is not None
+    this_kind = f"this is {kind}" if is_kind_written else f"the kind is {kind} by default"
+    return f"belongs to {', '.join(kinds_with_key)}; {this_kind}"
+
+
+def _kinds_with_key(schema: Schema, section: Schema, key: int | str) -> list[str]:
+    """The kinds of a section that have a key."""
+    kinds = []
+    for kind, reference in _references_by_kind(section).items():
+        if key in _resolve(schema, reference)["properties"]:
+            kinds.append(kind)
+    return kinds
+
+
+def _references_by_kind(section: Schema) -> dict[str, str]:
+    """The reference to the schema of each kind of a section; empty if the section has no kinds."""
+    references: dict[str, str] = section.get("discriminator", {}).get("mapping", {})
+    return references
+
+
+class _SchemaPlace(NamedTuple):
+    """The keys of the file that lead to a place, and the schema of what is there."""
+
+    key_path: Keys
+    schema: Schema
+
+
+def _schema_place(schema: Schema, loc: Loc) -> _SchemaPlace:
+    """Follow one of pydantic's places through a schema.
+
+    Two kinds of parts of a `loc` are not keys of the file: the kind of a section, and "[key]", which says that a key is
+    wrong instead of its value.
+    """
+    key_path: Keys = ()
+    section = _without_alternatives(schema, schema)
+    for part in loc:
+        if part == "[key]":
+            continue
+        kind_reference = _references_by_kind(section).get(str(part))
+        if kind_reference:
+            section = _resolve(schema, kind_reference)
+            continue
+        key_path = (*key_path, part)
+        section = _without_alternatives(schema, _entry_schema(section, part))
+    return _SchemaPlace(key_path, section)
+
+
+def _entry_schema(section: Schema, key: int | str) -> Schema:
+    """The schema of one entry of a section, a mapping or a list; empty if it is unknown."""
+    property_schema: Schema | None = section.get("properties", {}).get(key)
+    return property_schema or _value_schema(section) or section.get("items") or {}
+
+
+def _value_schema(section: Schema) -> Schema | None:
+    """The schema of the values of a mapping; None if the section is not a mapping."""
+    if "patternProperties" not in section:
+        additional: Schema | None = section.get("additionalProperties")
+        return additional
+    schemas_by_pattern: dict[str, Schema] = section["patternProperties"]
+    return next(iter(schemas_by_pattern.values()))
+
+
+def _without_alternatives(schema: Schema, section: Schema) -> Schema:
+    """The first alternative of a section, which is its full form; the others are null or the name of a preset."""
+    while "anyOf" in section or "$ref" in section:
+        section = _resolve(schema, section["$ref"]) if "$ref" in section else section["anyOf"][0]
+    return section
+
+
+def _resolve(schema: Schema, reference: str) -> Schema:
+    """The definition that a reference such as #/$defs/Suite points to."""
+    resolved: Schema = schema["$defs"][reference.rpartition("/")[2]]
+    return resolved
