@@ -8,7 +8,7 @@ import zipfile
 from pathlib import Path
 
 import pytest
-import yaml
+from ruamel.yaml import YAML
 
 from vobench.runner.bundle import opened
 from vobench.runner.folder import SUITE, RunFolder
@@ -25,7 +25,7 @@ if sys.argv[1] != "run":
 
 
 def steps():
-    workflow = yaml.safe_load((CI / "vobench.yml").read_text())
+    workflow = YAML(typ="safe").load((CI / "vobench.yml").read_text())
     return workflow["jobs"]["regression"]["steps"]
 
 
