@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.random import Generator
 from scipy import stats
+from scipy.spatial.transform import Rotation
 
 from vobench.geometry.se3 import Array
 from vobench.metric.ranking import DECIDED, MIN_DRIVES, TrialTable, rank
@@ -22,9 +23,13 @@ from vobench.metric.repeat_test import worse_than_best
 from vobench.metric.sequential import half_width
 from vobench.metric.significance import PairedDifference
 from vobench.metric.unit import make_design
+from vobench.report.cell import CaseFacts
 from vobench.report.compare import NOT_DETERMINISTIC, REGRESSIONS, compare
 from vobench.report.leaderboard import Board, make_board
+from vobench.runner.estimate import FINISHED, EstimatorOutcome
 from vobench.runner.folder import TrialScore
+from vobench.runner.score import score_estimate, status_of
+from vobench.trajectory.trajectory import Trajectory
 
 CASE_STD = 1.5
 NOISE = 0.3
@@ -351,6 +356,103 @@ def _count(places: float) -> str:
     return f"over {MOST_PLACES}" if np.isinf(places) else f"{places:.0f}"
 
 
+FRAMES = 60
+FRAME_NS = 100_000_000
+STEP_M = 0.1
+DRIFT_M = 0.002  # the standard deviation of the error that an oracle adds in each frame, along each axis
+DRIFT_RAD = 0.001
+
+
+def _drive(rng: Generator) -> Trajectory:
+    """A planar drive of FRAMES poses whose curvature wanders."""
+    heading_rad = np.cumsum(0.1 * np.cumsum(0.2 * rng.standard_normal(FRAMES)))
+    steps_m = STEP_M * np.stack([np.cos(heading_rad), np.sin(heading_rad), np.zeros(FRAMES)], axis=1)
+    rotation_vectors = np.zeros((FRAMES, 3))
+    rotation_vectors[:, 2] = heading_rad
+    T_world_body = np.tile(np.eye(4), (FRAMES, 1, 1))
+    T_world_body[:, :3, :3] = Rotation.from_rotvec(rotation_vectors).as_matrix()
+    T_world_body[:, :3, 3] = np.cumsum(steps_m, axis=0)
+    return Trajectory(FRAME_NS * np.arange(FRAMES, dtype=np.int64), T_world_body)
+
+
+def _noisy_oracle(truth: Trajectory, factor: float, rng: Generator) -> Trajectory:
+    """The true drive with an error that adds up from frame to frame, as that of odometry does."""
+    T_previous_next = np.linalg.inv(truth.T_world_frame[:-1]) @ truth.T_world_frame[1:]
+    T_estimated = [truth.T_world_frame[0]]
+    for T_step in T_previous_next:
+        error = np.eye(4)
+        error[:3, :3] = Rotation.from_rotvec(factor * DRIFT_RAD * rng.standard_normal(3)).as_matrix()
+        error[:3, 3] = factor * DRIFT_M * rng.standard_normal(3)
+        T_estimated.append(T_estimated[-1] @ T_step @ error)
+    return Trajectory(truth.t_ns, np.array(T_estimated))
+
+
+def _oracle_trial(truth: Trajectory, estimate: Trajectory, case: str, estimator: str, repeat: int) -> TrialScore:
+    """The trial of an oracle, scored as a run scores it."""
+    scored = score_estimate(estimate, truth, ())
+    status, reason = status_of(EstimatorOutcome(kind=FINISHED, reason=""), scored, truth)
+    return TrialScore(
+        case=case,
+        variant={},
+        estimator=estimator,
+        repeat=repeat,
+        status=status,
+        reason=reason,
+        coverage=1.0,
+        frames=FRAMES,
+        path_m=float(truth.distances_m()[-1]),
+        score=scored.as_dict() if scored else None,
+    )
+
+
+def _oracle_board(places: int, repeats: int, ratio: float, place_std: float, rng: Generator) -> Board:
+    """The board of two noisy oracles whose errors have this ratio, and differ from place to place besides."""
+    trials = []
+    facts = {}
+    for place in range(places):
+        truth = _drive(rng)
+        case = f"case{place}"
+        facts[case] = CaseFacts(place=f"place{place}", drive="drive")
+        for estimator, of_estimator in (("good", 1.0), ("poor", ratio)):
+            factor = of_estimator * np.exp(place_std * rng.standard_normal())
+            for repeat in range(repeats):
+                estimate = _noisy_oracle(truth, factor, rng)
+                trials.append(_oracle_trial(truth, estimate, case, estimator, repeat))
+    return make_board(trials, {}, facts)
+
+
+def real_boards(boards: int, rng: Generator) -> Iterator[list[str]]:
+    """Of boards of noisy oracles, scored from their trajectories: how often the order is decided, and intervals hold.
+
+    A tenth of the boards, for each takes a second. The errors of oracles differ from place to place by a standard
+    deviation of 0.3 of their logarithm.
+    """
+    yield ["places × repeats", "true ratio", "decided", "for the worse one", "interval holds"]
+    for places, repeats in ((7, 1), (7, 4), (12, 2)):
+        for ratio in (1.0, 1.5, 2.0):
+            made = [_oracle_board(places, repeats, ratio, 0.3, rng) for _ in range(boards // 10)]
+            decided = [bool(board.totals[1].decided_above) for board in made]
+            wrong = [board.totals[1].decided_above and board.totals[0].estimator == "poor" for board in made]
+            covered = [_holds(board, ratio) for board in made]
+            yield [
+                f"{places} × {repeats}",
+                f"{ratio:g}",
+                f"{np.mean(decided):.3f}",
+                f"{np.mean(wrong):.3f}" if ratio > 1 else "",
+                f"{np.mean(covered):.3f}",
+            ]
+
+
+def _holds(board: Board, ratio: float) -> bool:
+    """Whether the interval of a board's second estimator contains its true ratio to the first."""
+    second = board.totals[1]
+    if second.error_interval is None:
+        return False
+    low, high = second.error_interval
+    true_ratio = ratio if second.estimator == "poor" else 1.0 / ratio
+    return bool(low <= true_ratio <= high)
+
+
 @dataclass(frozen=True, slots=True)
 class Change:
     """What differs between two runs of four estimators: the factor on the loss of each trial, and failures by chance.
@@ -446,6 +548,7 @@ TABLES: list[Callable[[int, Generator], Iterator[list[str]]]] = [
     advice,
     until_decided,
     places_until_decided,
+    real_boards,
     false_marks,
     regressions,
 ]

@@ -3,7 +3,8 @@
 import pytest
 
 from vobench.errors import InputError, UnknownNameError
-from vobench.report.trial_choice import pick, ranked, sentence
+from vobench.report.cell import CaseFacts
+from vobench.report.trial_choice import pick, ranked, sentence, story
 
 
 def names(trials):
@@ -80,3 +81,19 @@ def test_a_case_without_a_sequence_is_left_out_and_said_where_it_is_asked_for(sc
     message = "'dark' has no sequence to show because it could not be simulated or imported: no light"
     with pytest.raises(InputError, match=message):
         pick([*trials, unmade], case="dark", estimator=None)
+
+
+@pytest.mark.parametrize(
+    ("status", "words"),
+    [("lost", "loses track"), ("diverged", "diverges"), ("crashed", "crashes"), ("refused", "fails (refused)")],
+)
+def test_the_story_of_a_failure_names_the_scenario_the_severity_and_the_place(scored, status, words):
+    facts = CaseFacts(scenario="low_light", severity=3, place="room")
+    assert story(scored("poor", status), facts) == f"poor {words} in low light at 3 (room)"
+
+
+def test_the_story_of_any_other_trial_is_its_sentence(scored):
+    survivor = scored("good")
+    assert story(survivor, CaseFacts(scenario="low_light", severity=3)) == sentence(survivor)
+    failed = scored("poor", "lost")
+    assert story(failed, CaseFacts()) == sentence(failed)

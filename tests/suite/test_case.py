@@ -1,11 +1,22 @@
 """A case builds its scene, its nominal rig and its true rig."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vobench.geometry.rig import drawn_calibration_error, true_rig
+from vobench.suite.suite import read_plan
 
 # ruff: noqa: E501 - an entry stands in one line
+
+NOISY = """name: noisy
+seed: 3
+noise_seeds: 3
+scenes: [{name: flat, seed: 1}]
+trajectories: {tour: {kind: wander, body: pioneer, length_m: 2, seed: 1}}
+estimators: [lk_epipolar]
+"""
 
 
 def test_a_lighting_sets_the_lamps_it_names_and_leaves_the_others(bent):
@@ -65,3 +76,12 @@ def test_without_rigs_a_pair_looks_ahead_ten_degrees_below_the_horizon(bent):
     (case, *_) = bent(("rigs: {down: {pitch_deg: 90}}\n", "")).cases
     assert (case.variant["rig"], case.rig.pitch_deg) == ("ahead", 10)
     assert (case.rig.forward_m, case.rig.height_m, case.rig.picture_scale) == (0.25, 0.4, 1)
+
+
+def test_draws_of_noise_share_place_and_drive_and_differ_in_their_seed(tmp_path):
+    suite = tmp_path / "noisy.yaml"
+    suite.write_text(NOISY)
+    first, second, third = read_plan(str(suite)).simulated
+    assert [case.name for case in (second, third)] == [f"{first.name}-noise2", f"{first.name}-noise3"]
+    assert len({case.seed for case in (first, second, third)}) == 3
+    assert replace(second, name=first.name, seed=first.seed) == first

@@ -17,7 +17,8 @@ from vobench.cli.run_display import TerminalDisplay
 from vobench.errors import InputError
 from vobench.runner.exposure_doubt import doubts_of_run
 from vobench.runner.folder import total_failure, with_sequence
-from vobench.runner.launch import run_plan
+from vobench.runner.key import cache_folder
+from vobench.runner.launch import default_jobs, run_plan, typical_seconds
 from vobench.runner.motion import cut
 from vobench.runner.preflight import summarize
 from vobench.runner.store import SilentProgress
@@ -222,6 +223,7 @@ def run_command(
         return
 
     from vobench.report import page
+    from vobench.report.advice import cost_of_deciding
 
     cost = ""
     if sequential.until:
@@ -247,6 +249,9 @@ def run_command(
         _print_remarks(folder, scores, shares_time=execution.share_time or plan.suite.share_time)
         for doubt in doubts_of_run(plan, folder):
             terminal.warn(doubt)
+        if not sequential.until:
+            jobs = execution.jobs or default_jobs()
+            cost = cost_of_deciding(board.totals, plan, typical_seconds(cache_folder()), jobs=jobs)
         if cost:
             terminal.console().print(cost)
     _exit_if_failed(scores, board, thresholds)
@@ -342,7 +347,8 @@ def _print_board(board: "Board", *, as_json: bool) -> None:
 
 def _print_remarks(folder: "RunFolder", scores: "Sequence[TrialScore]", *, shares_time: bool) -> None:
     """Print where the results of a run are, what affects its CPU times, and which trial to look at."""
-    from vobench.report.trial_choice import pick, sentence
+    from vobench.report.case_facts import case_facts
+    from vobench.report.trial_choice import pick, story
     from vobench.runner.run import BESIDE
 
     console = terminal.console()
@@ -354,9 +360,10 @@ def _print_remarks(folder: "RunFolder", scores: "Sequence[TrialScore]", *, share
     if with_sequence(scores):
         trial = pick(scores, case=None, estimator=None)
         name = f"{folder.path}/{trial.case}/{trial.estimator}"
-        console.print(f"{sentence(trial)}\nSee it: {command} view {name}")
-        if "scene" in trial.variant:  # a recording cannot be simulated again
-            console.print(f"Ask why: {command} explain {name}")
+        see = f"see it (`{command} view {name}`)"
+        # A recording cannot be simulated again.
+        ask = f", ask why (`{command} explain {name}`)" if "scene" in trial.variant else ""
+        console.print(f"{story(trial, case_facts(folder, trial.case))}: {see}{ask}")
 
 
 def _split_assignments(assignments: Sequence[str]) -> dict[str, str]:

@@ -13,6 +13,7 @@ from vobench.report import board_table, leaderboard
 from vobench.report.board_formats import FORMATS
 from vobench.report.board_metric import METRICS
 from vobench.report.case_facts import case_facts, design_remarks
+from vobench.report.determinism import determinism_remarks
 from vobench.report.frame_statistics import Answered, EstimatorStatistics, summarize_frames
 from vobench.report.json_file import read_object
 from vobench.report.leaderboard import Board
@@ -57,7 +58,10 @@ def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> B
         facts,
         title=title,
         environment=read_environment(folder),
-        remarks=design_remarks(facts.values(), base_seed=_base_seed(folder)),
+        remarks=[
+            *design_remarks(facts.values(), base_seed=_base_seed(folder)),
+            *determinism_remarks(folder, scores),
+        ],
         until_ratio=recorded_ratio(folder),
     )
 

@@ -5,10 +5,19 @@ from math import inf
 from statistics import fmean
 
 from vobench.errors import InputError, UnknownNameError
+from vobench.report.cell import CaseFacts
 from vobench.report.division import is_ranked
 from vobench.runner.folder import STATUSES, SURVIVED, TrialScore, with_sequence
 
 CAMERAS = ("stereo", "mono", "colour")
+# What an estimator does whose trial has this status.
+DEEDS = {
+    "lost": "loses track",
+    "diverged": "diverges",
+    "timeout": "runs out of time",
+    "out_of_memory": "runs out of memory",
+    "crashed": "crashes",
+}
 
 
 def ranked(scores: Sequence[TrialScore], *, case: str | None, estimator: str | None) -> list[TrialScore]:
@@ -81,6 +90,16 @@ def _error_m(score: TrialScore) -> float:
 
 def _mean_error_m(scores: Sequence[TrialScore]) -> float:
     return fmean(_error_m(score) for score in scores)
+
+
+def story(score: TrialScore, facts: CaseFacts) -> str:
+    """How a trial went, in words: what its estimator did, and in which scenario and place, if the case states them."""
+    if score.status in SURVIVED or not facts.scenario or facts.severity is None:
+        return sentence(score)
+    deed = DEEDS.get(score.status, f"fails ({score.status})")
+    scenario = facts.scenario.replace("_", " ")
+    place = f" ({facts.place})" if facts.place else ""
+    return f"{score.estimator} {deed} in {scenario} at {facts.severity}{place}"
 
 
 def sentence(score: TrialScore) -> str:

@@ -1,5 +1,6 @@
 """One simulated case of a suite: the scene, lighting, rig, trajectory and camera of one sequence."""
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_spec import EXACT, Rendering, TruthNoise, Window
 from vobench.suite.trajectory import TrajectorySpec
 
+NOISE_SEED_STEP = 1_000_000  # between the seeds of two draws of noise for one case
 CALIBRATION_STREAM = 7_301  # an arbitrary number that separates calibration errors from a seed's other random streams
 
 
@@ -71,3 +73,15 @@ class Case:
         rng = np.random.default_rng([self.seed, CALIBRATION_STREAM])
         error = drawn_calibration_error(self.rig.calibration_error, nominal_rig, rng)
         return true_rig(nominal_rig, error)
+
+
+def with_noise_seeds(cases: Iterable[Case], count: int) -> Iterator[Case]:
+    """Each case with a number of draws of all noise: of sensors, of slipping wheels, and of calibration errors.
+
+    They share place and drive, so that a board averages them within one unit.
+    """
+    for case in cases:
+        yield case
+        for number in range(1, count):
+            name = f"{case.name}-noise{number + 1}"
+            yield replace(case, name=name, seed=case.seed + number * NOISE_SEED_STEP)
