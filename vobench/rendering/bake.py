@@ -2,7 +2,7 @@
 
 import json
 import zipfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,8 +17,8 @@ from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
-from vobench.rendering.direct_light import direct_light, mirror_images
-from vobench.rendering.emitter import emitters
+from vobench.rendering.direct_light import direct_light, importance, mirror_images
+from vobench.rendering.emitter import Emitter, emitters
 from vobench.rendering.gathering import Rounds, Smoothing
 from vobench.rendering.geometry import FAR_M, RayCaster, are_panes, face_materials, offset_from_surface
 from vobench.rendering.indirect_light import (
@@ -58,12 +58,12 @@ PROBES_M = 0.25  # between places that ask whether the sun reaches a face
 PLACED_DONE = 0.1
 GATHER_DONE = 0.4
 SMALL_M2 = 10.0  # of a thing that is sunlit as a whole
-SKY_RAYS = 64  # at least from a surfel to tell whether it sees the sky
+SKY_RAYS = 32  # at least from a surfel to tell whether it sees the sky
 BLIND = 0.02  # of a surfel's rays: one that sees less is inside something
 TEXTURE_FIELDS = ("texture", "emission_texture")
 SAMPLES = 4_000_000  # of light, by default: what a bake of minutes takes
 UNSEEN = 1e-3  # hits, of a texel that no ray has found
-INDIRECT_RAYS = 72  # from a surfel at first, by default
+INDIRECT_RAYS = 32  # from a surfel at first, by default
 SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 
 
@@ -72,7 +72,7 @@ class BakeSettings:
     """How finely light is sampled; rays per sample are squares so that they can be stratified.
 
     bounces: at most; they end where they add no more. indirect_rays: from each surfel at first; more follow from those
-    whose light has a relative standard error above light_noise, up to 8 times as many.
+    whose light has a relative standard error above light_noise, up to 16 times as many.
     """
 
     spacing_m: Positive = 0.025
@@ -275,7 +275,8 @@ def bake(
     is_usable = rounds.met() + rounds.escaped > BLIND
     spread = blend(points, groups, layout, visibility, is_usable)
     smoothing = Smoothing(spread[points.index[groups.middle]])
-    open_sky = (spread @ rounds.escaped)[points.index] > 0
+    # Averages over neighbours, because few rays of each may miss a narrow opening.
+    open_sky = (spread @ smoothing.averaged(rounds.escaped))[points.index] > 0
     static = StaticScene(faces, visibility, atlas, points, layout, groups.of, open_sky)
 
     # A surfel is represented by its points that rays have found, not by those that lie hidden under a rug.
@@ -284,18 +285,27 @@ def bake(
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
     reflectors = Reflectors(gatherer, points, point_areas_m2, settings.seed)
 
-    def by_photons(row: int, light: Floats) -> Floats:
+    def by_photons(row: int, light: Floats, scattered_lm: float) -> Floats:
         """The illuminance (2, S) by way of mirroring faces, by each half of the photons."""
         index, t_ns = instants[row]
         if not settings.bounces or isinstance(scene.lights[index], Sky):
             return np.zeros((2, len(groups)), np.float32)
         share = settings.indirect_rays / INDIRECT_RAYS / len(instants)
+        effort = share * reflectors.effort(light, scattered_lm)
         light_emitters = emitters(scene.lights[index], visibility, t_ns=t_ns)
-        flux_lm = reflectors.flux_lm(light_emitters, light, effort=share, seed=[settings.seed, row])
+        flux_lm = reflectors.flux_lm(light_emitters, light, effort=effort, seed=[settings.seed, row])
         return smoothing.density(flux_lm.T, area_m2).T
 
     straight = _straight(
-        scene, settings, static, groups, weights, instants=instants, by_photons=by_photons, report=report
+        scene,
+        settings,
+        static,
+        groups,
+        weights,
+        area_m2=area_m2,
+        instants=instants,
+        by_photons=by_photons,
+        report=report,
     )
     del static, points, layout  # bounces take memory of their own
     indirect, noise = _bounces(scene, settings, rounds, smoothing, straight=straight, instants=instants)
@@ -335,12 +345,14 @@ def _straight(
     groups: Surfels,
     weights: Floats,
     *,
+    area_m2: Floats,
     instants: list[tuple[int, float]],
-    by_photons: Callable[[int, Floats], Floats],
+    by_photons: Callable[[int, Floats, float], Floats],
     report: Report,
 ) -> _Straight:
-    """Trace the direct light of the lights at some instants; weights (P,) of points in their surfels."""
+    """Trace the direct light of the lights at some instants; weights (P,) of points in their surfels, area_m2 (S,)."""
     scatters = albedo(static.faces, scene.materials, static.points)
+    shares = _importance(scene, static.visibility, static.points.take(groups.middle), instants)
     direct = np.zeros((len(scene.lights), static.atlas.height, static.atlas.width), np.float32)
     illuminance_lx = np.zeros((len(instants), len(groups)), np.float32)
     received = np.zeros((len(instants), len(groups), 3), np.float32)
@@ -348,11 +360,12 @@ def _straight(
     # Backwards, so that a moving sun's layer ends as that of its first instant.
     for row in reversed(range(len(instants))):
         index, t_ns = instants[row]
-        light = direct_points(scene, index, static, settings, t_ns=t_ns)
+        light = direct_points(scene, index, static, settings, t_ns=t_ns, shares=shares[row])
         illuminance_lx[row] = groups.mean(light[:, None], weights)[:, 0]
         received[row] = groups.mean(scatters * light[:, None], weights)
         direct[index] = direct_layer(scene, index, static, light)
-        by_mirrors_lx[:, row] = by_photons(row, light)
+        scattered_lm = float((received[row] @ LUMINANCE * area_m2).sum())
+        by_mirrors_lx[:, row] = by_photons(row, light, scattered_lm)
         report(1 - (1 - GATHER_DONE) * row / len(instants))
     return _Straight(direct, groups.mean(scatters, weights), illuminance_lx, received, by_mirrors_lx)
 
@@ -480,6 +493,33 @@ def travelled_rad(sun: Sun) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps_rad)])
 
 
+def _all_emitters(light: Light, visibility: Visibility, t_ns: float) -> list[Emitter]:
+    """The emitters of a light and their images in mirrors."""
+    images = mirror_images(light, visibility, t_ns=t_ns)
+    return [*emitters(light, visibility, t_ns=t_ns), *images]
+
+
+def _importance(
+    scene: Scene,
+    visibility: Visibility,
+    middles: Texels,
+    instants: list[tuple[int, float]],
+) -> list[list[Floats]]:
+    """For the light of each instant, the shares (S,) of surfels' light that its emitters bring.
+
+    They are shares of the light of all lamps, or of all skies. The sun has none.
+    """
+    result: list[list[Floats]] = [[] for _ in instants]
+    is_sky = [isinstance(scene.lights[index], Sky) for index, _ in instants]
+    is_lamp = [not isinstance(scene.lights[index], Sky | Sun) for index, _ in instants]
+    for is_selected in (is_sky, is_lamp):
+        rows = np.flatnonzero(is_selected)
+        by_light = [_all_emitters(scene.lights[instants[row][0]], visibility, instants[row][1]) for row in rows]
+        for row, shares in zip(rows, importance(by_light, middles, visibility), strict=True):
+            result[row] = shares
+    return result
+
+
 def direct_points(
     scene: Scene,
     index: int,
@@ -487,13 +527,13 @@ def direct_points(
     settings: BakeSettings,
     *,
     t_ns: float,
+    shares: Sequence[Floats] = (),
 ) -> Floats:
-    """The direct light (P,) of one light on the points."""
+    """The direct light (P,) of one light on the points; `shares` as by `importance` of each of its emitters."""
     light = scene.lights[index]
     total = np.zeros(len(static.points), np.float32)
     side = round(np.sqrt(settings.light_rays))
-    images = mirror_images(light, static.visibility, t_ns=t_ns)
-    for emitter in [*emitters(light, static.visibility, t_ns=t_ns), *images]:
+    for nth, emitter in enumerate(_all_emitters(light, static.visibility, t_ns)):
         stop.check()
         everywhere = np.ones(len(static.points), bool)
         is_reachable = static.open_sky if emitter.sky == "open" else everywhere
@@ -505,6 +545,7 @@ def direct_points(
             static.visibility,
             side=side,
             among=is_reachable,
+            importance=shares[nth] if shares else None,
         )
     return total
 

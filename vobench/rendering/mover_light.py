@@ -410,8 +410,13 @@ class MoverLight:
         faces = baked.faces
         materials = baked.scene.materials
         self._scene = baked.scene
-        self._radiosity = baked.patches.radiosity
+        # All lights beside one another (S, 3 L), so that one product serves them all.
+        surfel_count = len(baked.patches.area_m2)
+        by_surfel = baked.patches.radiosity.transpose(1, 0, 2)
+        self._radiosity = np.ascontiguousarray(by_surfel).reshape(surfel_count, -1)
         self._rays = GATHER_RAYS if baked.settings.bounces else 0
+        self._emitters: list[SampledEmitter] = []
+        self._emitters_key: tuple[float, ...] | None = None
         is_solid = (faces.mover >= 0) & ~are_panes(faces, materials)
         self.bodies = moving_bodies(baked.scene.movers, faces, is_solid)
         self._visibility = Visibility(faces, materials, np.flatnonzero(faces.mover < 0))
@@ -461,11 +466,17 @@ class MoverLight:
     def emitters(self, suns_ns: Sequence[float]) -> list[SampledEmitter]:
         """The emitters of all lights. The arrays of the shaders limit the number of their samples.
 
-        `suns_ns` (L,) is the time at which the direction of a moving sun is evaluated.
+        `suns_ns` (L,) is the time at which the direction of a moving sun is evaluated. The emitters of the last call
+        are returned again if no time has changed.
         """
-        probe_count = sum(len(body.probes_m) for body in self.bodies)
-        most = min(MOST_MAPS // max(len(self.bodies), 1), MOST_REACHES // max(probe_count, 1))
-        return sampled_emitters(self._scene.lights, self._visibility, suns_ns, min(most, MOST_SAMPLES))
+        key = tuple(suns_ns)
+        if key != self._emitters_key:
+            probe_count = sum(len(body.probes_m) for body in self.bodies)
+            most = min(MOST_MAPS // max(len(self.bodies), 1), MOST_REACHES // max(probe_count, 1))
+            lights = self._scene.lights
+            self._emitters = sampled_emitters(lights, self._visibility, suns_ns, min(most, MOST_SAMPLES))
+            self._emitters_key = key
+        return self._emitters
 
     def at(self, t_ns: float, suns_ns: Sequence[float]) -> MoverLightAt:
         """The movers at a time, and the light around them.
@@ -585,14 +596,14 @@ class MoverLight:
         lights = self._scene.lights
         places_m = np.repeat(probes_m, 6, axis=0).astype(np.float32)
         gathered = self._gatherer.gather(_points(places_m, normals), rays=self._rays)
-        surfel_count = self._radiosity.shape[1]
-        result = np.zeros((len(normals), len(lights), 3), np.float32)
+        surfel_count = len(self._radiosity)
+        by_surfels = gathered.table[:, :surfel_count] @ self._radiosity
+        result = by_surfels.reshape(len(normals), len(lights), 3)
+        by_mirrors = gathered.table[:, surfel_count:].toarray()  # (6 N, L)
         sky_row = 0
         for index, light in enumerate(lights):
-            result[:, index] = gathered.table[:, :surfel_count] @ self._radiosity[index]
             if isinstance(light, AreaLight):
-                by_mirrors = gathered.table[:, surfel_count + index].toarray()
-                result[:, index] += np.pi * light.luminance_cd_m2 * by_mirrors
+                result[:, index] += np.pi * light.luminance_cd_m2 * by_mirrors[:, index, None]
             if isinstance(light, Sky):
                 result[:, index] += gathered.sky[sky_row][:, None]
                 sky_row += 1
