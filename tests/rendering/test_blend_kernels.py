@@ -6,7 +6,7 @@ import pytest
 from vobench.geometry.se3 import Array
 from vobench.rendering.blend_kernels import LEAST, WIDTH, count_weights, write_weights
 
-Z = [0.0, 0.0, 1.0]
+Z = np.array([0.0, 0.0, 1.0], np.float32)
 SPACING_M = 0.1
 
 
@@ -15,7 +15,7 @@ def row_of_surfels(*points_m: float, hidden: tuple[int, ...] = (), turned: tuple
     count = len(points_m)
     middles_m = np.zeros((5, 3), np.float32)
     middles_m[:, 0] = SPACING_M * np.arange(-2, 3)
-    normals = np.tile(np.float32(Z), (5, 1))
+    normals = np.tile(Z, (5, 1))
     for surfel in turned:
         normals[surfel] = -normals[surfel]
     is_hidden = np.zeros((5, 5), bool)
@@ -25,7 +25,7 @@ def row_of_surfels(*points_m: float, hidden: tuple[int, ...] = (), turned: tuple
     inputs = (
         np.arange(count + 1, dtype=np.int32),  # the last texel has no point
         positions_m,
-        np.tile(np.float32(Z), (count, 1)),
+        np.tile(Z, (count, 1)),
         np.full(count, 2, np.int32),
         np.tile(np.arange(5), (5, 1)),
         is_hidden,

@@ -58,12 +58,12 @@ PROBES_M = 0.25  # between places that ask whether the sun reaches a face
 PLACED_DONE = 0.1
 GATHER_DONE = 0.4
 SMALL_M2 = 10.0  # of a thing that is sunlit as a whole
-SKY_RAYS = 32  # at least from a surfel to tell whether it sees the sky
+SKY_RAYS = 64  # at least from a surfel to tell whether it sees the sky
 BLIND = 0.02  # of a surfel's rays: one that sees less is inside something
 TEXTURE_FIELDS = ("texture", "emission_texture")
 SAMPLES = 4_000_000  # of light, by default: what a bake of minutes takes
 UNSEEN = 1e-3  # hits, of a texel that no ray has found
-INDIRECT_RAYS = 32  # from a surfel at first, by default
+INDIRECT_RAYS = 72  # from a surfel at first, by default
 SUN_STEP_RAD = np.deg2rad(3)  # between the suns whose indirect light is baked
 
 
@@ -72,7 +72,7 @@ class BakeSettings:
     """How finely light is sampled; rays per sample are squares so that they can be stratified.
 
     bounces: at most; they end where they add no more. indirect_rays: from each surfel at first; more follow from those
-    whose light has a relative standard error above light_noise, up to 16 times as many.
+    whose light has a relative standard error above light_noise, up to 8 times as many.
     """
 
     spacing_m: Positive = 0.025
@@ -275,8 +275,7 @@ def bake(
     is_usable = rounds.met() + rounds.escaped > BLIND
     spread = blend(points, groups, layout, visibility, is_usable)
     smoothing = Smoothing(spread[points.index[groups.middle]])
-    # Averages over neighbours, because few rays of each may miss a narrow opening.
-    open_sky = (spread @ smoothing.averaged(rounds.escaped))[points.index] > 0
+    open_sky = (spread @ rounds.escaped)[points.index] > 0
     static = StaticScene(faces, visibility, atlas, points, layout, groups.of, open_sky)
 
     # A surfel is represented by its points that rays have found, not by those that lie hidden under a rug.

@@ -20,7 +20,7 @@ SMOOTHINGS = 4  # how often light from far surfels is averaged over neighbouring
 VARIANCE_SMOOTHINGS = 2  # how often variances are smoothed
 DARK = 0.1  # the noise of a place darker than this share of the mean light is relative to this share
 FAINTEST = 1e-9  # the smallest light in lux that noise is relative to, for a scene without light
-MOST_ROUNDS = 16  # the largest number of rounds of rays from a surfel
+MOST_ROUNDS = 8  # the largest number of rounds of rays from a surfel
 FEWEST = 0.002  # the share of noisy surfels up to which another round is not worth its overhead
 
 

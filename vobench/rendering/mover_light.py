@@ -564,31 +564,42 @@ class MoverLight:
 
         Stationary faces reduce it. For hard emitters, the strength is that without occlusion.
         """
-        columns = []
-        for emitter in sampled:
-            place = emitter.places
-            vectors_m = place[None, :, :3] - place[None, :, 3:] * probes_m[:, None]
-            shape = vectors_m.shape[:2]
-            strength = np.broadcast_to(emitter.strength, shape)
-            if not emitter.is_hard:
-                light = self._scene.lights[emitter.light]
-                directions = unit(vectors_m)
-                is_sky = isinstance(light, Sky)
-                if is_sky and np.isfinite(emitter.ball.radius_m):
-                    luminance = light.luminance_cd_m2(directions.reshape(-1, 3)) if isinstance(light, Sky) else 0
-                    strength = strength * np.reshape(luminance, shape)
-                ends_m = FAR_M * directions if is_sky else vectors_m * (1 - 1e-3)
-                origins_m = np.broadcast_to(probes_m[:, None], vectors_m.shape).reshape(-1, 3)
-                passing = self._visibility.passing(
-                    origins_m.astype(np.float32), ends_m.reshape(-1, 3).astype(np.float32)
-                ).reshape(shape)
-                if is_sky and not np.isfinite(emitter.ball.radius_m) and self._visibility.sky_panes:
-                    # Light through a pane already belongs to the emitter of this pane.
-                    by_pane = self._visibility.crosses_sky_pane(origins_m, ends_m.reshape(-1, 3)).reshape(shape)
-                    passing = passing * ~by_pane
-                strength = strength * passing
-            columns.append(strength)
-        return np.concatenate([np.zeros((len(probes_m), 0)), *columns], 1)
+        if not sampled:
+            return np.zeros((len(probes_m), 0))
+        counts = [len(emitter.places) for emitter in sampled]
+        strengths = np.concatenate([emitter.strength for emitter in sampled])
+        result: Array = np.tile(strengths, (len(probes_m), 1))
+        soft = np.flatnonzero(np.repeat([not emitter.is_hard for emitter in sampled], counts))
+        if not len(soft):
+            return result
+        places = np.concatenate([emitter.places for emitter in sampled])[soft]
+        light_index = np.repeat([emitter.light for emitter in sampled], counts)[soft]
+        is_finite = np.repeat([bool(np.isfinite(emitter.ball.radius_m)) for emitter in sampled], counts)[soft]
+        is_sky = np.array([isinstance(light, Sky) for light in self._scene.lights])[light_index]
+
+        vectors_m = places[:, :3] - places[:, 3:] * probes_m[:, None]  # (N, K, 3)
+        directions = unit(vectors_m)
+        arriving = result[:, soft]
+        for index, light in enumerate(self._scene.lights):
+            by_pane = np.flatnonzero(is_sky & is_finite & (light_index == index))
+            if isinstance(light, Sky) and len(by_pane):
+                luminance_cd_m2 = light.luminance_cd_m2(directions[:, by_pane].reshape(-1, 3))
+                arriving[:, by_pane] *= luminance_cd_m2.reshape(len(probes_m), -1)
+
+        # The rays of all emitters at once, because each call costs more than the rays of one emitter.
+        ends_m = np.where(is_sky[:, None], FAR_M * directions, vectors_m * (1 - 1e-3)).astype(np.float32)
+        origins_m = np.broadcast_to(probes_m[:, None], ends_m.shape).astype(np.float32)
+        passing = self._visibility.passing(origins_m.reshape(-1, 3), ends_m.reshape(-1, 3))
+        arriving *= passing.reshape(arriving.shape)
+        open_sky = np.flatnonzero(is_sky & ~is_finite)
+        if len(open_sky):
+            # Light through a pane already belongs to the emitter of this pane.
+            crosses_pane = self._visibility.crosses_sky_pane(
+                origins_m[:, open_sky].reshape(-1, 3), ends_m[:, open_sky].reshape(-1, 3)
+            )
+            arriving[:, open_sky] *= ~crosses_pane.reshape(len(probes_m), -1)
+        result[:, soft] = arriving
+        return result
 
     def _cubes(self, probes_m: Array) -> Floats:
         """The indirect illuminance (N, 6, L, 3) at probes (N, 3), by the normals AXES and by lights at level 1."""
@@ -607,7 +618,7 @@ class MoverLight:
             if isinstance(light, Sky):
                 result[:, index] += gathered.sky[sky_row][:, None]
                 sky_row += 1
-        return result.reshape(len(probes_m), 6, len(lights), 3)
+        return np.asarray(result.reshape(len(probes_m), 6, len(lights), 3))
 
     def _hard(self, points_m: Array, normals: Array, suns_ns: Sequence[float]) -> Floats:
         """The illuminance (H, P) of points by each hard emitter; only stationary faces cast shadows."""
