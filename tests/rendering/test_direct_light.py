@@ -176,7 +176,7 @@ def test_shadows_of_unimportant_emitters_take_fewer_rays_and_hardly_change(monke
     monkeypatch.setattr(visibility, "passing", counted)
     ray_counts = []
     results = []
-    for share in (1.0, 0.05, 0.01):
+    for share in (1.0, 0.15, 0.05):
         sent.clear()
         light_lx = direct_light(
             emitter,
@@ -190,8 +190,8 @@ def test_shadows_of_unimportant_emitters_take_fewer_rays_and_hardly_change(monke
         )
         ray_counts.append(sum(sent))
         results.append(light_lx)
-    assert ray_counts[0] > 2 * ray_counts[1] > 4 * ray_counts[2]
+    assert ray_counts[0] > ray_counts[1] > ray_counts[2]
     open_lx = open_light(emitter, points, np.arange(len(points)), 4)[0]
-    for light_lx, tolerance in zip(results[1:], (0.1, 0.2), strict=True):
+    for light_lx, tolerance in zip(results[1:], (0.05, 0.1), strict=True):
         assert np.sqrt((((light_lx - results[0]) / open_lx) ** 2).mean()) < tolerance
         assert light_lx.mean() == pytest.approx(results[0].mean(), rel=0.05)

@@ -143,11 +143,10 @@ WIDE_RAD = 0.6
 RIM = 2  # texels around a place of half shadow
 PARTIAL = 0.2  # share of the points around that see an emitter in part, from which a shadow takes more rays
 LEAST_LX = 1e-30  # by which nothing is divided that is darker
-# Shares of the light of a place, of what an emitter brings: below MAJOR its wide shadows take no further rays, below
-# MINOR its shadows' edges neither, and below FAINT one ray tells whether it is seen.
+# Shares of the light of a place, of what an emitter brings: below MAJOR its wide shadows take no further rays, and
+# below MINOR its shadows' edges neither.
 MAJOR = 0.2
 MINOR = 0.06
-FAINT = 0.015
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,7 +187,6 @@ def direct_light(
     if is_hard and emitter.sky != "pane":
         return receivers.hard_light(emitter, side)
     sides = np.where(share < MINOR, np.minimum(sides, max(side // 2, 1)), sides)
-    sides = np.where(share < FAINT, 1, sides)
     if emitter.sky == "pane":
         return receivers.pane_light(emitter, sides)
     return receivers.soft_light(emitter, sides, side)
@@ -353,8 +351,8 @@ def importance(
 ) -> list[list[Floats]]:
     """The share (S,) of the light of lamps or of the sky at the middles of surfels that each of their emitters brings.
 
-    One ray each tells which emitters are seen there; the share of one that is hidden is what it would bring if it
-    alone were seen.
+    Few rays tell which emitters are seen there; the share of one that is hidden is what it would bring if it alone were
+    seen. The share of an emitter whose light so few rays do not tell is infinite.
     """
     open_lx = []
     total_lx = np.zeros(len(middles), np.float32)
@@ -362,10 +360,10 @@ def importance(
         of_light = []
         for emitter in light_emitters:
             rows = reached(emitter, middles, np.arange(len(middles)))
-            arrived_lx, _, unshaded_lx = arriving(emitter, middles, rows, visibility, Rays(1))
+            arrived_lx, _, unshaded_lx = arriving(emitter, middles, rows, visibility, Rays(2))
             total_lx[rows] += arrived_lx
             everywhere_lx = np.zeros(len(middles), np.float32)
-            everywhere_lx[rows] = unshaded_lx
+            everywhere_lx[rows] = unshaded_lx if emitter.open_side == 1 else np.inf
             of_light.append(everywhere_lx)
         open_lx.append(of_light)
     return [[each / np.maximum(total_lx, LEAST_LX) for each in of_light] for of_light in open_lx]
