@@ -5,17 +5,7 @@ import pytest
 
 from tests.rendering.rectangles import rectangle
 from vobench.geometry.se3 import Array
-from vobench.rendering.array_types import Floats
-from vobench.rendering.direct_light import (
-    Rays,
-    arriving,
-    direct_light,
-    first_rays,
-    importance,
-    mirror_images,
-    open_light,
-    reached,
-)
+from vobench.rendering.direct_light import Rays, arriving, direct_light, first_rays, mirror_images, open_light, reached
 from vobench.rendering.emitter import Emitter, emitters
 from vobench.rendering.texel import Texels, texels
 from vobench.rendering.texel_layout import TexelLayout
@@ -31,8 +21,7 @@ MATERIALS = {"a": Material(), "mirror": Material("mirror", tint=0.8)}
 X, Y, Z = np.eye(3)
 FLOOR = rectangle(0 * Z, 2 * X, 2 * Y, "a", "floor")
 BULB = PointLight("bulb", np.array([0.3, -0.2, 1.5]), 4 * np.pi * 100)
-PANEL_M = np.array([0.2, 0.1, 2.0])
-PANEL = ceiling_light("panel", PANEL_M, (0.4, 0.3), power_lm=500)
+PANEL = ceiling_light("panel", np.array([0.2, 0.1, 2.0]), (0.4, 0.3), power_lm=500)
 
 
 def open_floor(*more: Thing) -> tuple[Texels, TexelLayout, Visibility]:
@@ -140,58 +129,3 @@ def test_wide_emitters_take_more_rays_than_narrow_ones_and_points_take_one() -> 
     (bulb,) = emitters(BULB, open_floor()[2])
     assert isinstance(bulb, Emitter)
     assert first_rays(bulb, points_m, 8).tolist() == [1]
-
-
-def test_importance_is_the_share_of_the_light_that_an_emitter_brings() -> None:
-    points, _, visibility = open_floor()
-    dim = ceiling_light("dim", np.array([0.2, 0.1, 2.0]), (0.4, 0.3), power_lm=50)
-    by_light = [emitters(light, visibility) for light in (PANEL, dim)]
-    (strong,), (weak,) = importance(by_light, points, visibility)
-    np.testing.assert_allclose(strong, 10 / 11, rtol=1e-4)
-    np.testing.assert_allclose(weak, 1 / 11, rtol=1e-4)
-
-
-def test_a_hidden_emitter_counts_with_what_it_would_bring_if_it_were_seen() -> None:
-    lid = rectangle(PANEL_M - 0.2 * Z, 1.5 * Y, 1.5 * X, "a", "lid")
-    points, _, visibility = open_floor(lid)
-    low = ceiling_light("low", np.array([0.2, 0.1, 1.5]), (0.4, 0.3), power_lm=50)
-    (hidden,), (seen,) = importance([emitters(light, visibility) for light in (PANEL, low)], points, visibility)
-    below = np.abs(points.points_m[:, :2] - PANEL_M[:2]).max(1) < 0.3
-    assert (hidden[below] > 1).all()
-    np.testing.assert_allclose(seen[below], 1, rtol=1e-5)
-
-
-def test_shadows_of_unimportant_emitters_take_fewer_rays_and_hardly_change(monkeypatch: pytest.MonkeyPatch) -> None:
-    block = rectangle(PANEL_M - 1.2 * Z, 0.5 * Y, 0.5 * X, "a", "block")
-    points, layout, visibility = open_floor(block)
-    (emitter,) = emitters(PANEL, visibility)
-    cells = np.arange(len(points), dtype=np.int32)
-    sent = []
-    passing = visibility.passing
-
-    def counted(origins_m: Floats, segments_m: Floats) -> Floats:
-        sent.append(len(origins_m))
-        return passing(origins_m, segments_m)
-
-    monkeypatch.setattr(visibility, "passing", counted)
-    ray_counts = []
-    results = []
-    for share in (1.0, 0.15, 0.05):
-        sent.clear()
-        light_lx = direct_light(
-            emitter,
-            points,
-            layout,
-            cells,
-            visibility,
-            side=4,
-            among=np.ones(len(points), bool),
-            importance=np.full(len(points), share, np.float32),
-        )
-        ray_counts.append(sum(sent))
-        results.append(light_lx)
-    assert ray_counts[0] > ray_counts[1] > ray_counts[2]
-    open_lx = open_light(emitter, points, np.arange(len(points)), 4)[0]
-    for light_lx, tolerance in zip(results[1:], (0.05, 0.1), strict=True):
-        assert np.sqrt((((light_lx - results[0]) / open_lx) ** 2).mean()) < tolerance
-        assert light_lx.mean() == pytest.approx(results[0].mean(), rel=0.05)

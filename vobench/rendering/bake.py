@@ -2,7 +2,7 @@
 
 import json
 import zipfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from itertools import pairwise
 from pathlib import Path
@@ -17,8 +17,8 @@ from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
-from vobench.rendering.direct_light import direct_light, importance, mirror_images
-from vobench.rendering.emitter import Emitter, emitters
+from vobench.rendering.direct_light import direct_light, mirror_images
+from vobench.rendering.emitter import emitters
 from vobench.rendering.gathering import Rounds, Smoothing
 from vobench.rendering.geometry import FAR_M, RayCaster, are_panes, face_materials, offset_from_surface
 from vobench.rendering.indirect_light import (
@@ -351,7 +351,6 @@ def _straight(
 ) -> _Straight:
     """Trace the direct light of the lights at some instants; weights (P,) of points in their surfels, area_m2 (S,)."""
     scatters = albedo(static.faces, scene.materials, static.points)
-    shares = _importance(scene, static.visibility, static.points.take(groups.middle), instants)
     direct = np.zeros((len(scene.lights), static.atlas.height, static.atlas.width), np.float32)
     illuminance_lx = np.zeros((len(instants), len(groups)), np.float32)
     received = np.zeros((len(instants), len(groups), 3), np.float32)
@@ -359,7 +358,7 @@ def _straight(
     # Backwards, so that a moving sun's layer ends as that of its first instant.
     for row in reversed(range(len(instants))):
         index, t_ns = instants[row]
-        light = direct_points(scene, index, static, settings, t_ns=t_ns, shares=shares[row])
+        light = direct_points(scene, index, static, settings, t_ns=t_ns)
         illuminance_lx[row] = groups.mean(light[:, None], weights)[:, 0]
         received[row] = groups.mean(scatters * light[:, None], weights)
         direct[index] = direct_layer(scene, index, static, light)
@@ -492,33 +491,6 @@ def travelled_rad(sun: Sun) -> Array:
     return np.concatenate([[0.0], np.cumsum(steps_rad)])
 
 
-def _all_emitters(light: Light, visibility: Visibility, t_ns: float) -> list[Emitter]:
-    """The emitters of a light and their images in mirrors."""
-    images = mirror_images(light, visibility, t_ns=t_ns)
-    return [*emitters(light, visibility, t_ns=t_ns), *images]
-
-
-def _importance(
-    scene: Scene,
-    visibility: Visibility,
-    middles: Texels,
-    instants: list[tuple[int, float]],
-) -> list[list[Floats]]:
-    """For the light of each instant, the shares (S,) of surfels' light that its emitters bring.
-
-    They are shares of the light of all lamps, or of all skies. The sun has none.
-    """
-    result: list[list[Floats]] = [[] for _ in instants]
-    is_sky = [isinstance(scene.lights[index], Sky) for index, _ in instants]
-    is_lamp = [not isinstance(scene.lights[index], Sky | Sun) for index, _ in instants]
-    for is_selected in (is_sky, is_lamp):
-        rows = np.flatnonzero(is_selected)
-        by_light = [_all_emitters(scene.lights[instants[row][0]], visibility, instants[row][1]) for row in rows]
-        for row, shares in zip(rows, importance(by_light, middles, visibility), strict=True):
-            result[row] = shares
-    return result
-
-
 def direct_points(
     scene: Scene,
     index: int,
@@ -526,13 +498,13 @@ def direct_points(
     settings: BakeSettings,
     *,
     t_ns: float,
-    shares: Sequence[Floats] = (),
 ) -> Floats:
-    """The direct light (P,) of one light on the points; `shares` as by `importance` of each of its emitters."""
+    """The direct light (P,) of one light on the points."""
     light = scene.lights[index]
     total = np.zeros(len(static.points), np.float32)
     side = round(np.sqrt(settings.light_rays))
-    for nth, emitter in enumerate(_all_emitters(light, static.visibility, t_ns)):
+    images = mirror_images(light, static.visibility, t_ns=t_ns)
+    for emitter in [*emitters(light, static.visibility, t_ns=t_ns), *images]:
         stop.check()
         everywhere = np.ones(len(static.points), bool)
         is_reachable = static.open_sky if emitter.sky == "open" else everywhere
@@ -544,7 +516,6 @@ def direct_points(
             static.visibility,
             side=side,
             among=is_reachable,
-            importance=shares[nth] if shares else None,
         )
     return total
 

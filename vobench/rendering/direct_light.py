@@ -1,6 +1,5 @@
 """Direct light at texels: stratified shadow rays, and lamps that flat mirrors show."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -143,10 +142,6 @@ WIDE_RAD = 0.6
 RIM = 2  # texels around a place of half shadow
 PARTIAL = 0.2  # share of the points around that see an emitter in part, from which a shadow takes more rays
 LEAST_LX = 1e-30  # by which nothing is divided that is darker
-# Shares of the light of a place, of what an emitter brings: below MAJOR its wide shadows take no further rays, and
-# below MINOR its shadows' edges neither.
-MAJOR = 0.2
-MINOR = 0.06
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,45 +161,34 @@ def direct_light(
     *,
     side: int,
     among: Mask,
-    importance: Floats | None = None,
 ) -> Floats:
     """Illuminance (P,) in lux that one emitter gives at level 1 to those among the points; of coats what enters.
 
     Few rays tell whether the emitter is seen, of soft shadows at every other point along rows and columns. Where it
     is neither seen nor hidden all around, within RIM texels or in the same of the cells (P,), rays from all over each
     texel follow. Elsewhere its light needs no rays, and the sky in a pane is smoothed instead.
-
-    `importance` (S,) is the share of the light of each cell that the emitter brings, 1 everywhere if it is not given.
-    Where it is small, fewer rays are sent.
     """
     lit = reached(emitter, points, np.flatnonzero(among))
     if not len(lit):
         return np.zeros(len(points), np.float32)
-    share = np.ones(len(lit), np.float32) if importance is None else importance[cells[lit]]
-    receivers = Receivers(points, layout, cells, visibility, lit, share)
+    receivers = Receivers(points, layout, cells, visibility, lit)
     sides = first_rays(emitter, points.points_m[lit], side)
-    is_hard = not (sides > 1).any()
-    if is_hard and emitter.sky != "pane":
-        return receivers.hard_light(emitter, side)
-    sides = np.where(share < MINOR, np.minimum(sides, max(side // 2, 1)), sides)
     if emitter.sky == "pane":
         return receivers.pane_light(emitter, sides)
+    if not (sides > 1).any():
+        return receivers.hard_light(emitter, side)
     return receivers.soft_light(emitter, sides, side)
 
 
 @dataclass(frozen=True, slots=True)
 class Receivers:
-    """Points that an emitter may light, at rows `lit` (N,) among all (P,), and what may hide it from them.
-
-    `share` (N,) is the share of the light of each of them that the emitter brings, about.
-    """
+    """Points that an emitter may light, at rows `lit` (N,) among all (P,), and what may hide it from them."""
 
     points: Texels
     layout: TexelLayout
     cells: Indices
     visibility: Visibility
     lit: Rows
-    share: Floats
 
     def pane_light(self, emitter: Emitter, sides: NDArray[np.int64]) -> Floats:
         """The sky's light (P,) in a pane, by side x side (N,) rays from every other point along rows and columns."""
@@ -247,11 +231,7 @@ class Receivers:
             share[asked] = total / np.maximum(unshaded, LEAST_LX)
         share = layout.interpolated(share)
 
-        # Where the emitter brings little, its shadow is smoothed and takes no more rays.
-        is_minor = self.share < MINOR
-        minor = self.lit[is_minor]
-        share[minor] = layout.blurred_among(share, minor, np.ones(len(minor), bool))
-        half = self._half_shadow(clear, self.cells, self.lit[~is_minor], rim=RIM)
+        half = self._half_shadow(clear, self.cells, self.lit, rim=RIM)
         rays = Rays(max(side // 2, 1), spread=True)
         total, clear[half], unshaded = arriving(emitter, points, half, self.visibility, rays, self._pattern(stride=1))
         share[half] = total / np.maximum(unshaded, LEAST_LX)
@@ -259,9 +239,7 @@ class Receivers:
         # More rays where shadows are wide.
         is_partial = (clear > 0) & (clear < 1)
         density = layout.blurred_among(is_partial, half, unshaded > 0)
-        is_major = np.zeros(len(points), bool)
-        is_major[self.lit] = self.share >= MAJOR
-        wide = half[(density > PARTIAL) & is_major[half]]
+        wide = half[density > PARTIAL]
         more = Rays(max(3 * side // 4, 1), spread=True)
         halfway = self._pattern(stride=1, turn=0.5)
         total, more_clear, more_unshaded = arriving(emitter, points, wide, self.visibility, more, halfway)
@@ -342,31 +320,6 @@ def _spread_bits(numbers: Rows) -> NDArray[np.uint32]:
     bits = (bits | bits << np.uint32(4)) & np.uint32(0x30F)
     bits = (bits | bits << np.uint32(2)) & np.uint32(0x333)
     return (bits | bits << np.uint32(1)) & np.uint32(0x555)
-
-
-def importance(
-    emitters_by_light: Sequence[Sequence[Emitter]],
-    middles: Texels,
-    visibility: Visibility,
-) -> list[list[Floats]]:
-    """The share (S,) of the light of lamps or of the sky at the middles of surfels that each of their emitters brings.
-
-    Few rays tell which emitters are seen there; the share of one that is hidden is what it would bring if it alone were
-    seen. The share of an emitter whose light so few rays do not tell is infinite.
-    """
-    open_lx = []
-    total_lx = np.zeros(len(middles), np.float32)
-    for light_emitters in emitters_by_light:
-        of_light = []
-        for emitter in light_emitters:
-            rows = reached(emitter, middles, np.arange(len(middles)))
-            arrived_lx, _, unshaded_lx = arriving(emitter, middles, rows, visibility, Rays(2))
-            total_lx[rows] += arrived_lx
-            everywhere_lx = np.zeros(len(middles), np.float32)
-            everywhere_lx[rows] = unshaded_lx if emitter.open_side == 1 else np.inf
-            of_light.append(everywhere_lx)
-        open_lx.append(of_light)
-    return [[each / np.maximum(total_lx, LEAST_LX) for each in of_light] for of_light in open_lx]
 
 
 def reached(emitter: Emitter, points: Texels, rows: Rows) -> Rows:
