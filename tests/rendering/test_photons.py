@@ -4,10 +4,13 @@ import numpy as np
 import pytest
 
 from tests.rendering.rectangles import rectangle, sheet
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import BakedScene, BakeSettings, bake, bodies, static_points
+from vobench.rendering.indirect_light import Gatherer, response
+from vobench.rendering.photons import ALL_PHOTONS_SHARE, LEAST_EFFORT, TYPICAL_COSINE, Reflectors
+from vobench.rendering.unwrap import unwrap
 from vobench.scene.light import PointLight, Sun
 from vobench.scene.material import Material, fresnel
-from vobench.scene.scene import Scene
+from vobench.scene.scene import Scene, triangles
 
 ETA = 1.5
 MATERIALS = {
@@ -56,3 +59,25 @@ def test_a_coat_shows_a_bulb_as_an_image_of_fresnels_share() -> None:
     # The image is 2 m below the ceiling, near to right above it.
     expected_lm = 1000 / (4 * np.pi) / 2.0**2 * float(fresnel(np.array(1.0), ETA)) * 0.36
     assert ceiling_flux_lm(baked) == pytest.approx(expected_lm, rel=0.06)
+
+
+def test_photons_are_fewer_where_they_carry_little_of_the_light() -> None:
+    """A bulb over a coated floor: its effort grows with the square of the share that the coat mirrors."""
+    floor = sheet(np.array([-1.0, -1.0, 0.0]), 2 * X, 2 * Y, "coated", "floor")
+    scene = Scene("coat", (floor,), MATERIALS, (PointLight("bulb", Z, 1000.0),))
+    faces = triangles(scene)
+    atlas = unwrap(faces, np.full(len(faces), 0.1), bodies(scene, faces))
+    visibility, points, _, area_m2 = static_points(scene, faces, atlas, seed=0)
+    surfel_of = np.full(atlas.height * atlas.width, -1, np.int32)
+    gatherer = Gatherer(
+        atlas, visibility, response(faces, MATERIALS, visibility), [], surfel_of=surfel_of, surfels=1, lamps=0
+    )
+    reflectors = Reflectors(gatherer, points, area_m2, seed=0)
+    light_lx = np.full(len(points), 100.0, np.float32)
+    arriving_lm = 100.0 * area_m2.sum()
+    mirrored = float(fresnel(np.array(float(TYPICAL_COSINE)), ETA))
+    assert reflectors.effort(light_lx, 0.0) == 1
+    assert reflectors.effort(light_lx, 1e3 * arriving_lm) == LEAST_EFFORT
+    scattered_lm = 2 * mirrored * arriving_lm / ALL_PHOTONS_SHARE
+    assert reflectors.effort(light_lx, scattered_lm) == pytest.approx(1 / 4, rel=1e-3)
+    assert reflectors.effort(np.zeros_like(light_lx), scattered_lm) == 1

@@ -286,18 +286,27 @@ def bake(
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
     reflectors = Reflectors(gatherer, points, point_areas_m2, settings.seed)
 
-    def by_photons(row: int, light: Floats) -> Floats:
+    def by_photons(row: int, light: Floats, scattered_lm: float) -> Floats:
         """The illuminance (2, S) by way of mirroring faces, by each half of the photons."""
         index, t_ns = instants[row]
         if not settings.bounces or isinstance(scene.lights[index], Sky):
             return np.zeros((2, len(groups)), np.float32)
         share = settings.indirect_rays / INDIRECT_RAYS / len(instants)
+        effort = share * reflectors.effort(light, scattered_lm)
         light_emitters = emitters(scene.lights[index], visibility, t_ns=t_ns)
-        flux_lm = reflectors.flux_lm(light_emitters, light, effort=share, seed=[settings.seed, row])
+        flux_lm = reflectors.flux_lm(light_emitters, light, effort=effort, seed=[settings.seed, row])
         return smoothing.density(flux_lm.T, area_m2).T
 
     straight = _straight(
-        scene, settings, static, groups, weights, instants=instants, by_photons=by_photons, report=report
+        scene,
+        settings,
+        static,
+        groups,
+        weights,
+        area_m2=area_m2,
+        instants=instants,
+        by_photons=by_photons,
+        report=report,
     )
     del static, points, layout  # bounces take memory of their own
     indirect, noise = _bounces(scene, settings, rounds, smoothing, straight=straight, instants=instants)
@@ -337,11 +346,12 @@ def _straight(
     groups: Surfels,
     weights: Floats,
     *,
+    area_m2: Floats,
     instants: list[tuple[int, float]],
-    by_photons: Callable[[int, Floats], Floats],
+    by_photons: Callable[[int, Floats, float], Floats],
     report: Report,
 ) -> _Straight:
-    """Trace the direct light of the lights at some instants; weights (P,) of points in their surfels."""
+    """Trace the direct light of the lights at some instants; weights (P,) of points in their surfels, area_m2 (S,)."""
     scatters = albedo(static.faces, scene.materials, static.points)
     direct = np.zeros((len(scene.lights), static.atlas.height, static.atlas.width), np.float32)
     illuminance_lx = np.zeros((len(instants), len(groups)), np.float32)
@@ -354,7 +364,8 @@ def _straight(
         illuminance_lx[row] = groups.mean(light[:, None], weights)[:, 0]
         received[row] = groups.mean(scatters * light[:, None], weights)
         direct[index] = direct_layer(scene, index, static, light)
-        by_mirrors_lx[:, row] = by_photons(row, light)
+        scattered_lm = float((received[row] @ LUMINANCE * area_m2).sum())
+        by_mirrors_lx[:, row] = by_photons(row, light, scattered_lm)
         report(1 - (1 - GATHER_DONE) * row / len(instants))
     return _Straight(direct, groups.mean(scatters, weights), illuminance_lx, received, by_mirrors_lx)
 

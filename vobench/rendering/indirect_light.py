@@ -10,6 +10,7 @@ import scipy
 
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas
+from vobench.rendering.blend_kernels import TURNED, count_weights, write_weights
 from vobench.rendering.direct_light import EvenPattern
 from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, face_materials, take
@@ -29,9 +30,6 @@ if TYPE_CHECKING:
 
 RAISED = 0.25  # of a cell, above their faces: places that see each other there share light
 NEIGHBOURS = 9  # surfels whose light a texel may take, its own included
-WIDTH = 1.2  # square of the blend's width, in cells
-TURNED = 2.0  # cells that two opposite normals are apart by, and by half
-LEAST = 0.02  # of the weights of a blend
 PATTERN_SIDE = 64  # cells after which the dither of surfels repeats
 
 
@@ -125,7 +123,7 @@ def blend(
     places = np.hstack([middles_m, TURNED * step_m * normals])  # (S, 6): apart in space or in direction
     tree = scipy.spatial.cKDTree(places[known])
     _, nearest = tree.query(places, k=min(NEIGHBOURS, len(known)))
-    neighbours = known[nearest.reshape(len(groups), -1)]  # (S, K)
+    neighbours = np.sort(known[nearest.reshape(len(groups), -1)], axis=1)  # (S, K)
 
     raised_m = middles_m + RAISED * step_m * points.planes[groups.middle]
     surfel = np.repeat(np.arange(len(groups)), neighbours.shape[1])
@@ -136,52 +134,21 @@ def blend(
     is_hidden = chunked(hidden, len(surfel)).reshape(neighbours.shape)
     is_hidden = is_hidden & (neighbours != np.arange(len(groups))[:, None])
     is_hidden &= ~is_hidden.all(1, keepdims=True)
+    inputs = (points.points_m, points.normals, groups.of, neighbours, is_hidden, middles_m, normals, groups.step_m)
 
-    def weights(part: slice) -> "csr_matrix":
-        return _weights(
-            points.take(part),
-            groups,
-            groups.of[part],
-            neighbours,
-            is_hidden=is_hidden,
-            middles=(middles_m, normals),
-        )
+    texel_count = layout.source.size
+    starts = np.zeros(texel_count + 1, np.int32)
+    in_chunks(lambda part: count_weights(layout.source[part], *inputs, starts[1:][part]), texel_count)
+    np.cumsum(starts, out=starts)
+    columns = np.empty(starts[-1], np.int32)
+    values = np.empty(starts[-1], np.float32)
 
-    blends = in_chunks(weights, len(points))
-    none = scipy.sparse.csr_matrix((1, len(groups)), dtype=np.float32)  # of the point that stands for none
-    table = scipy.sparse.vstack([*blends, none], "csr")
-    return table[layout.source]
+    def write(part: slice) -> None:
+        entries = slice(starts[part.start], starts[part.stop])
+        write_weights(layout.source[part], *inputs, columns[entries], values[entries])
 
-
-def _weights(
-    points: Texels,
-    groups: Surfels,
-    of: Indices,
-    neighbours: Rows,
-    *,
-    is_hidden: Mask,
-    middles: tuple[Floats, Floats],
-) -> "csr_matrix":
-    """Weights (P, S) of surfels at points whose surfels (P,) are known, by position and normal (S, 3) of each."""
-    middles_m, normals = middles
-    candidates = neighbours[of]
-    hidden = is_hidden[of]
-    step_m = groups.step_m[of, None]
-    offset_m = points.points_m[:, None] - middles_m[candidates]
-    squared = (offset_m**2).sum(-1) / step_m**2
-    turn = points.normals[:, None] - normals[candidates]
-    squared += (turn**2).sum(-1) * TURNED**2
-    nearest = np.where(hidden, np.inf, squared).min(1, keepdims=True)
-    closeness = np.exp(-(squared - nearest) / WIDTH)
-    weights = np.where(hidden, 0, closeness)
-    weights[weights < LEAST * weights.sum(1, keepdims=True)] = 0
-    weights /= weights.sum(1, keepdims=True)
-
-    rows = np.repeat(np.arange(len(of)), candidates.shape[1])
-    entries = (weights.ravel().astype(np.float32), (rows, candidates.ravel()))
-    table = scipy.sparse.csr_matrix(entries, (len(of), len(groups)))
-    table.eliminate_zeros()
-    return table
+    in_chunks(write, texel_count)
+    return scipy.sparse.csr_matrix((values, columns, starts), (texel_count, len(groups)))
 
 
 MOST_PX = 256  # along a texture's side, finer than texels are apart

@@ -412,8 +412,13 @@ class MoverLight:
         faces = baked.faces
         materials = baked.scene.materials
         self._scene = baked.scene
-        self._radiosity = baked.patches.radiosity
+        # All lights beside one another (S, 3 L), so that one product serves them all.
+        surfel_count = len(baked.patches.area_m2)
+        by_surfel = baked.patches.radiosity.transpose(1, 0, 2)
+        self._radiosity = np.ascontiguousarray(by_surfel).reshape(surfel_count, -1)
         self._rays = GATHER_RAYS if baked.settings.bounces else 0
+        self._emitters: list[SampledEmitter] = []
+        self._emitters_key: tuple[float, ...] | None = None
         is_solid = (faces.mover >= 0) & ~are_panes(faces, materials)
         self.bodies = moving_bodies(baked.scene.movers, faces, is_solid)
         self._visibility = Visibility(faces, materials, np.flatnonzero(faces.mover < 0))
@@ -463,11 +468,17 @@ class MoverLight:
     def emitters(self, suns_ns: Sequence[float]) -> list[SampledEmitter]:
         """The emitters of all lights. The arrays of the shaders limit the number of their samples.
 
-        `suns_ns` (L,) is the time at which the direction of a moving sun is evaluated.
+        `suns_ns` (L,) is the time at which the direction of a moving sun is evaluated. The emitters of the last call
+        are returned again if no time has changed.
         """
-        probe_count = sum(len(body.probes_m) for body in self.bodies)
-        most = min(MOST_MAPS // max(len(self.bodies), 1), MOST_REACHES // max(probe_count, 1))
-        return sampled_emitters(self._scene.lights, self._visibility, suns_ns, min(most, MOST_SAMPLES))
+        key = tuple(suns_ns)
+        if key != self._emitters_key:
+            probe_count = sum(len(body.probes_m) for body in self.bodies)
+            most = min(MOST_MAPS // max(len(self.bodies), 1), MOST_REACHES // max(probe_count, 1))
+            lights = self._scene.lights
+            self._emitters = sampled_emitters(lights, self._visibility, suns_ns, min(most, MOST_SAMPLES))
+            self._emitters_key = key
+        return self._emitters
 
     def at(self, t_ns: float, suns_ns: Sequence[float]) -> MoverLightAt:
         """The movers at a time, and the light around them.
@@ -555,31 +566,42 @@ class MoverLight:
 
         Stationary faces reduce it. For hard emitters, the strength is that without occlusion.
         """
-        columns = []
-        for emitter in sampled:
-            place = emitter.places
-            vectors_m = place[None, :, :3] - place[None, :, 3:] * probes_m[:, None]
-            shape = vectors_m.shape[:2]
-            strength = np.broadcast_to(emitter.strength, shape)
-            if not emitter.is_hard:
-                light = self._scene.lights[emitter.light]
-                directions = unit(vectors_m)
-                is_sky = isinstance(light, Sky)
-                if is_sky and np.isfinite(emitter.ball.radius_m):
-                    luminance = light.luminance_cd_m2(directions.reshape(-1, 3)) if isinstance(light, Sky) else 0
-                    strength = strength * np.reshape(luminance, shape)
-                ends_m = FAR_M * directions if is_sky else vectors_m * (1 - 1e-3)
-                origins_m = np.broadcast_to(probes_m[:, None], vectors_m.shape).reshape(-1, 3)
-                passing = self._visibility.passing(
-                    origins_m.astype(np.float32), ends_m.reshape(-1, 3).astype(np.float32)
-                ).reshape(shape)
-                if is_sky and not np.isfinite(emitter.ball.radius_m) and self._visibility.sky_panes:
-                    # Light through a pane already belongs to the emitter of this pane.
-                    by_pane = self._visibility.crosses_sky_pane(origins_m, ends_m.reshape(-1, 3)).reshape(shape)
-                    passing = passing * ~by_pane
-                strength = strength * passing
-            columns.append(strength)
-        return np.concatenate([np.zeros((len(probes_m), 0)), *columns], 1)
+        if not sampled:
+            return np.zeros((len(probes_m), 0))
+        counts = [len(emitter.places) for emitter in sampled]
+        strengths = np.concatenate([emitter.strength for emitter in sampled])
+        result: Array = np.tile(strengths, (len(probes_m), 1))
+        soft = np.flatnonzero(np.repeat([not emitter.is_hard for emitter in sampled], counts))
+        if not len(soft):
+            return result
+        places = np.concatenate([emitter.places for emitter in sampled])[soft]
+        light_index = np.repeat([emitter.light for emitter in sampled], counts)[soft]
+        is_finite = np.repeat([bool(np.isfinite(emitter.ball.radius_m)) for emitter in sampled], counts)[soft]
+        is_sky = np.array([isinstance(light, Sky) for light in self._scene.lights])[light_index]
+
+        vectors_m = places[:, :3] - places[:, 3:] * probes_m[:, None]  # (N, K, 3)
+        directions = unit(vectors_m)
+        arriving = result[:, soft]
+        for index, light in enumerate(self._scene.lights):
+            by_pane = np.flatnonzero(is_sky & is_finite & (light_index == index))
+            if isinstance(light, Sky) and len(by_pane):
+                luminance_cd_m2 = light.luminance_cd_m2(directions[:, by_pane].reshape(-1, 3))
+                arriving[:, by_pane] *= luminance_cd_m2.reshape(len(probes_m), -1)
+
+        # The rays of all emitters at once, because each call costs more than the rays of one emitter.
+        ends_m = np.where(is_sky[:, None], FAR_M * directions, vectors_m * (1 - 1e-3)).astype(np.float32)
+        origins_m = np.broadcast_to(probes_m[:, None], ends_m.shape).astype(np.float32)
+        passing = self._visibility.passing(origins_m.reshape(-1, 3), ends_m.reshape(-1, 3))
+        arriving *= passing.reshape(arriving.shape)
+        open_sky = np.flatnonzero(is_sky & ~is_finite)
+        if len(open_sky):
+            # Light through a pane already belongs to the emitter of this pane.
+            crosses_pane = self._visibility.crosses_sky_pane(
+                origins_m[:, open_sky].reshape(-1, 3), ends_m[:, open_sky].reshape(-1, 3)
+            )
+            arriving[:, open_sky] *= ~crosses_pane.reshape(len(probes_m), -1)
+        result[:, soft] = arriving
+        return result
 
     def _cubes(self, probes_m: Array) -> Floats:
         """The indirect illuminance (N, 6, L, 3) at probes (N, 3), by the normals AXES and by lights at level 1."""
@@ -587,18 +609,18 @@ class MoverLight:
         lights = self._scene.lights
         places_m = np.repeat(probes_m, 6, axis=0).astype(np.float32)
         gathered = self._gatherer.gather(_points(places_m, normals), rays=self._rays)
-        surfel_count = self._radiosity.shape[1]
-        result = np.zeros((len(normals), len(lights), 3), np.float32)
+        surfel_count = len(self._radiosity)
+        by_surfels = gathered.table[:, :surfel_count] @ self._radiosity
+        result = by_surfels.reshape(len(normals), len(lights), 3)
+        by_mirrors = gathered.table[:, surfel_count:].toarray()  # (6 N, L)
         sky_row = 0
         for index, light in enumerate(lights):
-            result[:, index] = gathered.table[:, :surfel_count] @ self._radiosity[index]
             if isinstance(light, AreaLight):
-                by_mirrors = gathered.table[:, surfel_count + index].toarray()
-                result[:, index] += np.pi * light.luminance_cd_m2 * by_mirrors
+                result[:, index] += np.pi * light.luminance_cd_m2 * by_mirrors[:, index, None]
             if isinstance(light, Sky):
                 result[:, index] += gathered.sky[sky_row][:, None]
                 sky_row += 1
-        return result.reshape(len(probes_m), 6, len(lights), 3)
+        return np.asarray(result.reshape(len(probes_m), 6, len(lights), 3))
 
     def _hard(self, points_m: Array, normals: Array, suns_ns: Sequence[float]) -> Floats:
         """The illuminance (H, P) of points by each hard emitter; only stationary faces cast shadows."""

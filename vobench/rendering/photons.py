@@ -22,6 +22,9 @@ TYPICAL_COSINE = np.float32(0.6)  # the cosine of incidence at which reflectance
 # texels. All other photons start on panes and mirrors.
 BY_LIGHT = 0.5
 EVENLY = 0.2
+# All photons are used if reflecting faces reflect this share of what texels scatter, fewer if it is less.
+ALL_PHOTONS_SHARE = 0.2
+LEAST_EFFORT = 1 / 16
 CHUNK = 1 << 15  # the number of photons that a thread computes at a time
 
 
@@ -116,6 +119,22 @@ class Reflectors:
                 photons = self._emitted(emitter, chance, count // 2, [*seed, nth, half])
                 flux_lm[half] += self._gatherer.deposited(photons)
         return flux_lm
+
+    def effort(self, light_lx: Floats, scattered_lm: float) -> float:
+        """The share of PHOTONS that a light needs, given its direct illuminance (P,) on all texels.
+
+        `scattered_lm` is the flux that texels scatter. The noise of photons matters by the share of the light that
+        they carry, and it decreases with the square root of their number.
+        """
+        lit = light_lx[light_lx > 0]
+        if not len(lit) or not len(self):
+            return 1.0
+        # Panes and mirrors have no texels. They are taken to be lit as lit texels are on average.
+        place_lx = np.full(len(self), lit.mean(dtype=float))
+        place_lx[: len(self.texels)] = light_lx[self.texels]
+        mirrored_lm = float((self._weight * place_lx).sum())
+        share = mirrored_lm / max(scattered_lm, 1e-30)
+        return float(np.clip((share / ALL_PHOTONS_SHARE) ** 2, LEAST_EFFORT, 1))
 
     def _chances(self, light_lx: Floats) -> Floats:
         """The probability that a photon starts at each place, given the direct light (P,) on all texels."""
