@@ -14,8 +14,8 @@ from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.metric import ate
 from vobench.metric import rpe as pairs_module
-from vobench.metric.ate import errors_between
 from vobench.metric.comparison import in_plane
+from vobench.metric.motion_error import errors_between
 from vobench.metric.rpe import (
     distance_errors,
     part_errors,

@@ -24,7 +24,14 @@ from vobench.dataset.picture import listed
 from vobench.dataset.recording import ReadOptions
 from vobench.errors import InputError, SequenceError
 from vobench.geometry import se3
-from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt
+from vobench.geometry.camera import (
+    BrownConrady,
+    Camera,
+    DoubleSphere,
+    Equirectangular,
+    KannalaBrandt,
+    focal_and_center_px,
+)
 from vobench.geometry.rig import ImuCalibration, Rig
 from vobench.geometry.se3 import Array
 
@@ -98,7 +105,7 @@ def intrinsics(camera: Camera) -> Intrinsics:
         linear = [camera.xi, camera.alpha, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px]
         return Intrinsics(DOUBLE_SPHERE, np.array(linear), NO_DISTORTION, np.array([]))
 
-    focal_px = camera.K[[0, 1, 0, 1], [0, 1, 2, 2]]  # fx, fy, cx, cy
+    focal_px = np.array(focal_and_center_px(camera.K))
     match camera:
         case KannalaBrandt():
             coefficients = [getattr(camera, name) for name in camera.coefficients]
