@@ -252,10 +252,10 @@ def test_a_recording_opens_at_the_first_failure_of_any_trial_or_where_one_goes_w
     fine = replace(run_viewer, statuses=["ok"] * 60, first=100)
     failed = replace(fine, statuses=["ok"] * 40 + ["lost"] + ["ok"] * 19)
     wrong = replace(fine, wrong_at=50)
-    assert rerun._focus([fine]) is None
-    assert rerun._focus([fine, failed]) == (125, 155)
-    assert rerun._focus([fine, wrong]) == (135, 159)
-    assert rerun._focus([wrong, failed]) == (125, 155)
+    assert rerun._replayed_frames([fine]) is None
+    assert rerun._replayed_frames([fine, failed]) == (125, 155)
+    assert rerun._replayed_frames([fine, wrong]) == (135, 159)
+    assert rerun._replayed_frames([wrong, failed]) == (125, 155)
 
 
 def test_a_layout_has_a_plot_of_numbers_and_of_costs_where_there_are_some(run_viewer, tmp_path):

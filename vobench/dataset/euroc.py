@@ -8,7 +8,8 @@ import numpy as np
 
 from vobench.dataset import kalibr
 from vobench.dataset.body import MountedCamera, mounted_rig, on_body
-from vobench.dataset.calibration_file import AboveZero, Numbers, Resolution, RigidTransform, Text, read_yaml
+from vobench.dataset.calibration_file import read_yaml
+from vobench.dataset.calibration_value import AboveZero, Numbers, Resolution, RigidTransform, Text
 from vobench.dataset.distortion import focal_camera
 from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
@@ -83,7 +84,7 @@ def sensor_camera(path: Path) -> MountedCamera:
             f"but is {sensor.camera_model!r} with {len(sensor.intrinsics)}"
         )
     if sensor.distortion_model is None:
-        raise file.missing("distortion_model", file.tree)
+        raise file.missing_key_error("distortion_model", file.tree)
     coefficients = sensor.distortion_coefficients or ()
     camera = focal_camera(size_px, sensor.intrinsics, sensor.distortion_model, coefficients, place=str(path))
     return MountedCamera(camera, sensor.T_BS)

@@ -8,17 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vobench.dataset.calibration_file import (
-    AboveZero,
-    CalibrationFile,
-    Number,
-    Numbers,
-    Resolution,
-    RigidTransform,
-    Text,
-    ZeroOrMore,
-    read_yaml,
-)
+from vobench.dataset.calibration_file import CalibrationFile, read_yaml
+from vobench.dataset.calibration_value import AboveZero, Number, Numbers, Resolution, RigidTransform, Text, ZeroOrMore
 from vobench.dataset.distortion import focal_camera
 from vobench.dataset.picture import listed
 from vobench.dataset.recording import ReadOptions
@@ -237,7 +228,7 @@ def _chain_rig(file: CalibrationFile, cameras: Mapping[str, ChainCamera]) -> Rig
 
     T_right_left = cameras["cam1"].T_cn_cnm1
     if T_right_left is None:
-        raise file.missing("cam1.T_cn_cnm1", file.tree["cam1"])
+        raise file.missing_key_error("cam1.T_cn_cnm1", file.tree["cam1"])
     right = _camera(file, "cam1", cameras["cam1"])
     T_body_right = T_body_left @ se3.inverse(T_right_left)
     return Rig(left, right, T_body_left, T_body_right)
