@@ -1,5 +1,6 @@
 """Without a sandbox strange makers run once they are trusted; on the command line all are named."""
 
+import pickle
 from pathlib import Path
 
 import pytest
@@ -34,7 +35,7 @@ def test_ours_and_those_below_the_working_folder_run_and_are_named_once(asked, t
 
 def test_a_strange_one_is_refused_until_it_is_trusted_and_again_when_it_changes(asked, tmp_path):
     maker = tmp_path / "strangers" / "maker.py"
-    with pytest.raises(SuiteError, match="--trust, once for each version of it"):
+    with pytest.raises(SuiteError, match=r"--trust, .* once for each version of it"):
         asked(maker)
     assert asked(maker, trusts_new=True) == [f"scene hall runs the program {maker}"]
     assert asked(maker) == [f"scene hall runs the program {maker}"]
@@ -59,5 +60,40 @@ def test_a_link_in_the_working_folder_does_not_make_a_strange_one_ours(asked, tm
         asked(link)
 
 
-def test_from_python_nobody_is_asked(tmp_path):
-    trust.admit(tmp_path / "maker.py", [b"code"], "hall", is_contained=False)
+@pytest.fixture
+def python(tmp_path, monkeypatch):
+    """A program that has imported vobench, in a folder of its own."""
+    (tmp_path / "mine").mkdir()
+    monkeypatch.chdir(tmp_path / "mine")
+    python_gate = trust.Gate(trust._tell_nobody, ours=lambda: (Path.cwd(),), folder=lambda: None)
+    monkeypatch.setattr(trust, "_gates", [python_gate])
+
+
+def test_from_python_a_strange_one_is_refused_and_the_function_named_that_trusts_it(python, tmp_path):
+    with pytest.raises(SuiteError, match=r"vobench\.trust_maker"):
+        trust.admit(tmp_path / "maker.py", [b"code"], "hall", is_contained=False)
+
+
+def test_from_python_those_below_the_working_folder_and_those_in_a_sandbox_run(python, tmp_path):
+    trust.admit(tmp_path / "mine" / "maker.py", [b"code"], "hall", is_contained=False)
+    trust.admit(tmp_path / "maker.py", [b"code"], "hall", is_contained=True)
+
+
+def test_a_version_that_a_program_trusts_runs_and_no_other(python, tmp_path):
+    trust.trust_version([b"co", b"de"])
+    trust.admit(tmp_path / "maker.py", [b"co", b"de"], "hall", is_contained=False)
+    with pytest.raises(SuiteError, match="trust_maker"):
+        trust.admit(tmp_path / "maker.py", [b"code"], "hall", is_contained=False)
+
+
+def test_a_process_that_works_for_another_trusts_whom_that_one_trusts(python, tmp_path, monkeypatch):
+    (tmp_path / "trusted").mkdir()
+    with trust.gate(lambda _: None, ours=lambda: [tmp_path / "ours"], folder=lambda: tmp_path / "trusted"):
+        trust.trust_version([b"by a program"])
+        sent = pickle.dumps(trust.policy())
+    monkeypatch.chdir(tmp_path)  # of another process
+    trust.adopt(pickle.loads(sent))
+    trust.admit(tmp_path / "ours" / "maker.py", [b"code"], "hall", is_contained=False)
+    trust.admit(tmp_path / "strangers" / "maker.py", [b"by a program"], "hall", is_contained=False)
+    with pytest.raises(SuiteError, match="--trust"):
+        trust.admit(tmp_path / "strangers" / "maker.py", [b"code"], "hall", is_contained=False)

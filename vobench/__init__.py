@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from vobench.metric.settings import LIKE, ScoreSettings
     from vobench.notebook.class_source import write_estimator
+    from vobench.notebook.makers import trust_maker
     from vobench.notebook.questions import causes, drive, explain, realism, shrink, twin
     from vobench.notebook.runs import Check, Run, bundle, check, compare, read_board, read_run, run
     from vobench.notebook.simulation import Simulation, read_sequence, render, simulate
@@ -46,6 +47,7 @@ _HOMES = {
     "read_board": "vobench.notebook.runs",
     "read_run": "vobench.notebook.runs",
     "run": "vobench.notebook.runs",
+    "trust_maker": "vobench.notebook.makers",
     "Simulation": "vobench.notebook.simulation",
     "read_sequence": "vobench.notebook.simulation",
     "render": "vobench.notebook.simulation",
@@ -81,6 +83,7 @@ __all__ = [
     "score",
     "shrink",
     "simulate",
+    "trust_maker",
     "twin",
     "write_estimator",
 ]

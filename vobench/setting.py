@@ -259,6 +259,8 @@ def merged_over(preset: dict[str, Any], given: dict[str, Any]) -> dict[str, Any]
 
 
 Positive = Annotated[float, Gt(0)]
+# The largest number of points or legs of a path in settings: more would take minutes to drive.
+MOST_POINTS = 10_000
 NonNegative = Annotated[float, Ge(0)]
 Share = Annotated[float, Ge(0), Le(1)]
 Triple = tuple[float, float, float]

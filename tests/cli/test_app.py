@@ -2,6 +2,7 @@
 
 import os
 import re
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -32,6 +33,22 @@ def test_help_imports_no_heavy_library():
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1].strip() == "heavy:"
     assert "Usage: vobench" in done.stdout
+
+
+FAULT = """
+import ctypes, sys
+from vobench.cli import app, main
+app._call_command = lambda: ctypes.string_at(0)
+sys.argv = ["vobench", "list"]
+main()
+"""
+
+
+def test_a_fault_in_a_library_shows_where_vobench_was():
+    done = subprocess.run([sys.executable, "-c", FAULT], capture_output=True, text=True, check=False)
+    assert done.returncode == -signal.SIGSEGV
+    assert "Fatal Python error: Segmentation fault" in done.stderr
+    assert "cli/app.py" in done.stderr
 
 
 OUTSIDE = """

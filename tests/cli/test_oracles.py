@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import sys
 from pathlib import Path
 
@@ -123,6 +124,7 @@ def test_without_a_sandbox_an_oracle_is_first_but_no_link_is_followed_and_the_re
 
 
 HONEST = """
+import shutil
 import sys
 import time
 from pathlib import Path
@@ -175,3 +177,56 @@ def files_of(here, name):
     """An estimator's score, poses and frames, as bytes."""
     place = next((here / "runs" / "tiny" / "latest" / "cases").iterdir()) / "estimates" / name / "0"
     return {file: Path(place, file).read_bytes() for file in ("score.json", "estimate.tum", "frames.csv")}
+
+
+def put_in(own, here):
+    """Put an earlier run in three forms, and recordings of the truth, into the folder of an estimator."""
+    earlier = (here / "runs" / "tiny" / "latest").resolve()
+    truth = next(earlier.glob("cases/*/ground_truth.tum")).read_text()
+    shutil.copytree(earlier, own / "kept" / "deep" / "run", symlinks=True)
+    (own / "truth").mkdir()
+    for name in ("groundtruth.txt", "ground_truth.tum"):
+        (own / "truth" / name).write_text(truth)
+
+
+OWN_SEARCH = """
+import glob, os, sys
+
+def found():
+    '''Everything below its own folder that could be a trajectory, but its own answers.'''
+    own = os.path.dirname(os.path.abspath(__file__))
+    paths = [path for end in ("tum", "txt") for path in glob.glob(own + "/**/*." + end, recursive=True)]
+    seen = [path for path in paths if os.path.getsize(path) and os.access(path, os.R_OK)]
+    print("it sees", seen)
+    return sorted(seen, key=lambda path: "truth" not in os.path.basename(path))
+"""
+
+
+@pytest.fixture
+def project(here, vobench):
+    """An estimator whose folder is that of a whole project, with results of an earlier run in it."""
+    assert vobench("run", "tiny").code == 0
+    add(here, "project", "class: estimator:Oracle", OWN_SEARCH + CLASS)
+    own = here / "estimators" / "project"
+    put_in(own, here)
+    results = own / "results"
+    assert vobench("run", "tiny", "-e", "stand_still", "--out", str(results)).code == 0
+    return own
+
+
+def test_an_estimator_whose_folder_holds_results_does_not_read_them(here, vobench, project):
+    names = [word for name in ("project", "stand_still", "wheel_odometry") for word in ("-e", name)]
+    assert vobench("run", "tiny", *names, "--out", str(project / "results")).code == 0
+    run = open_run(project / "results" / "tiny")
+    scores = {score.estimator: score for score in run.scores()}
+    assert scores["project"].score["metrics"] == scores["stand_still"].score["metrics"]
+    (log,) = run.path.glob("cases/*/estimates/project/0/log.txt")
+    assert "it sees []" in log.read_text()
+
+
+def test_nor_does_one_to_which_the_folder_of_all_results_is_opened(here, vobench, project, monkeypatch):
+    monkeypatch.setenv("VOBENCH_SANDBOX_READ", str(here))
+    names = [word for name in ("project", "stand_still") for word in ("-e", name)]
+    assert vobench("run", "tiny", *names, "--out", str(here / "other")).code == 0
+    scores = {score.estimator: score for score in open_run(here / "other" / "tiny").scores()}
+    assert scores["project"].score["metrics"] == scores["stand_still"].score["metrics"]

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.estimator.guard import CANNOT_START, descendants, stat
+from vobench.estimator.guard import CANNOT_START, START_REPORT, descendants, stat
 from vobench.estimator.program import GUARD
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="it needs /proc")
@@ -51,10 +51,23 @@ def is_alive(pid):
     return bool(fields) and fields[0] != "Z"
 
 
+def test_the_kernel_ends_the_program_before_the_guard_if_memory_runs_out():
+    with python("print(open('/proc/self/oom_score_adj').read())") as (guard, _):
+        assert int(Path(f"/proc/{guard.pid}/oom_score_adj").read_text()) < 1000
+        assert int(guard.stdout.read()) == 1000
+
+
+def test_the_number_of_descriptors_is_limited_for_good():
+    code = "import resource; print(*resource.getrlimit(resource.RLIMIT_NOFILE))"
+    with python(code) as (guard, _):
+        soft, hard = map(int, guard.stdout.read().split())
+        assert soft <= hard <= 1024
+
+
 @pytest.mark.parametrize("code", [0, 3, 255])
 def test_it_ends_with_the_exit_code_of_the_program(code):
     with python(f"raise SystemExit({code})") as (guard, line):
-        assert line.recv(100) == b"0"
+        assert line.recv(100) == START_REPORT + b"0"
         assert guard.wait(PATIENCE_S) == code
 
 
@@ -66,13 +79,13 @@ def test_it_ends_by_the_signal_that_ended_the_program(number):
 
 def test_a_program_that_is_not_there_is_reported_by_its_error_number():
     with guarded("/no/such/program") as (guard, line):
-        assert int(line.recv(100)) == errno.ENOENT
+        assert line.recv(100) == START_REPORT + str(errno.ENOENT).encode()
         assert guard.wait(PATIENCE_S) == CANNOT_START
 
 
 def test_a_program_is_started_by_its_path_and_named_by_its_first_argument():
     with guarded("dash", "-c", 'echo "$0" "$1"', "one", "two", program="/bin/sh") as (guard, line):
-        assert line.recv(100) == b"0"
+        assert line.recv(100) == START_REPORT + b"0"
         assert guard.stdout.read() == b"one two\n"
 
 

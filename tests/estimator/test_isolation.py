@@ -18,7 +18,15 @@ OTHERS_X86_64 = {
     "socket": 41,
     "fallocate": 285,
     "msgget": 68,
+    "semget": 64,
     "shmget": 29,
+    "vmsplice": 278,
+    "setsockopt": 54,
+    "truncate": 76,
+    "ftruncate": 77,
+    "open": 2,
+    "openat": 257,
+    "openat2": 437,
     "clone": 56,
     "kill": 62,
     "clone3": 435,
@@ -29,7 +37,14 @@ OTHERS_AARCH64 = {
     "socket": 198,
     "fallocate": 47,
     "msgget": 186,
+    "semget": 190,
     "shmget": 194,
+    "vmsplice": 75,
+    "setsockopt": 208,
+    "truncate": 45,
+    "ftruncate": 46,
+    "openat": 56,
+    "openat2": 437,
     "clone": 220,
     "kill": 129,
     "clone3": 435,
@@ -176,10 +191,19 @@ def verdict(program: list[Instruction], data: dict[int, int]) -> int:
         position += if_true if holds else if_false
 
 
-def called(machine: str, name: str, first: int = 0, second: int = 0, *, kills_all: bool = False) -> int:
-    """The verdict on a system call of a machine with its first two arguments."""
-    program = system_call_filter(machine, kills_all=kills_all)
-    data = {0: NUMBERS[machine][name], 4: AUDIT_ARCHITECTURE[machine], 16: first, 24: second}
+def called(
+    machine: str,
+    name: str,
+    first: int = 0,
+    second: int = 0,
+    third: int = 0,
+    *,
+    kills_all: bool = False,
+    truncates: bool = True,
+) -> int:
+    """The verdict on a system call of a machine with its first three arguments."""
+    program = system_call_filter(machine, kills_all=kills_all, truncates=truncates)
+    data = {0: NUMBERS[machine][name], 4: AUDIT_ARCHITECTURE[machine], 16: first, 24: second, 32: third}
     return verdict(program, data)
 
 
@@ -231,7 +255,7 @@ def test_nothing_can_be_typed_into_a_terminal(machine):
 
 
 @machines
-@pytest.mark.parametrize("name", ["shmget", "msgget"])
+@pytest.mark.parametrize("name", ["shmget", "msgget", "semget", "vmsplice"])
 def test_memory_that_counts_as_nobodys_is_not_to_be_had(machine, name):
     assert called(machine, name) == FAIL | errno.ENOSYS
 
@@ -252,6 +276,75 @@ def test_no_space_is_reserved_beyond_the_end_of_a_file(machine, mode, is_allowed
 def test_no_ioctl_reserves_space_beyond_the_end_of_a_file(machine):
     for request in (0x40305828, 0x4030582A, 0x40305839):  # FS_IOC_RESVSP, FS_IOC_RESVSP64, FS_IOC_ZERO_RANGE
         assert called(machine, "ioctl", 2, request) == EPERM
+
+
+SOL_SOCKET = 1
+IPPROTO_TCP = 6
+SO_KEEPALIVE = 9
+
+
+@machines
+@pytest.mark.parametrize("option", [7, 8, 32, 33])  # SO_SNDBUF, SO_RCVBUF and the same by force
+def test_a_request_for_larger_buffers_of_a_socket_succeeds_without_an_effect(machine, option):
+    assert called(machine, "setsockopt", 3, SOL_SOCKET, option) == FAIL
+    assert called(machine, "setsockopt", 3, IPPROTO_TCP, option) == ALLOW
+
+
+@machines
+def test_other_options_of_a_socket_can_be_set(machine):
+    assert called(machine, "setsockopt", 3, SOL_SOCKET, SO_KEEPALIVE) == ALLOW
+
+
+@machines
+@pytest.mark.parametrize(
+    ("mode", "empties", "is_allowed"),
+    [
+        (os.O_RDONLY, False, True),
+        (os.O_RDONLY, True, False),
+        (os.O_WRONLY, False, True),
+        (os.O_WRONLY, True, True),
+        (os.O_RDWR, True, True),
+        (os.O_WRONLY | os.O_RDWR, False, True),
+        (os.O_WRONLY | os.O_RDWR, True, False),  # neither for reading nor for writing: open(2)
+    ],
+)
+def test_where_landlock_does_not_keep_files_from_being_emptied_the_filter_does(machine, mode, empties, is_allowed):
+    flags = os.O_CLOEXEC | mode | (os.O_TRUNC if empties else 0)
+    expected = ALLOW if is_allowed else EPERM
+    assert called(machine, "openat", 3, 0, flags, truncates=False) == expected
+    assert called(machine, "openat", 3, 0, flags) == ALLOW
+    if machine == "x86_64":
+        assert called(machine, "open", 0, flags, truncates=False) == expected
+
+
+@machines
+def test_there_a_file_is_not_emptied_by_its_path_and_openat2_is_not_to_be_had(machine):
+    assert called(machine, "truncate", truncates=False) == EPERM
+    assert called(machine, "openat2", truncates=False) == FAIL | errno.ENOSYS
+    assert called(machine, "ftruncate", truncates=False) == ALLOW
+    assert called(machine, "truncate") == ALLOW
+
+
+EMPTIES = """
+import os, sys
+from contextlib import suppress
+from vobench.estimator import isolation
+assert isolation._filter_system_calls(kills_all=False, truncates=False)
+path = sys.argv[1]
+for way in (lambda: os.truncate(path, 0), lambda: os.open(path, os.O_TRUNC), lambda: os.open(path, 3 | os.O_TRUNC)):
+    with suppress(PermissionError): way()
+    print(os.path.getsize(path))
+open(path, "w").close()
+print(os.path.getsize(path))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="seccomp is Linux's")
+def test_the_kernel_agrees_on_what_empties_a_file(tmp_path):
+    file = tmp_path / "truth"
+    file.write_text("content")
+    done = subprocess.run([sys.executable, "-c", EMPTIES, str(file)], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["7", "7", "7", "0"]
 
 
 @machines

@@ -143,7 +143,7 @@ def test_what_it_prints_is_kept_up_to_a_limit_and_what_it_writes_is_gone(tmp_pat
         process.process(frame())
     log = (tmp_path / "log.txt").read_text()
     assert LOG_BYTES < len(log) < LOG_BYTES + 200
-    assert log.splitlines()[-1].startswith("[vobench: cut here; the estimator printed 3000")
+    assert log.splitlines()[-1].startswith("[vobench: cut here; the estimator printed at least 3000")
     assert not Path(log.splitlines()[0]).exists()
 
 

@@ -174,7 +174,8 @@ if os.path.exists(T['runs']): print(T['half'] + T['other_half'])
     "holds memory of System V that nobody has attached": Attack(SYSTEM_CALLS, "c", """
 #include <sys/shm.h>
 #include <sys/msg.h>
-static void attack(void) { if (shmget(IPC_PRIVATE, 4096, 0600 | IPC_CREAT) >= 0 || msgget(IPC_PRIVATE, 0600 | IPC_CREAT) >= 0) printf("%s%s", T("half"), T("other_half")); }""", works_bare=False),
+#include <sys/sem.h>
+static void attack(void) { if (shmget(IPC_PRIVATE, 4096, 0600 | IPC_CREAT) >= 0 || msgget(IPC_PRIVATE, 0600 | IPC_CREAT) >= 0 || semget(IPC_PRIVATE, 9, 0600 | IPC_CREAT) >= 0) printf("%s%s", T("half"), T("other_half")); }""", works_bare=False),
     "reserves disk space beyond the end of its log": Attack(SYSTEM_CALLS, "c", """
 #include <sys/ioctl.h>
 static void attack(void) { struct { short type, whence; long start, length; int more[6]; } space = {0, 0, 0, 1 << 22}; struct stat log;
@@ -536,13 +537,30 @@ def test_without_a_sandbox_no_folder_stays_closed(monkeypatch):
 
 
 def test_what_is_hidden_stays_hidden_in_a_folder_that_is_opened(run, world, monkeypatch):
-    if sandbox_here().level != "full":
-        pytest.skip("without mounts a folder is opened as a whole")
+    if FILES in sandbox_here().sees:
+        pytest.skip("here it may read everything")
     monkeypatch.setenv(READ, str(world.place))
     _, printed = run("sh", 'cat "$truth"; ls "$runs"; ls "$own"')
     assert world.secret not in printed
     assert "data.txt" in printed
     assert "suite" in printed
+
+
+def test_a_hidden_file_in_its_own_folder_is_not_read_by_any_of_its_names(run, world, tmp_path):
+    if FILES in sandbox_here().sees:
+        pytest.skip("here it may read everything")
+    own = tmp_path / "own"
+    truth = own / "results" / "truth.txt"
+    truth.parent.mkdir(parents=True)
+    truth.write_text(world.secret)
+    (own / "results" / "data.txt").write_text("beside it")
+    (own / "link").symlink_to("results/truth.txt")
+    (own / "outside").symlink_to(world.place / "user" / ".ssh")
+    code = f"cd {own}; cat results/truth.txt link outside/id_ed25519 2>/dev/null; cat results/data.txt"
+    argv = ["/bin/sh", "-c", code]
+    with Program(argv, log=tmp_path / "log.txt", limits=LIMITS, folder=own, hidden=[truth, own / "missing"]) as program:
+        program.wait()
+    assert (tmp_path / "log.txt").read_text() == "beside it"
 
 
 def test_an_estimator_in_a_hidden_folder_sees_itself_and_nothing_beside_it(run, world):

@@ -185,6 +185,7 @@ ZOO = {
     # It does well, and more.
     "20 MB of a reason": Animal(FINISHED, "return Result(I, reason='x' * 20_000_000)"),
     "a reason of surrogates, ESC and NUL": Animal(FINISHED, "return Result(I, Status.DEGRADED, '\\ud800\\x1b[2J\\0dark\\u202e', stats={'\\x1b\\ud800n': 1})"),
+    "a reason that is a formula": Animal(FINISHED, "return Result(I, reason='=cmd|calc')"),
     "stats that are no numbers": Animal(FINISHED, "return Result(I, stats={'a': float('nan'), 'b': float('inf')})"),
     "prints 30 MB": Animal(FINISHED, f"print('\\x1b[2J' + 'y' * 10_000_000)\n{OK}"),
     "prints secrets": Animal(FINISHED, f"print(sorted(os.environ.items()))\n{OK}"),
@@ -205,6 +206,9 @@ ZOO = {
     "shared memory with a name": Animal(FINISHED, f"if not frame.index: self.held = shared(0, 32 << 20)\n{OK}"),
     "too much shared memory with a name": Animal(MEMORY, "self.held = [shared(n, 60 << 20) for n in range(4)]\ntime.sleep(30)", "its processes hold", memory_mib=200),
     "too much shared memory in closed files": Animal(MEMORY, "for n in range(4): os.close(shared(n, 60 << 20))\ntime.sleep(30)", "its processes hold", memory_mib=200),
+    "full sockets": Animal(MEMORY, "import socket\npairs = []\nfor _ in range(450):\n    pairs.append(socket.socketpair())\n    for end in pairs[-1]:\n        end.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 8 << 20); end.setblocking(False)\n        try:\n            while True: end.send(bytes(4096))\n        except BlockingIOError: pass\ntime.sleep(30)", "its sockets can hold", memory_mib=200),
+    "processes without end": Animal(MEMORY, "for _ in range(600):\n    if os.fork() == 0: time.sleep(600)\ntime.sleep(30)", "", memory_mib=8192),
+    "page tables": Animal(MEMORY, "import mmap\nmaps = [mmap.mmap(-1, 1 << 38, mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | 0x4000, mmap.PROT_READ) for _ in range(2)]\nfor place in maps:\n    for at in range(0, 1 << 38, 2 << 20): place[at]\ntime.sleep(30)", "its processes hold", memory_mib=400),
     "more files than the disk has": Animal(MEMORY, "for n in range(20000): open(str(n), 'w').close()\ntime.sleep(30)", "", disk_mib=64),
     "fills the disk and the error is caught": Animal(MEMORY, "try:\n    for n in range(200): open(str(n), 'wb').write(bytes(1 << 20))\nexcept OSError: pass\ntime.sleep(30)", "its files hold more than the limit of 64 MiB", disk_mib=64),
     "nests folders": Animal(FINISHED, f"if not frame.index:\n    for _ in range(3000): os.mkdir('a'); os.chdir('a')\n{OK}"),
@@ -300,6 +304,7 @@ def test_a_bad_plugin_is_a_row_with_a_reason_and_nothing_is_left_of_it(run, tmp_
     assert not list(Path("/dev/shm").glob(f"{str(tmp_path).replace(os.sep, '_')}*"))
     said = (tmp_path / "estimate" / ANSWERS).read_text()
     assert not {"\x1b", "\0", "\ud800", "\u202e"} & set(said)
+    assert ",=" not in said
     if outcome.kind == FINISHED:
         assert [len(row["reason"]) <= 500 for row in read_table(tmp_path / "estimate" / ANSWERS)] == [True] * 3
 

@@ -4,6 +4,7 @@ import json
 import shutil
 import stat
 import subprocess
+import time
 import warnings
 from hashlib import sha256
 from zipfile import ZipFile, ZipInfo
@@ -214,3 +215,31 @@ def test_a_signature_names_who_signed_and_whether_that_is_verified(honest, tmp_p
     assert "NOT" in signature_sentence(path, None)
     with pytest.raises(InputError, match="the bundle could not be signed"):
         sign(path, tmp_path / "no_key")
+
+
+def with_targets(files, count, **options):
+    """The files with a case of that many targets."""
+    case = json.loads(files["cases/full/case.json"])
+    trajectory = case["trajectory"] | {"kind": "waypoints", "targets_m": [[0.3, 0.0]] * count, **options}
+    return files | {"cases/full/case.json": json.dumps(case | {"trajectory": trajectory}).encode()}
+
+
+@pytest.mark.parametrize(
+    ("forge", "sentence"),
+    [
+        (lambda files: with_targets(files, 100_000), "its case.json is too long (trajectory.waypoints.targets_m"),
+        (lambda files: with_targets(files, 9_000, max_time_s=3600.0), "frames; at most 20000000 are possible"),
+        (
+            lambda files: files | {"cases/full/case.json": b" " * (33 << 20) + files["cases/full/case.json"]},
+            "its case.json is larger than 32 MiB",
+        ),
+    ],
+    ids=["many targets", "much time", "many bytes"],
+)
+def test_a_case_whose_path_would_take_minutes_is_refused_in_one_line_at_once(honest, tmp_path, forge, sentence):
+    path = packed(forge(dict(honest)), tmp_path / "a.zip")
+    began_s = time.process_time()
+    told = reported(path)
+    assert told
+    assert all(sentence in each and "\n" not in each for each in told), told
+    assert time.process_time() - began_s < 5

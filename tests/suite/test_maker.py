@@ -153,6 +153,6 @@ def test_a_maker_is_trusted_with_every_python_file_of_its_folder(tmp_path) -> No
     path.write_text("one\n")
     other.write_text("two\n")
     (tmp_path / "table.py").write_text("three\n")
-    names_and_contents = [*maker._sources(path)]
+    names_and_contents = [*maker.sources(path)]
     assert names_and_contents[:2] == [b"maker.py", b"one\n"]
     assert names_and_contents[2:] == [b"parts/maker.py", b"two\n", b"table.py", b"three\n"]

@@ -1,6 +1,8 @@
 """The entry point of the command line: it calls the command that the arguments name, and reports errors."""
 
+import faulthandler
 import sys
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -26,6 +28,9 @@ app = typer.Typer(
 
 def run() -> None:
     """Run a command. An error that the user can correct is printed as one line, and the exit code is 1."""
+    with suppress(OSError, ValueError, AttributeError, RuntimeError):  # there is no file for standard error
+        # If a fault in a library ends vobench, the calls of every thread are printed.
+        faulthandler.enable()
     for stream in filter(None, (sys.stdout, sys.stderr)):
         stream.reconfigure(errors="replace")  # a terminal that cannot show ° shows ?
     try:

@@ -384,6 +384,7 @@ LAYOUTS = (
         partial(read_bag, form="ros2"),
         HEEDS,
         Writing(write_ros2, topics=ROS2_TOPICS, keeps=None),
+        r"[^/]*/[^/]*\.db3",
     ),
     Layout(
         "ros1",
@@ -391,6 +392,7 @@ LAYOUTS = (
         partial(_begins, suffix=".bag"),
         partial(read_bag, form="ros1"),
         HEEDS,
+        truth=r"[^/]*/[^/]*\.bag",
     ),
     Layout(
         "mcap",
@@ -398,5 +400,6 @@ LAYOUTS = (
         partial(_begins, suffix=".mcap"),
         partial(read_bag, form="mcap"),
         HEEDS,
+        truth=r"[^/]*/[^/]*\.mcap",
     ),
 )

@@ -413,6 +413,7 @@ def _biases(source: ExportSource) -> tuple[list[Array], str]:
 
 
 HEEDS = frozenset({"calibration", "imu", "truth", "within_ns"})
+TRUTH_FOLDERS = rf"[^/]*/(?:{'|'.join((*TRUTHS, POSITIONS))})"
 LAYOUTS = (
     Layout(
         "tumvi",
@@ -420,6 +421,7 @@ LAYOUTS = (
         _is_tumvi,
         partial(read_euroc, form="tumvi"),
         HEEDS,
+        truth=r"dso/gt_[^/]*",
     ),
     Layout(
         "euroc",
@@ -428,5 +430,6 @@ LAYOUTS = (
         read_euroc,
         HEEDS,
         Writing(write_euroc, keeps=("imu",)),
+        TRUTH_FOLDERS,
     ),
 )

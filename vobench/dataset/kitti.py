@@ -122,6 +122,8 @@ def _rig_of_calib_txt(path: Path, camera_folders: tuple[str, ...], size_px: tupl
     return CalibratedRig(rig, str(path), notes)
 
 
+# Truth beside the pictures, in a file of that name or of the name of its folder, or in the folder `poses`.
+TRUTH_NAMES = r"[^/]*/poses\.txt|(?P<sequence>[^/]+)/(?P=sequence)\.txt|poses/[^/]*\.txt"
 LAYOUTS = (
     Layout(
         name="kitti",
@@ -130,5 +132,6 @@ LAYOUTS = (
         read=read_kitti,
         heeds=frozenset({"calibration", "truth"}),
         writing=Writing(write_kitti, views=rectified, stamps=exported_stamps, path=trajectory_read_back),
+        truth=TRUTH_NAMES,
     ),
 )

@@ -58,7 +58,12 @@ class Writing:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """A layout of recordings: how it is recognised, read and written. `heeds` names the ReadOptions that it uses."""
+    """A layout of recordings: how it is recognised, read and written.
+
+    `heeds` names the ReadOptions that it uses.
+    `truth` is a regular expression for its files and folders with ground truth, as `folder/name`. The sandbox hides
+    them from estimators.
+    """
 
     name: str
     known_by: str
@@ -66,6 +71,7 @@ class Layout:
     read: Callable[[Path, ReadOptions], Recording]
     heeds: frozenset[str] = frozenset()
     writing: Writing | None = None
+    truth: str = ""
 
 
 def layouts() -> dict[str, Layout]:

@@ -54,7 +54,15 @@ def read_own(path: Path, _options: ReadOptions) -> Recording:
     )
 
 
-LAYOUTS = (Layout("vobench", f"a sequence of vobench: {SENSORS_FILE}", is_sequence, read_own),)
+LAYOUTS = (
+    Layout(
+        "vobench",
+        f"a sequence of vobench: {SENSORS_FILE}",
+        is_sequence,
+        read_own,
+        truth=r"[^/]*/[^/]*\.mcap",
+    ),
+)
 
 
 def convert(

@@ -114,5 +114,6 @@ LAYOUTS = (
         _is_tartanair,
         read_tartanair,
         frozenset({"calibration", "truth", "rate_hz"}),
+        truth=r"[^/]*/pose_[^/]*\.txt",
     ),
 )

@@ -192,5 +192,6 @@ LAYOUTS = (
         read_tum,
         frozenset({"calibration", "truth"}),
         Writing(write_tum, _left_view, keeps=("imu", DEPTH_TOPIC)),
+        r"[^/]*/groundtruth[^/]*\.txt",
     ),
 )

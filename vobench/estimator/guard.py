@@ -34,6 +34,12 @@ CANNOT_START = 127
 # A limit of 0 would still pipe a whole core to a program that the kernel is told to start; 1 prevents that: core(5).
 CORE_BYTES = 1
 PLAN_BYTES = 1 << 20
+# The largest number of descriptors of a process. It bounds the memory of the kernel that pipes and sockets can hold.
+MOST_DESCRIPTORS = 1024
+OOM_SCORE = b"1000"  # the largest score: if memory runs out, the kernel ends the estimator before anything else
+# The first letters of the messages to vobench.
+SANDBOX_REPORT = b"S"
+START_REPORT = b"E"
 
 
 def main() -> "NoReturn":
@@ -46,13 +52,19 @@ def main() -> "NoReturn":
 def guard(line: _socket.socket, plan: "dict[str, Any]") -> "NoReturn":
     """Start a program, report its start to vobench, and end as the program ends, or when the socket is closed.
 
-    `plan` is the result of `sandbox.plan`. `line` is the socket to vobench. The guard sends two messages: what the
-    program can see besides its own files and processes, with the descriptors of `isolation.enter`; and the errno of
-    the start, which is 0 if the program runs.
+    `plan` is the result of `sandbox.plan`. `line` is the socket to vobench. The guard sends two messages: a
+    SANDBOX_REPORT on what the program can see besides its own files and processes, with the descriptors of
+    `isolation.enter`, if the program is isolated; and a START_REPORT with the errno of the start, which is 0 if the
+    program runs.
     """
     os.set_inheritable(line.fileno(), False)
     parent = os.getppid()
-    for limit, value in ((resource.RLIMIT_FSIZE, plan["file_bytes"]), (resource.RLIMIT_CORE, CORE_BYTES)):
+    limits = (
+        (resource.RLIMIT_FSIZE, plan["file_bytes"]),
+        (resource.RLIMIT_CORE, CORE_BYTES),
+        (resource.RLIMIT_NOFILE, MOST_DESCRIPTORS),
+    )
+    for limit, value in limits:
         with suppress(ValueError):  # the limit of the guard itself is lower
             resource.setrlimit(limit, (value, value))
     _prctl(PR_SET_CHILD_SUBREAPER, 1)  # orphaned descendants become children of the guard
@@ -92,6 +104,7 @@ def _started(plan: "dict[str, Any]", line: _socket.socket, ended: int) -> int:
         for number in (signal.SIGCHLD, signal.SIGPIPE, signal.SIGXFSZ):  # the interpreter has changed these handlers
             signal.signal(number, signal.SIG_DFL)
         _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+        _be_ended_first()
         if is_isolated:
             _isolate(plan, line, has_pid_namespace=has_pid_namespace)
         line.close()
@@ -108,19 +121,25 @@ def _started(plan: "dict[str, Any]", line: _socket.socket, ended: int) -> int:
         failed += more
     os.close(reads)
     with suppress(OSError):  # vobench has ended
-        line.send(failed or b"0")
+        line.send(START_REPORT + (failed or b"0"))
     return pid
 
 
 def _isolate(plan: "dict[str, Any]", line: _socket.socket, *, has_pid_namespace: bool) -> None:
     """Isolate this process, and send a report: what it can still see, why, and the descriptors of its file systems."""
     sees, why, descriptors = isolation.enter(plan, has_pid_namespace=has_pid_namespace)
-    report = marshal.dumps((sees, why, has_pid_namespace))
+    report = SANDBOX_REPORT + marshal.dumps((sees, why, has_pid_namespace))
     packed = b"".join(descriptor.to_bytes(4, sys.byteorder) for descriptor in descriptors)
     rights = [(_socket.SOL_SOCKET, _socket.SCM_RIGHTS, packed)] if packed else []
     line.sendmsg([report], rights)
     for descriptor in descriptors:
         os.close(descriptor)
+
+
+def _be_ended_first() -> None:
+    """Let the kernel end this process and its descendants before others if memory runs out: proc(5), oom_score_adj."""
+    with suppress(OSError), open("/proc/self/oom_score_adj", "wb", buffering=0) as file:
+        file.write(OOM_SCORE)
 
 
 def _be_first(writes: int, ended: int) -> None:

@@ -169,7 +169,9 @@ def enter(plan: dict[str, object], *, has_pid_namespace: bool) -> tuple[list[str
         sees.append(NETWORK)
     libc.unshare(CLONE_NEWIPC)
     _drop_capabilities()
-    if not _filter_system_calls(kills_all=has_pid_namespace):
+    # Without a private tree, an older Landlock does not keep a program from emptying the user's files.
+    truncates = bool(descriptors) or _landlock_version() >= SINCE_TRUNCATE
+    if not _filter_system_calls(kills_all=has_pid_namespace, truncates=truncates):
         sees.append(SYSTEM_CALLS)
     return sees, why, descriptors
 
@@ -405,6 +407,7 @@ BITS_OF_VERSION = {1: 13, 2: 14, 3: 15, 4: 15}
 BITS_SINCE_5 = 16
 IOCTL_BIT = 1 << 15
 ABSTRACT_SOCKETS_AND_SIGNALS = 0b11
+SINCE_TRUNCATE = 3
 SINCE_NETWORK = 4
 SINCE_SCOPES = 6
 
@@ -414,26 +417,24 @@ def _restrict_files(plan: dict[str, object]) -> bool:
 
     It uses landlock(7), which needs no namespace.
     """
-    version = libc.syscall(ctypes.c_long(LANDLOCK_CREATE_RULESET), None, ctypes.c_size_t(0), LANDLOCK_VERSION_ASKED)
-    readable = [os.path.realpath(path) for path in (*SYSTEM, *SETTINGS, *PROCESSORS, *plan["read"])]  # type: ignore[misc]
-    hidden = [str(path) for path in plan["hidden"]]  # type: ignore[attr-defined]
-    if version < 1 or _has_hidden_path(readable, hidden):  # landlock cannot hide a part of a readable folder
+    version = _landlock_version()
+    if version < 1:
         return False
     every_access = (1 << BITS_OF_VERSION.get(version, BITS_SINCE_5)) - 1
     ruleset = _new_ruleset(version, every_access)
     if ruleset < 0:
         return False
-    for path, access in _access_rules(plan, readable, every_access):
+    for path, access in _access_rules(plan, every_access):
         _allow(ruleset, path, access & every_access)
     failed = libc.syscall(ctypes.c_long(LANDLOCK_RESTRICT_SELF), ctypes.c_int(ruleset), 0)
     os.close(ruleset)
     return bool(failed == 0)
 
 
-def _has_hidden_path(readable: list[str], hidden: list[str]) -> bool:
-    """Whether one of the hidden paths is in one of the readable folders."""
-    prefixes = tuple(f"{folder}/" for folder in readable)
-    return any(f"{path}/".startswith(prefixes) for path in hidden)
+def _landlock_version() -> int:
+    """The version of Landlock that the kernel supports; negative if none."""
+    number = ctypes.c_long(LANDLOCK_CREATE_RULESET)
+    return int(libc.syscall(number, None, ctypes.c_size_t(0), LANDLOCK_VERSION_ASKED))
 
 
 def _new_ruleset(version: int, every_access: int) -> int:
@@ -449,9 +450,13 @@ def _new_ruleset(version: int, every_access: int) -> int:
     return int(ruleset)
 
 
-def _access_rules(plan: dict[str, object], readable: list[str], every_access: int) -> list[tuple[str, int]]:
+def _access_rules(plan: dict[str, object], every_access: int) -> list[tuple[str, int]]:
     """The paths that the process may use, each with its rights."""
-    rules = [(path, EXECUTE_READ_LIST) for path in (*readable, "/proc")]
+    readable = [os.path.realpath(path) for path in (*SYSTEM, *SETTINGS, *PROCESSORS, *plan["read"])]  # type: ignore[misc]
+    hidden = [str(path) for path in plan["hidden"]]  # type: ignore[attr-defined]
+    rules = [("/proc", EXECUTE_READ_LIST)]
+    for path in readable:
+        rules += _rules_around(path, [place for place in hidden if place != path])
     # Python lists the folder that contains a package. If vobench is a clone, that folder is not in `readable`.
     package = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
     rules.append((os.path.dirname(package), LIST))
@@ -459,6 +464,32 @@ def _access_rules(plan: dict[str, object], readable: list[str], every_access: in
     rules += [(path, READ_WRITE | IOCTL_BIT) for path in (*DEVICES, *GRAPHICS, *graphics)]
     rules += [(str(plan["home"]), every_access), ("/dev/shm", every_access)]
     return rules
+
+
+def _rules_around(path: str, hidden: list[str]) -> list[tuple[str, int]]:
+    """The rights to read a file or folder except the hidden paths in it, whose names can still be listed.
+
+    A rule holds for everything below a folder. If a hidden path is in it, its other entries get one rule each.
+    """
+    inside = [place for place in hidden if f"{place}/".startswith(f"{path}/")]
+    if path in inside:
+        return []
+    if not inside:
+        return [(path, EXECUTE_READ_LIST)]
+    rules = [(path, LIST)]
+    for name in _names(path):
+        entry = os.path.join(path, name)
+        if not os.path.islink(entry):  # a rule would hold for its target
+            rules += _rules_around(entry, inside)
+    return rules
+
+
+def _names(folder: str) -> list[str]:
+    """The names in a folder; none if it cannot be listed."""
+    try:
+        return os.listdir(folder)
+    except OSError:
+        return []
 
 
 def _allow(ruleset: int, path: str, access: int) -> None:
@@ -575,8 +606,18 @@ SOCKET = (41, 198)
 IOCTL = (16, 29)
 KILL = (62, 129)
 FALLOCATE = (285, 47)
-# System V memory and messages outlive their process and count as nobody's, so that no limit holds for them.
-UNCOUNTED = {"msgget": (68, 186), "shmget": (29, 194)}
+# System V memory, messages and semaphores outlive their process and count as nobody's, so that no limit holds for them.
+# Neither does one hold for the pages that vmsplice lends to a pipe.
+UNCOUNTED = {"msgget": (68, 186), "semget": (64, 190), "shmget": (29, 194), "vmsplice": (278, 75)}
+# Larger buffers of sockets count as nobody's, too. Requests for them have no effect.
+SETSOCKOPT = (54, 208)
+SOL_SOCKET = 1
+BUFFER_SIZES = (7, 8, 32, 33)  # SO_SNDBUF, SO_RCVBUF, SO_SNDBUFFORCE, SO_RCVBUFFORCE
+# Calls that can empty a file which the program may not write. A filter cannot check the flags of openat2.
+TRUNCATE = (76, 45)
+OPEN = (2, -1)
+OPENAT = (257, 56)
+OPENAT2 = (437, 437)
 FALLOC_FL_KEEP_SIZE = 1  # linux/falloc.h
 FALLOC_FL_PUNCH_HOLE = 2
 SECCOMP = (317, 277)
@@ -596,6 +637,7 @@ NUMBER = 0
 ARCHITECTURE = 4
 FIRST_ARGUMENT = 16
 SECOND_ARGUMENT = 24
+THIRD_ARGUMENT = 32
 ALLOW = 0x7FFF0000
 FAIL = 0x00050000
 SECCOMP_SET_MODE_FILTER = 1
@@ -605,10 +647,11 @@ SECCOMP_MODE_FILTER = 2
 Instruction = tuple[int, int, int, int]  # code, number of instructions to skip if true and if false, operand
 
 
-def system_call_filter(machine: str, *, kills_all: bool) -> list[Instruction]:
+def system_call_filter(machine: str, *, kills_all: bool, truncates: bool = True) -> list[Instruction]:
     """The seccomp filter for a machine, which is `x86_64` or `aarch64`.
 
-    `kills_all` allows a signal to all visible processes at once.
+    `kills_all` allows a signal to all visible processes at once. Without `truncates`, a file can be emptied only by a
+    program that opens it for writing.
     """
     column, architecture = MACHINES[machine]
     fails = FAIL | errno.EPERM
@@ -638,6 +681,7 @@ def system_call_filter(machine: str, *, kills_all: bool) -> list[Instruction]:
     program += _of_call(CLONE[column], FIRST_ARGUMENT, new_namespace)
     family = [(JUMP_IF_EQUAL, len(FAMILIES) - place, 0, known) for place, known in enumerate(FAMILIES)]
     program += _of_call(SOCKET[column], FIRST_ARGUMENT, [*family, (RETURN, 0, 0, FAIL | errno.EAFNOSUPPORT)])
+    program += _ignored_buffer_sizes(SETSOCKOPT[column])
     refused_requests: list[Instruction] = []
     for request in (*TYPES_INTO_TERMINAL, *RESERVES):
         refused_requests += [(JUMP_IF_EQUAL, 0, 1, request), (RETURN, 0, 0, fails)]
@@ -645,7 +689,40 @@ def system_call_filter(machine: str, *, kills_all: bool) -> list[Instruction]:
     if not kills_all:
         everybody = [(JUMP_IF_EQUAL, 0, 1, 0xFFFFFFFF), (RETURN, 0, 0, fails)]
         program += _of_call(KILL[column], FIRST_ARGUMENT, everybody)
+    if not truncates:
+        program += _refused_truncation(column, fails)
     return [*program, (RETURN, 0, 0, ALLOW)]
+
+
+def _ignored_buffer_sizes(number: int) -> list[Instruction]:
+    """Instructions that let setsockopt succeed without an effect if it would change the size of a buffer."""
+    options = [(JUMP_IF_EQUAL, len(BUFFER_SIZES) - place, 0, size) for place, size in enumerate(BUFFER_SIZES)]
+    body: list[Instruction] = [
+        (JUMP_IF_EQUAL, 0, len(options) + 3, SOL_SOCKET),
+        (LOAD, 0, 0, THIRD_ARGUMENT),
+        *options,
+        (RETURN, 0, 0, ALLOW),
+        (RETURN, 0, 0, FAIL),
+    ]
+    return _of_call(number, SECOND_ARGUMENT, body)
+
+
+def _refused_truncation(column: int, fails: int) -> list[Instruction]:
+    """Instructions that refuse to empty a file by its path, or by opening it without writing."""
+    program: list[Instruction] = [(JUMP_IF_EQUAL, 0, 1, TRUNCATE[column]), (RETURN, 0, 0, fails)]
+    program += [(JUMP_IF_EQUAL, 0, 1, OPENAT2[column]), (RETURN, 0, 0, FAIL | errno.ENOSYS)]
+    # Landlock checks reading and writing. A file can also be opened for neither, with both bits of the mode set.
+    empties_without_writing: list[Instruction] = [
+        (JUMP_IF_ANY_BIT, 0, 4, os.O_TRUNC),
+        (JUMP_IF_ANY_BIT, 1, 0, os.O_WRONLY),
+        (JUMP_IF_ANY_BIT, 2, 1, os.O_RDWR),
+        (JUMP_IF_ANY_BIT, 0, 1, os.O_RDWR),
+        (RETURN, 0, 0, fails),
+    ]
+    for number, flags in ((OPEN[column], SECOND_ARGUMENT), (OPENAT[column], THIRD_ARGUMENT)):
+        if number >= 0:
+            program += _of_call(number, flags, empties_without_writing)
+    return program
 
 
 def _of_call(number: int, argument: int, body: list[Instruction]) -> list[Instruction]:
@@ -653,12 +730,12 @@ def _of_call(number: int, argument: int, body: list[Instruction]) -> list[Instru
     return [(JUMP_IF_EQUAL, 0, len(body) + 2, number), (LOAD, 0, 0, argument), *body, (RETURN, 0, 0, ALLOW)]
 
 
-def _filter_system_calls(*, kills_all: bool) -> bool:
+def _filter_system_calls(*, kills_all: bool, truncates: bool) -> bool:
     """Install the filter of system calls, and return whether that succeeds."""
     machine = os.uname().machine
     if machine not in MACHINES:
         return False
-    program = system_call_filter(machine, kills_all=kills_all)
+    program = system_call_filter(machine, kills_all=kills_all, truncates=truncates)
     code = b"".join(struct.pack("HBBI", *instruction) for instruction in program)
     buffer = ctypes.create_string_buffer(code, len(code))
     whole = struct.pack("HxxxxxxQ", len(program), ctypes.addressof(buffer))

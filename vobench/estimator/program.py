@@ -2,6 +2,7 @@
 
 import marshal
 import os
+import re
 import resource
 import signal
 import socket
@@ -18,9 +19,9 @@ from types import TracebackType
 from typing import Any, Self
 
 from vobench import stop
-from vobench.estimator import sandbox
+from vobench.estimator import isolation, sandbox
 from vobench.estimator.check import in_one_line
-from vobench.estimator.guard import descendants, stat
+from vobench.estimator.guard import SANDBOX_REPORT, START_REPORT, descendants, stat
 from vobench.estimator.home import Home, UnreadableFileError, held_bytes, read_below
 from vobench.estimator.manifest import Limits
 from vobench.estimator.protocol import Result
@@ -41,7 +42,11 @@ KEPT_ENVIRONMENT = (
 )
 LOG_BYTES = 1 << 20
 LOG_SPACE_BYTES = 2 * LOG_BYTES  # more disk space than a log of LOG_BYTES needs
-LAST_LINES_BYTES = 4096  # the end of a log that is searched for the last line
+END_BYTES = 1 << 16  # the end of a log that is searched for a stack, or for the last line
+STACK_HEADING = "Fatal Python error: "
+# The lines of a stack with the calls of the thread that failed; the innermost call comes first.
+FAILED_THREAD = re.compile(r"^Current thread .*\n((?:  .*\n)*)", re.MULTILINE)
+CALL = re.compile(r'  File "(.*)", line (\d+) in (.*)')
 LOOK_S = 0.1  # period at which memory and time of a running program are measured
 WEIGH_S = 1.0  # period at which the disk space of its files is measured
 DEATH_S = 5.0  # a program must end within this time after it has closed its output
@@ -60,7 +65,16 @@ ENTRY_BYTES = 4096  # the approximate size of an entry of a folder
 # Fields of /proc/PID/stat after the name: proc(5).
 OWN_TICKS = slice(11, 13)
 CHILDREN_TICKS = slice(13, 15)
+VIRTUAL_BYTES = 20
 RESIDENT_PAGES = 21
+# A process whose address space is smaller has less than 64 MiB of page tables, which are not counted.
+LARGE_BYTES = 1 << 35
+# With the limit of descriptors, it bounds the memory that full pipes can hold to that of 500,000 small ones, 4 GiB.
+MOST_PROCESSES = 512
+# Settings of the kernel: the sizes of the buffers of sockets. The kernel doubles a size that a program asks for.
+DEFAULT_BUFFERS = ("core/wmem_default", "core/rmem_default")
+LARGEST_BUFFERS = 2 * ("core/wmem_max", "core/rmem_max")
+TCP_BUFFERS = ("ipv4/tcp_wmem", "ipv4/tcp_rmem")
 
 
 class EstimatorFailure(Exception):  # noqa: N818 - a result, not an error of vobench
@@ -104,7 +118,10 @@ class Program:
     ) -> None:
         self.limits = limits
         self._log_path = log
+        self._folder = folder
         self._printed = 0
+        self._cut_end = b""
+        self._stack = ""
         self._began = time.monotonic()
         self._looked = 0.0
         self._weighed = time.monotonic()
@@ -168,9 +185,7 @@ class Program:
         self._line.settimeout(start_s)
         try:
             self._line.send(marshal.dumps(plan))
-            if plan["is_isolated"]:
-                self._take_report()
-            error_number = int(self._line.recv(MESSAGE_BYTES) or b"0")
+            error_number = self._take_reports()
         except TimeoutError:
             raise EstimatorFailure("timeout", f"it did not run within {start_s:g} s") from None
         except OSError:  # the guard has ended, and its exit status says why
@@ -186,15 +201,22 @@ class Program:
         fixed = {"PYTHONHASHSEED": "0", "HOME": home, "TMPDIR": home}
         return {**kept, **threads, **fixed, **sandbox.user_packages()}
 
-    def _take_report(self) -> None:
-        """Receive the guard's report on the sandbox, and the descriptors of the program's file systems."""
-        message, descriptors, _, _ = socket.recv_fds(self._line, MESSAGE_BYTES, maxfds=3)
-        if not message:
-            return
-        sees, why, self.is_apart = marshal.loads(message)
-        self.sandbox = sandbox.of_report(sees, why)
-        if descriptors:
-            self._disk, self._files, self._shared_memory = descriptors
+    def _take_reports(self) -> int:
+        """Receive the guard's reports on the sandbox, if there is one, and on the start, whose errno is returned.
+
+        If the isolation itself fails, the guard reports only the start, and the program's process has ended. If the
+        guard has ended, it reports nothing, and its exit status says why.
+        """
+        while True:
+            message, descriptors, _, _ = socket.recv_fds(self._line, MESSAGE_BYTES, maxfds=3)
+            if not message:
+                return 0
+            if message.startswith(START_REPORT):
+                return int(message.removeprefix(START_REPORT))
+            sees, why, self.is_apart = marshal.loads(message.removeprefix(SANDBOX_REPORT))
+            self.sandbox = sandbox.of_report(sees, why)
+            if descriptors:
+                self._disk, self._files, self._shared_memory = descriptors
 
     def _why_not_started(self, name: str, error_number: int, folder: Path | None) -> str:
         sentence = f"{name} cannot be started ({os.strerror(error_number)})"
@@ -274,9 +296,14 @@ class Program:
             stats.pop(pid, None)
         memory_mib = self._memory_mib(stats)
         self.peak_mib = max(self.peak_mib, memory_mib)
+        limit = f"where the limit is {self.limits.memory_mib} MiB"
         if memory_mib > self.limits.memory_mib:
-            limit = f"where the limit is {self.limits.memory_mib} MiB"
             raise EstimatorFailure("out_of_memory", f"its processes hold {memory_mib:.0f} MiB, {limit}")
+        if len(stats) > MOST_PROCESSES:
+            sentence = f"it has {len(stats)} processes, where the limit is {MOST_PROCESSES}"
+            raise EstimatorFailure("out_of_memory", sentence)
+        if is_time and self._socket_mib() > self.limits.memory_mib:
+            raise EstimatorFailure("out_of_memory", f"its sockets can hold {self._socket_mib():.0f} MiB, {limit}")
 
         if self._disk >= 0:
             self._weigh_disk()
@@ -300,7 +327,27 @@ class Program:
                 private += private_part
                 shared += shared_part
             memory = private + max(shared, in_files)  # mapped files are part of both
+        large = [pid for pid, fields in stats.items() if int(fields[VIRTUAL_BYTES]) > LARGE_BYTES]
+        memory += sum(map(_page_table_bytes, large))
         return memory / MEBIBYTE
+
+    def _socket_mib(self) -> float:
+        """The memory that the buffers of all sockets can hold at most. The kernel does not report how much they hold.
+
+        In a private network, the kernel counts all sockets, even those that no process has open. Otherwise the open
+        ones are counted.
+        """
+        pids = self._pids[1:]  # without the guard, which has another network
+        if not pids:  # the program has ended
+            return 0.0
+        if isolation.NETWORK in self.sandbox.sees:
+            count = _open_socket_count(pids)
+            tcp_count = count
+        else:
+            count, tcp_count = _socket_counts(pids[-1])
+        has_fixed_size = isolation.SYSTEM_CALLS not in self.sandbox.sees
+        of_any = _buffer_bytes(DEFAULT_BUFFERS if has_fixed_size else LARGEST_BUFFERS)
+        return (count * of_any + tcp_count * _buffer_bytes(TCP_BUFFERS)) / MEBIBYTE
 
     def _weigh_disk(self) -> None:
         """Raise EstimatorFailure if the file system of the home folder holds more than the limit."""
@@ -341,12 +388,17 @@ class Program:
     def _cut_log(self) -> None:
         """Cut the log to LOG_BYTES, and count the bytes that were removed.
 
-        Disk space that the program reserved beyond the end of the log is freed.
+        Disk space that the program reserved beyond the end of the log is freed. What the program prints between the two
+        calls is removed without being counted.
         """
         facts = os.fstat(self._log)
         size = facts.st_size
         kept = min(size, LOG_BYTES)
         self._printed += size - kept
+        if size > kept:
+            start = max(size - END_BYTES, LOG_BYTES)
+            end = self._cut_end + os.pread(self._log, END_BYTES, start)
+            self._cut_end = end[-END_BYTES:]
         if size > kept or facts.st_blocks * STAT_BLOCK_BYTES > LOG_SPACE_BYTES:
             os.ftruncate(self._log, kept)
 
@@ -373,18 +425,33 @@ class Program:
             return failure.kind, failure.reason
         if code == -signal.SIGKILL:
             return "out_of_memory", "killed by the system, most likely for memory"
-        cause = f"exit code {code}"
         if code < 0:
             cause = f"signal {signal.Signals(-code).name}"
+            self._stack = self._printed_stack()
+            if self._stack:
+                place = _place_in(self._stack, self._folder)
+                return "crashed", f"the process ended with {cause}{place} (its stack is in {self._log_path.name})"
+        else:
+            cause = f"exit code {code}"
         last_line = self._last_line()
         printed = f": {last_line}" if last_line else ""
         return "crashed", f"the process ended with {cause}{printed}"
 
+    def _printed_stack(self) -> str:
+        """The calls of every thread, which Python's fault handler has printed at the end; empty if it has not."""
+        _, heading, stack = self._printed_end().rpartition(STACK_HEADING)
+        return f"{heading}{stack}" if heading else ""
+
+    def _printed_end(self) -> str:
+        """The last END_BYTES that the program printed, even if they were cut off the log."""
+        size = os.fstat(self._log).st_size
+        start = max(size - END_BYTES, LOG_BYTES if self._printed else 0)
+        end = self._cut_end + os.pread(self._log, END_BYTES, start)
+        return end[-END_BYTES:].decode("utf-8", "replace")
+
     def _last_line(self) -> str:
-        """The last line of the log that is not blank; empty if there is none."""
-        start = max(os.fstat(self._log).st_size - LAST_LINES_BYTES, 0)
-        text = os.pread(self._log, LAST_LINES_BYTES, start).decode("utf-8", "replace")
-        for line in reversed(text.split("\n")):
+        """The last printed line that is not blank; empty if there is none."""
+        for line in reversed(self._printed_end().split("\n")):
             printed = in_one_line(line, LINE_LETTERS)
             if printed:
                 return printed
@@ -409,10 +476,25 @@ class Program:
         self._cut_log()
         if self._printed:
             printed_bytes = LOG_BYTES + self._printed
-            note = f"\n[vobench: cut here; the estimator printed {printed_bytes} bytes]\n"
-            os.write(self._log, note.encode())
+            note = f"\n[vobench: cut here; the estimator printed at least {printed_bytes} bytes]\n"
+            # The program shares the descriptor, so it can have turned off appending and moved the position.
+            os.pwrite(self._log, f"{note}{self._stack}".encode(), os.fstat(self._log).st_size)
         os.fchmod(self._log, self._log_mode)
         os.close(self._log)
+
+
+def _place_in(stack: str, folder: Path | None) -> str:
+    """The innermost call in a stack that is in the estimator's folder, or else the innermost call, as a clause.
+
+    It is empty if the thread that failed has no call of Python.
+    """
+    thread = FAILED_THREAD.search(stack)
+    lines = thread[1].splitlines() if thread else []
+    calls = [call for line in lines if (call := CALL.fullmatch(line))]
+    own_calls = [call for call in calls if folder and Path(call[1]).is_relative_to(folder)]
+    for file, line_number, function in (call.groups() for call in (*own_calls, *calls)):
+        return f" in {function} at {file}:{line_number}"
+    return ""
 
 
 def _open_log(path: Path) -> int:
@@ -492,6 +574,55 @@ def _proportional_bytes(pid: int, resident_pages: int) -> tuple[int, int]:
         shared = kib.get("Pss_Shmem:", 0)
         return 1024 * (kib["Pss:"] - shared), 1024 * shared
     return resident_pages * resource.getpagesize(), 0
+
+
+def _page_table_bytes(pid: int) -> int:
+    """The size of the page tables of a process, which can be large although it has few pages: proc(5), VmPTE."""
+    with suppress(OSError, ValueError), open(f"/proc/{pid}/status", encoding="ascii", errors="replace") as file:
+        for line in file:
+            if line.startswith("VmPTE:"):
+                return 1024 * int(line.split()[1])
+    return 0
+
+
+def _socket_counts(pid: int) -> tuple[int, int]:
+    """The numbers of all sockets and of TCP sockets in the network of a process: proc(5), sockstat."""
+    count = 0
+    tcp_count = 0
+    for name in ("sockstat", "sockstat6"):
+        with suppress(OSError, ValueError), open(f"/proc/{pid}/net/{name}", encoding="ascii") as file:
+            for line in file:
+                words = line.split()
+                if words[0] == "sockets:":
+                    count = int(words[2])
+                elif words[0] in ("TCP:", "TCP6:"):
+                    tcp_count += int(words[2])
+    return count, tcp_count
+
+
+def _open_socket_count(pids: Iterable[int]) -> int:
+    """The number of sockets that processes have open."""
+    sockets = set[str]()
+    for pid in pids:
+        folder = f"/proc/{pid}/fd"
+        with suppress(OSError):
+            for name in os.listdir(folder):
+                with suppress(OSError):
+                    target = os.readlink(f"{folder}/{name}")
+                    if target.startswith("socket:"):
+                        sockets.add(target)
+    return len(sockets)
+
+
+@cache
+def _buffer_bytes(settings: Sequence[str]) -> int:
+    """The sum of the largest sizes of buffers in settings of the kernel."""
+    total = 0
+    for setting in settings:
+        with suppress(OSError, ValueError, IndexError):
+            largest = Path("/proc/sys/net", setting).read_text(encoding="ascii").split()[-1]
+            total += int(largest)
+    return total
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,6 +1,7 @@
 """The process in which the class of an estimator runs: it imports the class and passes frames to it."""
 
 import errno
+import faulthandler
 import importlib
 import importlib.machinery
 import importlib.util
@@ -93,6 +94,9 @@ Message = tuple[bytes, bytes]  # tag and content
 
 def main(folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
     """Answer requests until vobench closes the connection."""
+    # If a fault ends this process, the calls of every thread are written to the log; since Python 3.14 also those of
+    # libraries.
+    faulthandler.enable()
     # Warnings about retired names are written to the log.
     warnings.filterwarnings("default", message=r"vobench\.", category=DeprecationWarning)
     resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))

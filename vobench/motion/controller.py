@@ -172,6 +172,8 @@ BOUND = 1e6
 LONGEST_LEG_S = 3600.0
 FASTEST_HZ = 1e4
 LegTime = Annotated[float, Gt(0), Le(LONGEST_LEG_S)]
+MOST_FRAMES = 200_000  # nearly two hours at 30 Hz
+MOST_POSSIBLE_FRAMES = 20_000_000  # of all legs if each takes its full time; disturbances are drawn for all of them
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,6 +338,11 @@ class Legs:
 
     def __post_init__(self) -> None:
         require(self)
+        if self.longest > MOST_POSSIBLE_FRAMES:
+            raise MotionError(
+                f"{len(self.targets_m)} targets with up to {self.leg_s or self.max_time_s:g} s each are up to "
+                f"{self.longest} frames; at most {MOST_POSSIBLE_FRAMES} are possible"
+            )
         if self.leg_s is None:
             return
         frames = self.leg_s * self.rate_hz
@@ -372,9 +379,12 @@ class Legs:
             is_over = frame == self._clock(len(ends) + 1)
             return [frame] if is_over else []
 
-        distance_m = np.abs(targets_left_m - place_m[-1])
-        is_inside = (distance_m < self.tolerance_m).all(1)
-        entered = int(np.logical_and.accumulate(is_inside).sum())
+        entered = 0
+        for target_m in targets_left_m:
+            distance_m = np.abs(target_m - place_m[-1])
+            if not (distance_m < self.tolerance_m).all():
+                break
+            entered += 1
         leg_start = ends[-1] if ends else 0
         if not entered and frame - leg_start >= self.patience:
             self._raise_timeout(np.array(place_m[leg_start:]), targets_left_m[0], number=len(ends) + 1)

@@ -7,7 +7,7 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 import scipy
-from annotated_types import Ge, Gt, Le, MinLen
+from annotated_types import Ge, Gt, Le, MaxLen, MinLen
 from numpy.typing import ArrayLike
 
 from vobench.errors import MotionError, SettingError
@@ -16,6 +16,7 @@ from vobench.geometry.se3 import Array
 from vobench.geometry.vector import cross_2d
 from vobench.motion.pioneer import wheel_speeds
 from vobench.motion.wheeled import MOVER_KEYS, UNLED_KEYS, Acceleration, Length, Mover, Pause, Speed, Wheeled
+from vobench.setting import MOST_POINTS
 from vobench.trajectory.kinematics import (
     CurveMotion,
     Kinematics,
@@ -358,7 +359,7 @@ class StopAndGo(Wheeled):
     """Straight ahead by each length in turn, with a pause between them."""
 
     kind: Literal["stop_and_go"] = "stop_and_go"
-    legs_m: Annotated[tuple[Length, ...], MinLen(1)]
+    legs_m: Annotated[tuple[Length, ...], MinLen(1), MaxLen(MOST_POINTS)]
     pause_s: Pause = 1.0
     speed_mps: Speed = 0.3
     accel_mps2: Acceleration = 0.5

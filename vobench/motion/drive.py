@@ -6,14 +6,14 @@ from math import ceil
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from annotated_types import MinLen
+from annotated_types import MaxLen, MinLen
 from numpy.polynomial.polynomial import polyder, polyval
 from numpy.typing import ArrayLike
 
 from vobench.errors import MotionError
 from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
 from vobench.geometry.se3 import Array
-from vobench.motion.controller import CONTROLLERS, ControllerSettings, Legs, LegTime, Vehicle
+from vobench.motion.controller import CONTROLLERS, MOST_FRAMES, ControllerSettings, Legs, LegTime, Vehicle
 from vobench.motion.pioneer import THETAS, UNLIMITED, AccelerationLimits, Theta
 from vobench.motion.slip import (
     DELTAS,
@@ -28,7 +28,7 @@ from vobench.motion.slip import (
     generator_of,
 )
 from vobench.motion.wheeled import PIONEER_KEYS, Mover, Wheeled
-from vobench.setting import Positive
+from vobench.setting import MOST_POINTS, Positive
 from vobench.trajectory.kinematics import Kinematics, level
 from vobench.trajectory.trajectory import Stamps
 
@@ -222,7 +222,7 @@ class Waypoints(Wheeled):
     }
 
     kind: Literal["waypoints"] = "waypoints"
-    targets_m: Annotated[tuple[tuple[float, float], ...], MinLen(1)]
+    targets_m: Annotated[tuple[tuple[float, float], ...], MinLen(1), MaxLen(MOST_POINTS)]
     tolerance_m: Positive = 0.01
     leg_s: LegTime | None = None
     max_time_s: LegTime = 60.0
@@ -377,6 +377,8 @@ def _driven(
     ends = list[int]()
     last_frame = len(disturbances.rows) - 1
     for frame in range(last_frame + 1):
+        if frame > MOST_FRAMES:
+            raise MotionError(f"the drive takes more than {MOST_FRAMES} frames; at most these are possible")
         if legs:
             ends += legs.ended(positions_m, ends)
         references.append(reference(state, frame, len(ends)))

@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 import scipy
-from annotated_types import Ge, Le, MinLen
+from annotated_types import Ge, Le, MaxLen, MinLen
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
@@ -18,7 +18,7 @@ from vobench.geometry.se3 import Array
 from vobench.motion.rail import check_apart
 from vobench.motion.spline import Jet, from_zero, of_axes
 from vobench.motion.wheeled import Rate, Speed
-from vobench.setting import Triple, settings
+from vobench.setting import MOST_POINTS, Triple, settings
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, CurveMotion, Kinematics, evenly
 from vobench.trajectory.trajectory import step_lengths_m
 
@@ -79,7 +79,7 @@ class Quadrotor:
     """
 
     kind: Literal["quadrotor"] = "quadrotor"
-    points_m: Annotated[tuple[Triple, ...], MinLen(2)]
+    points_m: Annotated[tuple[Triple, ...], MinLen(2), MaxLen(MOST_POINTS)]
     t_s: tuple[float, ...] | None = None
     speed_mps: Speed = 0.5
     yaw_deg: Annotated[float, Ge(-360), Le(360)] | None = None

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 import numpy as np
 import scipy
-from annotated_types import MinLen
+from annotated_types import MaxLen, MinLen
 from numpy.typing import NDArray
 
 from vobench.errors import MotionError
@@ -14,7 +14,7 @@ from vobench.geometry.se3 import Array
 from vobench.motion.course import BLUNT, ArcLength, arc_length
 from vobench.motion.spline import Jet, of_axes, quintic
 from vobench.motion.wheeled import Acceleration, Rate, Speed
-from vobench.setting import Triple, settings
+from vobench.setting import MOST_POINTS, Triple, settings
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, rest_to_rest
 from vobench.trajectory.trajectory import path_lengths_m, step_lengths_m
 
@@ -63,7 +63,7 @@ class Rail:
     """A motion along a rail through points from rest to rest, facing along it, without roll."""
 
     kind: Literal["rail"] = "rail"
-    points_m: Annotated[tuple[Triple, ...], MinLen(2)]
+    points_m: Annotated[tuple[Triple, ...], MinLen(2), MaxLen(MOST_POINTS)]
     speed_mps: Speed = 0.3
     accel_mps2: Acceleration = 0.5
     rate_hz: Rate = 30.0

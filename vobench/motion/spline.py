@@ -6,14 +6,14 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import scipy
-from annotated_types import MinLen
+from annotated_types import MaxLen, MinLen
 from numpy.typing import ArrayLike
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.wheeled import Rate
-from vobench.setting import NonNegative, Triple, settings
+from vobench.setting import MOST_POINTS, NonNegative, Triple, settings
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, TimeLaw, evenly, rest_to_rest
 
 
@@ -147,7 +147,7 @@ class Pose:
         return se3.transform(R, np.array(self.position_m))
 
 
-Poses = Annotated[tuple[Pose, ...], MinLen(FEWEST)]
+Poses = Annotated[tuple[Pose, ...], MinLen(FEWEST), MaxLen(MOST_POINTS)]
 
 
 @settings()

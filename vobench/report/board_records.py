@@ -4,13 +4,13 @@ import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from vobench.errors import printable
 from vobench.report.board_metric import METRICS
 from vobench.report.board_table import remarks
 from vobench.report.cell import Cell
 from vobench.report.leaderboard import Board
 from vobench.report.total import Total
 from vobench.runner.folder import NO_SEQUENCE
+from vobench.spreadsheet import cell
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -19,7 +19,6 @@ Record = dict[str, Any]
 ALL_CASES = "all"
 # Fields of a total that its record has in another form, or that only the board of all records can tell.
 NOT_IN_RECORD = ("claims", "ranks", "error_interval", "ate_percent", "cases")
-FORMULA_BEGINNINGS = ("=", "+", "-", "@", "|")
 
 
 def as_json(board: Board) -> str:
@@ -50,15 +49,7 @@ def as_csv(board: Board) -> str:
 
 def csv_record(record: Record) -> Record:
     """A record whose text no spreadsheet takes for a formula."""
-    return {name: _csv_value(value) for name, value in record.items()}
-
-
-def _csv_value(value: Any) -> Any:
-    """A value as a cell; text that a spreadsheet would take for a formula begins with an apostrophe."""
-    if not isinstance(value, str):
-        return value
-    text = printable(value)
-    return f"'{text}" if text.startswith(FORMULA_BEGINNINGS) else text
+    return {name: cell(value) for name, value in record.items()}
 
 
 def data_frame(board: Board) -> "pd.DataFrame":

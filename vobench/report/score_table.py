@@ -5,6 +5,7 @@ from typing import Any
 
 from vobench.metric.score import Score
 from vobench.report.markdown_table import markdown_table
+from vobench.spreadsheet import cell
 
 COLUMNS = ("n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99")
 SHOWN = ("n", "rmse", "mean", "median", "std", "min", "max", "p95", "p99")
@@ -23,7 +24,7 @@ def as_csv(content: Content, *, per_length: bool) -> str:
     rows = []
     for name, part in _named_parts(content):
         metrics = [*part["metrics"], *(part["per_length"] if per_length else [])]
-        rows += [{"sequence": name, **metric} for metric in metrics]
+        rows += [{"sequence": cell(name), **metric} for metric in metrics]
     columns = ["name", "unit", *COLUMNS, "id"]
     if per_length:
         columns.insert(2, "length_m")

@@ -24,12 +24,13 @@ from tempfile import TemporaryFile
 from typing import IO, Any, Literal, Protocol
 from uuid import uuid4
 
-from vobench import __version__, stop
+from vobench import __version__, stop, trust
 from vobench.errors import InputError, MissingDependencyError, VobenchError
 from vobench.runner.fork_server import ForkServer, WorkerProcess, shared_server, watch
 from vobench.runner.key import code_digest
 from vobench.runner.store import STATE, Progress, SilentProgress, Store, Tell
 from vobench.runner.task import ENTRIES, NO_LIMIT, Stage, Task, perform
+from vobench.trust import TrustPolicy
 
 FailureKind = Literal["crashed", "out_of_memory", "refused"]
 # Missing resources that would make all other tasks fail, too.
@@ -165,11 +166,19 @@ class LocalProcesses:
 
     Only sequences with the same light that follow each other in a slot share a process, which has their scene loaded.
     Unless `pins_cores` is False, each slot has separate cores, as many as a task gets threads, because libraries use
-    as many threads as there are cores.
+    as many threads as there are cores. `makers` says which makers of scenes may run; by default, it is this process's.
     """
 
-    def __init__(self, slots: int, *, server: ForkServer | None = None, pins_cores: bool = True) -> None:
+    def __init__(
+        self,
+        slots: int,
+        *,
+        server: ForkServer | None = None,
+        pins_cores: bool = True,
+        makers: TrustPolicy | None = None,
+    ) -> None:
         self.slots = slots
+        self._makers = makers
         self._cores = sorted(os.sched_getaffinity(0))
         self._pins_cores = pins_cores
         self._server = server or shared_server(ENTRY, PRELOADED)
@@ -223,7 +232,7 @@ class LocalProcesses:
         process = self._server.start_worker()
         self._running.add(process)
         trace = TemporaryFile()  # noqa: SIM115 - open as long as the worker runs
-        worker = _Worker(process, cores, _main_input(task), trace)
+        worker = _Worker(process, cores, _main_input(task), trace, self._makers or trust.policy())
         worker.begin()
         return worker
 
@@ -254,13 +263,14 @@ class _Worker:
     """A process that performs tasks on certain cores until its connection is closed.
 
     `main_input` is the key of the light or sequence that it has loaded. `trace` is the file to which it writes its
-    stack when a fault ends it.
+    stack when a fault ends it. `makers` says which makers of scenes it may run.
     """
 
     process: WorkerProcess
     cores: list[int]
     main_input: str
     trace: IO[bytes]
+    makers: TrustPolicy
 
     @property
     def had_fault(self) -> bool:
@@ -275,7 +285,7 @@ class _Worker:
     def begin(self) -> None:
         """Send the process its folder, environment and cores. It may not have started yet."""
         with suppress(OSError):  # the process is dead, which `ask` reports
-            self.process.connection.send((os.getcwd(), dict(os.environ), self.cores))
+            self.process.connection.send((os.getcwd(), dict(os.environ), self.cores, self.makers))
             send_handle(self.process.connection, self.trace.fileno(), None)
 
     def ask(self, task: Task, store: Path, threads: int, tell: Tell) -> TaskOutcome:
@@ -341,7 +351,8 @@ def work(connection: Connection, vobench_fd: int) -> None:
     watching = partial(watch, connection, vobench_fd, signals_fd, grace_s=STOP_S, leave=_leave)
     threading.Thread(target=watching, name="watch vobench", daemon=True).start()
     try:
-        folder, environment, cores = connection.recv()
+        folder, environment, cores, makers = connection.recv()
+        trust.adopt(makers)
         # If a fault ends this process, the stack of every thread is written; since Python 3.14 also that of libraries.
         faulthandler.enable(recv_handle(connection))
         os.environ.clear()
@@ -410,7 +421,7 @@ class Dask:
         worker = self._workers[slot]
         self._tells[task.key] = tell
         sent = self._client.submit(
-            _performed_for, self._held, task, store, threads,
+            _performed_for, self._held, task, store, threads, trust.policy(),
             key=task.key, workers=[worker], allow_other_workers=True, pure=False,
         )  # fmt: skip
 
@@ -436,15 +447,18 @@ _processes_for: dict[str, LocalProcesses] = {}
 _leases_lock = threading.Lock()
 
 
-def _performed_for(lease: str, task: Task, store: Path, threads: int) -> TaskOutcome:
-    """Perform a task on a Dask worker, in a process that ends when the client that holds the lease ends."""
+def _performed_for(lease: str, task: Task, store: Path, threads: int, makers: TrustPolicy) -> TaskOutcome:
+    """Perform a task on a Dask worker, in a process that ends when the client that holds the lease ends.
+
+    `makers` says which makers of scenes the client trusts.
+    """
     from distributed import get_worker
 
     worker = get_worker()
     with _leases_lock:
         if lease not in _processes_for:
             server = ForkServer(ENTRY, PRELOADED)
-            _processes_for[lease] = LocalProcesses(1, server=server, pins_cores=False)
+            _processes_for[lease] = LocalProcesses(1, server=server, pins_cores=False, makers=makers)
             leaving = partial(_leave_with, lease, worker, server)
             threading.Thread(target=leaving, name=f"watch {lease}", daemon=True).start()
         processes = _processes_for[lease]

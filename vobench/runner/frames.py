@@ -6,11 +6,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass, fields
 from functools import cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 from pydantic import TypeAdapter, ValidationError
 
 from vobench.errors import InputError
+from vobench.spreadsheet import cell, value_in
 
 if TYPE_CHECKING:
     from vobench.metric.score import Score
@@ -113,16 +114,31 @@ def _adapter() -> TypeAdapter[list[FrameRow]]:
     return TypeAdapter(list[FrameRow])
 
 
+class TableWriter:
+    """Writes the rows of a CSV file that is open. No cell is a formula for spreadsheets."""
+
+    def __init__(self, file: TextIO, columns: Iterable[str]) -> None:
+        self._table = csv.DictWriter(file, tuple(columns), lineterminator="\n")
+        self._table.writeheader()
+
+    def writerow(self, row: Mapping[str, object]) -> None:
+        """Write a row that maps columns to values. Missing cells are empty."""
+        self._table.writerow({column: cell(value) for column, value in row.items()})
+
+
 @contextmanager
-def new_table(path: Path, columns: Iterable[str]) -> Iterator["csv.DictWriter[str]"]:
-    """A writer of a CSV file, for rows that map columns to cells. Missing cells are empty."""
+def new_table(path: Path, columns: Iterable[str]) -> Iterator[TableWriter]:
+    """A writer of a new CSV file."""
     with path.open("w", newline="", encoding="utf-8") as file:
-        table = csv.DictWriter(file, tuple(columns), lineterminator="\n")
-        table.writeheader()
-        yield table
+        yield TableWriter(file, columns)
 
 
 def read_table(path: Path) -> list[dict[str, str]]:
-    """The rows of a CSV file, which map columns to cells."""
+    """The rows of a CSV file, which map columns to values."""
     with path.open(newline="", encoding="utf-8") as file:
-        return list(csv.DictReader(file))
+        return [_values(row) for row in csv.DictReader(file)]
+
+
+def _values(row: Mapping[str, str]) -> dict[str, str]:
+    """The values in the cells of a row. A row that is too short or too long has cells that are no text."""
+    return {column: value_in(text) if isinstance(text, str) else text for column, text in row.items()}

@@ -16,7 +16,7 @@ from vobench.errors import InputError, MotionError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS, ackermann
-from vobench.motion.controller import ControllerSettings
+from vobench.motion.controller import MOST_FRAMES, ControllerSettings
 from vobench.motion.course import Planar, Unled, rolled
 from vobench.motion.drive import Drive, Waypoints, follow, led_by, options
 from vobench.motion.handheld import Handheld
@@ -48,7 +48,6 @@ def generator(seed: int, stream: str) -> np.random.Generator:
 
 
 ENCODERS_PER_FRAME = 4
-MOST_FRAMES = 200_000  # nearly two hours at 30 Hz
 UP_M = 1e3  # the length of the ray that finds the ceiling
 
 

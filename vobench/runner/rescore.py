@@ -12,9 +12,10 @@ import numpy as np
 from pydantic import ValidationError
 
 from vobench import stop
-from vobench.errors import InputError, VobenchError
+from vobench.errors import InputError, MotionError, VobenchError
 from vobench.metric.score import Score
 from vobench.motion.wander import Wander
+from vobench.regular_file import read_regular
 from vobench.runner.consistency import COVARIANCE, CovarianceConsistency, trial_consistency
 from vobench.runner.estimate import DROPPED, ESTIMATE, FINISHED, EstimatorOutcome
 from vobench.runner.folder import CASE, SURVIVED, RunFolder, TrialScore, read_tum
@@ -37,6 +38,8 @@ OF_ESTIMATE = (*SURVIVED, "lost", "diverged")
 # The settings of a case on which its path does not depend.
 NOT_OF_PATH = ("name", "variant", "scene", "lighting")
 VALUE_LETTERS = 60
+TOO_LONG = "too_long"  # pydantic's name of the error
+MOST_CASE_BYTES = 32 << 20  # of a case's settings, which can contain a recorded path of 200,000 poses
 
 
 @dataclass(frozen=True, slots=True)
@@ -247,8 +250,12 @@ def wrong_truths(folder: RunFolder) -> dict[str, str]:
     paths: dict[str, Trajectory] = {}
     for place in sorted((folder.path / "cases").iterdir()):
         stop.check()
-        case = _case(place / CASE)
         truth = place / GROUND_TRUTH
+        try:
+            case = _case(place / CASE)
+        except InputError as error:
+            wrong[place.name] = _one_line(error)
+            continue
         if case is None or not truth.is_file():
             continue
         if isinstance(case.trajectory, Wander):
@@ -262,6 +269,9 @@ def wrong_truths(folder: RunFolder) -> dict[str, str]:
             key = json.dumps(_settings_of_path(place / CASE), sort_keys=True)
             if key not in paths:
                 paths[key] = _true_path(case)
+        except MotionError as error:
+            wrong[place.name] = f"its {CASE} gives no path ({_one_line(error)})"
+            continue
         except (VobenchError, OSError, ValueError, LookupError, AssertionError):
             continue  # for example, a camera file is on another machine
         if not _is_same(stated, paths[key]):
@@ -270,9 +280,25 @@ def wrong_truths(folder: RunFolder) -> dict[str, str]:
 
 
 def _case(path: Path) -> Case | None:
+    """The case in a file; None if it is not one that this version of vobench can simulate.
+
+    Raises InputError if the file or one of its lists is too long, so that its path is not computed.
+    """
     try:
-        return checked(Case, json.loads(path.read_bytes()))
-    except (OSError, ValueError, RecursionError, ValidationError, VobenchError):
+        content = read_regular(path, most_bytes=MOST_CASE_BYTES + 1)
+    except OSError:
+        return None
+    if len(content) > MOST_CASE_BYTES:
+        raise InputError(f"its {CASE} is larger than {MOST_CASE_BYTES >> 20} MiB")
+    try:
+        return checked(Case, json.loads(content))
+    except ValidationError as error:
+        for complaint in error.errors(include_input=False, include_url=False):
+            if complaint["type"] == TOO_LONG:
+                place = ".".join(map(str, complaint["loc"]))
+                raise InputError(f"its {CASE} is too long ({place}: {complaint['msg']})") from None
+        return None
+    except (ValueError, RecursionError, VobenchError):
         return None
 
 

@@ -1,7 +1,7 @@
 """Runs a suite: performs its tasks, and writes the results to one folder."""
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import ZipFile
@@ -93,7 +93,7 @@ def run_suite(
     require_held()
     if unopened := note_on_unopened():
         tell(unopened)
-    tasks = plan(suite, recordings)
+    tasks = plan(_with_hidden_truth(suite, root), recordings)
     scores = [task for task in tasks if task.stage == "score"]
     results = Store(store)
     with results.in_use(tell):
@@ -116,6 +116,15 @@ def run_suite(
             write_hashes(folder)
 
         return make_run(root, suite.suite.name, digest(gathering.identity), fill)
+
+
+def _with_hidden_truth(suite: Plan, root: Path) -> Plan:
+    """The plan with everything hidden that tells the truth: the runs below `root`, and all recordings of the suite."""
+    hidden = [root.resolve()]
+    for case in suite.recorded:
+        truth = case.source.truth
+        hidden += [Path(path).resolve() for path in (case.source.path, truth) if path]
+    return replace(suite, hidden=(*suite.hidden, *hidden))
 
 
 class _Gathering:

@@ -49,7 +49,7 @@ def generated_by(generator: Path, *, seed: int, lighting: str, scene: str) -> Ge
 def _returned_by(file: Path, function: str, arguments: Sequence[Any], scene: str) -> GeneratedPlace:
     if file.resolve().is_relative_to(builtin_root().resolve()):
         return _in_this_process(file, function, arguments)
-    trust.admit(file, _sources(file), scene, is_contained=_is_contained())
+    trust.admit(file, sources(file), scene, is_contained=_is_contained())
     return _in_a_sandbox(file, function, arguments)
 
 
@@ -65,7 +65,7 @@ def _is_contained() -> bool:
     return isolation.FILES not in sandbox_here().sees
 
 
-def _sources(maker: Path) -> Iterator[bytes]:
+def sources(maker: Path) -> Iterator[bytes]:
     """The name and content of the maker, followed by those of all other Python files in its folder and subfolders."""
     others = [path for path in maker.parent.rglob("*.py") if path != maker and path.is_file()]
     for path in [maker, *sorted(others)]:

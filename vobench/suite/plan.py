@@ -3,6 +3,7 @@
 import fnmatch
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from vobench.errors import UnknownNameError, unknown_name_sentence
@@ -16,11 +17,12 @@ from vobench.suite.yaml_source import Mistakes, YamlFile
 
 @dataclass(frozen=True, slots=True)
 class Trial:
-    """One run of one estimator on one case. `repeat` counts from 0."""
+    """One run of one estimator on one case. `repeat` counts from 0, and `hidden` is that of the plan."""
 
     case: Case | RecordedCase
     estimator_entry: EstimatorEntry
     repeat: int
+    hidden: tuple[Path, ...] = ()
 
     @property
     def name(self) -> str:
@@ -34,6 +36,7 @@ class Plan:
 
     `found` lists the scenes, scenarios and estimators that the names in the suite refer to.
     `source` is the file of the suite.
+    `hidden` are files and folders that no estimator may see, such as the folder of all runs.
     """
 
     suite: Suite
@@ -42,6 +45,7 @@ class Plan:
     estimator_entries: tuple[EstimatorEntry, ...]
     found: tuple[CatalogEntry, ...]
     source: YamlFile
+    hidden: tuple[Path, ...] = ()
 
     @property
     def cases(self) -> tuple[Case | RecordedCase, ...]:
@@ -51,7 +55,7 @@ class Plan:
     def trials(self, case: Case | RecordedCase) -> list[Trial]:
         """Every trial on one case."""
         repeats = range(self.suite.repeats)
-        return [Trial(case, entry, repeat) for entry in self.estimator_entries for repeat in repeats]
+        return [Trial(case, entry, repeat, self.hidden) for entry in self.estimator_entries for repeat in repeats]
 
     def only(self, cases: Collection[str], scenes: Collection[str]) -> "Plan":
         """The plan with only the cases whose name matches one of `cases`, and whose scene matches one of `scenes`.

@@ -1,0 +1,118 @@
+"""Finds ground truth in the folders that an estimator may read, so that the sandbox can hide it.
+
+An estimator may read its own folder, Python's folders and those that the user has opened. A run, a cache or a recording
+can lie in one of them, and would tell the estimator the answer. Therefore these folders are searched before an
+estimator starts, by the names of files. Links are not followed, because their targets are not readable.
+"""
+
+import os
+import re
+from collections.abc import Collection, Iterable, Iterator
+from functools import cache
+from pathlib import Path
+from zipfile import BadZipFile, ZipFile
+
+from vobench.estimator import isolation, sandbox
+from vobench.estimator.program import EstimatorFailure
+from vobench.runner.folder import PAGE, SUITE
+from vobench.runner.frames import GROUND_TRUTH
+
+MOST_ENTRIES = 1_000_000  # the largest number of files and folders that are searched, which takes about 2 s
+# Folders with code that was installed or is managed by a tool. They are large, and nobody keeps recordings in them.
+INSTALLED = frozenset({".git", "__pycache__", "dist-packages", "node_modules", "pkgs", "site-packages"})
+CASES = "cases"
+OF_RUN = {CASES, SUITE}
+OF_STORE = {"sequences", "state"}
+# The entries of a run and of a store that tell the truth or somebody else's answers.
+TELLING = {CASES, PAGE, "sequences", "estimates", "scores"}
+BUNDLE_MEMBER = "sequence_hashes.json"
+BUNDLE_SUFFIX = ".zip"
+# The truth of a run, and recordings of the viewer, which contain it.
+OF_VOBENCH = (rf"[^/]*/{re.escape(GROUND_TRUTH)}", r"[^/]*/[^/]*\.rrd")
+
+
+def visible_truth(estimator_folder: Path, known: Collection[Path]) -> list[Path]:
+    """The files and folders with ground truth below the folders that an estimator may read.
+
+    `known` are the real paths of files and folders that are hidden in any case, and therefore not searched.
+    Raises EstimatorFailure if a folder holds more than MOST_ENTRIES files and folders.
+    """
+    if sandbox.is_switched_off():
+        return []
+    skipped = {str(path) for path in known}
+    found = list[Path]()
+    for folder in _searched_folders(estimator_folder):
+        found += _search(folder, skipped)
+    return found
+
+
+def _searched_folders(estimator_folder: Path) -> list[str]:
+    """The real paths of the folders to search: all that are readable, except those of the system."""
+    folders = [str(estimator_folder), *sandbox.opened(), *sandbox.libraries()]
+    real_folders = list(dict.fromkeys(os.path.realpath(folder) for folder in folders))
+    systems = [os.path.realpath(folder) for folder in isolation.SYSTEM]
+    return [folder for folder in real_folders if not _is_below(folder, systems)]
+
+
+def _is_below(path: str, folders: Iterable[str]) -> bool:
+    """Whether a path is one of the folders, or in one of them."""
+    return any(f"{path}/".startswith(f"{folder}/") for folder in folders)
+
+
+def _search(top: str, skipped: Collection[str]) -> Iterator[Path]:
+    """The files and folders with ground truth below a folder. Raises EstimatorFailure if it is too large."""
+    pattern = _truth_pattern()
+    to_search = [top]
+    count = 0
+    while to_search:
+        folder = to_search.pop()
+        entries = _entries(folder)
+        count += len(entries)
+        if count > MOST_ENTRIES:
+            raise EstimatorFailure(
+                "refused",
+                f"it may read a folder with more than {MOST_ENTRIES} files, too many to be searched for ground truth; "
+                f"use a smaller one: {top}",
+            )
+        names = {entry.name for entry in entries}
+        is_result = names >= OF_RUN or names >= OF_STORE
+        if is_result and folder != top:
+            yield Path(folder)
+            continue
+
+        parent = os.path.basename(folder)
+        for entry in entries:
+            is_telling = is_result and entry.name in TELLING
+            if is_telling or pattern.fullmatch(f"{parent}/{entry.name}") or _is_bundle(entry):
+                yield Path(entry.path)
+            elif entry.is_dir(follow_symlinks=False) and entry.name not in INSTALLED and entry.path not in skipped:
+                to_search.append(entry.path)
+
+
+def _entries(folder: str) -> list["os.DirEntry[str]"]:
+    """The entries of a folder; none if the user cannot read it, because then the estimator cannot read it either."""
+    try:
+        with os.scandir(folder) as entries:
+            return list(entries)
+    except OSError:
+        return []
+
+
+def _is_bundle(entry: "os.DirEntry[str]") -> bool:
+    """Whether a file is a bundle, which contains the truth of a run."""
+    if not entry.name.lower().endswith(BUNDLE_SUFFIX) or not entry.is_file():
+        return False
+    try:
+        with ZipFile(entry.path) as archive:
+            return BUNDLE_MEMBER in archive.namelist()
+    except (OSError, BadZipFile, NotImplementedError, ValueError):
+        return False
+
+
+@cache
+def _truth_pattern() -> re.Pattern[str]:
+    """A pattern for the names, as `folder/name`, of files and folders with ground truth in all layouts and in runs."""
+    from vobench.dataset.layout import layouts
+
+    patterns = [*OF_VOBENCH, *(layout.truth for layout in layouts().values() if layout.truth)]
+    return re.compile("|".join(f"(?:{pattern})" for pattern in patterns), re.IGNORECASE)
