@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 
 from vobench.geometry.rig import LENSES
-from vobench.sensor.exposure import AutoExposure, Exposure, initial_exposures, next_exposures, strips
+from vobench.sensor.exposure import AutoExposure, Exposure, initial_exposures, next_exposures
 from vobench.sensor.image_sensor import (
     CAMERAS,
     CameraSensor,
@@ -26,6 +26,7 @@ from vobench.sensor.image_sensor import (
     fixed_pattern,
 )
 from vobench.sensor.lens import apply_lens, lens_maps
+from vobench.sensor.rolling_shutter import row_strips
 
 LENS = LENSES["paper_literal"]
 SHAPE = (LENS.height_px, LENS.width_px)
@@ -95,7 +96,10 @@ def the_rest() -> Iterator[tuple[str, Callable[[], object]]]:
     signal = chip.signal_of_grey
     state = initial_exposures(loop, Exposure(0.005))
     yield "auto-exposure, a step", lambda: next_exposures(loop, state, grey, signal)
-    yield "32 strips of 8 sub-frames", lambda: strips(SHAPE[0], 0.02, 0, 0.01, row_strips=32, sub_frames=8)
+    yield (
+        "32 strips of 8 sub-frames",
+        lambda: row_strips(SHAPE[0], readout_s=0.02, t_ns=0, exposure_s=0.01, strip_count=32, sub_frames=8),
+    )
     yield "once: a fixed pattern", lambda: fixed_pattern(SHAPE, chip, np.random.default_rng(2))
     yield (
         "once: a lens with all four effects",

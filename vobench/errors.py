@@ -15,7 +15,7 @@ VobenchError               an error that the user can correct: one line, exit co
 └── SequenceError          a recording is incomplete, damaged or of another form
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Any
@@ -163,3 +163,10 @@ def require_known(kind: str, name: str, known: Iterable[str]) -> str:
 def counted(number: int, noun: str) -> str:
     """A number with a noun, in the plural unless it is 1."""
     return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def listed(phrases: Sequence[str]) -> str:
+    """The phrases joined by commas, with "and" before the last one."""
+    if len(phrases) < 2:
+        return "".join(phrases)
+    return f"{', '.join(phrases[:-1])} and {phrases[-1]}"

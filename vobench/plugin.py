@@ -75,8 +75,10 @@ if TYPE_CHECKING:
     from vobench.dataset.picture import EncodedPicture as RecordedPicture
     from vobench.dataset.picture import unread
     from vobench.dataset.picture_list import numbered, picture_files
+    from vobench.dataset.png_frame import png_frames
     from vobench.dataset.recording import PictureStream, ReadOptions, RecordedFrame, Recording, Topics, assemble
-    from vobench.dataset.source import ExportSource, Views, png_frames, rectified
+    from vobench.dataset.rectified_view import Views, rectified
+    from vobench.dataset.source import ExportSource
     from vobench.dataset.truth_file import truth_file
     from vobench.errors import InputError, SequenceError, SettingError, VobenchError
     from vobench.estimator.disparity_offset import DisparityOffset
@@ -210,9 +212,9 @@ HOMES = {
     "picture_files": "vobench.dataset.picture_list",
     "truth_file": "vobench.dataset.truth_file:truth_file",
     "ExportSource": "vobench.dataset.source",
-    "Views": "vobench.dataset.source",
-    "png_frames": "vobench.dataset.source",
-    "rectified": "vobench.dataset.source",
+    "Views": "vobench.dataset.rectified_view",
+    "png_frames": "vobench.dataset.png_frame",
+    "rectified": "vobench.dataset.rectified_view",
     "InputError": "vobench.errors",
     "SequenceError": "vobench.errors",
     "SettingError": "vobench.errors",

@@ -92,10 +92,10 @@ MOVED = {
         "scale_errors": "vobench.metric.segment.scale_errors",
     },
     "vobench.metric.pose_error": {
-        "angle_rad": "vobench.metric.ate.angle_rad",
+        "angle_rad": "vobench.metric.motion_error.angle_rad",
         "in_plane": "vobench.metric.comparison.in_plane",
-        "motion_errors": "vobench.metric.ate.motion_errors",
-        "motions": "vobench.metric.ate.motions",
+        "motion_errors": "vobench.metric.motion_error.motion_errors",
+        "motions": "vobench.metric.motion_error.motions",
         "roll_pitch_yaw_rad": "vobench.geometry.se3.roll_pitch_yaw_rad",
     },
     "vobench.metric.pairs": {"select_pairs": "vobench.metric.rpe.select_pairs"},

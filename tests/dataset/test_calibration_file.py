@@ -5,20 +5,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vobench.dataset.calibration_file import (
-    LONGEST_SHOWN,
-    MOST_BRACKETS,
-    MOST_CHARACTERS,
-    AboveZero,
-    Number,
-    Numbers,
-    Resolution,
-    RigidTransform,
-    Text,
-    ZeroOrMore,
-    read_yaml,
-    shown,
-)
+from vobench.dataset.calibration_file import LONGEST_SHOWN, MOST_BRACKETS, MOST_CHARACTERS, read_yaml, shown
+from vobench.dataset.calibration_value import AboveZero, Number, Numbers, Resolution, RigidTransform, Text, ZeroOrMore
 from vobench.errors import InputError
 from vobench.geometry import se3
 

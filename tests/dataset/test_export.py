@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from vobench.dataset import export as exporting
 from vobench.dataset.export import TRAJECTORY_FORMS, export, export_trajectory
 from vobench.dataset.layout import read, sniff, writable
-from vobench.dataset.source import rectified
+from vobench.dataset.rectified_view import rectified
 from vobench.errors import InputError, SequenceError, VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import Equirectangular

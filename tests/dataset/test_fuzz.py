@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from vobench.dataset.calibration_file import read_yaml
 from vobench.dataset.euroc import SensorYamlImu, read_imu_csv, sensor_camera
 from vobench.dataset.kalibr import ImuDensities, read_camchain, read_imu
-from vobench.dataset.kitti import read_calibration
+from vobench.dataset.kitti_calibration import read_calibration
 from vobench.dataset.picture import read_text
 from vobench.dataset.picture_list import read_list
 from vobench.dataset.truth_file import read_truth_file

@@ -5,7 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from vobench.dataset.export import export
 from vobench.dataset.layout import read
 from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
@@ -15,7 +14,6 @@ from vobench.geometry.rig import looking
 from vobench.sequence import Sequence, read_truth
 
 POSES = Path(__file__).parents[3] / "shared" / "data" / "trajectories" / "KITTI_00_gt.txt"
-START_NS = 1_403_636_579_763_555_584  # of make_sequence: its pictures are about 50 ms apart
 LEVEL = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))  # ahead, left, up of a camera's right, down, ahead
 TIMES = POSES.with_name("KITTI_00_gt_times.txt")
 
@@ -123,38 +121,6 @@ def test_of_poses_with_one_number_the_first_is_kept_and_it_is_said(scene, tmp_pa
     recording = read(folder)
     assert np.array_equal(recording.truth.T_world_frame, whole.T_world_frame[[0, 2]])
     assert any("left out: 1 of 3" in note for note in recording.notes)
-
-
-def test_a_matrix_that_is_not_rectified_is_refused(scene, tmp_path):
-    folder = scene.kitti(tmp_path)
-    (folder / "calib.txt").write_text("P0: 40 3 23 0 0 40 15 0 0 0 1 0\nP1: 40 0 23 -20 0 40 15 0 0 0 1 0\n")
-    with pytest.raises(VobenchError, match=r"calib\.txt: P0 should be a rectified camera"):
-        read(folder)
-
-
-def test_a_matrix_that_occurs_twice_is_refused_with_both_lines(scene, tmp_path):
-    path = scene.kitti(tmp_path) / "calib.txt"
-    path.write_text(path.read_text() + "P1: 40 0 23 -80 0 40 15 0 0 0 1 0\n")
-    with pytest.raises(VobenchError, match=r"calib\.txt:6: P1 should occur once, but is also in line 2"):
-        read(path.parent)
-
-
-@pytest.mark.parametrize("offsets_ns", [[60_000_000], [60_000_000, 80_000_000], [-2, -1], [1_000_000_000]])
-def test_pictures_that_all_lie_outside_of_the_truth_are_exported_without_poses(make_sequence, tmp_path, offsets_ns):
-    made = make_sequence(truth_ns=START_NS + np.array(offsets_ns))
-    exported = export(made.folder, tmp_path / "out", "kitti")
-    assert "No picture lies within the truth's time, so there is no poses.txt." in exported.notes
-    assert not any("interpolated" in note or "frames lie before" in note for note in exported.notes)
-    assert not (tmp_path / "out" / "poses.txt").exists()
-    assert len((tmp_path / "out" / "times.txt").read_text().splitlines()) == len(made.t_ns)
-
-
-def test_a_single_true_pose_at_a_picture_is_exported_with_that_picture_alone(make_sequence, tmp_path):
-    t_ns = make_sequence().t_ns
-    made = make_sequence(truth_ns=t_ns[2:3])
-    exported = export(made.folder, tmp_path / "out", "kitti")
-    assert f"4 of {len(t_ns)} frames lie before or after the truth and were left out." in exported.notes
-    assert len((tmp_path / "out" / "poses.txt").read_text().splitlines()) == 1
 
 
 @pytest.mark.skipif(not POSES.is_file(), reason="no folder ../shared/data with real trajectories")

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from vobench.dataset.export import export
 from vobench.dataset.photometric import camera_text
 from vobench.dataset.read_back import known_points
-from vobench.dataset.source import rectified
+from vobench.dataset.rectified_view import rectified
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, pixel_grid
 from vobench.geometry.rig import PRESETS, Rig

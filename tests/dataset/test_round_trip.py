@@ -11,8 +11,8 @@ import pytest
 from vobench.dataset.export import export
 from vobench.dataset.layout import read, writable
 from vobench.dataset.read_back import pixel_difference
+from vobench.dataset.rectified_view import rectified
 from vobench.dataset.sequence import convert
-from vobench.dataset.source import rectified
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, DoubleSphere, KannalaBrandt
 from vobench.geometry.rig import PRESETS, ImuCalibration, Rig, looking

@@ -8,12 +8,12 @@ from types import SimpleNamespace
 
 import pytest
 
-from vobench.estimator import program, sandbox
+from vobench.estimator import program
 from vobench.estimator.home import Home
 from vobench.estimator.manifest import Limits
 from vobench.estimator.process import EstimatorProcess
 from vobench.estimator.program import EstimatorFailure, Program, _cpu_s, _nameless, _proportional_bytes, _used_bytes
-from vobench.estimator.sandbox import SWITCH
+from vobench.estimator.readable_folders import SWITCH_VARIABLE, is_switched_off
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
 
@@ -67,7 +67,7 @@ def test_a_long_last_line_is_cut_to_what_fits_on_one_line_of_a_board(tmp_path):
 @pytest.mark.parametrize(("file_count", "is_too_much"), [(1, False), (3, True)])
 def test_files_that_were_in_its_folder_before_do_not_count(tmp_path, monkeypatch, file_count, is_too_much):
     """Without a private file system, the size of the folder is measured before and after."""
-    monkeypatch.setenv(SWITCH, "off")
+    monkeypatch.setenv(SWITCH_VARIABLE, "off")
     monkeypatch.setattr(program, "WEIGH_S", 0.1)
     code = f"for name in 'abc'[:{file_count}]: open(name, 'wb').write(bytes(2 << 20))\nimport time; time.sleep(0.8)"
     log = tmp_path / "log"
@@ -220,10 +220,12 @@ def test_a_fault_in_the_worker_of_a_class_is_kept_as_well(tmp_path):
 
 
 def test_if_the_isolation_itself_fails_the_cause_is_in_the_reason(tmp_path, monkeypatch):
-    if sandbox.is_switched_off():
+    if is_switched_off():
         pytest.skip("nothing is isolated")
-    whole = sandbox.plan
-    monkeypatch.setattr(sandbox, "plan", lambda *words, **options: whole(*words, **options) | {"disk_bytes": "a lot"})
+    whole = program.guard_plan
+    monkeypatch.setattr(
+        program, "guard_plan", lambda *words, **options: whole(*words, **options) | {"disk_bytes": "a lot"}
+    )
     kind, reason = failure(tmp_path, "print('ran')")
     assert kind == "crashed"
     assert "exit code 1" in reason

@@ -21,12 +21,13 @@ from pathlib import Path
 
 import pytest
 
-from vobench.estimator import isolation, sandbox
+from vobench.estimator import isolation
 from vobench.estimator.home import Home
 from vobench.estimator.isolation import FILES, NAMES, NETWORK, PROCESSES, SHARED_MEMORY, SYSTEM_CALLS
 from vobench.estimator.manifest import Limits
 from vobench.estimator.program import EstimatorFailure, Program, sandbox_here
-from vobench.estimator.sandbox import READ, SWITCH, Sandbox
+from vobench.estimator.readable_folders import READ_VARIABLE, SWITCH_VARIABLE
+from vobench.estimator.sandbox import Sandbox
 
 # ruff: noqa: E501 - one attack is one text
 
@@ -360,10 +361,10 @@ BARE = {name: attack for name, attack in ATTACKS.items() if attack.works_bare}
 @pytest.mark.skipif(bool(os.environ.get(RERUN)), reason="as another user an attack may fail for other reasons")
 @pytest.mark.parametrize("attack", BARE.values(), ids=BARE)
 def test_an_attack_succeeds_where_there_is_no_sandbox_and_the_record_says_so(run, world, monkeypatch, attack):
-    monkeypatch.setenv(SWITCH, "off")
+    monkeypatch.setenv(SWITCH_VARIABLE, "off")
     saw, printed = run(attack.language, attack.code)
     assert saw.level == "none"
-    assert saw.why == f"{SWITCH}=off"
+    assert saw.why == f"{SWITCH_VARIABLE}=off"
     if attack.sees in (FILES, PROCESSES, NETWORK):
         assert attack.sees in saw.sees
     assert world.secret in printed
@@ -574,7 +575,7 @@ os.wait(); print('forked')
 
 
 def test_a_folder_can_be_opened_to_it_which_the_record_names(run, world, monkeypatch):
-    monkeypatch.setenv(READ, str(world.place / "user"))
+    monkeypatch.setenv(READ_VARIABLE, str(world.place / "user"))
     saw, printed = run("sh", 'cat "$user/.ssh/id_ed25519"; cat "$truth"')
     assert saw.read == (str(world.place / "user"),)
     if FILES not in saw.sees:
@@ -583,33 +584,10 @@ def test_a_folder_can_be_opened_to_it_which_the_record_names(run, world, monkeyp
         assert str(world.place / "user") in saw.sentence
 
 
-@pytest.mark.parametrize(
-    ("named", "unopened", "read"),
-    [
-        ("", "", ()),
-        ("/opt/ros:/tmp/slam", "", ("/opt/ros", "/tmp/slam")),
-        ("/opt/ros:/tmp", "/tmp", ("/opt/ros",)),
-        ("/proc:/opt/..:/dev/", "/proc, / and /dev", ()),
-    ],
-)
-def test_a_folder_that_is_never_opened_is_named_with_the_reason(monkeypatch, named, unopened, read):
-    monkeypatch.delenv(SWITCH, raising=False)
-    monkeypatch.setenv(READ, named)
-    assert sandbox.opened() == read
-    note = sandbox.note_on_unopened()
-    assert note.startswith(f"{READ} does not open {unopened}: estimators have their own /dev") if unopened else not note
-
-
-def test_without_a_sandbox_no_folder_stays_closed(monkeypatch):
-    monkeypatch.setenv(READ, "/tmp")
-    monkeypatch.setenv(SWITCH, "off")
-    assert sandbox.note_on_unopened() == ""
-
-
 def test_what_is_hidden_stays_hidden_in_a_folder_that_is_opened(run, world, monkeypatch):
     if FILES in sandbox_here().sees:
         pytest.skip("here it may read everything")
-    monkeypatch.setenv(READ, str(world.place))
+    monkeypatch.setenv(READ_VARIABLE, str(world.place))
     _, printed = run("sh", 'cat "$truth"; ls "$runs"; ls "$own"')
     assert world.secret not in printed
     assert "data.txt" in printed
@@ -649,13 +627,16 @@ def test_a_program_that_it_may_not_read_is_refused_with_the_variable_to_set(worl
     program = world.place / "user" / "slam"
     program.write_text("#!/bin/sh\n")
     program.chmod(0o755)
-    with pytest.raises(EstimatorFailure, match=READ), Program([str(program)], log=tmp_path / "log", limits=LIMITS):
+    with (
+        pytest.raises(EstimatorFailure, match=READ_VARIABLE),
+        Program([str(program)], log=tmp_path / "log", limits=LIMITS),
+    ):
         pass
 
 
 def test_a_sentence_says_what_was_seen():
     assert Sandbox("full").sentence == "saw only its own files"
-    assert Sandbox("full", read=("/opt/ros",)).sentence == f"saw only its own files and /opt/ros ({READ})"
+    assert Sandbox("full", read=("/opt/ros",)).sentence == f"saw only its own files and /opt/ros ({READ_VARIABLE})"
     assert Sandbox("partial", (NETWORK,)).sentence == "saw only its own files and the network"
     assert Sandbox("partial", (FILES, NETWORK)).sentence == "saw the user's files and the network"
     assert (
@@ -677,7 +658,7 @@ def test_homes_may_lie_in_a_folder_that_it_may_read_and_those_of_others_are_not_
     temporary = world.place / "user" / "temporary"
     temporary.mkdir(exist_ok=True)
     monkeypatch.setattr("tempfile.tempdir", str(temporary))
-    monkeypatch.setenv(READ, str(world.place / "user"))
+    monkeypatch.setenv(READ_VARIABLE, str(world.place / "user"))
     with Home(world.place / "log") as other:
         (other.path / "poses.txt").write_text(world.secret)
         saw, printed = run("sh", f'echo x > here; ls; cat {other.path}/poses.txt 2>/dev/null; ls "$user/temporary/"*')
@@ -755,7 +736,7 @@ def test_the_same_as_an_ordinary_user():
                 check=False,
             )
             if tried.returncode == 0:
-                rerun(drop, python=python, environment={"PYTHONPATH": search, READ: search})
+                rerun(drop, python=python, environment={"PYTHONPATH": search, READ_VARIABLE: search})
                 return
     pytest.skip("no interpreter that an ordinary user may execute")
 
@@ -788,17 +769,3 @@ def test_without_namespaces_the_record_says_what_can_be_seen():
         assert {PROCESSES, SHARED_MEMORY, NETWORK} <= set(saw.sees)
         assert saw.why
         assert (saw.level == "none") == (FILES in saw.sees)
-
-
-def test_a_program_is_the_first_on_path_that_an_estimator_may_read(tmp_path, monkeypatch):
-    shim = tmp_path / "shims" / "sh"
-    shim.parent.mkdir()
-    shim.write_text("#!/bin/sh\n")
-    shim.chmod(0o755)
-    monkeypatch.setenv("PATH", f"{shim.parent}:/usr/bin:/bin")
-    assert sandbox.program_path("sh", None) in ("/usr/bin/sh", "/bin/sh")
-    assert sandbox.program_path("sh", shim.parent) == str(shim)  # its own folder
-    assert sandbox.program_path(str(shim), None) == str(shim)
-    monkeypatch.setenv("PATH", str(shim.parent))
-    assert sandbox.program_path("sh", None) == str(shim)
-    assert sandbox.is_out_of_reach("sh", None)

@@ -92,3 +92,10 @@ def test_the_flow_is_the_median_length_of_the_tracks_and_zero_without_any():
     end = np.array([[3, 4], [0, 1], [0, 20]], np.float32)
     assert Followed(start, end, np.zeros(3), np.zeros(3)).flow_px == 5.0
     assert Followed(start[:0], end[:0], np.zeros(0), np.zeros(0)).flow_px == 0.0
+
+
+def test_points_are_followed_only_from_a_keyframe():
+    tracker = StereoTracker(PAIR, SETTINGS)
+    blank = np.full(SIZE, 90, np.uint8)
+    with pytest.raises(RuntimeError, match="no keyframe to follow points from"):
+        tracker.follow(blank, blank, np.eye(4))

@@ -12,10 +12,10 @@ from scipy.spatial.transform import Rotation
 
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
-from vobench.metric import ate
+from vobench.metric import blockwise
 from vobench.metric import rpe as pairs_module
-from vobench.metric.ate import errors_between
 from vobench.metric.comparison import in_plane
+from vobench.metric.motion_error import errors_between
 from vobench.metric.rpe import (
     distance_errors,
     part_errors,
@@ -441,7 +441,7 @@ def test_errors_do_not_depend_on_the_size_of_the_blocks(monkeypatch, block):
     )
     pairs = frames_apart(T_gt, 3)
     expected = errors_between(T_gt, T_est, *pairs)
-    monkeypatch.setattr(ate, "BLOCK", block)
+    monkeypatch.setattr(blockwise, "BLOCK", block)
     found = errors_between(T_gt, T_est, *pairs)
     np.testing.assert_array_equal(found.trans_m, expected.trans_m)
     np.testing.assert_array_equal(found.rot_rad, expected.rot_rad)

@@ -1,4 +1,4 @@
-"""The eye sees the whole path, whatever its shape, and stands where a path looks long."""
+"""The colours of a recording are what they are called."""
 
 import colorsys
 
@@ -7,99 +7,22 @@ import pytest
 
 from vobench.report import blueprint as bp
 
-PATHS = {
-    "straight": np.linspace([0, 0, 0.4], [10, 0, 0.4], 50),
-    "across": np.linspace([0, -3, 0.4], [0, 3, 0.4], 50),
-    "circle": np.array([[2 * np.cos(a), 2 * np.sin(a), 0.4] for a in np.linspace(0, 6, 50)]),
-    "at rest": np.tile([1.0, 2.0, 0.4], (20, 1)),
-    "single": np.array([[1.0, 2.0, 0.4]]),
-}
-
-
-@pytest.fixture(params=PATHS.values(), ids=PATHS.keys())
-def points(request):
-    return request.param
-
-
-def test_whole_path_lies_within_forty_degrees_of_the_line_of_sight(points):
-    eye, target = bp.eye_and_target(points)
-    ahead = (target - eye) / np.linalg.norm(target - eye)
-    rays = points - eye
-    cosines = rays @ ahead / np.linalg.norm(rays, axis=1)
-    assert cosines.min() > np.cos(np.deg2rad(40))
-
-
-def test_eye_is_above_the_path_and_not_on_it(points):
-    eye, target = bp.eye_and_target(points)
-    assert eye[2] > points[:, 2].max()
-    assert np.linalg.norm(eye - target) > 0.3
-
-
-def test_eye_looks_across_a_straight_path():
-    for name in ("straight", "across"):
-        eye, target = bp.eye_and_target(PATHS[name])
-        along = PATHS[name][-1] - PATHS[name][0]
-        assert abs((target - eye) @ along) < 1e-9 * np.linalg.norm(along)
-
-
-def test_eye_moves_with_the_scene(points):
-    eye, target = bp.eye_and_target(points)
-    shifted_eye, shifted_target = bp.eye_and_target(points + np.array([5, -7, 1]))
-    np.testing.assert_allclose(shifted_eye - eye, [5, -7, 1])
-    np.testing.assert_allclose(shifted_target - target, [5, -7, 1])
-
-
-def test_estimate_that_flies_off_does_not_change_the_view():
-    truth = PATHS["circle"]
-    near = truth + np.array([0.1, 0, 0])
-    flown = np.concatenate([near, [[1e6, 0, 0]]])
-    np.testing.assert_array_equal(bp._near_truth(truth, flown), bp._near_truth(truth, near))
-
-
-@pytest.mark.parametrize("extent_m", [0.5, 1.0, 7.0, 20.0, 300.0])
-def test_grid_has_three_to_thirty_lines(extent_m):
-    spacing_m = bp.grid_spacing_m(extent_m)
-    assert 3 <= extent_m / spacing_m <= 30 + 1e-9
-    assert np.log10(spacing_m) == pytest.approx(round(np.log10(spacing_m)))
-
 
 @pytest.mark.parametrize(
     ("name", "hue_deg"), [("orange", 32), ("blue", 212), ("violet", 285), ("yellow", 52), ("cyan", 180)]
 )
 def test_each_colour_is_what_it_is_called(name, hue_deg):
-    (rgb,) = [colour.rgb for colour in bp.ESTIMATOR_COLOURS if colour.name == name]
-    red, green, blue = (value / 255 for value in rgb)
+    red, green, blue = (value / 255 for value in bp.ESTIMATOR_COLORS[name])
     hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
     assert 360 * hue == pytest.approx(hue_deg, abs=3)
     assert 0.5 < lightness < 0.75
     assert saturation > 0.55
 
 
-def test_a_camera_is_drawn_in_proportion_to_its_path():
-    assert bp.frustum_m(2 * PATHS["circle"]) == pytest.approx(2 * bp.frustum_m(PATHS["circle"]))
-    assert bp.frustum_m(PATHS["straight"]) == pytest.approx(0.8)
-    assert bp.frustum_m(PATHS["at rest"]) == pytest.approx(0.04)
-
-
-def test_the_eye_is_as_far_away_as_the_path_is_large():
-    for path in (PATHS["straight"], PATHS["circle"]):
-        eye, target = bp.eye_and_target(path)
-        radius_m = np.linalg.norm(np.ptp(path, axis=0)) / 2
-        assert np.linalg.norm(eye - target) == pytest.approx(1.6 * radius_m)
-        assert np.rad2deg(np.arcsin((eye - target)[2] / (1.6 * radius_m))) == pytest.approx(38.0)
-        assert eye[1] < target[1]
-
-
-def test_an_estimate_counts_up_to_twice_the_radius_from_the_middle():
-    truth = PATHS["straight"]  # of 10 m around (5, 0)
-    near, far = np.array([[14.9, 0, 0.4]]), np.array([[15.1, 0, 0.4]])
-    assert len(bp._near_truth(truth, near)) == len(truth) + 1
-    assert len(bp._near_truth(truth, far)) == len(truth)
-
-
-def test_a_sixth_estimator_is_in_the_legend_with_the_first_colour():
-    labels = [f"vo_{number}" for number in range(6)]
-    view = bp._paths_view(PATHS["circle"], PATHS["circle"], labels)
-    assert view.name == (
-        "Truth green, vo_0 orange, vo_1 blue, vo_2 violet, vo_3 yellow, vo_4 cyan, vo_5 orange, error red"
-    )
+def test_an_estimator_without_a_colour_is_refused_and_not_left_out():
+    path_m = np.zeros((3, 3))
+    most = len(bp.ESTIMATOR_COLORS)
+    labels = [f"estimator {index}" for index in range(most + 1)]
+    bp.layout(path_m, path_m, bp.LayoutOptions(replayed_frames=None, labels=labels[:most]))
+    with pytest.raises(ValueError, match="zip"):
+        bp.layout(path_m, path_m, bp.LayoutOptions(replayed_frames=None, labels=labels))

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.report.boards import ates, scores_of
-from vobench.metric.coverage import lost_aware_score
+from vobench.metric.lost_aware import lost_aware_score
 from vobench.report.board_metric import COSTS, METRICS, lost_aware
 from vobench.runner.folder import STATUSES, SURVIVED
 

@@ -95,12 +95,6 @@ def test_a_noisy_pair_of_pictures_takes_sixty_kilobytes_at_most(run_viewer, tmp_
         assert sum(sizes) <= 60_000
 
 
-def test_a_sixth_estimator_is_in_the_recording_too(run_viewer, tmp_path):
-    others = [replace(run_viewer, label=f"vo_{number}") for number in range(5)]
-    save_trial(tmp_path / "six.rrd", run_viewer, *others)
-    assert len(rows(tmp_path / "six.rrd", "/world/vo_4/path", static=True)) == 1
-
-
 def test_two_estimators_are_in_one_recording_each_with_entities_and_a_left_picture_of_its_own(run_viewer, tmp_path):
     other = replace(run_viewer, label="other", title="other on room", rotation_deg=np.full(12, 2.0))
     save_trial(tmp_path / "two.rrd", run_viewer, other)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vobench.dataset.source import rectified
+from vobench.dataset.rectified_view import rectified
 from vobench.geometry import se3
 from vobench.geometry.rig import LENSES, PRESETS, ImuCalibration, stereo_rig
 from vobench.report import page

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.estimator.sandbox import READ, SWITCH
+from vobench.estimator.readable_folders import READ_VARIABLE, SWITCH_VARIABLE
 from vobench.runner import key
 from vobench.runner.key import PACKAGE, closure, code_digest, folder_digest, imported_by
 from vobench.runner.task import ENTRIES
@@ -202,8 +202,8 @@ def test_a_built_in_estimators_key_changes_with_the_code_behind_its_names(
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")
 def test_links_that_lead_out_of_a_folder_or_in_circles_do_not_count_and_are_not_walked(tmp_path, monkeypatch):
-    monkeypatch.delenv(READ, raising=False)
-    monkeypatch.delenv(SWITCH, raising=False)
+    monkeypatch.delenv(READ_VARIABLE, raising=False)
+    monkeypatch.delenv(SWITCH_VARIABLE, raising=False)
     outside = tmp_path / "outside"
     outside.mkdir()
     (outside / "weights").write_text("1")
@@ -223,8 +223,8 @@ def test_links_that_lead_out_of_a_folder_or_in_circles_do_not_count_and_are_not_
 
 @pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")
 def test_what_a_link_leads_to_counts_where_the_folder_is_opened_to_estimators(tmp_path, monkeypatch):
-    monkeypatch.delenv(SWITCH, raising=False)
-    monkeypatch.setenv(READ, str(tmp_path / "outside"))
+    monkeypatch.delenv(SWITCH_VARIABLE, raising=False)
+    monkeypatch.setenv(READ_VARIABLE, str(tmp_path / "outside"))
     outside = tmp_path / "outside"
     outside.mkdir()
     own = tmp_path / "own"

@@ -16,7 +16,7 @@ from vobench.report import board_records, page
 from vobench.runner.bundle import bundle, merged, opened
 from vobench.runner.folder import HASHES
 from vobench.runner.rescore import check, wrong_truths
-from vobench.runner.signature import sign, signed_by
+from vobench.runner.signature import sign, signature_sentence
 
 TRIAL = "cases/full/estimates/stand_still/0"
 OTHER = "cases/full/estimates/wheel_odometry/0"
@@ -202,17 +202,17 @@ def test_a_signature_names_who_signed_and_whether_that_is_verified(honest, tmp_p
         subprocess.run(["ssh-keygen", "-q", "-t", "ed25519", "-N", "", "-f", key], check=True)
     allowed = tmp_path / "allowed"
     allowed.write_text(f"ada@example.org {keys[0].with_suffix('.pub').read_text()}")
-    assert signed_by(path, allowed) == ""
+    assert signature_sentence(path, allowed) == ""
     assert sign(path, keys[0]) == tmp_path / "a.zip.sig"
-    assert signed_by(path, allowed) == "signed by ada@example.org, verified"
-    assert "signed by SHA256:" in signed_by(path, None)
-    assert "not verified" in signed_by(path, None)
+    assert signature_sentence(path, allowed) == "signed by ada@example.org, verified"
+    assert "signed by SHA256:" in signature_sentence(path, None)
+    assert "not verified" in signature_sentence(path, None)
     sign(path, keys[1])
-    assert "NOT verified" in signed_by(path, allowed)
+    assert "NOT verified" in signature_sentence(path, allowed)
     sign(path, keys[0])
     packed(edited(honest, f"{TRIAL}/score.json", repeat=0, path_m=1.0), path)
-    assert "NOT verified" in signed_by(path, allowed)
-    assert "NOT" in signed_by(path, None)
+    assert "NOT verified" in signature_sentence(path, allowed)
+    assert "NOT" in signature_sentence(path, None)
     with pytest.raises(InputError, match="the bundle could not be signed"):
         sign(path, tmp_path / "no_key")
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from vobench.estimator.program import sandbox_here
-from vobench.estimator.sandbox import READ
+from vobench.estimator.readable_folders import READ_VARIABLE
 from vobench.rendering import raster
 from vobench.report.verify import verify_run
 from vobench.runner import estimate
@@ -259,8 +259,11 @@ def test_a_failure_is_a_row_and_is_tried_again_when_its_cause_may_be_gone(bench,
     if sandbox_here().level == "full":
         out_of_reach = bench.run(change).scores()[0]
         assert out_of_reach.status == "refused"
-        assert f"PYTHONPATH has {tmp_path}, which an estimator may not read: name it in {READ}" in out_of_reach.reason
-    monkeypatch.setenv(READ, str(tmp_path))
+        assert (
+            f"PYTHONPATH has {tmp_path}, which an estimator may not read: name it in {READ_VARIABLE}"
+            in out_of_reach.reason
+        )
+    monkeypatch.setenv(READ_VARIABLE, str(tmp_path))
     assert {s.status for s in bench.run(change).scores()} == {"ok"}
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from vobench.errors import InputError
 from vobench.runner import signature
-from vobench.runner.signature import sign, signed_by
+from vobench.runner.signature import sign, signature_sentence
 
 needs_openssh = pytest.mark.skipif(shutil.which("ssh-keygen") is None, reason="no OpenSSH")
 
@@ -33,22 +33,22 @@ def test_a_principal_is_named_whole(bundle, key, tmp_path, principals):
     allowed.write_text(f"{principals} {key.with_suffix('.pub').read_text()}")
     sign(bundle, key)
     first = principals.strip('"').partition(",")[0]
-    assert signed_by(bundle, allowed) == f"signed by {first}, verified"
+    assert signature_sentence(bundle, allowed) == f"signed by {first}, verified"
     bundle.write_bytes(b"other content")
-    assert signed_by(bundle, allowed).startswith(f"signed by {first}, NOT verified (")
+    assert signature_sentence(bundle, allowed).startswith(f"signed by {first}, NOT verified (")
 
 
 @needs_openssh
 def test_without_a_list_of_signers_only_the_key_is_named(bundle, key):
     sign(bundle, key)
-    assert signed_by(bundle, None).startswith("signed by SHA256:")
+    assert signature_sentence(bundle, None).startswith("signed by SHA256:")
     bundle.write_bytes(b"other content")
-    assert signed_by(bundle, None).startswith("its signature is NOT that of this file (")
+    assert signature_sentence(bundle, None).startswith("its signature is NOT that of this file (")
 
 
 def test_a_missing_list_of_signers_is_reported(bundle, tmp_path):
     with pytest.raises(InputError, match=r"there is no such allowed-signers file: .*allowed$"):
-        signed_by(bundle, tmp_path / "allowed")
+        signature_sentence(bundle, tmp_path / "allowed")
 
 
 def test_an_ssh_keygen_that_hangs_is_stopped(bundle, tmp_path, monkeypatch):

@@ -7,7 +7,7 @@ import pytest
 
 from vobench.dataset.layout import layouts
 from vobench.estimator.program import EstimatorFailure
-from vobench.estimator.sandbox import READ, SWITCH
+from vobench.estimator.readable_folders import READ_VARIABLE, SWITCH_VARIABLE
 from vobench.runner import visible_truth as visible_truth_file
 from vobench.runner.visible_truth import visible_truth
 
@@ -15,8 +15,8 @@ from vobench.runner.visible_truth import visible_truth
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     """The folder of an estimator, with its code."""
-    monkeypatch.delenv(READ, raising=False)
-    monkeypatch.delenv(SWITCH, raising=False)
+    monkeypatch.delenv(READ_VARIABLE, raising=False)
+    monkeypatch.delenv(SWITCH_VARIABLE, raising=False)
     folder = tmp_path / "mine"
     put(folder, "estimator.py")
     return folder
@@ -110,7 +110,7 @@ def test_a_bundle_is_found_whatever_its_name(folder):
 
 def test_folders_that_the_user_opened_are_searched(folder, tmp_path, monkeypatch):
     put(tmp_path, "opened/seq/groundtruth.txt")
-    monkeypatch.setenv(READ, str(tmp_path / "opened"))
+    monkeypatch.setenv(READ_VARIABLE, str(tmp_path / "opened"))
     assert visible_truth(folder, []) == [tmp_path / "opened/seq/groundtruth.txt"]
 
 
@@ -135,5 +135,5 @@ def test_a_folder_that_is_too_large_to_be_searched_is_refused(folder, monkeypatc
 
 def test_without_a_sandbox_nothing_is_searched(folder, monkeypatch):
     put(folder, "groundtruth.txt")
-    monkeypatch.setenv(SWITCH, "off")
+    monkeypatch.setenv(SWITCH_VARIABLE, "off")
     assert visible_truth(folder, []) == []

@@ -11,7 +11,7 @@ from vobench.errors import InputError, TrajectoryError
 from vobench.geometry import se3
 from vobench.trajectory import trajectory as trajectory_module
 from vobench.trajectory.associate import associate, match
-from vobench.trajectory.trajectory import PoseConvention, Trajectory, parse_pose_convention, poses_at
+from vobench.trajectory.trajectory import PoseConvention, Trajectory, mean_rate_hz, parse_pose_convention, poses_at
 
 AXES = [
     ",".join(sign + axis for sign, axis in zip(signs, order, strict=True))
@@ -223,3 +223,8 @@ def test_something_mounted_moves_along():
     path = Trajectory(T_NS, poses_trajectory())
     back = path.of_mounted(T_body_camera).of_mounted(se3.inverse(T_body_camera))
     np.testing.assert_allclose(back.T_world_frame, path.T_world_frame, atol=1e-12)
+
+
+@pytest.mark.parametrize(("stamps", "rate_hz"), [([5], 0.0), ([5, 5], 0.0), ([0, 50_000_000, 100_000_000], 20.0)])
+def test_the_mean_rate_is_the_number_of_intervals_over_their_time(stamps, rate_hz):
+    assert mean_rate_hz(np.array(stamps)) == rate_hz

@@ -20,7 +20,7 @@ from vobench.report.leaderboard import Board
 from vobench.runner.bundle import merged, opened
 from vobench.runner.folder import RunFolder, TrialScore
 from vobench.runner.rescore import Rescored, check, wrong_truths
-from vobench.runner.signature import signed_by
+from vobench.runner.signature import signature_sentence
 
 TERMINAL = "terminal"
 FILE_FORMATS = (*FORMATS, "html")
@@ -108,7 +108,7 @@ def _choose_format(form: str | None, out: Path | None, *, as_json: bool) -> str:
 
 def _signature(run: Path, allowed_signers: Path | None) -> str:
     """A sentence about the signature of a bundle; empty if it has none, or if the path is a folder."""
-    sentence = signed_by(run, allowed_signers) if run.is_file() else ""
+    sentence = signature_sentence(run, allowed_signers) if run.is_file() else ""
     return f"{run.name}: {sentence}" if sentence else ""
 
 

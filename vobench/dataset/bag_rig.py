@@ -9,7 +9,7 @@ import numpy as np
 from vobench.dataset.distortion import focal_camera
 from vobench.errors import InputError
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera
+from vobench.geometry.camera import Camera, focal_and_center_px
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.sequence.camera_info import DOUBLE_SPHERE, EQUIRECTANGULAR, parse_camera
@@ -107,20 +107,14 @@ class Info:
         message = self.message
         size_px = (int(message.width), int(message.height))
         if self.rectified:
-            return focal_camera(size_px, _focal_px(self.matrix("p", 3, 4)), "none", [], place=self.topic)
+            return focal_camera(size_px, focal_and_center_px(self.matrix("p", 3, 4)), "none", [], place=self.topic)
         if message.distortion_model in VOBENCH_MODELS:
             return parse_camera(message)
-        focal_px = _focal_px(self.matrix("k", 3, 3))
+        focal_px = focal_and_center_px(self.matrix("k", 3, 3))
         coefficients = [float(value) for value in self._field("d")]
         if not np.isfinite(coefficients).all():
             raise InputError(f"{self.topic}: D should be finite numbers, but is {coefficients}")
         return focal_camera(size_px, focal_px, message.distortion_model, coefficients, place=self.topic)
-
-
-def _focal_px(K: Array) -> list[float]:
-    """The values fx, fy, cx, cy of K (3, 3) or P (3, 4)."""
-    focal_px: list[float] = K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
-    return focal_px
 
 
 def by_projection(left: Info, right: Info) -> Array:

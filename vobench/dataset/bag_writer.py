@@ -8,7 +8,8 @@ from rosbags.highlevel import AnyReader, AnyReaderError
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, ReaderError, StoragePlugin, Writer
 
-from vobench.dataset.source import ExportSource, Views
+from vobench.dataset.rectified_view import Views
+from vobench.dataset.source import ExportSource
 from vobench.errors import SequenceError
 from vobench.sequence.bag import Bag
 from vobench.sequence.message_type import TYPES

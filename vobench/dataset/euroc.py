@@ -8,13 +8,16 @@ import numpy as np
 
 from vobench.dataset import kalibr
 from vobench.dataset.body import MountedCamera, mounted_rig, on_body
-from vobench.dataset.calibration_file import AboveZero, Numbers, Resolution, RigidTransform, Text, read_yaml
+from vobench.dataset.calibration_file import read_yaml
+from vobench.dataset.calibration_value import AboveZero, Numbers, Resolution, RigidTransform, Text
 from vobench.dataset.distortion import focal_camera
 from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.picture_list import PictureList, listed_pictures, picture_files
+from vobench.dataset.png_frame import png_frames
 from vobench.dataset.recording import CalibratedImu, CalibratedRig, Notes, ReadOptions, Recording, assemble
-from vobench.dataset.source import ExportSource, Views, png_frames, rate_hz
+from vobench.dataset.rectified_view import Views
+from vobench.dataset.source import ExportSource
 from vobench.dataset.truth_file import read_truth_file, truth_file
 from vobench.errors import InputError
 from vobench.geometry import se3
@@ -25,7 +28,7 @@ from vobench.sensor.imu import ImuReadings
 from vobench.trajectory.euroc import csv_rows, format_euroc
 from vobench.trajectory.stamp_text import stamps_ns
 from vobench.trajectory.text_table import NUMBER, content_lines, read_table
-from vobench.trajectory.trajectory import Stamps, Trajectory
+from vobench.trajectory.trajectory import Stamps, Trajectory, mean_rate_hz
 
 MAV = "mav0"
 CAMERAS = ("cam0", "cam1")
@@ -81,7 +84,7 @@ def sensor_camera(path: Path) -> MountedCamera:
             f"but is {sensor.camera_model!r} with {len(sensor.intrinsics)}"
         )
     if sensor.distortion_model is None:
-        raise file.missing("distortion_model", file.tree)
+        raise file.missing_key_error("distortion_model", file.tree)
     coefficients = sensor.distortion_coefficients or ()
     camera = focal_camera(size_px, sensor.intrinsics, sensor.distortion_model, coefficients, place=str(path))
     return MountedCamera(camera, sensor.T_BS)
@@ -292,7 +295,7 @@ def write_euroc(source: ExportSource, views: Views, folder: Path) -> list[str]:
     T_base_body = rig.imu.T_body_imu if rig.imu else np.eye(4)  # base_link is vobench's body, and the IMU is EuRoC's
     T_body_base = se3.inverse(T_base_body)
     stamps = _write_pictures(source, views, mav)
-    rate = rate_hz(stamps)
+    rate = mean_rate_hz(stamps)
     for index, side in enumerate(rig.sides):
         T_body_camera = T_body_base @ rig.T_body_camera(side)
         text = _camera_yaml(index, rig.camera(side), T_body_camera, rate)

@@ -14,8 +14,10 @@ from vobench.dataset.layout import Writing, read, writable
 from vobench.dataset.overlap import overlapping_truth
 from vobench.dataset.photometric import write_photometric
 from vobench.dataset.picture import require_free
+from vobench.dataset.png_frame import PNG
 from vobench.dataset.read_back import check_path, check_rig
-from vobench.dataset.source import PNG, ExportSource, Views, open_source
+from vobench.dataset.rectified_view import Views
+from vobench.dataset.source import ExportSource, open_source
 from vobench.errors import InputError, SequenceError, unknown_name_sentence
 from vobench.geometry.rig import Rig
 from vobench.trajectory.euroc import format_euroc

@@ -8,23 +8,21 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vobench.dataset.calibration_file import (
-    AboveZero,
-    CalibrationFile,
-    Number,
-    Numbers,
-    Resolution,
-    RigidTransform,
-    Text,
-    ZeroOrMore,
-    read_yaml,
-)
+from vobench.dataset.calibration_file import CalibrationFile, read_yaml
+from vobench.dataset.calibration_value import AboveZero, Number, Numbers, Resolution, RigidTransform, Text, ZeroOrMore
 from vobench.dataset.distortion import focal_camera
 from vobench.dataset.picture import listed
 from vobench.dataset.recording import ReadOptions
 from vobench.errors import InputError, SequenceError
 from vobench.geometry import se3
-from vobench.geometry.camera import BrownConrady, Camera, DoubleSphere, Equirectangular, KannalaBrandt
+from vobench.geometry.camera import (
+    BrownConrady,
+    Camera,
+    DoubleSphere,
+    Equirectangular,
+    KannalaBrandt,
+    focal_and_center_px,
+)
 from vobench.geometry.rig import ImuCalibration, Rig
 from vobench.geometry.se3 import Array
 
@@ -98,7 +96,7 @@ def intrinsics(camera: Camera) -> Intrinsics:
         linear = [camera.xi, camera.alpha, camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px]
         return Intrinsics(DOUBLE_SPHERE, np.array(linear), NO_DISTORTION, np.array([]))
 
-    focal_px = camera.K[[0, 1, 0, 1], [0, 1, 2, 2]]  # fx, fy, cx, cy
+    focal_px = np.array(focal_and_center_px(camera.K))
     match camera:
         case KannalaBrandt():
             coefficients = [getattr(camera, name) for name in camera.coefficients]
@@ -230,7 +228,7 @@ def _chain_rig(file: CalibrationFile, cameras: Mapping[str, ChainCamera]) -> Rig
 
     T_right_left = cameras["cam1"].T_cn_cnm1
     if T_right_left is None:
-        raise file.missing("cam1.T_cn_cnm1", file.tree["cam1"])
+        raise file.missing_key_error("cam1.T_cn_cnm1", file.tree["cam1"])
     right = _camera(file, "cam1", cameras["cam1"])
     T_body_right = T_body_left @ se3.inverse(T_right_left)
     return Rig(left, right, T_body_left, T_body_right)

@@ -13,7 +13,8 @@ from pkgutil import iter_modules
 
 from vobench.dataset.picture import enumerated, listed, refuse_lfs_pointer
 from vobench.dataset.recording import ReadOptions, Recording
-from vobench.dataset.source import ExportSource, Views
+from vobench.dataset.rectified_view import Views
+from vobench.dataset.source import ExportSource
 from vobench.errors import InputError, unknown_name_sentence
 from vobench.geometry.rig import Rig
 from vobench.trajectory.trajectory import Stamps, Trajectory

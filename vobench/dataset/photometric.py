@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.dataset import kalibr
-from vobench.dataset.source import ExportSource, Views
+from vobench.dataset.rectified_view import Views
+from vobench.dataset.source import ExportSource
 from vobench.errors import InputError
-from vobench.geometry.camera import BrownConrady, Camera, KannalaBrandt, Pinhole
+from vobench.geometry.camera import BrownConrady, Camera, KannalaBrandt, Pinhole, focal_and_center_px
 from vobench.geometry.se3 import Array
 from vobench.sensor.image_sensor import SENSOR_PRESETS
 from vobench.sensor.lens import vignetting
@@ -155,7 +156,7 @@ def camera_text(camera: Camera) -> str | None:
     """
     width = camera.width_px
     height = camera.height_px
-    fx, fy, cx, cy = camera.K[[0, 1, 0, 1], [0, 1, 2, 2]].tolist()
+    fx, fy, cx, cy = focal_and_center_px(camera.K)
     relative = [
         fx / width,
         fy / height,

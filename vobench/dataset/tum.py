@@ -12,8 +12,10 @@ from vobench.dataset.kalibr import chain_rig, find_chain, no_calibration
 from vobench.dataset.layout import Layout, Writing
 from vobench.dataset.picture import read_text, unread
 from vobench.dataset.picture_list import listed_pictures, picture_files
+from vobench.dataset.png_frame import png_frames
 from vobench.dataset.recording import CalibratedRig, ReadOptions, Recording, assemble
-from vobench.dataset.source import ExportSource, Views, png_frames
+from vobench.dataset.rectified_view import Views
+from vobench.dataset.source import ExportSource
 from vobench.dataset.truth_file import truth_file
 from vobench.geometry.camera import BrownConrady, Camera, Pinhole
 from vobench.geometry.rig import Rig

@@ -53,7 +53,7 @@ def main() -> "NoReturn":
 def guard(line: _socket.socket, plan: "dict[str, Any]") -> "NoReturn":
     """Start a program, report its start to vobench, and end as the program ends, or when the socket is closed.
 
-    `plan` is the result of `sandbox.plan`. `line` is the socket to vobench. The guard sends two messages: a
+    `plan` is the result of `guard_plan`. `line` is the socket to vobench. The guard sends two messages: a
     SANDBOX_REPORT on what the program can see besides its own files and processes, with the descriptors of
     `isolation.enter`, if the program is isolated; and a START_REPORT with the errno of the start, which is 0 if the
     program runs.

@@ -145,7 +145,7 @@ def new_pid_namespace() -> bool:
 def enter(plan: dict[str, object], *, has_pid_namespace: bool) -> tuple[list[str], str, list[int]]:
     """Isolate this process and all of its descendants, as far as the kernel allows.
 
-    `plan` is the result of `sandbox.plan`. Returns what the process can still see; the reason why the kernel did not
+    `plan` is the result of `guard_plan`. Returns what the process can still see; the reason why the kernel did not
     allow a private mount tree, empty if it did; and the descriptors of the private file systems, as in
     `_Tree.descriptors`.
     """

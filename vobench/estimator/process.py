@@ -33,8 +33,9 @@ from vobench.estimator.message import (
     read_revision,
 )
 from vobench.estimator.program import LOOK_S, Answer, EstimatorFailure, Program
+from vobench.estimator.program_path import hint_on_modules
 from vobench.estimator.protocol import Frame
-from vobench.estimator.sandbox import Sandbox, hint_on_modules
+from vobench.estimator.sandbox import Sandbox
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 

@@ -22,9 +22,12 @@ from vobench import stop
 from vobench.estimator import isolation, sandbox
 from vobench.estimator.check import in_one_line
 from vobench.estimator.guard import SANDBOX_REPORT, START_REPORT, descendants, stat
+from vobench.estimator.guard_plan import GuardPlan, guard_plan
 from vobench.estimator.home import Home, UnreadableFileError, held_bytes, read_below
 from vobench.estimator.manifest import Limits
+from vobench.estimator.program_path import is_unreadable_program
 from vobench.estimator.protocol import Result
+from vobench.estimator.readable_folders import READ_VARIABLE, user_site_environment
 from vobench.estimator.sandbox import Sandbox
 from vobench.portable import PORTABLE, VARIABLES
 from vobench.temporary import temporary_folder
@@ -114,7 +117,7 @@ class Program:
 
     Its output is written to `log`. It works in a home folder, is started without a shell, and has only the variables
     KEPT_ENVIRONMENT of vobench's environment. A guard is the ancestor of all processes that it starts, in whatever
-    session, and kills them with it. It sees the files of `sandbox.plan`, of which `folder` is its own, except those
+    session, and kills them with it. It sees the files of `guard_plan`, of which `folder` is its own, except those
     that are `hidden`; `sandbox` describes what it could see.
     """
 
@@ -169,8 +172,13 @@ class Program:
                     undone.callback(pipe.close)
             undone.enter_context(stop.cleanup_after(self._kill, is_awaited=True))
 
-            plan = sandbox.plan(
-                argv, home=self.home, homes=self._home.base, folder=folder, hidden=hidden, limits=limits
+            plan = guard_plan(
+                argv,
+                work_folder=self.home,
+                all_work_folders=self._home.base,
+                estimator_folder=folder,
+                hidden=hidden,
+                limits=limits,
             )
             self._start_program(plan, folder)
             self._undone = undone.pop_all()
@@ -192,12 +200,12 @@ class Program:
         except (OSError, ValueError) as error:  # there is too little memory, or an argument contains NUL
             raise EstimatorFailure("refused", f"{name} cannot be started ({error})") from None
 
-    def _start_program(self, plan: dict[str, Any], folder: Path | None) -> None:
+    def _start_program(self, plan: GuardPlan, folder: Path | None) -> None:
         """Send the plan to the guard, which starts the program, and receive its reports."""
         start_s = self.limits.start_s
         self._line.settimeout(start_s)
         try:
-            self._line.send(marshal.dumps(plan))
+            self._line.send(marshal.dumps(dict(plan)))
             error_number = self._take_reports()
         except TimeoutError:
             raise EstimatorFailure("timeout", f"it did not run within {start_s:g} s") from None
@@ -212,7 +220,7 @@ class Program:
         kept = {name: value for name, value in os.environ.items() if name in KEPT_ENVIRONMENT}
         threads = dict.fromkeys(THREADS, str(self.limits.threads))
         fixed = {"PYTHONHASHSEED": "0", "HOME": home, "TMPDIR": home}
-        return {**kept, **threads, **fixed, **sandbox.user_packages()}
+        return {**kept, **threads, **fixed, **user_site_environment()}
 
     def _take_reports(self) -> int:
         """Receive the guard's reports on the sandbox, if there is one, and on the start, whose errno is returned.
@@ -227,14 +235,14 @@ class Program:
             if message.startswith(START_REPORT):
                 return int(message.removeprefix(START_REPORT))
             sees, why, self.is_apart = marshal.loads(message.removeprefix(SANDBOX_REPORT))
-            self.sandbox = sandbox.of_report(sees, why)
+            self.sandbox = sandbox.from_guard_report(sees, why)
             if descriptors:
                 self._disk, self._files, self._shared_memory = descriptors
 
     def _why_not_started(self, name: str, error_number: int, folder: Path | None) -> str:
         sentence = f"{name} cannot be started ({os.strerror(error_number)})"
-        if self.sandbox.level != "none" and sandbox.is_out_of_reach(name, folder):
-            return f"{sentence}: it lies outside of what an estimator may read; name its folder in {sandbox.READ}"
+        if self.sandbox.level != "none" and is_unreadable_program(name, folder):
+            return f"{sentence}: it lies outside of what an estimator may read; name its folder in {READ_VARIABLE}"
         return sentence
 
     def _kill(self) -> None:

@@ -9,6 +9,7 @@ from vobench.estimator.pose import PoseFit, pose_from_points
 from vobench.estimator.protocol import Image
 from vobench.estimator.stereo import StereoPair, predicted, shifted_left
 from vobench.estimator.tracking import (
+    Mask,
     Points,
     comparable,
     corners_per_cell,
@@ -40,23 +41,34 @@ class TrackerSettings:
 
 
 @dataclass(frozen=True, slots=True)
-class Keyframe:
-    """A stereo pair with N points that have a measured disparity.
+class _KeyframePoints:
+    """N points of a keyframe that have a measured disparity.
 
     `left_px` and `right_px` (N, 2) are the pixels of the points in both pictures.
     `disparity_px` (N,) are the measured disparities, which include the disparity offset.
     """
 
-    left: Image
-    right: Image
     left_px: Points
     right_px: Points
     disparity_px: Array
 
+    def selected(self, mask: Mask) -> "_KeyframePoints":
+        """The points for which the mask (N,) is set."""
+        return _KeyframePoints(self.left_px[mask], self.right_px[mask], self.disparity_px[mask])
+
+
+@dataclass(frozen=True, slots=True)
+class _Keyframe:
+    """A stereo pair of pictures, and the points in it that are tracked."""
+
+    left: Image
+    right: Image
+    points: _KeyframePoints
+
 
 @dataclass(frozen=True, slots=True)
 class Followed:
-    """N tracks from the keyframe ("last") to the current stereo pair.
+    """N tracks from the keyframe ("last") to the current stereo pair ("now").
 
     `uv_last_px` and `uv_px` (N, 2) are pixels in the left pictures.
     `disparity_last_px` and `disparity_px` (N,) are the measured disparities, which include the disparity offset.
@@ -80,14 +92,16 @@ class Followed:
 class StereoTracker:
     """Tracks the points of one keyframe into each new stereo pair.
 
-    Points are tracked from one left picture to the next and from one right picture to the next, so that errors of the
-    stereo calibration affect both pairs equally and cancel.
+    Points are tracked from the left picture of the keyframe to the current one, and from the right picture to the
+    current one, so that errors of the stereo calibration affect both pairs equally and cancel.
+
+    `T_now_last` (4, 4) is the pose of the keyframe ("last") in the frame of the current camera ("now").
     """
 
     def __init__(self, pair: StereoPair, settings: TrackerSettings) -> None:
         self._pair = pair
         self._settings = settings
-        self._keyframe: Keyframe | None = None
+        self._keyframe: _Keyframe | None = None
         self.offset = DisparityOffset()
 
     @property
@@ -98,70 +112,84 @@ class StereoTracker:
     def look(self, left: Image, right: Image) -> bool:
         """Make this pair the keyframe. If too few points have a depth, return False and keep the old keyframe."""
         settings = self._settings
-        margin_px = settings.margin_px
-        distance_px = settings.corner_distance_px
-        corners = corners_per_cell(left, settings.corners_per_cell, distance_px=distance_px, margin_px=margin_px)
+        corners = corners_per_cell(
+            left, settings.corners_per_cell, distance_px=settings.corner_distance_px, margin_px=settings.margin_px
+        )
         corners = corners[self._pair.seen(corners)]
         right_px, disparity_px = self._pair.match(
-            left, right, corners, margin_px=margin_px, window_px=settings.window_px, with_edges=False
+            left, right, corners, margin_px=settings.margin_px, window_px=settings.window_px, with_edges=False
         )
         has_depth = np.isfinite(disparity_px)
         if has_depth.sum() < settings.min_points:
             return False
-        self._keyframe = Keyframe(left, right, corners[has_depth], right_px[has_depth], disparity_px[has_depth])
+        points = _KeyframePoints(corners, right_px, disparity_px).selected(has_depth)
+        self._keyframe = _Keyframe(left, right, points)
         return True
 
     def follow(self, left: Image, right: Image, T_now_last: Array) -> Followed:
-        """Track the points of the keyframe into a later pair. The search starts at their predicted pixels.
+        """Track the points of the keyframe into the current pair. The search starts at their predicted pixels.
 
-        `T_now_last` (4, 4) is the predicted pose of the keyframe in the frame of the current camera.
+        `T_now_last` is the predicted pose. Raises RuntimeError if there is no keyframe.
         """
         keyframe = self._keyframe
-        assert keyframe is not None
+        if keyframe is None:
+            raise RuntimeError("there is no keyframe to follow points from; call look() first")
+
+        left_px, is_tracked = self._track_left(keyframe, left, T_now_last)
+        tracked_points = keyframe.points.selected(is_tracked)
+        tracked_px = left_px[is_tracked]
+        disparity_px = self._track_right(keyframe.right, right, tracked_points, tracked_px, T_now_last)
+        return Followed(tracked_points.left_px, tracked_px, tracked_points.disparity_px, disparity_px)
+
+    def _track_left(self, keyframe: _Keyframe, left: Image, T_now_last: Array) -> tuple[Points, Mask]:
+        """The current pixels (N, 2) of the keyframe's points in the left picture, and which of them (N,) are found."""
         pair = self._pair
-        margin_px = self._settings.margin_px
-
-        inverse_depth = (keyframe.disparity_px - self.offset.px) / pair.focal_baseline  # (N,), 1/m
-        guess_px = predicted(pair.left, keyframe.left_px, inverse_depth, T_now_last)
-        before, now = comparable(keyframe.left, left)
-        uv_px, is_found = follow_predicted(before, now, keyframe.left_px, guess_px, window_px=self._settings.window_px)
-        is_tracked = is_found & inside(uv_px, left, margin_px) & pair.seen(uv_px)
-
-        tracked_px = uv_px[is_tracked]
-        tracked = Keyframe(
-            keyframe.left,
-            keyframe.right,
-            keyframe.left_px[is_tracked],
-            keyframe.right_px[is_tracked],
-            keyframe.disparity_px[is_tracked],
+        points = keyframe.points
+        inverse_depth = (points.disparity_px - self.offset.px) / pair.focal_baseline  # (N,), 1/m
+        predicted_px = predicted(pair.left, points.left_px, inverse_depth, T_now_last)
+        keyframe_image, current_image = comparable(keyframe.left, left)
+        left_px, is_found = follow_predicted(
+            keyframe_image, current_image, points.left_px, predicted_px, window_px=self._settings.window_px
         )
-        disparity_px = self._current_disparity(tracked, right, tracked_px, T_now_last)
-        return Followed(tracked.left_px, tracked_px, tracked.disparity_px, disparity_px)
+        is_tracked = is_found & inside(left_px, left, self._settings.margin_px) & pair.seen(left_px)
+        return left_px, is_tracked
 
-    def _current_disparity(self, keyframe: Keyframe, right: Image, uv_px: Points, T_now_last: Array) -> Array:
-        """The current disparities (N,) of the points of a keyframe; NaN for points lost in the right picture.
+    def _track_right(
+        self,
+        keyframe_right: Image,
+        right: Image,
+        points: _KeyframePoints,
+        left_px: Points,
+        T_now_last: Array,
+    ) -> Array:
+        """The current disparities (N,) of points of the keyframe; NaN for points lost in the right picture.
 
-        `uv_px` (N, 2) are the current pixels of the points in the left picture. The search in the right picture starts
-        at the predicted pixel of each point.
+        `left_px` (N, 2) are the current pixels of the points in the left picture.
         """
-        if not len(uv_px):
+        if not len(left_px):
             return np.zeros(0)
-        pair = self._pair
-        offset_px = self.offset.px
-
-        points_m = pair.points(keyframe.left_px, keyframe.disparity_px - offset_px)
-        depth_m = se3.apply(T_now_last, points_m)[:, 2]
-        predicted_disparity_px = pair.focal_baseline / depth_m + offset_px
-        in_right_view = shifted_left(pair.left.in_view(uv_px), predicted_disparity_px)
-        predicted_right_px = pair.right.from_view(in_right_view)
-        is_predicted = np.isfinite(predicted_right_px)
-        guess_px = np.where(is_predicted, predicted_right_px, keyframe.right_px).astype(np.float32)
-
+        predicted_px = self._predicted_right_px(points, left_px, T_now_last)
         # No forward-backward check: the robust fit reduces the weight of points whose two tracks are inconsistent.
-        before, now = comparable(keyframe.right, right)
-        right_px, is_found = lucas_kanade(before, now, keyframe.right_px, guess_px, window_px=self._settings.window_px)
+        keyframe_image, current_image = comparable(keyframe_right, right)
+        right_px, is_found = lucas_kanade(
+            keyframe_image, current_image, points.right_px, predicted_px, window_px=self._settings.window_px
+        )
         is_tracked = is_found & inside(right_px, right, self._settings.margin_px)
-        return np.where(is_tracked, pair.disparity(uv_px, right_px), np.nan)
+        return np.where(is_tracked, self._pair.disparity(left_px, right_px), np.nan)
+
+    def _predicted_right_px(self, points: _KeyframePoints, left_px: Points, T_now_last: Array) -> Points:
+        """The predicted current pixels (N, 2) of points in the right picture, given those in the left picture.
+
+        A point without a prediction gets its pixel in the keyframe.
+        """
+        pair = self._pair
+        points_m = pair.points(points.left_px, points.disparity_px - self.offset.px)  # (N, 3), keyframe's left view
+        depth_m = se3.apply(T_now_last, points_m)[:, 2]
+        predicted_disparity_px = pair.focal_baseline / depth_m + self.offset.px
+        in_right_view = shifted_left(pair.left.in_view(left_px), predicted_disparity_px)
+        right_px = pair.right.from_view(in_right_view)
+        is_predicted = np.isfinite(right_px)
+        return np.where(is_predicted, right_px, points.right_px).astype(np.float32)
 
     def fit(self, followed: Followed) -> PoseFit | None:
         """The pose T_now_last of the keyframe, estimated from the tracks.
@@ -182,8 +210,7 @@ class StereoTracker:
         )
 
     def learn(self, followed: Followed, T_now_last: Array) -> None:
-        """Update the estimate of the disparity offset, given tracks and the estimated pose T_now_last (4, 4)."""
+        """Update the estimate of the disparity offset, given tracks and the estimated pose T_now_last."""
         rays_last = self._pair.left.rays(followed.uv_last_px)
         rays_now = self._pair.left.rays(followed.uv_px)
-        disparity_px = followed.disparity_last_px
-        self.offset = self.offset.after(rays_last, rays_now, disparity_px, T_now_last, self._pair)
+        self.offset = self.offset.after(rays_last, rays_now, followed.disparity_last_px, T_now_last, self._pair)

@@ -168,6 +168,11 @@ def camera_matrix(fx_px: float, fy_px: float, cx_px: float, cy_px: float) -> Arr
     return K
 
 
+def focal_and_center_px(K: Array) -> list[float]:
+    """The values fx, fy, cx, cy of a camera matrix (3, 3) or of a projection matrix (3, 4)."""
+    return [float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2])]
+
+
 def pixel_grid(camera: "Camera") -> Array:
     """Columns and rows (H, W, 2) of the centres of all pixels."""
     columns = np.arange(camera.width_px, dtype=float)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,18 +11,18 @@ from numpy.typing import NDArray
 from vobench.errors import AlignmentError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.metric.ate import (
+from vobench.metric.blockwise import ErrorArrays, in_blocks
+from vobench.metric.comparison import HARTLEY, POSES, STURM_RPE, ZHANG, Comparison, MetricDefinition, OverLengths
+from vobench.metric.motion_error import (
+    MatrixErrors,
     PoseErrors,
-    Rows,
     angle_rad,
     distances_between,
     errors_between,
-    in_blocks,
-    matrix_norms,
+    matrix_errors,
     motion_errors,
     motions,
 )
-from vobench.metric.comparison import HARTLEY, POSES, STURM_RPE, ZHANG, Comparison, MetricDefinition, OverLengths
 from vobench.metric.settings import RelativeRule, Unit
 from vobench.trajectory.associate import Index, nearest
 from vobench.trajectory.trajectory import Stamps, Trajectory, path_lengths_m, step_lengths_m
@@ -201,29 +201,40 @@ MAX_TRUTH_STEPS = 2.0
 STILL_M = 1e-100  # the square of a percentage of a smaller true motion would overflow
 
 
-def relative_matrix_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
-    """The `matrix_norms` (P,) of the errors of the motions between the poses of pairs of matched poses (K, 4, 4)."""
+def relative_matrix_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> MatrixErrors:
+    """The matrix errors (P,) of the motions between the poses of pairs of matched poses (K, 4, 4)."""
     first, last = pairs
-
-    def norms(block: slice) -> Rows:
-        gt = motions(T_gt, first[block], last[block])
-        est = motions(T_est, first[block], last[block])
-        return matrix_norms(se3.inverse(gt) @ est)
-
-    return in_blocks(len(first), norms)
+    return MatrixErrors(*in_blocks(len(first), partial(_matrix_errors_of_pairs, T_gt, T_est, first, last)))
 
 
-def distance_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> Rows:
-    """| ‖q_j - q_i‖ - ‖p_j - p_i‖ | of matched poses (K, 4, 4), q true and p estimated: in m, and in % of the true one.
+def _matrix_errors_of_pairs(T_gt: Array, T_est: Array, first: Index, last: Index, block: slice) -> MatrixErrors:
+    """The matrix errors of the motions between a block of pairs of poses."""
+    gt = motions(T_gt, first[block], last[block])
+    est = motions(T_est, first[block], last[block])
+    return matrix_errors(se3.inverse(gt) @ est)
 
-    A pair without true motion has no percentage. Source: evo's point_distance and its ratio.
+
+class DistanceErrors(NamedTuple):
+    """The errors of the distances between P pairs of poses: in m, and in % of the true distance.
+
+    A pair without true motion has no percentage, so there can be fewer percentages than pairs.
+    """
+
+    metres: Array
+    percent: Array
+
+
+def distance_errors(T_gt: Array, T_est: Array, pairs: IndexPairs) -> DistanceErrors:
+    """| ‖q_j - q_i‖ - ‖p_j - p_i‖ | of matched poses (K, 4, 4), q true and p estimated.
+
+    Source: evo's point_distance and its ratio.
     """
     gt_m = distances_between(T_gt, *pairs)
     est_m = distances_between(T_est, *pairs)
     errors_m = np.abs(gt_m - est_m)
     is_moving = gt_m > STILL_M
     percent = errors_m[is_moving] / gt_m[is_moving] * 100
-    return errors_m, percent
+    return DistanceErrors(errors_m, percent)
 
 
 def tum_errors(
@@ -311,10 +322,8 @@ def part_errors(
     first = np.concatenate(firsts)
     last = np.concatenate(lasts)
 
-    def errors(block: slice) -> Rows:
-        return _part_errors(T_gt, T_est, first[block], last[block])
-
-    return RelativeErrors(np.concatenate(part_lengths_m), *in_blocks(len(first), errors))
+    errors = in_blocks(len(first), partial(_part_errors, T_gt, T_est, first, last))
+    return RelativeErrors(np.concatenate(part_lengths_m), *errors)
 
 
 def _part_tolerance_m(length_m: float, rule: RelativeRule) -> float:
@@ -330,8 +339,11 @@ def _part_errors(
     T_est: Array,
     first: Index,
     last: Index,
-) -> Rows:
-    """The translation, angle, yaw and tilt (N,) of the errors of motions."""
+    block: slice,
+) -> ErrorArrays:
+    """The translation, angle, yaw and tilt (N,) of the errors of the motions between a block of pairs of poses."""
+    first = first[block]
+    last = last[block]
     E = se3.inverse(motions(T_gt, first, last)) @ motions(T_est, first, last)
     R_error = E[:, :3, :3]
     R_est = T_est[last, :3, :3]
@@ -374,12 +386,12 @@ def _relative(comparison: Comparison) -> PoseErrors:
     return errors_between(comparison.matched.T_gt, comparison.T_moving, first, last)
 
 
-def _matrices(comparison: Comparison) -> Rows:
+def _matrix_errors(comparison: Comparison) -> MatrixErrors:
     pairs = comparison.once(_pairs)
     return relative_matrix_errors(comparison.matched.T_gt, comparison.T_moving, pairs)
 
 
-def _distances(comparison: Comparison) -> Rows:
+def _distance_errors(comparison: Comparison) -> DistanceErrors:
     pairs = comparison.once(_pairs)
     return distance_errors(comparison.matched.T_gt, comparison.T_moving, pairs)
 
@@ -416,109 +428,109 @@ _motion_metric = partial(MetricDefinition, settings=MOTIONS)
 _part_metric = partial(MetricDefinition, source=ZHANG, settings=RELATIVE)
 METRICS = (
     _motion_metric(
-        "rpe_trans",
-        "relative pose error, translation",
-        "m",
-        f"‖t‖ of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
-        STURM_RPE,
+        id="rpe_trans",
+        title="relative pose error, translation",
+        unit="m",
+        formula=f"‖t‖ of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
+        source=STURM_RPE,
         blind=GLOBAL,
         full=False,
         measure=lambda comparison: comparison.once(_relative).trans_m,
     ),
     _motion_metric(
-        "rpe_rot",
-        "relative pose error, angle",
-        "deg",
-        f"angle of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
-        STURM_RPE,
+        id="rpe_rot",
+        title="relative pose error, angle",
+        unit="deg",
+        formula=f"angle of (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j), Q true and P estimated{ALL_PAIRS}",
+        source=STURM_RPE,
         blind=GLOBAL,
         full=False,
         measure=lambda comparison: np.rad2deg(comparison.once(_relative).rot_rad),
     ),
     _motion_metric(
-        "rpe_rot_chordal",
-        "relative pose error, rotation as a matrix",
-        "1",
-        "‖R − I‖_F of the same E as rpe_rot",
-        HARTLEY,
+        id="rpe_rot_chordal",
+        title="relative pose error, rotation as a matrix",
+        unit="1",
+        formula="‖R − I‖_F of the same E as rpe_rot",
+        source=HARTLEY,
         blind=GLOBAL,
-        measure=lambda comparison: comparison.once(_matrices)[0],
+        measure=lambda comparison: comparison.once(_matrix_errors).rotation,
     ),
     _motion_metric(
-        "rpe_full",
-        "relative pose error, whole motion",
-        "1",
-        "‖E − I‖_F",
-        "evo's full",
+        id="rpe_full",
+        title="relative pose error, whole motion",
+        unit="1",
+        formula="‖E − I‖_F",
+        source="evo's full",
         blind=f"the difference between translation and rotation: their sum depends on the unit of length; {GLOBAL}",
-        measure=lambda comparison: comparison.once(_matrices)[1],
+        measure=lambda comparison: comparison.once(_matrix_errors).full,
     ),
     _motion_metric(
-        "rpe_point",
-        "difference of the distances moved",
-        "m",
-        "| ‖q_j − q_i‖ − ‖p_j − p_i‖ |",
-        "evo's point_distance",
+        id="rpe_point",
+        title="difference of the distances moved",
+        unit="m",
+        formula="| ‖q_j − q_i‖ − ‖p_j − p_i‖ |",
+        source="evo's point_distance",
         blind="every direction: a motion of the right length to the wrong side has no error",
-        measure=lambda comparison: comparison.once(_distances)[0],
+        measure=lambda comparison: comparison.once(_distance_errors).metres,
     ),
     _motion_metric(
-        "rpe_point_percent",
-        "difference of the distances moved, of the true one",
-        "%",
-        "100 | ‖q_j − q_i‖ − ‖p_j − p_i‖ | / ‖q_j − q_i‖, pairs where the truth stood still left out",
-        "evo's point_distance_error_ratio",
+        id="rpe_point_percent",
+        title="difference of the distances moved, of the true one",
+        unit="%",
+        formula="100 | ‖q_j − q_i‖ − ‖p_j − p_i‖ | / ‖q_j − q_i‖, pairs where the truth stood still left out",
+        source="evo's point_distance_error_ratio",
         blind="every direction, and drift while the truth is stationary",
-        measure=lambda comparison: comparison.once(_distances)[1],
+        measure=lambda comparison: comparison.once(_distance_errors).percent,
     ),
     _part_metric(
-        "rel_trans",
-        "translation error over parts of the path",
-        "m",
-        "‖t‖ of (T_gt,ij)⁻¹ T_est,ij, j nearest to the length along the true path",
+        id="rel_trans",
+        title="translation error over parts of the path",
+        unit="m",
+        formula="‖t‖ of (T_gt,ij)⁻¹ T_est,ij, j nearest to the length along the true path",
         blind="lengths are mixed: the longest decide",
         measure=_over_parts(lambda parts: parts.trans_m),
     ),
     _part_metric(
-        "rel_trans_percent",
-        "translation error over parts of the path, of their length",
-        "%",
-        "100 ‖t‖ / length of the same parts",
+        id="rel_trans_percent",
+        title="translation error over parts of the path, of their length",
+        unit="%",
+        formula="100 ‖t‖ / length of the same parts",
         blind="jitter on long parts",
         headline="mean",
         measure=_over_parts(lambda parts: 100 * parts.trans_m / parts.length_m),
     ),
     _part_metric(
-        "rel_rot",
-        "angle error over parts of the path",
-        "deg",
-        "angle of (T_gt,ij)⁻¹ T_est,ij",
+        id="rel_rot",
+        title="angle error over parts of the path",
+        unit="deg",
+        formula="angle of (T_gt,ij)⁻¹ T_est,ij",
         blind="lengths are mixed: the longest decide",
         measure=_over_parts(lambda parts: np.rad2deg(parts.rot_rad)),
     ),
     _part_metric(
-        "rel_rot_per_m",
-        "angle error over parts of the path, per metre",
-        "deg/m",
-        "angle / length of the same parts",
+        id="rel_rot_per_m",
+        title="angle error over parts of the path, per metre",
+        unit="deg/m",
+        formula="angle / length of the same parts",
         blind="jitter on long parts",
         headline="mean",
         measure=_over_parts(lambda parts: np.rad2deg(parts.rot_rad) / parts.length_m),
     ),
     _part_metric(
-        "rel_yaw",
-        "yaw error over parts of the path: the turn about gravity that inertia can't see",
-        "deg",
-        "|yaw| of the error turned into the world: R_est,j R_E R_est,j⁻¹ = Rz(yaw) Ry(pitch) Rx(roll); "
+        id="rel_yaw",
+        title="yaw error over parts of the path: the turn about gravity that inertia can't see",
+        unit="deg",
+        formula="|yaw| of the error turned into the world: R_est,j R_E R_est,j⁻¹ = Rz(yaw) Ry(pitch) Rx(roll); "
         "rpg's is the estimate's own world, openvins' the truth's",
         blind="gravity is the z of the world: another vertical mixes it with rel_gravity",
         measure=_over_parts(lambda parts: np.rad2deg(parts.yaw_rad)),
     ),
     _part_metric(
-        "rel_gravity",
-        "tilt error over parts of the path: the turn against gravity that inertia sees",
-        "deg",
-        "√(pitch² + roll²) of the same rotation as rel_yaw",
+        id="rel_gravity",
+        title="tilt error over parts of the path: the turn against gravity that inertia sees",
+        unit="deg",
+        formula="√(pitch² + roll²) of the same rotation as rel_yaw",
         blind="gravity is the z of the world: another vertical mixes it with rel_yaw",
         measure=_over_parts(lambda parts: np.rad2deg(parts.gravity_rad)),
     ),

@@ -12,8 +12,9 @@ from vobench.geometry.se3 import Array
 from vobench.metric import nees
 from vobench.metric.ate import absolute
 from vobench.metric.comparison import DEFAULTS, Comparison, MetricDefinition, OverLengths, compare
-from vobench.metric.coverage import SLOT_NS, Coverage, TrackingFailure, coverage, failure, slots
+from vobench.metric.coverage import SLOT_NS, Coverage, coverage, slots
 from vobench.metric.definitions import DEFINITIONS, identity
+from vobench.metric.lost_aware import TrackingResult, tracking_result
 from vobench.metric.segment import mean_drift
 from vobench.metric.settings import ScoreSettings
 from vobench.trajectory.align import Alignment
@@ -187,7 +188,7 @@ class Score:
     metrics: tuple[MetricResult, ...]
     association: Association
     coverage: Coverage
-    failure: TrackingFailure
+    failure: TrackingResult
     lost_aware_id: str
     alignment: Alignment
     warnings: tuple[str, ...]
@@ -230,7 +231,7 @@ class Score:
         """The score as plain JSON values, without the values of frames. The coverage is part of the failure."""
         coverage_details = asdict(self.coverage)
         ratio = coverage_details.pop("ratio")
-        coverage_of = coverage_details.pop("of")
+        coverage_of = coverage_details.pop("slot_kind")
         failure = {"id": self.lost_aware_id, **asdict(self.failure), "coverage_of": coverage_of, **coverage_details}
         return {
             "metrics": [metric.as_dict() for metric in self.metrics],
@@ -263,7 +264,7 @@ def score(
     scored = tuple(part.metric(complete_settings, n=n, of=len(gt)) for part in samples)
 
     ate = comparison.once(absolute)
-    covered = coverage(gt.t_ns, frames, of=settings.coverage_of)
+    covered = coverage(gt.t_ns, frames, rule=settings.coverage_of)
     slot = slots(gt.t_ns, settings.coverage_of)[frames]
     path_m = float(comparison.distances_m[-1])
     warnings = (*_matching_warnings(comparison, covered), *_missing_warnings(comparison, scored))
@@ -271,7 +272,7 @@ def score(
         metrics=scored,
         association=Association(n, len(gt), len(est), settings.max_diff_ns / 1e9),
         coverage=covered,
-        failure=failure(ate.trans_m, slot, covered, fail_m=settings.fail_ratio * path_m),
+        failure=tracking_result(ate.trans_m, slot, covered, fail_m=settings.fail_ratio * path_m),
         lost_aware_id=identity(DEFINITIONS["lost_aware"], complete_settings, n=n, of=len(gt)),
         alignment=comparison.alignment,
         warnings=warnings,
@@ -348,7 +349,7 @@ def _matching_warnings(comparison: Comparison, covered: Coverage) -> Iterator[st
             f"the positions leave open: {', '.join(unobservable)}; "
             f"the first matched orientation decides, so rotation errors are relative to it"
         )
-    if covered.of == "time":
+    if covered.slot_kind == "time":
         yield _time_warning(covered)
     elif covered.gaps:
         yield (

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.metric.ate import PoseErrors, Rows, distances_between, errors_between, in_blocks
+from vobench.metric.blockwise import ErrorArrays, in_blocks
 from vobench.metric.comparison import POSES, Comparison, MetricDefinition, OverLengths
+from vobench.metric.motion_error import PoseErrors, distances_between, errors_between
 from vobench.metric.settings import INDOOR_LENGTHS_M, Mean, Precision
 from vobench.trajectory.associate import Index
 
@@ -62,12 +63,9 @@ def segment_errors(
     divisor_m = divisor_m[order]
     length_m = length_m[order]
 
-    def devkit_errors(block: slice) -> Rows:
-        return _devkit_errors(T_gt, T_est, first[block], last[block])
-
     if precision == "devkit":
         divisor_m = divisor_m.astype(np.float32)
-        errors = PoseErrors(*in_blocks(len(first), devkit_errors))
+        errors = PoseErrors(*in_blocks(len(first), partial(_devkit_errors, T_gt, T_est, first, last)))
     else:
         errors = errors_between(T_gt, T_est, first, last)
     return SegmentErrors(
@@ -137,8 +135,14 @@ def _devkit_errors(
     T_est: Array,
     first: Index,
     last: Index,
-) -> Rows:
-    """The errors with the rounding of the devkit: inverses in float64, then float32, and angles from their cosine."""
+    block: slice,
+) -> ErrorArrays:
+    """The errors of a block of segments with the devkit's rounding.
+
+    Inverses are computed in float64, then everything in float32, and angles from their cosine.
+    """
+    first = first[block]
+    last = last[block]
     gt = np.linalg.inv(T_gt[first]) @ T_gt[last]
     est = np.linalg.inv(T_est[first]) @ T_est[last]
     E = np.linalg.inv(est) @ gt
@@ -256,34 +260,34 @@ _drift_metric = partial(MetricDefinition, source=GEIGER, settings=SEGMENTS, head
 _scale_metric = partial(MetricDefinition, source=STRASDAT, settings=SEGMENTS, headline="mean")
 METRICS = (
     _drift_metric(
-        "kitti_t_rel",
-        "translation drift per metre of path",
-        "1",
-        "‖t‖ of (T_est,ij)⁻¹ T_gt,ij / length, j the first frame further than the length along the true path",
+        id="kitti_t_rel",
+        title="translation drift per metre of path",
+        unit="1",
+        formula="‖t‖ of (T_est,ij)⁻¹ T_gt,ij / length, j the first frame further than the length along the true path",
         blind="jitter: it is small against segments of a hundred metres",
         measure=_translation_drift,
     ),
     _drift_metric(
-        "kitti_r_rel",
-        "rotation drift per metre of path",
-        "deg/m",
-        "angle of (T_est,ij)⁻¹ T_gt,ij / length, segments as of kitti_t_rel",
+        id="kitti_r_rel",
+        title="rotation drift per metre of path",
+        unit="deg/m",
+        formula="angle of (T_est,ij)⁻¹ T_gt,ij / length, segments as of kitti_t_rel",
         blind="jitter, and errors that turn back within a segment",
         measure=_rotation_drift,
     ),
     _scale_metric(
-        "scale_error",
-        "scale error of the segments",
-        "1",
-        "‖p_j − p_i‖ / ‖q_j − q_i‖ − 1 of the segments of kitti_t_rel, with its sign",
+        id="scale_error",
+        title="scale error of the segments",
+        unit="1",
+        formula="‖p_j − p_i‖ / ‖q_j − q_i‖ − 1 of the segments of kitti_t_rel, with its sign",
         blind="scale where a segment ends near where it began; an alignment with scale has taken the mean out",
         measure=_scale_error,
     ),
     _scale_metric(
-        "scale_drift",
-        "drift of the scale per metre of path",
-        "1/m",
-        "slope by least squares of log(1 + scale_error) over the true path, one number",
+        id="scale_drift",
+        title="drift of the scale per metre of path",
+        unit="1/m",
+        formula="slope by least squares of log(1 + scale_error) over the true path, one number",
         blind="a scale that goes up and comes down again",
         measure=_scale_drift,
     ),

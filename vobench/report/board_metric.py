@@ -7,7 +7,7 @@ from math import inf
 import numpy as np
 
 from vobench.metric import ranking
-from vobench.metric.coverage import lost_aware_score
+from vobench.metric.lost_aware import lost_aware_score
 from vobench.runner.folder import SURVIVED, TrialScore
 
 FAIL_RATIO = 0.1  # of the path length; the error that counts as failed, for scores without a lost-aware score

@@ -4,7 +4,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from itertools import cycle
 from pathlib import Path
 from typing import Literal
 
@@ -16,7 +15,8 @@ from vobench import stop
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 from vobench.report import blueprint
-from vobench.report.blueprint import ESTIMATOR_COLOURS, Entities
+from vobench.report.blueprint import ESTIMATOR_COLORS, LayoutOptions
+from vobench.report.entity import COSTS, STATS, TRUTH_LEFT, TRUTH_PATH, TRUTH_RIGHT, WORLD, EstimatorEntities
 from vobench.report.rerun_scene import log_scene
 from vobench.report.rerun_stream import (
     GREEN,
@@ -31,6 +31,7 @@ from vobench.report.rerun_stream import (
 from vobench.report.rerun_tracks import log_epipolar_lines, log_tails, log_tracks
 from vobench.report.rerun_truth import log_truth
 from vobench.report.trial_view import NO_OUTPUT, TrialView
+from vobench.report.viewpoint import frustum_m
 from vobench.sequence import EncodedFrame
 from vobench.sequence.picture import BAYER, RGB, decode, encode, rgb
 from vobench.trajectory.trajectory import Stamps, Trajectory
@@ -75,8 +76,9 @@ def save_trial(path: Path, trial: TrialView, *others: TrialView, form: PictureFo
         if trial.scene is not None:
             log_scene(log, trial.scene)
         unit = _unit(trials)
-        for view, colour in zip(trials, cycle(ESTIMATOR_COLOURS), strict=False):
-            _log_trial(log, view, colour.rgb, unit)
+        colors = list(ESTIMATOR_COLORS.values())[: len(trials)]
+        for view, color in zip(trials, colors, strict=True):
+            _log_trial(log, view, color, unit)
         if trial.truth is not None:
             log_truth(stream, trial.truth)
         stream.send_blueprint(_layout(trials))
@@ -91,15 +93,15 @@ def application_id(title: str) -> str:
 
 def _layout(trials: Sequence[TrialView]) -> rrb.Blueprint:
     first = trials[0]
-    return blueprint.layout(
-        first.ground_truth.positions_m,
-        np.concatenate([view.estimate.positions_m for view in trials]),
+    options = LayoutOptions(
         replayed_frames=_replayed_frames(trials),
         labels=[view.label for view in trials],
         channels=first.truth.channels if first.truth else (),
         has_stats=any(view.stats for view in trials),
         has_costs=any(view.costs for view in trials),
     )
+    estimates_m = np.concatenate([view.estimate.positions_m for view in trials])
+    return blueprint.layout(first.ground_truth.positions_m, estimates_m, options)
 
 
 def _replayed_frames(trials: Sequence[TrialView]) -> FrameRange | None:
@@ -125,7 +127,7 @@ def first_failure(statuses: Sequence[str]) -> FrameRange | None:
 
 def _around(index: int, count: int) -> FrameRange:
     """The first and the last of the frames around one of `count`."""
-    reach = blueprint.FRAMES_AROUND_FOCUS
+    reach = blueprint.FRAMES_AROUND_REPLAY
     return max(0, index - reach), min(count - 1, index + reach)
 
 
@@ -140,9 +142,9 @@ def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame], fo
     quality = BEST_QUALITY  # falls where frames would be too large, and stays there
     with ThreadPoolExecutor(2) as threads:
         for frame in frames:
-            encoded = {blueprint.TRUTH_LEFT: frame.left}
+            encoded = {TRUTH_LEFT: frame.left}
             if frame.right:
-                encoded[blueprint.TRUTH_RIGHT] = frame.right
+                encoded[TRUTH_RIGHT] = frame.right
             recode = partial(_recoded, frame=frame, form=form)
             pictures = list(threads.map(partial(recode, quality=quality), encoded.values()))
             while form == "jpeg" and quality > WORST_QUALITY and _bytes(pictures) > FRAME_BYTES:
@@ -180,18 +182,18 @@ def _recoded(encoded: bytes, *, frame: EncodedFrame, form: PictureForm, quality:
 def _log_truth_path(log: FrameStream, trial: TrialView) -> None:
     """Log the true path and the true cameras."""
     truth = trial.ground_truth
-    log.static(blueprint.WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
-    log.static(blueprint.TRUTH_PATH, rr.LineStrips3D([truth.positions_m], colors=GREEN, radii=PATH_RADIUS))
-    length_m = blueprint.frustum_m(truth.positions_m)
-    _log_camera(log, blueprint.TRUTH_LEFT, trial.rig.left, truth, length_m=length_m, color=GREEN)
+    log.static(WORLD, rr.ViewCoordinates.RIGHT_HAND_Z_UP)
+    log.static(TRUTH_PATH, rr.LineStrips3D([truth.positions_m], colors=GREEN, radii=PATH_RADIUS))
+    length_m = frustum_m(truth.positions_m)
+    _log_camera(log, TRUTH_LEFT, trial.rig.left, truth, length_m=length_m, color=GREEN)
     if trial.rig.right:
         right = truth.of_mounted(trial.rig.T_left_right)
-        _log_camera(log, blueprint.TRUTH_RIGHT, trial.rig.right, right, length_m=length_m, color=GREEN)
+        _log_camera(log, TRUTH_RIGHT, trial.rig.right, right, length_m=length_m, color=GREEN)
 
 
 def _log_trial(log: FrameStream, trial: TrialView, color: Color, unit: Unit) -> None:
     """Log everything that belongs to one estimator."""
-    entities = Entities(trial.label)
+    entities = EstimatorEntities(trial.label)
     _log_estimate(log, trial, entities, color)
     _log_errors(log, trial, entities, color, unit)
     _log_error_lines(log, trial, entities)
@@ -200,20 +202,20 @@ def _log_trial(log: FrameStream, trial: TrialView, color: Color, unit: Unit) -> 
         log_tails(log, trial.tracks, trial.steps, entities)
         log_epipolar_lines(log, trial.rig, trial.ground_truth, trial.steps, entities)
     _log_points(log, trial.points, entities, color)
-    _log_numbers(log, f"{blueprint.STATS}/{trial.label}", trial.stats)
-    _log_numbers(log, f"{blueprint.COSTS}/{trial.label}", trial.costs)
+    _log_numbers(log, f"{STATS}/{trial.label}", trial.stats)
+    _log_numbers(log, f"{COSTS}/{trial.label}", trial.costs)
     _log_statuses(log, trial.statuses, entities)
     summary = rr.TextDocument(trial.summary_md, media_type=rr.MediaType.MARKDOWN)
     log.static(entities.summary, summary)
 
 
-def _log_estimate(log: FrameStream, trial: TrialView, entities: Entities, color: Color) -> None:
+def _log_estimate(log: FrameStream, trial: TrialView, entities: EstimatorEntities, color: Color) -> None:
     """Log the estimated path, interrupted at frames without a pose, and the left camera, which vanishes there."""
     frames, samples = log.match(trial.estimate.t_ns)
     gaps = np.flatnonzero(np.diff(frames) > 1) + 1
     strips = np.split(trial.estimate.positions_m[samples], gaps)
     log.static(entities.path, rr.LineStrips3D(strips, colors=color, radii=PATH_RADIUS))
-    length_m = blueprint.frustum_m(trial.ground_truth.positions_m)
+    length_m = frustum_m(trial.ground_truth.positions_m)
     _log_camera(log, entities.left, trial.rig.left, trial.estimate, length_m=length_m, color=color)
     without_pose = np.setdiff1d(np.arange(log.count), frames)
     clear = rr.Clear.columns(is_recursive=[False] * len(without_pose))
@@ -256,7 +258,7 @@ def _unit(trials: Sequence[TrialView]) -> Unit:
     return 1.0, "m"
 
 
-def _log_errors(log: FrameStream, trial: TrialView, entities: Entities, color: Color, unit: Unit) -> None:
+def _log_errors(log: FrameStream, trial: TrialView, entities: EstimatorEntities, color: Color, unit: Unit) -> None:
     """Log the errors of each frame as curves, which have gaps where there is no pose."""
     scale, unit_name = unit
     _log_curve(log, entities.position_error, scale * trial.error_m, f"{trial.label} ({unit_name})", color)
@@ -268,7 +270,7 @@ def _log_curve(log: FrameStream, entity: str, values: Array, name: str, color: C
     log.columns(entity, np.arange(len(values)), rr.Scalars.columns(scalars=values))
 
 
-def _log_error_lines(log: FrameStream, trial: TrialView, entities: Entities) -> None:
+def _log_error_lines(log: FrameStream, trial: TrialView, entities: EstimatorEntities) -> None:
     """Log the error of each frame as a line from truth to estimate, none where there is no pose."""
     truth_frames, truth_samples = log.match(trial.ground_truth.t_ns)
     estimate_frames, estimate_samples = log.match(trial.estimate.t_ns)
@@ -282,7 +284,7 @@ def _log_error_lines(log: FrameStream, trial: TrialView, entities: Entities) -> 
     log.every(entities.error_line, columns)
 
 
-def _log_points(log: FrameStream, points: Mapping[int, Array], entities: Entities, color: Color) -> None:
+def _log_points(log: FrameStream, points: Mapping[int, Array], entities: EstimatorEntities, color: Color) -> None:
     """Log the points of the scene as the estimator reconstructs it; those of a frame stay until the next ones."""
     if not points:
         return
@@ -301,7 +303,7 @@ def _log_numbers(log: FrameStream, origin: str, numbers: Mapping[str, Array]) ->
         log.columns(f"{origin}/{name}", known, rr.Scalars.columns(scalars=values[known]))
 
 
-def _log_statuses(log: FrameStream, statuses: Sequence[str], entities: Entities) -> None:
+def _log_statuses(log: FrameStream, statuses: Sequence[str], entities: EstimatorEntities) -> None:
     """Log the status where it changes: Rerun draws it until the next one."""
     known = list(dict.fromkeys([*STATUS_COLORS, *statuses]))
     colors = [STATUS_COLORS.get(status, OTHER_STATUS_COLOR) for status in known]

@@ -15,7 +15,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.bake import BakedScene, load_baked
 from vobench.rendering.illumination import Illumination
 from vobench.rendering.texel_owner import owners
-from vobench.report import blueprint
+from vobench.report.entity import SCENE
 from vobench.report.rerun_stream import FrameStream
 from vobench.runner.folder import CASE, SEQUENCE, RunFolder
 from vobench.scene.material import Material, linear_texture, srgb
@@ -61,9 +61,9 @@ class SceneMesh:
 
 def log_scene(log: FrameStream, scene: SceneMesh) -> None:
     """Log the stationary faces as one mesh, and those of each mover as a mesh with a pose per frame."""
-    log.static(blueprint.SCENE, scene.mesh(scene.mover < 0))
+    log.static(SCENE, scene.mesh(scene.mover < 0))
     for index, path in enumerate(scene.paths):
-        entity = f"{blueprint.SCENE}/mover_{index}"
+        entity = f"{SCENE}/mover_{index}"
         log.static(entity, scene.mesh(scene.mover == index))
         poses = [path.pose(t_ns) for t_ns in log.t_ns.tolist()]
         log.poses(entity, np.arange(log.count), np.stack(poses))

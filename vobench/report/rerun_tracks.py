@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
-from vobench.report.blueprint import Entities
+from vobench.report.entity import EstimatorEntities
 from vobench.report.rerun_stream import GREEN, PIXEL_CENTRE, RED, FrameStream
 from vobench.trajectory.trajectory import Trajectory
 
@@ -26,7 +26,7 @@ MOST_LINES = 40  # epipolar lines in a picture
 DISTANCES_M = np.geomspace(0.3, 100.0, 12)  # of the points of an epipolar line from the previous camera
 
 
-def log_tracks(log: FrameStream, tracks: Mapping[int, Tracks], entities: Entities) -> None:
+def log_tracks(log: FrameStream, tracks: Mapping[int, Tracks], entities: EstimatorEntities) -> None:
     """Log the points of each frame; a frame without points clears those of the frame before."""
     rows = [_tracks_of(tracks, index) for index in range(log.count)]
     points_px = np.concatenate([points.reshape(-1, 2) for points, _ in rows])
@@ -45,7 +45,9 @@ def _colors(is_inlier: NDArray[np.bool_]) -> NDArray[np.uint8]:
     return np.where(is_inlier[:, None], GREEN, RED).astype(np.uint8)
 
 
-def log_tails(log: FrameStream, tracks: Mapping[int, Tracks], steps: Mapping[int, Array], entities: Entities) -> None:
+def log_tails(
+    log: FrameStream, tracks: Mapping[int, Tracks], steps: Mapping[int, Array], entities: EstimatorEntities
+) -> None:
     """Log the path of the tracks over the last frames; `steps` has each track's place in the frame before (K, 2)."""
     strips = []
     is_inlier = []
@@ -62,7 +64,7 @@ def log_tails(log: FrameStream, tracks: Mapping[int, Tracks], steps: Mapping[int
 
 
 def log_epipolar_lines(
-    log: FrameStream, rig: Rig, ground_truth: Trajectory, steps: Mapping[int, Array], entities: Entities
+    log: FrameStream, rig: Rig, ground_truth: Trajectory, steps: Mapping[int, Array], entities: EstimatorEntities
 ) -> None:
     """Log the true epipolar lines of some tracks of each frame."""
     strips = []
@@ -73,8 +75,8 @@ def log_epipolar_lines(
         lengths.append(len(lines))
     columns = rr.LineStrips2D.columns(strips=strips)
     style = rr.LineStrips2D.from_fields(colors=EPIPOLAR, radii=EPIPOLAR_RADIUS)
-    log.static(entities.epipolar_lines, style)
-    log.every(entities.epipolar_lines, columns.partition(lengths))
+    log.static(entities.epipolar, style)
+    log.every(entities.epipolar, columns.partition(lengths))
 
 
 def track_tails(

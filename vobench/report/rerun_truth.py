@@ -8,14 +8,16 @@ import numpy as np
 import rerun as rr
 from numpy.typing import NDArray
 
-from vobench.report.blueprint import truth_entity
+from vobench.report.entity import truth_entity
 from vobench.report.rerun_stream import time_columns
 from vobench.sensor.pixel_truth import CHANNELS, TruthNames, picture
 from vobench.sequence import StereoTruth
 
-SIDES = ("left", "right")
 TRANSPARENT = (0, 0, 0, 0)
 TRANSLUCENT_WHITE = (255, 255, 255, 160)
+MASKS = [name for name, channel in CHANNELS.items() if channel.dtype is np.bool_]
+# The names of the values 0 and 1 of channels that are not ids. Rerun chooses the colours of larger values itself.
+VALUE_NAMES = {**{mask: ("", mask) for mask in MASKS}, "shadow": ("lit", "one light hidden")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,15 +30,18 @@ class TruthView:
 
 
 def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
-    """Log all channels of both cameras. Only one frame is in memory at a time."""
+    """Log all channels of both cameras. Only one frame is in memory at a time.
+
+    The recorded channels get names of their classes. The channels of a frame are logged as the frame has them.
+    """
     _log_classes(stream, view)
     for frame in view.frames():
         _log_frame(stream, frame)
 
 
 def _log_classes(stream: rr.RecordingStream, view: TruthView) -> None:
-    """Log the names and colours of classes, which are the same in all frames."""
-    for side in SIDES:
+    """Log the names and colours of the classes of each recorded channel, which hold for all frames."""
+    for side in ("left", "right"):
         for channel in view.channels:
             classes = _classes(channel, view.names)
             if classes:
@@ -44,9 +49,9 @@ def _log_classes(stream: rr.RecordingStream, view: TruthView) -> None:
 
 
 def _log_frame(stream: rr.RecordingStream, frame: StereoTruth) -> None:
-    """Log all channels that a frame has."""
+    """Log the channels of one frame."""
     times = time_columns(np.array([frame.index]), np.array([frame.t_ns]))
-    for side, truth in zip(SIDES, (frame.left, frame.right), strict=True):
+    for side, truth in (("left", frame.left), ("right", frame.right)):
         if truth is None:
             continue
         for channel, values in truth.channels().items():
@@ -75,33 +80,25 @@ def _format(
     datatype: rr.ChannelDatatype,
     colors: rr.ColorModel | None = None,
 ) -> rr.components.ImageFormat:
-    """The size in pixels and the type of the values of an image (H, W, ...)."""
+    """The size and the type of the pixels of an image (H, W) or (H, W, 3)."""
     height_px, width_px = values.shape[:2]
     return rr.components.ImageFormat(width_px, height_px, color_model=colors, channel_datatype=datatype)
 
 
 def _bytes(values: NDArray[np.generic]) -> NDArray[np.uint8]:
-    """The values as bytes, row by row."""
+    """The bytes of an image, row by row, as Rerun's buffers need them."""
     return np.ascontiguousarray(values).reshape(-1).view(np.uint8)
 
 
 def _classes(channel: str, names: TruthNames) -> list[rr.AnnotationInfo]:
-    """The name and the colour of each class of a channel; empty for a channel without classes.
-
-    Only the first two counts of hidden lights are classes of the channel `shadow`; Rerun chooses the other colours.
-    """
-    names_of_ids = {"instance": names.instance, "material": names.material}
-    if channel in names_of_ids:
-        return _named_ids(channel, names_of_ids[channel])
-    is_mask = CHANNELS[channel].dtype is np.bool_
-    if is_mask:
-        return _two_classes("", channel)
-    return _two_classes("lit", "one light hidden") if channel == "shadow" else []
-
-
-def _two_classes(zero: str, one: str) -> list[rr.AnnotationInfo]:
-    """Classes with the names of the values 0 and 1, of which only 1 is visible."""
-    return [rr.AnnotationInfo(0, zero, TRANSPARENT), rr.AnnotationInfo(1, one, TRANSLUCENT_WHITE)]
+    """The name and the colour of each class of a channel; empty for a channel without classes."""
+    id_names = {"instance": names.instance, "material": names.material}
+    if channel in id_names:
+        return _named_ids(channel, id_names[channel])
+    if channel in VALUE_NAMES:
+        name_of_0, name_of_1 = VALUE_NAMES[channel]
+        return [rr.AnnotationInfo(0, name_of_0, TRANSPARENT), rr.AnnotationInfo(1, name_of_1, TRANSLUCENT_WHITE)]
+    return []
 
 
 def _named_ids(channel: str, names: tuple[str, ...]) -> list[rr.AnnotationInfo]:

@@ -45,7 +45,7 @@ from vobench.trajectory.trajectory import Trajectory
 from vobench.trajectory.tum import format_tum
 
 if TYPE_CHECKING:
-    from vobench.dataset.source import Views
+    from vobench.dataset.rectified_view import Views
     from vobench.runner.store import Progress
     from vobench.suite.plan import Trial
 

@@ -20,7 +20,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from vobench import __version__
-from vobench.estimator import sandbox
+from vobench.estimator.readable_folders import folders_readable_by_all
 from vobench.regular_file import open_regular
 
 PACKAGE = Path(__file__).resolve().parents[1]
@@ -72,7 +72,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
     A link is followed only to a place that estimators may read, and only one of the links to a folder is followed.
     """
-    readable = [folder.resolve(), *sandbox.readable()]
+    readable = [folder.resolve(), *folders_readable_by_all()]
     seen = set[str]()  # the targets of links to folders
     for place, folders, names in os.walk(folder, followlinks=True):
         folders[:] = [name for name in sorted(folders) if _leads_on(Path(place, name), readable, seen)]

@@ -9,7 +9,7 @@ from zipfile import ZipFile
 from vobench import stop
 from vobench.errors import NoSequenceError
 from vobench.estimator.program import sandbox_works
-from vobench.estimator.sandbox import note_on_unopened
+from vobench.estimator.readable_folders import note_on_unopened
 from vobench.portable import require_held
 from vobench.runner.consistency import COVARIANCE
 from vobench.runner.entry import copy_files

@@ -11,9 +11,9 @@ from vobench.rendering.shot import CameraShot
 from vobench.rendering.truth import TruthCaster
 from vobench.runner.motion import BodyMotion, generator
 from vobench.scene.scene import Scene
-from vobench.sensor.exposure import row_stamps
 from vobench.sensor.imu import STREAMS, ImuBias, ImuReadings, measure
 from vobench.sensor.pixel_truth import TruthFrame, TruthNames
+from vobench.sensor.rolling_shutter import row_stamps
 from vobench.sequence import SequenceWriter
 from vobench.suite.case import Case
 from vobench.trajectory.kinematics import Motion
@@ -132,6 +132,6 @@ class PixelTruth:
         if not self._readout_s:
             T_world_body = self._motion.at(np.array([t_ns])).T_world_body[0]
             return CameraShot(T_world_body @ T_body_camera, t_ns)
-        stamps = row_stamps(self._rig.camera(side).height_px, self._readout_s, t_ns)
+        stamps = row_stamps(self._rig.camera(side).height_px, readout_s=self._readout_s, t_ns=t_ns)
         T_world_body = self._motion.at(stamps).T_world_body
         return CameraShot(T_world_body @ T_body_camera, stamps)

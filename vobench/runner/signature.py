@@ -40,7 +40,7 @@ def sign(bundle: Path, key: Path) -> Path:
     return signature
 
 
-def signed_by(bundle: Path, allowed_signers: Path | None) -> str:
+def signature_sentence(bundle: Path, allowed_signers: Path | None) -> str:
     """A sentence about the signature of a bundle; empty if there is no signature file beside it.
 
     `allowed_signers` is a file that lists who may sign, in the format of ssh-keygen(1).
@@ -63,10 +63,11 @@ def _signature_path(bundle: Path) -> Path:
 def _sentence_on_key(bundle: Path, signature: Path) -> str:
     """The key that signed the bundle; nothing is known about its owner."""
     result = _ssh_keygen("check-novalidate", "-n", NAMESPACE, "-s", str(signature.absolute()), stdin=bundle)
-    key = result.message.rpartition(" key ")[2]
-    if not result.succeeded or not key:
+    # OpenSSH prints: Good "vobench-bundle" signature with ED25519 key SHA256:uNiVztksCsDhcc0u9e8BrqXhK...
+    _, separator, key = result.message.rpartition(" key ")
+    if not (result.succeeded and separator and key):
         return f"its signature is NOT that of this file ({result.message})"
-    return f"signed by {key}, not verified: name an allowed-signers file with --allowed-signers"
+    return f"signed by {key}, not verified: pass --allowed-signers to verify"
 
 
 def _sentence_on_signer(bundle: Path, signature: Path, allowed_signers: Path) -> str:

@@ -17,10 +17,11 @@ from vobench.rendering.renderer import Radiance, Renderer, View
 from vobench.runner.motion import generator
 from vobench.scene.light import Steady
 from vobench.scene.scene import Scene, triangles
-from vobench.sensor.exposure import Exposure, initial_exposures, next_exposures, strips
+from vobench.sensor.exposure import Exposure, initial_exposures, next_exposures
 from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose, fixed_pattern
 from vobench.sensor.lens import apply_lens, lens_maps
 from vobench.sensor.response import Grey
+from vobench.sensor.rolling_shutter import row_strips
 from vobench.suite.case import Case
 from vobench.trajectory.kinematics import Motion
 from vobench.trajectory.trajectory import Stamps
@@ -186,16 +187,16 @@ class SimulatedCamera:
 
     def views(self, t_ns: int, exposure: Exposure) -> list[View]:
         """The views of strips of rows and sub-frames, which are as fine as the motion requires."""
-        exposed_strips = strips(
+        strips = row_strips(
             self._camera.height_px,
-            self._settings.readout_s,
-            t_ns,
-            exposure.time_s,
-            row_strips=self._row_strips(t_ns),
+            readout_s=self._settings.readout_s,
+            t_ns=t_ns,
+            exposure_s=exposure.time_s,
+            strip_count=self._strip_count(t_ns),
             sub_frames=self._sub_frames(t_ns, exposure),
         )
         views = []
-        for strip in exposed_strips:
+        for strip in strips:
             T_world_camera = self._poses(strip.mid_ns)
             views.append(View(strip.rows, T_world_camera, strip.start_ns, strip.end_ns))
         return views
@@ -207,7 +208,7 @@ class SimulatedCamera:
         sub_frames = np.ceil(moved_px / SUB_FRAME_PX)
         return int(np.clip(sub_frames, 1, MOST_SUB_FRAMES))
 
-    def _row_strips(self, t_ns: int) -> int:
+    def _strip_count(self, t_ns: int) -> int:
         height = self._camera.height_px
         if not self._settings.readout_s:
             return 1
@@ -215,8 +216,8 @@ class SimulatedCamera:
         if self._light_changes:
             least = math.ceil(height / ROWS_UNDER_CHANGING_LIGHT)
         moved_px = self._moved_px(t_ns, self._settings.readout_s)
-        row_strips = np.ceil(moved_px / STRIP_PX)
-        return int(np.clip(row_strips, least, height))
+        strip_count = np.ceil(moved_px / STRIP_PX)
+        return int(np.clip(strip_count, least, height))
 
     def _moved_px(self, t_ns: int, duration_s: float) -> float:
         half_ns = round(duration_s * 1e9) // 2

@@ -12,8 +12,9 @@ from functools import cache
 from pathlib import Path
 from zipfile import BadZipFile, ZipFile
 
-from vobench.estimator import isolation, sandbox
+from vobench.estimator import isolation
 from vobench.estimator.program import EstimatorFailure
+from vobench.estimator.readable_folders import folders_opened_by_user, is_switched_off, python_folders
 from vobench.runner.folder import PAGE, SUITE
 
 MOST_ENTRIES = 1_000_000  # the largest number of files and folders that are searched, which takes about 2 s
@@ -36,7 +37,7 @@ def visible_truth(estimator_folder: Path, known: Collection[Path]) -> list[Path]
     `known` are the real paths of files and folders that are hidden in any case, and therefore not searched.
     Raises EstimatorFailure if a folder holds more than MOST_ENTRIES files and folders.
     """
-    if sandbox.is_switched_off():
+    if is_switched_off():
         return []
     skipped = {str(path) for path in known}
     found = list[Path]()
@@ -47,7 +48,7 @@ def visible_truth(estimator_folder: Path, known: Collection[Path]) -> list[Path]
 
 def _searched_folders(estimator_folder: Path) -> list[str]:
     """The real paths of the folders to search: all that are readable, except those of the system."""
-    folders = [str(estimator_folder), *sandbox.opened(), *sandbox.libraries()]
+    folders = [str(estimator_folder), *folders_opened_by_user(), *python_folders()]
     real_folders = list(dict.fromkeys(os.path.realpath(folder) for folder in folders))
     systems = [os.path.realpath(folder) for folder in isolation.SYSTEM]
     return [folder for folder in real_folders if not _is_below(folder, systems)]

@@ -1,104 +1,17 @@
-"""Exposure time and gain, auto-exposure, and the exposure of each row by a rolling shutter."""
+"""Exposure time and gain, and auto-exposure."""
 
 import math
-from dataclasses import dataclass
-from itertools import pairwise
 from typing import Annotated
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 
-from vobench.errors import InputError, SettingError
+from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
 from vobench.sensor.response import FULL_SCALE_DN, Grey
 from vobench.setting import NonNegative, Positive, settings
-from vobench.trajectory.nanoseconds import NS_PER_S
-from vobench.trajectory.trajectory import Stamps
 
 MS_PER_S = 1e3
-
-
-@dataclass(frozen=True, slots=True)
-class RowStrip:
-    """A strip of adjacent rows that are exposed at the same time.
-
-    The exposure is divided into M sub-frames. Sub-frame m lasts from start_ns[m] to end_ns[m]; both arrays are (M,).
-    """
-
-    rows: slice
-    start_ns: Stamps
-    end_ns: Stamps
-
-    @property
-    def mid_ns(self) -> Stamps:
-        """The middle of each sub-frame (M,), at which it is rendered."""
-        durations_ns = self.end_ns - self.start_ns
-        return self.start_ns + durations_ns // 2
-
-
-def strips(
-    height: int,
-    readout_s: float,
-    t_ns: int,
-    exposure_s: float,
-    *,
-    row_strips: int,
-    sub_frames: int,
-) -> list[RowStrip]:
-    """The row strips of a picture from top to bottom.
-
-    `t_ns` is the mid-exposure time of the middle row.
-    `readout_s` is the number of rows times the delay between adjacent rows; it is 0 for a global shutter.
-    Each strip is exposed when its middle row is exposed. For its outermost rows, that time is wrong by
-    readout_s / (2 · row_strips). For a global shutter there is always one strip.
-    Raises InputError if the exposure has fewer nanoseconds than sub-frames, if the picture has fewer rows than strips,
-    or if a number is below 1.
-    Source: Kalibr; row v is exposed v times the line delay after row 0.
-    """
-    exposure_ns = round(exposure_s * NS_PER_S)
-    readout_ns = round(readout_s * NS_PER_S)
-    if not 1 <= sub_frames <= exposure_ns:
-        raise InputError(f"an exposure of {exposure_ns} ns cannot be divided into {sub_frames} sub-frames")
-    if not 1 <= row_strips <= height:
-        raise InputError(f"{height} rows cannot be divided into {row_strips} strips")
-    strip_count = row_strips if readout_ns else 1
-    border_rows = [height * index // strip_count for index in range(strip_count + 1)]
-    # The borders between sub-frames (sub_frames + 1,), relative to the start of the exposure.
-    border_offsets_ns = np.arange(sub_frames + 1, dtype=np.int64) * exposure_ns // sub_frames
-
-    row_strip_list = []
-    for first_row, end_row in pairwise(border_rows):
-        mid_ns = t_ns + _delay_ns(first_row, end_row, height, readout_ns)
-        start_ns = mid_ns - exposure_ns // 2
-        borders_ns = start_ns + border_offsets_ns
-        row_strip_list.append(RowStrip(slice(first_row, end_row), borders_ns[:-1], borders_ns[1:]))
-    return row_strip_list
-
-
-def row_stamps(height: int, readout_s: float, t_ns: int) -> Stamps:
-    """The mid-exposure time of each row (height,). `t_ns` is the mid-exposure time of the middle row."""
-    readout_ns = round(readout_s * NS_PER_S)
-    stamps = [t_ns + _delay_ns(row, row + 1, height, readout_ns) for row in range(height)]
-    return np.array(stamps, np.int64)
-
-
-def _delay_ns(
-    first_row: int,
-    end_row: int,
-    height: int,
-    readout_ns: int,
-) -> int:
-    """The delay of the middle of rows [first_row, end_row) relative to the middle of the picture.
-
-    It is negative in the upper half of the picture. Half a nanosecond is rounded away from 0, so two rows at the same
-    distance above and below the middle have exactly opposite delays.
-    """
-    # Twice the distance in rows between the two middles is an integer.
-    doubled_offset = first_row + end_row - height
-    magnitude_ns = (abs(doubled_offset) * readout_ns + height) // (2 * height)
-    return magnitude_ns if doubled_offset >= 0 else -magnitude_ns
-
-
 # A smaller error of the exposure (natural logarithm) is not corrected, so that noise and flicker do not change it.
 DEAD_BAND = 0.02
 
@@ -165,7 +78,8 @@ def next_exposures(
     The target follows from the exposure with which the picture was taken, not from the newest one. The loop therefore
     does not oscillate for any lag.
     """
-    darkest = float(linear_of_grey[linear_of_grey > 0][0]) / 2  # a black pixel may have up to half a grey value
+    first_positive = float(linear_of_grey[linear_of_grey > 0][0])
+    darkest = first_positive / 2  # a black pixel may have up to half a grey value
     measured = max(_brightness(loop, grey, linear_of_grey), darkest)
     target = _exposure_of_level(loop, _level_s(pending[0]) * loop.target_share / measured)
 

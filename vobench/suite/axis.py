@@ -67,10 +67,10 @@ class RigSettings:
         """The rig with the lenses from its file. Relative paths start at `folder`. Raises InputError."""
         if not (self.calib or self.camchain):
             return self
-        from vobench.dataset import kalibr, kitti
+        from vobench.dataset import kalibr, kitti_calibration
 
         if self.calib:
-            pair = kitti.read_pair(folder / self.calib, self.size_px)
+            pair = kitti_calibration.read_pair(folder / self.calib, self.size_px)
         else:
             pair = kalibr.read_pair(folder / str(self.camchain))
         return replace(self, own=custom_stereo_pair(pair), calib=None, size_px=None, camchain=None)

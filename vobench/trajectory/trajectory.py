@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from vobench.errors import InputError, TrajectoryError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 Stamps = NDArray[np.int64]
 SKEW = 1e-2  # the largest element of RᵀR - I; it is up to 3e-3 in a text with three digits
@@ -68,6 +69,16 @@ class Trajectory:
     def of_mounted(self, T_frame_mounted: Array) -> "Trajectory":
         """The trajectory of a frame fixed to this one, such as a camera on a body."""
         return Trajectory(self.t_ns, self.T_world_frame @ T_frame_mounted)
+
+
+def mean_rate_hz(t_ns: Stamps) -> float:
+    """The mean rate of stamps (N,); 0 for fewer than two different stamps."""
+    if len(t_ns) < 2:
+        return 0.0
+    span_ns = int(t_ns[-1]) - int(t_ns[0])
+    if span_ns == 0:
+        return 0.0
+    return (len(t_ns) - 1) * float(NS_PER_S) / span_ns
 
 
 def step_lengths_m(positions_m: Array) -> Array:
