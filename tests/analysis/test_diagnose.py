@@ -573,3 +573,35 @@ def test_positions_that_do_not_correlate_have_no_scale():
     tenfold = T_gt.copy()
     tenfold[:, :3, 3] *= 10
     assert [finding.fault for finding in _wrong_scale(T_gt, tenfold)] == ["scale"]
+
+
+def test_a_clock_that_is_late_is_found_behind_inverse_poses():
+    gt, est = (replace(reading, unit="s", format_unit="s") for reading in loop())
+    inverse_and_late = changed(moved("inverse")(est.trajectory), t_ns=est.trajectory.t_ns + 400_000_000)
+    findings = diagnose(gt, replace(est, trajectory=inverse_and_late))
+    assert [finding.fault for finding in findings] == ["inverse_poses", "time_offset"]
+    assert float(findings[1].options[0].partition("=")[2]) == pytest.approx(-0.4, abs=0.01)
+
+
+def test_poses_in_reversed_order_are_unrelated_whatever_offset_of_the_clocks_fits_best():
+    for seed in range(5):
+        gt, est = (replace(reading, unit="s", format_unit="s") for reading in loop(seed=seed))
+        backwards = changed(est.trajectory, est.trajectory.T_world_frame[::-1])
+        assert_named("unrelated", gt, replace(est, trajectory=backwards))
+
+
+def test_a_half_turn_of_the_axes_is_no_mirror_image():
+    gt, est = loop()
+    finding = assert_named("axis_swap", gt, replace(est, trajectory=moved("axes:x,-y,-z")(est.trajectory)))
+    assert "turned by half a turn" in finding.sentence
+
+
+def test_an_error_of_positions_along_a_straight_road_is_not_taken_for_another_frame_of_the_body():
+    rng = np.random.default_rng(3)
+    n = 500
+    sway = np.cumsum(rng.normal(scale=0.02, size=n))
+    positions_m = np.stack([np.linspace(0, 450, n), 60 * np.linspace(-1, 1, n) ** 2, sway], axis=-1)
+    gt = Trajectory(np.arange(n, dtype=np.int64) * 10**8, se3.transform(np.eye(3), positions_m))
+    bend_m = np.stack([np.zeros(n), np.zeros(n), 8 * np.cos(2.2 * np.linspace(-1, 1, n)) ** 3], axis=-1)
+    est = changed(gt, se3.transform(np.eye(3), positions_m + bend_m))
+    assert diagnose(TrajectoryReading(gt), TrajectoryReading(est)) == ()

@@ -40,10 +40,13 @@ MAX_POSES = 1000  # that frames are compared by
 # Real pairs without a fault (KITTI, TUM, TartanAir) are clear of this limit, and of those of scale and clock below.
 UNRELATED_MISFIT = 0.5  # share of the extent that is left after the best correction
 # Of made-up drives with 10 % of error in scale and heavy noise, the short motions disagree by 0.1 at most; of drives
-# that have nothing to do with each other, by 0.4 on winding roads and by 0.12 on straight ones at least.
+# that have nothing to do with each other, by 0.4 on winding roads and by 0.05 on straight ones at least.
 UNRELATED_DISAGREEMENT = 0.3
-DOUBTFUL_DISAGREEMENT = 0.12
-DOUBTFUL_MISFIT = 0.03  # share of the extent
+DOUBTFUL_DISAGREEMENT = 0.05
+DOUBTFUL_PRODUCT = 0.0036  # of the disagreement and the misfit, as a share of the extent
+# The largest of many correlations at any offset is up to 0.9 for drives that have nothing to do with each other.
+SURE_CORRELATION = 0.95  # of the speeds, at the offset of the clocks that was found
+MAX_MISFIT_WITHOUT_IT = 0.1  # share of the extent
 LONGEST_REPR = 100  # characters
 
 
@@ -89,9 +92,12 @@ def diagnose(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Finding, ..
     match, and no fault of the clocks explains that.
     """
     findings: list[Finding] = []
-    if gt.unit and est.unit:
+    has_clocks = bool(gt.unit and est.unit)
+    if has_clocks:
         gt, est = _in_right_units(gt, est, findings)
-        est = _on_one_clock(gt, est, findings)
+    unshifted = est
+    if has_clocks:
+        est = _on_one_clock(gt, unshifted, findings)
 
     T_gt, T_est = _matched_poses(gt, est)
     if len(T_gt) < MIN_POSES:
@@ -101,10 +107,17 @@ def diagnose(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Finding, ..
 
     if min(_extent_m(T_gt), _extent_m(T_est)) > 0:
         misfit_before = misfit(T_gt, T_est).trans
-        T_gt, T_est = _in_right_frames(T_gt, T_est, gt, est, findings)
+        mismatch = find_mismatch(T_gt, T_est, gt_order=gt.order, est_order=est.order)
+        if mismatch is not None:
+            findings.append(_mismatch_finding(mismatch, gt, est))
+            T_gt, T_est = mismatch.correction.T_gt, mismatch.correction.T_est
+        if has_clocks and mismatch is not None and mismatch.kind == "inverse_poses":
+            findings = [finding for finding in findings if finding.fault != "time_offset"]
+            T_gt, T_est = _on_one_clock_when_inverted(mismatch, gt, unshifted, findings)
         misfit_after = misfit(T_gt, T_est).trans
         disagreement = motion_disagreement(T_gt, T_est)
-        if _is_unrelated(misfit_after, disagreement):
+        is_chance = misfit_after > MAX_MISFIT_WITHOUT_IT and _has_unsure_offset(findings)
+        if is_chance or _is_unrelated(misfit_after, disagreement):
             units = (finding for finding in findings if finding.fault == "stamp_unit")
             return (*units, _unrelated(misfit_before, misfit_after, disagreement))
         findings += _wrong_scale(T_gt, T_est)
@@ -118,8 +131,14 @@ def _is_unrelated(misfit_after: float, disagreement: float | None) -> bool:
         return True
     if disagreement is None:
         return False
-    is_doubtful = disagreement >= DOUBTFUL_DISAGREEMENT and misfit_after >= DOUBTFUL_MISFIT
+    is_doubtful = disagreement >= DOUBTFUL_DISAGREEMENT and disagreement * misfit_after >= DOUBTFUL_PRODUCT
     return disagreement >= UNRELATED_DISAGREEMENT or is_doubtful
+
+
+def _has_unsure_offset(findings: list[Finding]) -> bool:
+    """Whether an offset between the clocks was found that trajectories of different motions could show by chance."""
+    offsets = [finding for finding in findings if finding.fault == "time_offset"]
+    return any(offset.evidence[0].after < SURE_CORRELATION for offset in offsets)
 
 
 def _unrelated(before: float, after: float, disagreement: float | None) -> Finding:
@@ -271,18 +290,8 @@ def _matched_poses(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Array
     return T_gt, T_est
 
 
-def _in_right_frames(
-    T_gt: Array,
-    T_est: Array,
-    gt: TrajectoryReading,
-    est: TrajectoryReading,
-    findings: list[Finding],
-) -> tuple[Array, Array]:
-    """The matched poses (K, 4, 4) with their fault of frames corrected."""
-    mismatch = find_mismatch(T_gt, T_est, gt_order=gt.order, est_order=est.order)
-    if mismatch is None:
-        return T_gt, T_est
-
+def _mismatch_finding(mismatch: Mismatch, gt: TrajectoryReading, est: TrajectoryReading) -> Finding:
+    """The finding of a fault of frames."""
     before = mismatch.before
     after = mismatch.correction.misfit
     angles_deg = np.rad2deg([before.rot_rad, after.rot_rad]).tolist()
@@ -294,8 +303,29 @@ def _in_right_frames(
     if lever:
         evidence.append(Evidence("translation of short motions left (rms)", "m", lever.before_m, lever.after_m))
     sentence, options = _frame_sentence(mismatch, gt, est)
-    findings.append(Finding(mismatch.kind, sentence, tuple(evidence), options))
-    return mismatch.correction.T_gt, mismatch.correction.T_est
+    return Finding(mismatch.kind, sentence, tuple(evidence), options)
+
+
+def _on_one_clock_when_inverted(
+    mismatch: Mismatch, gt: TrajectoryReading, est: TrajectoryReading, findings: list[Finding]
+) -> tuple[Array, Array]:
+    """The matched poses (K, 4, 4) with inverse poses corrected, after another search for an offset of the clocks.
+
+    The speeds of inverse poses are not those of the body, so the first search could not find an offset.
+    """
+    move = mismatch.correction.move
+    assert move is not None
+    if mismatch.correction.side == "gt":
+        gt = _moved(gt, move)
+    else:
+        est = _moved(est, move)
+    est = _on_one_clock(gt, est, findings)
+    return _matched_poses(gt, est)
+
+
+def _moved(reading: TrajectoryReading, move: PoseConvention) -> TrajectoryReading:
+    trajectory = reading.trajectory
+    return replace(reading, trajectory=Trajectory(trajectory.t_ns, move.apply(trajectory.T_world_frame)))
 
 
 def _frame_sentence(
@@ -334,7 +364,12 @@ def _mount_sentence(move: PoseConvention) -> str:
 def _axes_sentence(kind: Fault, move: PoseConvention) -> str:
     values = "positions and rotations" if move.kind == "axes" else "positions, but not its rotations,"
     axes = str(move).partition(":")[2]
-    verb = "mirrored" if kind == "mirrored_axes" else "swapped"
+    if kind == "mirrored_axes":
+        verb = "mirrored"
+    elif np.count_nonzero(np.diag(move.matrix)) == 3:
+        verb = "turned by half a turn"
+    else:
+        verb = "swapped"
     return f"the axes of the estimate's {values} are {verb}: the truth's x,y,z are its {axes}"
 
 

@@ -36,6 +36,10 @@ SIGNED_AXES = [
     if (order, signs) != ((0, 1, 2), (1.0, 1.0, 1.0))
 ]
 MAX_SWAY = 0.03  # of a path's length, aside from a straight line
+# A path that sways more is straight, too, if the misfit of positions is not much smaller than its sway: the roll about
+# it is known to about misfit / sway only.
+MAX_SWAY_WITH_MISFIT = 0.15
+MIN_SWAY_OVER_MISFIT = 30.0
 TINY = 1e-300  # prevents 0/0
 
 
@@ -60,15 +64,20 @@ def misfit(T_gt: Array, T_est: Array) -> Misfit:
     """The misfit of matched poses (K, 4, 4), which does not depend on their world frames and scales."""
     alignment = align(T_est, T_gt, kind="sim3")
     aligned = _aligned(T_est, T_gt)
-    position_errors_m = (aligned - T_gt)[:, :3, 3]
-    position_error_m = np.sqrt(np.sum(position_errors_m**2, axis=1).mean())
-    extent_m = np.sqrt(T_gt[:, :3, 3].var(axis=0).sum())
     angles_rad = se3.rotation_angle(_rotations_between(aligned, T_gt))
     return Misfit(
-        trans=float(position_error_m / extent_m),
+        trans=_position_misfit(aligned, T_gt),
         rot_rad=float(np.sqrt(np.mean(angles_rad**2))),
         turned_rad=float(se3.rotation_angle(alignment.rotation)),
     )
+
+
+def _position_misfit(aligned: Array, T_gt: Array) -> float:
+    """The rms distance of positions after alignment, relative to the extent of the path."""
+    position_errors_m = (aligned - T_gt)[:, :3, 3]
+    position_error_m = np.sqrt(np.sum(position_errors_m**2, axis=1).mean())
+    extent_m = np.sqrt(T_gt[:, :3, 3].var(axis=0).sum())
+    return float(position_error_m / extent_m)
 
 
 def _aligned(T_est: Array, T_gt: Array) -> Array:
@@ -80,7 +89,10 @@ def _aligned(T_est: Array, T_gt: Array) -> Array:
     aligned = align(T_est, T_gt, kind="sim3").apply(T_est)
     centre_m = T_gt[:, :3, 3].mean(axis=0)
     _, spreads, axes = np.linalg.svd(T_gt[:, :3, 3] - centre_m, full_matrices=False)
-    if spreads[1] > MAX_SWAY * spreads[0]:
+    sway = float(spreads[1] / (spreads[0] + TINY))
+    position_misfit = _position_misfit(aligned, T_gt)
+    hides_roll = sway <= min(MAX_SWAY_WITH_MISFIT, MIN_SWAY_OVER_MISFIT * position_misfit)
+    if sway > MAX_SWAY and not hides_roll:
         return aligned
 
     path_axis = axes[0]
@@ -235,7 +247,8 @@ def _kind(correction: Correction) -> Kind:
     if move.kind in INVERSE:
         return INVERSE[move.kind]
     is_diagonal = np.count_nonzero(np.diag(move.matrix)) == 3
-    return "mirrored_axes" if is_diagonal else "axis_swap"
+    is_mirrored = np.linalg.det(move.matrix) < 0
+    return "mirrored_axes" if is_diagonal and is_mirrored else "axis_swap"
 
 
 def discrete_corrections(
