@@ -1,35 +1,44 @@
 """Attackers beside an honest estimator in one suite: none has a better error or rank, and none changes its results.
 
-What each attacker could see stands on every form of the board. Single attacks, in more languages, and as other users
+What each trial could see stands on every form of the board. The file runs again as an ordinary user, and where the
+kernel gives no namespaces. Single attacks, in more languages, and as other users
 and on poorer machines, are in tests/estimator/test_sandbox.py; answers of all kinds are in tests/estimator/test_zoo.py.
 """
 
 import csv
+import html
 import io
 import shutil
 import subprocess
 import sys
 from math import inf
+from pathlib import Path
 
 import pytest
 
+from tests.elsewhere import first_time, on_poorer_kernels, refusing, rerun, rerun_as_ordinary_user
 from vobench.cli import report as cli_report
+from vobench.estimator.isolation import FILES
 from vobench.estimator.program import sandbox_here
-from vobench.estimator.sandbox import SWITCH
+from vobench.estimator.readable_folders import SWITCH_VARIABLE
 from vobench.report import page
 from vobench.report.board_formats import FORMATS
 from vobench.report.verify import verify_run
 from vobench.runner.bundle import bundle, opened
 from vobench.runner.estimate import ESTIMATE
-from vobench.runner.folder import ONLY_THEIR_OWN, SCORE
+from vobench.runner.folder import SCORE, seen_by
 from vobench.runner.frames import FRAMES, GROUND_TRUTH
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")
+pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")]
+
+NEEDED = "cv2, embreex, mcap, numba, numpy, OpenGL, PIL, pydantic, pytest, scipy, trimesh, vobench.runner.run"
+NOTHING_ELSE = ("only its own files", "only their own files")  # in a row of a trial, and in a sentence
 
 ONE_CASE = ("lightings: {full: {}, dim: {lamp: {power_lm: 150}}}", "lightings: {full: {}}")
 ESTIMATORS = "estimators: [wheel_odometry, stand_still]"
+CASE = "short"
 HONEST = "lk_epipolar"
-PATIENT = "{start_s: 600, frame_s: 600}"  # on a busy machine
+PATIENT = "{start_s: 1200, frame_s: 1200}"  # on a busy machine
 ENTRY = f"{{name: {HONEST}, limits: {PATIENT}}}"
 STAGES_OF_ESTIMATORS = ("estimates", "scores")
 
@@ -67,11 +76,11 @@ def found():
 """
 SEARCHES = """
 def found():
-    for place in (PLACES["store"], PLACES["runs"], "/tmp", "/proc/1/root" + PLACES["runs"], PLACES["honest"]):
-        for folder, _, names in os.walk(place):
-            for name in names:
-                if name in ("ground_truth.tum", "estimate.tum"):
-                    rows = read(os.path.join(folder, name))
+    for wanted in ("ground_truth.tum", "estimate.tum"):
+        for place in (PLACES["store"], PLACES["runs"], "/tmp", "/proc/1/root" + PLACES["runs"], PLACES["honest"]):
+            for folder, _, names in os.walk(place):
+                if wanted in names:
+                    rows = read(os.path.join(folder, wanted))
                     if rows is not None:
                         return rows
 """
@@ -149,12 +158,13 @@ def beside(bench, alone, tmp_path):
             bench.folder / "alone", store, symlinks=True, ignore=shutil.ignore_patterns(*STAGES_OF_ESTIMATORS)
         )
         places = {
-            "truth": str(alone.case("full") / GROUND_TRUTH),
+            "truth": str(alone.case(CASE) / GROUND_TRUTH),
             "store": str(bench.folder / "alone"),
             "runs": str(alone.path.parent),
-            "honest": str(alone.estimate("full", HONEST, 0)),
+            "honest": str(alone.estimate(CASE, HONEST, 0)),
             "temporary": str(tmp_path),
         }
+        assert all(Path(place).exists() for place in places.values())
         folders = [attacker(name, tmp_path / name, places) for name in names]
         listed = ", ".join(map(str, [*folders, ENTRY]))
         return bench.run(ONE_CASE, (ESTIMATORS, f"estimators: [{listed}]"), cache=store.name)
@@ -165,7 +175,7 @@ def beside(bench, alone, tmp_path):
 def attacker(name, folder, places):
     """The folder of an attacker."""
     folder.mkdir()
-    keys = {"name": name, "version": "'1'", "pose_of": "body", "needs": "[stereo]", "limits": PATIENT}
+    keys = {"name": name, "version": "'1'", "pose_of": "left_camera", "needs": "[stereo]", "limits": PATIENT}
     if name in CLASSES:
         keys["class"] = "estimator:Bad"
         (folder / "estimator.py").write_text(CLASS.format(places=places, attack=CLASSES[name]))
@@ -187,18 +197,30 @@ def quoted(value):
     return f"[{', '.join(words)}]"
 
 
-def forms(run, folder, capsys):
-    """The board of a run in every form, and that of its bundle, by name."""
-    board = page.run_board(run, run.scores())
-    texts = {name: form(board, "ate") for name, form in FORMATS.items()}
-    texts["html"] = (run.path / "leaderboard.html").read_text()
-    capsys.readouterr()
-    cli_report.print_board(board)
-    texts["terminal"] = capsys.readouterr().out
-    bundle(run, folder / "run.zip")
-    with opened(folder / "run.zip") as unpacked:
-        texts["bundle"] = FORMATS["md"](page.run_board(unpacked, unpacked.scores()), "ate")
-    return {name: " ".join(text.split()) for name, text in texts.items()}
+@pytest.fixture
+def forms(tmp_path, capsys, monkeypatch):
+    """The board of a run in every form, and that of its bundle, by name, without escapes and line breaks."""
+    monkeypatch.setenv("COLUMNS", "4000")
+
+    def read(run):
+        board = page.run_board(run, run.scores())
+        texts = {name: form(board, "ate") for name, form in FORMATS.items()}
+        texts["html"] = (run.path / "leaderboard.html").read_text()
+        capsys.readouterr()
+        cli_report.print_board(board)
+        texts["terminal"] = capsys.readouterr().out
+        bundle(run, tmp_path / "run.zip")
+        with opened(tmp_path / "run.zip") as unpacked:
+            texts["bundle"] = FORMATS["md"](page.run_board(unpacked, unpacked.scores()), "ate")
+        return {name: plain(text) for name, text in texts.items()}
+
+    return read
+
+
+def plain(text):
+    """A text on one line, without the escapes of HTML, LaTeX and Markdown."""
+    unescaped = html.unescape(text).replace("\\", "")
+    return " ".join(unescaped.split())
 
 
 def ate_m(score):
@@ -207,50 +229,67 @@ def ate_m(score):
     return inf if value is None else value
 
 
-def test_no_attacker_is_better_than_an_honest_estimator_or_changes_its_results(alone, beside, tmp_path, capsys):
+def test_no_attacker_is_better_than_an_honest_estimator_or_changes_its_results(alone, beside, forms):
+    are_files_closed = FILES not in sandbox_here().sees
     names = [*CLASSES, *COMMANDS]
     if shutil.which("cc"):
         names.append("copies")
-    if sandbox_here().level != "full":
+    if not are_files_closed:
         names.remove("sabotages")  # it would succeed, on this machine
     before = {path: path.read_bytes() for path in alone.path.rglob("*") if path.is_file()}
     run = beside(names)
     scores = {score.estimator: score for score in run.scores()}
     assert set(scores) == {*names, HONEST}
-    assert all(score.sandbox is not None for score in scores.values())
     assert ate_m(scores[HONEST]) < inf
 
-    texts = forms(run, tmp_path, capsys)
     totals = {total.estimator: total for total in page.run_board(run, run.scores()).totals}
-    for name in names:
-        saw = scores[name].sandbox
-        if saw.level == "full":
-            assert ate_m(scores[name]) > ate_m(scores[HONEST]), (name, scores[name])
-            rank = totals[name].rank
-            is_rival = totals[name].group == totals[HONEST].group and rank is not None
-            assert not is_rival or rank > totals[HONEST].rank
-            continue
-        assert all(name in text and saw.sentence in text for text in texts.values())
+    for name in names if are_files_closed else ():
+        assert ate_m(scores[name]) > ate_m(scores[HONEST]), (name, scores[name])
+        is_rival = totals[name].group == totals[HONEST].group and totals[name].rank is not None
+        assert not is_rival or totals[name].rank > totals[HONEST].rank, (name, totals[name])
 
-    if sandbox_here().level == "full":
-        assert all(ONLY_THEIR_OWN in texts[name] for name in texts if name != "csv")
-        rows = csv.DictReader(io.StringIO((run.path / "leaderboard.csv").read_text()))
-        assert {row["saw"] for row in rows if row["case"] == "full"} == {"only its own files"}
-        for name in (ESTIMATE, FRAMES, SCORE):
-            files = [folder.estimate("full", HONEST, 0) / name for folder in (alone, run)]
-            assert files[0].read_bytes() == files[1].read_bytes()
-        assert {path: path.read_bytes() for path in before} == before
+    for form, text in forms(run).items():
+        for name, score in scores.items():
+            seen = seen_by(score)
+            sentences = [seen] if seen else NOTHING_ELSE
+            assert name in text, (form, name)
+            assert any(sentence in text for sentence in sentences), (form, name, seen)
+
+    for name in (ESTIMATE, FRAMES, SCORE):
+        files = [folder.estimate(CASE, HONEST, 0) / name for folder in (alone, run)]
+        assert files[0].read_bytes() == files[1].read_bytes(), name
+    assert {path: path.read_bytes() for path in before} == before
     assert not [finding for finding in verify_run(run) if finding.wrong]
 
 
-def test_where_nothing_is_closed_an_attacker_wins_and_every_form_of_the_board_names_it(
-    beside, tmp_path, capsys, monkeypatch
-):
-    monkeypatch.setenv(SWITCH, "off")
-    run = beside(["opens", "symlinks"])
+def test_every_row_of_the_csv_says_what_its_trial_saw(alone):
+    rows = list(csv.DictReader(io.StringIO((alone.path / "leaderboard.csv").read_text())))
+    (trial,) = alone.scores()
+    expected = seen_by(trial) or NOTHING_ELSE[0]
+    assert {row["saw"] for row in rows if row["case"] == CASE} == {expected}
+
+
+def test_where_nothing_is_closed_an_attacker_wins_and_every_form_of_the_board_names_it(beside, forms, monkeypatch):
+    monkeypatch.setenv(SWITCH_VARIABLE, "off")
+    winners = ["opens", "searches"]
+    if shutil.which("cc"):
+        winners.append("copies")
+    run = beside([*winners, "symlinks"])
     scores = {score.estimator: score for score in run.scores()}
-    assert ate_m(scores["opens"]) < 1e-4 * ate_m(scores[HONEST])  # so the attack itself works
+    for name in winners:  # so the attacks themselves work
+        assert ate_m(scores[name]) < 1e-4 * ate_m(scores[HONEST]), scores[name]
     assert scores["symlinks"].status == "invalid_output"  # whatever it sees, links are not followed
-    for name, text in forms(run, tmp_path, capsys).items():
+    for name, text in forms(run).items():
         assert "opens" in text, name
-        assert "not sandboxed: it could see the user" in text, name
+        assert "not sandboxed: it could see the user's files" in text, name
+
+
+@first_time
+def test_the_same_as_an_ordinary_user():
+    rerun_as_ordinary_user(__file__, needed=NEEDED)
+
+
+@first_time
+@on_poorer_kernels
+def test_the_same_where_the_kernel_refuses(refused):
+    rerun(__file__, refusing(refused))
