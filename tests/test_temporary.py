@@ -7,7 +7,7 @@ import sys
 import pytest
 
 from vobench import temporary as temporary_folders
-from vobench.temporary import temporary_folder
+from vobench.temporary import remove_abandoned_folders, temporary_folder
 
 
 @pytest.fixture
@@ -59,6 +59,29 @@ def test_what_a_killed_process_has_left_is_removed_by_the_next(place) -> None:
     with temporary_folder():
         assert not left.exists()
     assert list(place.iterdir()) == []
+
+
+def test_what_a_process_has_left_that_was_killed_later_is_removed_on_request(place) -> None:
+    with temporary_folder():
+        pass
+    killed = subprocess.run([sys.executable, "-c", KILLED, str(place)], check=False)
+    assert killed.returncode == -signal.SIGKILL
+    with temporary_folder() as folder:  # the sweep of this process is over
+        (left,) = (path for path in folder.parent.iterdir() if path != folder)
+        remove_abandoned_folders()
+        assert not left.exists()
+        assert folder.is_dir()
+    remove_abandoned_folders()
+    assert list(place.iterdir()) == []
+
+
+def test_folders_of_somebody_else_are_not_swept(place) -> None:
+    with temporary_folder() as folder:
+        base = folder.parent
+    (base / "1-other").mkdir(parents=True)
+    base.chmod(0o777)
+    remove_abandoned_folders()
+    assert (base / "1-other").is_dir()
 
 
 def test_one_that_is_in_use_is_not_removed(place) -> None:

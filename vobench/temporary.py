@@ -72,23 +72,46 @@ def lock_new_folder(folder: Path) -> int | None:
 
 def _base() -> Path:
     """The folder of this user's temporary folders, which nobody else can enter."""
-    temporary = Path(tempfile.gettempdir()).resolve()
-    base = temporary / f"{BASE}-{os.getuid()}"
+    base = _base_path()
     with suppress(FileExistsError):
         base.mkdir(mode=0o700)
+    if not os.path.lexists(base):  # another process has removed it
+        return _base()
+    return base if _is_private(base) else Path(tempfile.mkdtemp(prefix=f"{BASE}-", dir=base.parent))
+
+
+def _base_path() -> Path:
+    return Path(tempfile.gettempdir()).resolve() / f"{BASE}-{os.getuid()}"
+
+
+def _is_private(base: Path) -> bool:
+    """Whether a path is a folder of this user that nobody else can enter."""
     try:
         facts = base.lstat()
     except FileNotFoundError:
-        return _base()
+        return False
     is_own_folder = stat.S_ISDIR(facts.st_mode) and facts.st_uid == os.getuid()
     is_open_to_others = facts.st_mode & 0o077
-    is_private = is_own_folder and not is_open_to_others
-    return base if is_private else Path(tempfile.mkdtemp(prefix=f"{BASE}-", dir=temporary))
+    return is_own_folder and not is_open_to_others
+
+
+def remove_abandoned_folders() -> None:
+    """Remove the folders of processes that were killed, and the folder that holds them if no other is in use."""
+    base = _base_path()
+    if not _is_private(base):
+        return
+    _sweep(base)
+    with suppress(OSError):  # others are in use
+        base.rmdir()
 
 
 @cache
 def _sweep_once(base: Path) -> None:
     """Remove the folders of processes that were killed. Once a process."""
+    _sweep(base)
+
+
+def _sweep(base: Path) -> None:
     for folder in base.glob("*-*"):
         remove_if_abandoned(folder)
 

@@ -11,7 +11,6 @@ import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 import uuid
@@ -21,6 +20,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.elsewhere import RERUN, first_time, on_poorer_kernels, refusing, rerun, rerun_as_ordinary_user
 from vobench.estimator import isolation
 from vobench.estimator.home import Home
 from vobench.estimator.isolation import FILES, NAMES, NETWORK, PROCESSES, SHARED_MEMORY, SYSTEM_CALLS
@@ -33,7 +33,6 @@ from vobench.estimator.sandbox import Sandbox
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")]
 
-RERUN = "VOBENCH_TEST_RERUN"
 LIMITS = Limits(start_s=30, trial_s=60)
 PREPARE = {
     "awk": "",
@@ -672,90 +671,23 @@ def test_homes_may_lie_in_a_folder_that_it_may_read_and_those_of_others_are_not_
 # The same as somebody else, and on a poorer machine
 
 
-WITHOUT = """
-import ctypes, errno, os, struct, sys
-sys.path.append(sys.argv.pop(1))
-import isolation
-column, architecture = isolation.MACHINES[os.uname().machine]
-refused = [isolation.REFUSED['unshare'][column], *map(int, filter(None, sys.argv.pop(1).split(',')))]
-program = [(0x20, 0, 0, 0)]
-for number in refused:
-    program += [(0x15, 0, 1, number), (0x06, 0, 0, isolation.FAIL | errno.EPERM)]
-program += [(0x06, 0, 0, isolation.ALLOW)]
-code = ctypes.create_string_buffer(b''.join(struct.pack('HBBI', *one) for one in program))
-whole = struct.pack('HxxxxxxQ', len(program), ctypes.addressof(code))
-isolation.libc.prctl(38, 1, 0, 0, 0)
-assert isolation.libc.prctl(22, ctypes.c_ulong(2), whole) == 0
-os.execv(sys.argv[1], sys.argv[1:])
-"""
-LANDLOCK = str(isolation.LANDLOCK_CREATE_RULESET)
-
-
-def rerun(before, *, python=sys.executable, environment=None):
-    """Run this file again, started in another way."""
-    with tempfile.TemporaryDirectory(prefix="vobench-test-", dir="/tmp", ignore_cleanup_errors=True) as temporary:
-        Path(temporary).chmod(0o777)
-        options = ["-n", "0", "-q", "-x", "-m", "slow", "-p", "no:cacheprovider", "--basetemp", f"{temporary}/tests"]
-        argv = [*before, python, "-m", "pytest", *options, __file__]
-        variables = {
-            **os.environ,
-            RERUN: "1",
-            "TMPDIR": temporary,
-            "HOME": temporary,
-            "PYTHONDONTWRITEBYTECODE": "1",
-            **(environment or {}),
-        }
-        root = Path(__file__).parents[2]
-        done = subprocess.run(argv, env=variables, cwd=root, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stdout[-4000:] + done.stderr[-2000:]
-
-
-again = pytest.mark.skipif(bool(os.environ.get(RERUN)), reason="this is the second time")
-
-
-@again
+@first_time
 def test_the_same_as_an_ordinary_user():
-    if os.getuid() != 0 or shutil.which("setpriv") is None:
-        pytest.skip("this is an ordinary user already")
-    # env, because setpriv keeps root's rights until it has found a program.
-    drop = ["setpriv", "--reuid", "65534", "--regid", "65534", "--clear-groups", "env"]
-    version = f"{sys.version_info.major}.{sys.version_info.minor}"
-    search = os.pathsep.join(
-        dict.fromkeys(path for path in sys.path if path.endswith("packages") or path == str(Path(__file__).parents[2]))
-    )
-    pythons = [sys.executable, f"/usr/bin/python{version}", f"/usr/local/bin/python{version}"]
-    script = "import numpy, pytest, vobench.estimator.program"
-    for python in pythons:
-        environment = {"PYTHONPATH": search, "HOME": "/", "PYTHONDONTWRITEBYTECODE": "1"}
-        with suppress(OSError):
-            tried = subprocess.run(
-                [*drop, python, "-c", script],
-                env={**os.environ, **environment},
-                cwd="/",
-                capture_output=True,
-                check=False,
-            )
-            if tried.returncode == 0:
-                rerun(drop, python=python, environment={"PYTHONPATH": search, READ_VARIABLE: search})
-                return
-    pytest.skip("no interpreter that an ordinary user may execute")
+    rerun_as_ordinary_user(__file__)
 
 
-@again
-@pytest.mark.parametrize("refused", ["", LANDLOCK], ids=["no namespaces", "neither namespaces nor landlock"])
+@first_time
+@on_poorer_kernels
 def test_the_same_where_the_kernel_refuses(refused):
-    folder = str(Path(isolation.__file__).parent)
-    rerun([sys.executable, "-I", "-S", "-c", WITHOUT, folder, refused])
+    rerun(__file__, refusing(refused))
 
 
-@again
-@pytest.mark.parametrize("refused", ["", LANDLOCK], ids=["no namespaces", "neither namespaces nor landlock"])
+@first_time
+@on_poorer_kernels
 def test_an_estimator_of_the_house_is_found_and_runs_where_the_kernel_refuses(refused):
-    folder = str(Path(isolation.__file__).parent)
-    search = {"PYTHONPATH": ""}  # what finds vobench is its installation
     tried = [sys.executable, "-m", "vobench", "try", "stand_still"]
-    argv = [sys.executable, "-I", "-S", "-c", WITHOUT, folder, refused, *tried]
-    environment = {**os.environ, **search}
+    environment = {**os.environ, "PYTHONPATH": ""}  # what finds vobench is its installation
+    argv = [*refusing(refused), *tried]
     done = subprocess.run(argv, env=environment, cwd="/", capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     assert "BROKEN" not in done.stdout

@@ -20,6 +20,7 @@ from vobench.runner.folder import PAGE, RunFolder
 from vobench.runner.run import run_suite
 from vobench.runner.store import locked
 from vobench.runner.task import NO_LIMIT, Task, plan
+from vobench.temporary import temporary_folder
 
 pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
 
@@ -127,6 +128,20 @@ def test_a_failure_takes_what_needs_it_along_and_nothing_else(tmp_path):
     found = perform_all(ALL, tmp_path, Recorder(2, failures))
     assert set(found) == {PICTURES[1].key, ESTIMATES[1].key, SCORES[1].key}
     assert found[SCORES[1].key] == TaskOutcome("crashed", "its sequence could not be made: lens fell off")
+
+
+def test_the_temporary_folder_of_a_process_that_was_killed_in_a_run_is_gone_after_the_run(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with temporary_folder() as folder:
+        base = folder.parent
+
+    class Killed(Recorder):
+        def close(self):
+            base.mkdir(mode=0o700)
+            (base / "1-killed" / "home").mkdir(parents=True)  # without a lock, which ended with the process
+
+    perform_all([LIGHT], tmp_path, Killed(1))
+    assert not base.exists()
 
 
 def test_ten_thousand_tasks_are_handed_out_in_little_time(tmp_path):

@@ -48,7 +48,9 @@ OF_RUN = (SUITE, ENVIRONMENT, ESTIMATORS, UNTIL)
 OF_CASE = (CASE, GROUND_TRUTH)
 OF_TRIAL = (SCORE, ESTIMATE, REVISED, COVARIANCE, FRAMES, TIMES, LOG)
 SEQUENCES = "sequence_hashes.json"  # the hashes of the recordings, which are too large for a bundle
-MOST_BYTES = 8 << 30  # the largest size after unpacking
+MOST_BYTES = 8 << 30  # the largest size of all files after unpacking
+MOST_JSON_BYTES = 64 << 20  # of one file that is read as a whole; parsed, it takes ten times as much memory
+MOST_FILES = 500_000
 # The form of names in a suite. In merged runs, a label can be followed by the name of its run.
 LABEL = re.compile(r"[a-z0-9][a-z0-9_.]*( of [A-Za-z0-9_.-]+)?")
 CASE_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -145,6 +147,7 @@ def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
     with temporary_folder() as temporary:
         try:
             with ZipFile(path) as file:
+                _require_sizes(file, path)
                 folder = RunFolder(temporary / _suite(file) / (_plain_name(path.stem) or "bundle"))
                 names = _unpack(file, folder.path, path)
         except (BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
@@ -235,12 +238,27 @@ def _suite(file: ZipFile) -> str:
     return name if LABEL.fullmatch(name) else "bundle"
 
 
-def _unpack(file: ZipFile, to: Path, path: Path) -> list[str]:
-    """Unpack all files, and return their names. Raises InputError for a duplicate, or a path outside of the folder."""
+def _require_sizes(file: ZipFile, path: Path) -> None:
+    """Raise InputError if there are too many files, or if they are too large.
+
+    The sizes are those that the bundle states. A file that turns out to be larger is not read further.
+    """
     entries = file.infolist()
+    if len(entries) > MOST_FILES:
+        raise InputError(f"contains {len(entries)} files, more than {MOST_FILES}: {path}")
     total = sum(entry.file_size for entry in entries)
     if total > MOST_BYTES:
         raise InputError(f"unpacks to {total / 1e9:.3g} GB, more than {MOST_BYTES / 1e9:.3g}: {path}")
+    for entry in entries:
+        is_json = PurePosixPath(entry.filename).suffix == ".json"
+        if is_json and entry.file_size > MOST_JSON_BYTES:
+            name = printable(entry.filename)
+            raise InputError(f"contains {name} of {entry.file_size} bytes, more than {MOST_JSON_BYTES}: {path}")
+
+
+def _unpack(file: ZipFile, to: Path, path: Path) -> list[str]:
+    """Unpack all files, and return their names. Raises InputError for a duplicate, or a path outside of the folder."""
+    entries = file.infolist()
     seen = set[str]()
     for entry in entries:
         if _is_outside(entry):

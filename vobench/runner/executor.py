@@ -30,6 +30,7 @@ from vobench.runner.fork_server import ForkServer, WorkerProcess, shared_server,
 from vobench.runner.key import code_digest
 from vobench.runner.store import STATE, Progress, SilentProgress, Store, Tell
 from vobench.runner.task import ENTRIES, NO_LIMIT, Stage, Task, perform
+from vobench.temporary import remove_abandoned_folders
 from vobench.trust import TrustPolicy
 
 FailureKind = Literal["crashed", "out_of_memory", "refused"]
@@ -246,6 +247,7 @@ class LocalProcesses:
         if was_killed:
             for store in self._stores:
                 Store(store).sweep()
+            remove_abandoned_folders()
 
     def _signal_all(self, number: int) -> bool:
         """Signal the running processes, and wait at most GRACE_S for them. Returns whether there were any."""
@@ -579,6 +581,7 @@ def perform_all(
             schedule.await_ends()
     finally:
         executor.close()
+        remove_abandoned_folders()  # those of workers that were killed during the run
     return schedule.failures
 
 
