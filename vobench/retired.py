@@ -19,6 +19,7 @@ MOVED = {
         "Unpainted": "vobench.asset.picture.LazyTexture",
         "some": "vobench.asset.picture.one_of",
     },
+    "vobench.plugin": {"Followed": "vobench.plugin.StereoTracks"},
     "vobench.geometry.rectify": {
         "Rectification": "vobench.plugin.Rectification",
         "rectification": "vobench.plugin.rectification",
