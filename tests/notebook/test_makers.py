@@ -8,7 +8,7 @@ import vobench
 from vobench import trust
 from vobench.errors import InputError, SuiteError
 from vobench.suite import maker as maker_file
-from vobench.suite.maker import made_by
+from vobench.suite.maker import create_scene
 
 MAKER = """
 import trimesh
@@ -37,7 +37,7 @@ def strange(tmp_path, monkeypatch):
 def build(maker):
     """What is said of a scene that cannot be built, because its maker is refused or makes nothing."""
     with pytest.raises(SuiteError) as raised:
-        made_by(maker, seed=1, scene="hall")
+        create_scene(maker, seed=1, scene_name="hall")
     return str(raised.value)
 
 

@@ -265,7 +265,7 @@ def score(
 
     ate = comparison.once(absolute)
     covered = coverage(gt.t_ns, frames, rule=settings.coverage_of)
-    slot = slots(gt.t_ns, settings.coverage_of)[frames]
+    slot = slots(gt.t_ns, settings.coverage_of).of_frame[frames]
     path_m = float(comparison.distances_m[-1])
     warnings = (*_matching_warnings(comparison, covered), *_missing_warnings(comparison, scored))
     return Score(
