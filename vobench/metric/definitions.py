@@ -8,7 +8,7 @@ from vobench.metric import ate, coverage, lost_aware, nees, rpe, segment
 from vobench.metric.comparison import DEFAULTS, MetricDefinition
 from vobench.metric.settings import ScoreSettings
 
-FAMILIES = (ate, rpe, segment, nees, coverage, lost_aware)
+FAMILIES = (ate, rpe, part_error, segment, nees, coverage, lost_aware)
 METRICS = [metric for family in FAMILIES for metric in family.METRICS]
 DEFINITIONS: dict[str, MetricDefinition] = {metric.id: metric for metric in METRICS}
 

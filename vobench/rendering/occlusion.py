@@ -161,7 +161,7 @@ class Bodies:
     def stationary_occluders(self) -> Occluders:
         """All stationary triangles that can stop light."""
         rows = np.flatnonzero(self._is_solid & (self.body[:-1] == 0) & (self._height_m[:-1] > 0))
-        is_cut_out = self._cut_outs.material_of_face[rows] >= 0
+        is_cut_out = self._cut_outs.cutout_of_face[rows] >= 0
         return Occluders(self.faces.corners_m[rows], ~is_cut_out)
 
     def _body(self, index: int, is_pane: Mask) -> Body:
@@ -179,7 +179,7 @@ class Bodies:
             return TriangleCaster(self.faces.corners_m, rows, robust=False)
 
         is_solid = self._is_solid
-        is_cut_out = self._cut_outs.material_of_face[:-1] >= 0
+        is_cut_out = self._cut_outs.cutout_of_face[:-1] >= 0
         has_holes = is_member & is_solid & is_cut_out
         is_glass = is_member & is_pane
         visible = caster(is_solid)
@@ -210,7 +210,7 @@ class Bodies:
             if not len(rays):
                 break
             hits = body.holed.hits(start_m, ahead_m, 1.0)
-            is_hole = self._cut_outs.holes(hits)
+            is_hole = self._cut_outs.are_in_holes(hits)
             is_stopped[rays[(hits.face >= 0) & ~is_hole]] = True
             offset = RAY_OFFSET_M / np.linalg.norm(ahead_m, axis=1)
             step = (hits.distance + offset)[:, None]
@@ -243,7 +243,7 @@ class Bodies:
     ) -> tuple[Hits, Array]:
         """What rays meet by Embree, backs and holes passed, and the cosines (R,) to the faces' normals."""
         hits = body.visible.hits(origins_m, directions, REACH_M)
-        is_hole = self._cut_outs.holes(hits)
+        is_hole = self._cut_outs.are_in_holes(hits)
         cosine = self._turn_to_fronts(hits.face, directions)
         passed = np.flatnonzero((cosine >= 0) | is_hole)
         if len(passed) and most:
