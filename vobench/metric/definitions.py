@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from vobench.metric import ate, coverage, lost_aware, nees, rpe, segment
+from vobench.metric import ate, coverage, lost_aware, nees, part_error, rpe, segment
 from vobench.metric.comparison import DEFAULTS, MetricDefinition
 from vobench.metric.settings import ScoreSettings
 
