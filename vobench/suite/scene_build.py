@@ -207,7 +207,7 @@ def _model(spec: ModelSpec) -> Contents:
     T_world_model = at(*spec.at_m, yaw=spec.yaw_deg)
     prefix = f"{spec.name}." if spec.name else ""
     placed_things = []
-    for thing in model.everything:
+    for thing in model.all_things:
         mesh = moved(thing.mesh, T_world_model)
         placed = replace(thing, name=prefix + thing.name, mesh=mesh, material=prefix + thing.material)
         placed_things.append(placed)
