@@ -8,18 +8,21 @@ from vobench.analysis.scene_sheet import (
     CELL_HEIGHT_PX,
     CELL_WIDTH_PX,
     CIRCLE_RGB,
+    GAP_PX,
     LENS,
     VIEWS_DEG,
     _PlanScale,
     _text,
+    _widest_view,
+    contact_sheet,
     plan,
     sheet,
 )
 from vobench.analysis.scene_survey import SceneSurvey, scene_survey
 from vobench.asset.shape import at, block
 from vobench.scene.material import Material, srgb
-from vobench.scene.mesh import make_mesh, moved, texture_coordinates
-from vobench.scene.scene import Scene
+from vobench.scene.mesh import flipped, make_mesh, moved, texture_coordinates
+from vobench.scene.scene import Scene, triangles
 from vobench.scene.triangles import Thing
 
 
@@ -156,3 +159,27 @@ def test_a_sheet_is_a_plan_lines_and_four_views() -> None:
     for number, cell in enumerate((cells[1], cells[2], cells[4], cells[5]), 1):
         assert (cell == tone(0.1 * number)).all()
     assert len(renderer.poses) == 4
+
+
+def test_pictures_of_a_sheet_stand_side_by_side_with_white_between_them() -> None:
+    black = np.zeros((5, 7, 3), np.uint8)
+    page = contact_sheet([black, black])
+    assert page.shape == (5 + GAP_PX, 2 * (7 + GAP_PX), 3)
+    assert (page[:GAP_PX] == 255).all()
+    assert (page[:, :GAP_PX] == 255).all()
+    assert (page[GAP_PX:, GAP_PX : GAP_PX + 7] == 0).all()
+
+
+def test_a_last_row_that_is_not_full_is_filled_with_white() -> None:
+    black = np.zeros((5, 7, 3), np.uint8)
+    page = contact_sheet([black] * 5)
+    assert page.shape == (2 * (5 + GAP_PX), 4 * (7 + GAP_PX), 3)
+    assert (page[5 + GAP_PX :, 7 + GAP_PX :] == 255).all()
+
+
+def test_a_view_of_a_place_looks_along_the_corridor() -> None:
+    corridor = moved(flipped(block((3.0, 20.0, 2.6), bevel_m=0)), at(0.0, 0.0, 1.3))
+    place = scene(Thing("corridor", corridor, "grey"))
+    viewpoint = _widest_view(triangles(place, t_ns=0), scene_survey(place))
+    along_y = abs(np.sin(np.deg2rad(viewpoint.yaw_deg)))
+    assert along_y > np.cos(np.deg2rad(25.0))
