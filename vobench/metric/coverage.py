@@ -51,7 +51,8 @@ class Coverage:
     ends_lost: bool
 
 
-class Slots(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class Slots:
     """The slots of N true poses: the index (N,) of the slot of each pose, from 0, and what a slot is."""
 
     of_frame: Index

@@ -70,9 +70,10 @@ def has_texture_coordinates(mesh: "Trimesh") -> bool:
 
 def texture_coordinates(mesh: "Trimesh") -> Array:
     """The texture coordinates (V, 2) of a mesh; 0 if it has none."""
-    if not has_texture_coordinates(mesh):
+    uv = getattr(mesh.visual, "uv", None)
+    if uv is None:
         return np.zeros((len(mesh.vertices), 2))
-    return np.asarray(mesh.visual.uv).reshape(-1, 2)
+    return np.asarray(uv).reshape(-1, 2)
 
 
 def as_arrays(mesh: "Trimesh") -> MeshArrays:
