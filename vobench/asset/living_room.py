@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from vobench.asset import bed_place, furnishing, household
 from vobench.asset.floor_plan import Rect, Side
-from vobench.asset.interior import GAP_M, RoomLayout, Span, Spot
 from vobench.asset.palette import Style
+from vobench.asset.room_layout import GAP_M, RoomLayout, Span, Spot
 
 OPPOSITE: dict[Side, Side] = {"east": "west", "west": "east", "north": "south", "south": "north"}
 SOFA_DEPTH_M = 0.92
