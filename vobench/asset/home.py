@@ -50,7 +50,7 @@ def furnished_flat(seed: int, lighting: str) -> Interior:
 
 
 def _outside(plan: FloorPlan, rng: Rng, lighting: str) -> Daylight:
-    """The daylight and what is seen through the windows."""
+    """The daylight and the view through the windows."""
     return daylight(
         rng,
         lighting,

@@ -52,7 +52,7 @@ def _add_dining_table(layout: RoomLayout, style: Style) -> None:
 
 
 class _Corner(NamedTuple):
-    """Where a television, a sofa and a coffee table stand, in the frame of the spot of the television.
+    """The places of a television, a sofa and a coffee table, in the frame of the spot of the television.
 
     `sofa_spot` is the spot at the wall behind the sofa; the sofa stands at it only if `is_at_wall`.
     `table_x` is the middle of the coffee table, None without one.

@@ -172,7 +172,7 @@ class RoomLayout:
         return self.spot(side, (first_m + last_m) / 2)
 
     def leaf_y(self, passage: Passage, spot: Spot) -> float:
-        """Where the leaf of a door hangs, along the wall in the frame of the spot in front of the door."""
+        """The coordinate of a door's hinge along the wall, in the frame of the spot in front of the door."""
         half_m = self.half_width_m(passage.rect)
         side = self.room.side_at(passage.rect)
         first_m, last_m = along_m(side, passage.rect)

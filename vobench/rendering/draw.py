@@ -1,4 +1,4 @@
-"""Draws pictures: batches of triangles, mirrors and what is seen in them, the background, panes."""
+"""Draws pictures: batches of triangles, mirrors with their reflections, the background, and panes."""
 
 from collections.abc import Mapping, Sequence
 
@@ -49,7 +49,7 @@ class BatchDraw:
 
     @property
     def mirrors_in_colour(self) -> bool:
-        """Whether some surface tints what it mirrors or what is seen through it."""
+        """Whether a surface tints its reflections or the light that it transmits."""
         for defines in self._calls.shader_defines:
             shows_others = bool(defines & {ShaderDefine.IS_PLANAR, ShaderDefine.IS_PANE})
             is_tinting = bool(defines & {ShaderDefine.IS_MIRROR, ShaderDefine.IS_PANE, ShaderDefine.HAS_METAL})
@@ -134,7 +134,7 @@ class BatchDraw:
     def _boxes(self, view: PinholeView, visible: Runs) -> dict[int, Box]:
         """Mirrors whose mirroring side is seen, all or those of which something is visible: boxes in the picture.
 
-        Where they are more than are followed, the choice must be the same whatever part of a picture is drawn.
+        If there are more mirrors than are drawn, the selection must be the same for every part of a picture.
         """
         is_choice = len(self._mirrors) > FOLLOWED[min(view.depth, MIRRORS - 1)]
         candidates = [mirror for mirror in self._mirrors if is_choice or self._is_visible(mirror, visible)]
@@ -166,7 +166,7 @@ class BatchDraw:
         boxes: dict[int, Box],
         box: Box,
     ) -> dict[int, Box]:
-        """Mirrors in a picture that are drawn again from behind, those that show most, and where in a box of it."""
+        """The mirrors in a picture whose reflections are drawn, largest first, each with its box of pixels."""
         if view.depth == MIRRORS or (self.needs_probe and not self._probe):
             return {}
         least_px = LEAST_SHARE * view.camera.width_px * view.camera.height_px

@@ -222,7 +222,7 @@ def remarks(board: Board) -> list[str]:
 
 
 def _undecided(above: Total, total: Total) -> str:
-    """What the board could have decided of two neighbours, and what a chosen ratio would take."""
+    """A sentence on two undecided neighbours: the ratio that would have been decided, and what a chosen one takes."""
     order = f"The order of {above.estimator} and {total.estimator} is not decided (p = {total.p_above:.2g})"
     found = f"a ratio of losses of {number(total.smallest_ratio)} would have been"
     more = (total.places_needed or 0) - total.places
