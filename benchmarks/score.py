@@ -23,7 +23,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.ate import absolute_errors
 from vobench.metric.motion_error import errors_between
-from vobench.metric.rpe import select_pairs
+from vobench.metric.pose_pairs import select_pairs
 from vobench.metric.score import ScoreSettings, score, statistics
 from vobench.trajectory.align import align
 from vobench.trajectory.associate import match

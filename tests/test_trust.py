@@ -18,7 +18,9 @@ def asked(tmp_path, monkeypatch):
 
     def ask(maker: Path, *sources: bytes, trusts_new: bool = False, is_contained: bool = False) -> list[str]:
         told = []
-        with trust.gate(told.append, ours=lambda: (builtin_root(), Path.cwd()), folder=lambda: tmp_path / "trusted"):
+        with trust.gate(
+            told.append, trusted_folders=lambda: (builtin_root(), Path.cwd()), hash_folder=lambda: tmp_path / "trusted"
+        ):
             if trusts_new:
                 trust.trust_new()
             for _ in range(2):
@@ -65,7 +67,7 @@ def python(tmp_path, monkeypatch):
     """A program that has imported vobench, in a folder of its own."""
     (tmp_path / "mine").mkdir()
     monkeypatch.chdir(tmp_path / "mine")
-    python_gate = trust.Gate(trust._tell_nobody, ours=lambda: (Path.cwd(),), folder=lambda: None)
+    python_gate = trust.Gate(trust._ignore, trusted_folders=lambda: (Path.cwd(),), hash_folder=lambda: None)
     monkeypatch.setattr(trust, "_gates", [python_gate])
 
 
@@ -88,7 +90,9 @@ def test_a_version_that_a_program_trusts_runs_and_no_other(python, tmp_path):
 
 def test_a_process_that_works_for_another_trusts_whom_that_one_trusts(python, tmp_path, monkeypatch):
     (tmp_path / "trusted").mkdir()
-    with trust.gate(lambda _: None, ours=lambda: [tmp_path / "ours"], folder=lambda: tmp_path / "trusted"):
+    with trust.gate(
+        lambda _: None, trusted_folders=lambda: [tmp_path / "ours"], hash_folder=lambda: tmp_path / "trusted"
+    ):
         trust.trust_version([b"by a program"])
         sent = pickle.dumps(trust.policy())
     monkeypatch.chdir(tmp_path)  # of another process

@@ -6,7 +6,7 @@ Estimators   Estimator Frame Result Status Tracks Image EncoderReadings ImuReadi
              Points Mask: corners and tracks
              StereoPair Eye stereo_pair coarse_disparity DisparityOffset: a stereo pair of any two lenses
              PoseFit pose_from_points carried_on: motion
-             StereoTracker TrackerSettings Followed: a keyframe whose points are tracked in both cameras
+             StereoTracker TrackerSettings StereoTracks: a keyframe whose points are tracked in both cameras
              parameters assert_contract: the manifest's parameters, and the contract in a plugin's own test
 Makers       Thing make_mesh joined moved copies flipped two_sided textured: meshes, as trimesh.Trimesh
              quad at block card cards cushion extrusion lathe pierced reveal sheet spline tube: shapes
@@ -93,7 +93,7 @@ if TYPE_CHECKING:
     )
     from vobench.estimator.protocol import EncoderReadings, Estimator, Frame, Image, Result, Status, Tracks
     from vobench.estimator.stereo import Eye, StereoPair, coarse_disparity, predicted, stereo_pair
-    from vobench.estimator.stereo_tracker import Followed, StereoTracker, TrackerSettings
+    from vobench.estimator.stereo_tracker import StereoTracker, StereoTracks, TrackerSettings
     from vobench.estimator.tracking import (
         Mask,
         Points,
@@ -239,8 +239,8 @@ HOMES = {
     "coarse_disparity": "vobench.estimator.stereo",
     "predicted": "vobench.estimator.stereo",
     "stereo_pair": "vobench.estimator.stereo",
-    "Followed": "vobench.estimator.stereo_tracker",
     "StereoTracker": "vobench.estimator.stereo_tracker",
+    "StereoTracks": "vobench.estimator.stereo_tracker",
     "TrackerSettings": "vobench.estimator.stereo_tracker",
     "Mask": "vobench.estimator.tracking",
     "Points": "vobench.estimator.tracking",
@@ -333,7 +333,6 @@ __all__ = [
     "ExportSource",
     "Eye",
     "Flicker",
-    "Followed",
     "Frame",
     "GeneratedPlace",
     "Image",
@@ -373,6 +372,7 @@ __all__ = [
     "Steady",
     "StereoPair",
     "StereoTracker",
+    "StereoTracks",
     "Sun",
     "Surroundings",
     "Switched",

@@ -19,6 +19,7 @@ MOVED = {
         "Unpainted": "vobench.asset.picture.LazyTexture",
         "some": "vobench.asset.picture.one_of",
     },
+    "vobench.plugin": {"Followed": "vobench.plugin.StereoTracks"},
     "vobench.geometry.rectify": {
         "Rectification": "vobench.plugin.Rectification",
         "rectification": "vobench.plugin.rectification",
@@ -98,7 +99,7 @@ MOVED = {
         "motions": "vobench.metric.motion_error.motions",
         "roll_pitch_yaw_rad": "vobench.geometry.se3.roll_pitch_yaw_rad",
     },
-    "vobench.metric.pairs": {"select_pairs": "vobench.metric.rpe.select_pairs"},
+    "vobench.metric.pairs": {"select_pairs": "vobench.metric.pose_pairs.select_pairs"},
     "vobench.metric.statistic": {"statistics": "vobench.metric.score.statistics"},
     "vobench.trajectory.text": {"format_tum": "vobench.trajectory.tum.format_tum"},
 }

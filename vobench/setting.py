@@ -427,10 +427,15 @@ def _error(error_type: str, value: Any, **context: Any) -> SettingError:
 
 def wrong_value_message(template: str, value: Any, context: Mapping[str, Any]) -> str:
     """The message of a template, with the value unless that is a whole section."""
-    sentence = template.format(**{key: _format_number(each) for key, each in context.items()})
+    requirement = template.format(**{key: _format_number(each) for key, each in context.items()})
+    return with_wrong_value(requirement, value)
+
+
+def with_wrong_value(requirement: str, value: Any) -> str:
+    """The message that says what would be right, with the value unless that is a whole section."""
     if isinstance(value, dict | list | tuple):
-        return sentence
-    return f"{sentence} (got {_format_value(value)})"
+        return requirement
+    return f"{requirement} (got {_format_value(value)})"
 
 
 def _format_number(value: Any) -> Any:

@@ -1,8 +1,8 @@
-"""Whose Python code may run as the maker of a scene.
+"""Decides which scene makers may run. A maker is a Python program beside a scene.
 
-A maker is a program. Where this machine has a sandbox, every maker runs in it. Where it has none, those below the
-working folder run. Any other runs only after the user has trusted that version of its code: with `--trust` on the
-command line, or `vobench.trust_maker` in Python.
+If this machine has a sandbox, every maker may run in it. Without a sandbox, the makers below the working folder may
+run. Any other maker runs only after the user has trusted that version of its code: with `--trust` on the command line,
+or `vobench.trust_maker` in Python.
 """
 
 import hashlib
@@ -18,50 +18,55 @@ from vobench.errors import SuiteError
 class TrustPolicy:
     """Which makers may run without a sandbox. It can be sent to other processes.
 
-    `ours` are the folders below which makers run unasked.
-    `hashes` is the folder that holds the hashes of trusted makers, if there is one.
-    `versions` are the hashes of other trusted makers.
-    A new maker is trusted from now on if `trusts_new`.
+    `trusted_folders` are the folders below which all makers are trusted.
+    `hash_folder` is the folder that holds the hashes of trusted makers, if there is one.
+    `trusted_versions` are the hashes of other trusted makers.
+    `trusts_new` is whether every maker that is about to run is trusted from then on.
     """
 
-    ours: tuple[Path, ...] = ()
-    hashes: Path | None = None
-    versions: frozenset[str] = frozenset()
+    trusted_folders: tuple[Path, ...] = ()
+    hash_folder: Path | None = None
+    trusted_versions: frozenset[str] = frozenset()
     trusts_new: bool = False
 
 
 @dataclass(slots=True)
 class Gate:
-    """What a process does before a maker runs.
+    """The check that a process makes before a maker runs.
 
-    `tell` is given a sentence that names the maker. `ours` and `folder` return the folders of `TrustPolicy`.
+    `announce` is called with a sentence that names the maker, once for each maker.
+    `trusted_folders` and `hash_folder` return the folders of `TrustPolicy`.
+    `announced` are the makers that have been announced.
     """
 
-    tell: Callable[[str], object]
-    ours: Callable[[], Iterable[Path]]
-    folder: Callable[[], Path | None]
+    announce: Callable[[str], object]
+    trusted_folders: Callable[[], Iterable[Path]]
+    hash_folder: Callable[[], Path | None]
     trusts_new: bool = False
-    versions: set[str] = field(default_factory=set)
-    named: set[Path] = field(default_factory=set)
+    trusted_versions: set[str] = field(default_factory=set)
+    announced: set[Path] = field(default_factory=set)
 
 
-def _tell_nobody(_: str) -> None:
-    """Ignore the sentence."""
+def _ignore(_: str) -> None:
+    """Do not announce makers."""
 
 
-# The last is in force. The first is that of Python programs, which import vobench.
-_gates = [Gate(_tell_nobody, ours=lambda: (Path.cwd(),), folder=lambda: None)]
+# The last one is in force. The first one is for Python programs that import vobench.
+_gates = [Gate(_ignore, trusted_folders=lambda: (Path.cwd(),), hash_folder=lambda: None)]
 
 
 @contextmanager
 def gate(
-    tell: Callable[[str], object], *, ours: Callable[[], Iterable[Path]], folder: Callable[[], Path | None]
+    announce: Callable[[str], object],
+    *,
+    trusted_folders: Callable[[], Iterable[Path]],
+    hash_folder: Callable[[], Path | None],
 ) -> Iterator[None]:
-    """A block, such as a command, in which makers are named before they run, and strange ones refused.
+    """A block, such as a command, in which makers are announced before they run, and untrusted ones are refused.
 
     The arguments are those of `Gate`.
     """
-    _gates.append(Gate(tell, ours, folder))
+    _gates.append(Gate(announce, trusted_folders, hash_folder))
     try:
         yield
     finally:
@@ -69,67 +74,79 @@ def gate(
 
 
 def trust_new() -> None:
-    """Trust, from now on, every maker that the command in force is about to run."""
+    """Trust every maker that the current command runs, and remember its hash."""
     _gates[-1].trusts_new = True
 
 
 def trust_version(sources: Iterable[bytes]) -> None:
     """Trust one version of a maker in this process. `sources` are those of `admit`."""
-    _gates[-1].versions.add(_version(sources))
+    _gates[-1].trusted_versions.add(_version(sources))
 
 
 def policy() -> TrustPolicy:
     """The policy in force, for processes that work for this one."""
-    in_force = _gates[-1]
-    ours = tuple(folder.resolve() for folder in in_force.ours())
-    return TrustPolicy(ours, in_force.folder(), frozenset(in_force.versions), in_force.trusts_new)
+    current = _gates[-1]
+    return TrustPolicy(
+        trusted_folders=tuple(folder.resolve() for folder in current.trusted_folders()),
+        hash_folder=current.hash_folder(),
+        trusted_versions=frozenset(current.trusted_versions),
+        trusts_new=current.trusts_new,
+    )
 
 
 def adopt(policy: TrustPolicy) -> None:
-    """Apply the policy of another process, which has named the makers already."""
-    own = Gate(_tell_nobody, lambda: policy.ours, lambda: policy.hashes, policy.trusts_new, set(policy.versions))
-    _gates[:] = [own]
+    """Apply the policy of another process, which has already announced the makers."""
+    _gates[:] = [
+        Gate(
+            _ignore,
+            trusted_folders=lambda: policy.trusted_folders,
+            hash_folder=lambda: policy.hash_folder,
+            trusts_new=policy.trusts_new,
+            trusted_versions=set(policy.trusted_versions),
+        )
+    ]
 
 
-def admit(maker: Path, sources: Iterable[bytes], scene: str, *, is_contained: bool) -> None:
-    """Name a maker that is about to run.
+def admit(maker: Path, sources: Iterable[bytes], scene_name: str, *, is_contained: bool) -> None:
+    """Announce a maker that is about to run.
 
-    `sources` are the maker's code and that beside it, read only where trust matters; `is_contained` says whether a
-    sandbox keeps the maker from the user's files. Raises SuiteError if none does, and the maker is a strange one that
-    the user does not trust yet.
+    `sources` are the maker's code and the code beside it. They are read only if trust is required.
+    `is_contained` is whether a sandbox hides the user's files from the maker.
+    Raises SuiteError if it does not, and the user does not trust the maker.
     """
-    in_force = _gates[-1]
+    current = _gates[-1]
     path = maker.resolve()
-    is_ours = any(path.is_relative_to(folder.resolve()) for folder in in_force.ours())
-    if not is_contained and not is_ours:
-        _require_trust(in_force, path, sources)
-    if path not in in_force.named:
-        in_force.named.add(path)
-        in_force.tell(f"scene {scene} runs the program {maker}")
+    is_in_trusted_folder = any(path.is_relative_to(folder.resolve()) for folder in current.trusted_folders())
+    if not is_contained and not is_in_trusted_folder:
+        _require_trust(current, path, sources)
+    if path not in current.announced:
+        current.announced.add(path)
+        current.announce(f"scene {scene_name} runs the program {maker}")
 
 
-def _require_trust(in_force: Gate, maker: Path, sources: Iterable[bytes]) -> None:
-    """Raise SuiteError if the user does not trust this version of a maker; remember it if the user does from now on."""
+def _require_trust(current: Gate, maker: Path, sources: Iterable[bytes]) -> None:
+    """Raise SuiteError if the user does not trust this version of a maker. A newly trusted version is remembered."""
     version = _version(sources)
-    hashes = in_force.folder()
-    trusted = hashes / version if hashes else None
-    if version in in_force.versions or (trusted and trusted.is_file()):
+    hash_folder = current.hash_folder()
+    hash_file = hash_folder / version if hash_folder else None
+    is_remembered = hash_file is not None and hash_file.is_file()
+    if version in current.trusted_versions or is_remembered:
         return
-    if not in_force.trusts_new:
+    if not current.trusts_new:
         raise SuiteError(
             "is a program from outside the working folder, and this machine has no sandbox, so that it would run with "
             "all your rights; read it, then run check, run, scene, render or drive with --trust, or in Python call "
             f"vobench.trust_maker, once for each version of it: {maker}"
         )
-    in_force.versions.add(version)
-    if trusted:
-        with suppress(OSError):  # without a cache it is asked again
-            trusted.parent.mkdir(parents=True, exist_ok=True)
-            trusted.write_text(f"{maker}\n", encoding="utf-8")
+    current.trusted_versions.add(version)
+    if hash_file is not None:
+        with suppress(OSError):  # the user is asked again if the hash cannot be stored
+            hash_file.parent.mkdir(parents=True, exist_ok=True)
+            hash_file.write_text(f"{maker}\n", encoding="utf-8")
 
 
 def _version(sources: Iterable[bytes]) -> str:
-    """A hash of a maker's code and that beside it."""
+    """A hash of a maker's code and the code beside it."""
     version = hashlib.sha256()
     for source in sources:
         version.update(hashlib.sha256(source).digest())

@@ -69,19 +69,19 @@ class ImuVisual:
         if left is None or right is None or frame.imu is None:
             return Result(None, Status.LOST, "no_reading")
         state = self._integrated(frame.imu, frame.t_ns)
-        if not self._tracker.has_view:
+        if not self._tracker.has_keyframe:
             return self._anchor(left, right, state, Status.INIT)
 
         T_now_anchor = se3.inverse(state.T_odom_imu) @ self._T_odom_anchor
         T_now_view = se3.inverse(self._T_imu_view) @ T_now_anchor @ self._T_imu_view
-        followed = self._tracker.follow(left, right, T_now_view)
-        fit = self._tracker.fit(followed)
+        tracks = self._tracker.follow(left, right, T_now_view)
+        fit = self._tracker.fit(tracks)
         after = None if fit is None else self._corrected(state, fit)
         if fit is None or after is None:
             return self._anchor(left, right, state, Status.DEGRADED, "inertial")
 
-        if followed.flow_px >= self._settings.keep_below_px:
-            self._tracker.learn(followed, fit.T_now_last)
+        if tracks.flow_px >= self._settings.keep_below_px:
+            self._tracker.update_offset(tracks, fit.T_now_last)
             return self._anchor(left, right, after, Status.OK)
         self._state = after
         return self._result(after, Status.OK)
@@ -127,7 +127,7 @@ class ImuVisual:
 
     def _anchor(self, left: Image, right: Image, state: State, status: Status, reason: str = "") -> Result:
         """Take a new view at a state; if it has too few points, keep the old one."""
-        if self._tracker.look(left, right):
+        if self._tracker.set_keyframe(left, right):
             state = anchored(state)
             self._T_odom_anchor = state.T_odom_imu
         self._state = state

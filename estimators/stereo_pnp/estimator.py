@@ -8,7 +8,6 @@ import cv2
 import numpy as np
 
 from vobench.plugin import (
-    Followed,
     Frame,
     Image,
     PoseFit,
@@ -16,6 +15,7 @@ from vobench.plugin import (
     Rig,
     Status,
     StereoTracker,
+    StereoTracks,
     TrackerSettings,
     Tracks,
     carried_on,
@@ -52,58 +52,56 @@ class StereoPnp:
         """Track the last view's points, fit the motion to them, and take a new view if the old one is far away."""
         if frame.left is None or frame.right is None:
             return Result(None, Status.LOST, "no_picture")
-        if not self._tracker.has_view:
-            if self._tracker.look(frame.left, frame.right):
+        if not self._tracker.has_keyframe:
+            if self._tracker.set_keyframe(frame.left, frame.right):
                 return Result(np.eye(4), Status.INIT)
             return Result(None, Status.LOST, "few_corners")
 
         # The guess is that the camera goes on as it did.
         T_odom_guess = carried_on(self._T_odom_before, self._T_odom_now)
         T_guess_view = se3.inverse(T_odom_guess) @ self._T_odom_view
-        followed = self._tracker.follow(frame.left, frame.right, T_guess_view)
+        tracks = self._tracker.follow(frame.left, frame.right, T_guess_view)
 
         # No flow, no motion. The view stays, so a slow motion adds up until it shows.
-        has_tracks = len(followed.uv_px) >= self._settings.min_points
-        if has_tracks and followed.flow_px < self._settings.min_flow_px:
+        has_tracks = len(tracks.left_px) >= self._settings.min_points
+        if has_tracks and tracks.flow_px < self._settings.min_flow_px:
             self._T_odom_before = self._T_odom_view
             self._T_odom_now = self._T_odom_view
             return Result(self._pair.T_left(self._T_odom_now), Status.STATIONARY, "no_flow")
 
-        fit = self._tracker.fit(followed)
+        fit = self._tracker.fit(tracks)
         if fit is None:
-            return self._lost(frame.left, frame.right, followed)
-        return self._step(frame.left, frame.right, followed, fit)
+            return self._lost(frame.left, frame.right, tracks)
+        return self._step(frame.left, frame.right, tracks, fit)
 
-    def _step(self, left: Image, right: Image, followed: Followed, fit: PoseFit) -> Result:
+    def _step(self, left: Image, right: Image, tracks: StereoTracks, fit: PoseFit) -> Result:
         """Chain the motion onto the pose of the view; take a new view if that one is far away."""
         self._T_odom_before = self._T_odom_now
         T_odom_now = self._T_odom_view @ se3.inverse(fit.T_now_last)
         # Thousands of products drift off SO(3) by rounding.
         R_odom_now = se3.nearest_rotation(T_odom_now[:3, :3])
         self._T_odom_now = se3.transform(R_odom_now, T_odom_now[:3, 3])
-        if followed.flow_px >= self._settings.keep_below_px:
-            self._tracker.learn(followed, fit.T_now_last)
-            if self._tracker.look(left, right):
+        if tracks.flow_px >= self._settings.keep_below_px:
+            self._tracker.update_offset(tracks, fit.T_now_last)
+            if self._tracker.set_keyframe(left, right):
                 self._T_odom_view = self._T_odom_now
 
         stats = {
-            "tracks": len(followed.uv_px),
+            "tracks": len(tracks.left_px),
             "inliers": int(fit.inlier.sum()),
             "error_px": fit.error_px,
-            "parallax_px": followed.flow_px,
+            "parallax_px": tracks.flow_px,
             "offset_px": self._tracker.offset.px,
         }
-        uv_last_px = followed.uv_last_px.astype(float)
-        uv_px = followed.uv_px.astype(float)
-        tracks = Tracks(uv_last_px, uv_px, fit.inlier)
+        reported_tracks = Tracks(tracks.keyframe_left_px.astype(float), tracks.left_px.astype(float), fit.inlier)
         T_odom_left = self._pair.T_left(self._T_odom_now)
         if fit.error_px > self._settings.degraded_above_px:
-            return Result(T_odom_left, Status.DEGRADED, "error", tracks, stats)
-        return Result(T_odom_left, Status.OK, "", tracks, stats)
+            return Result(T_odom_left, Status.DEGRADED, "error", reported_tracks, stats)
+        return Result(T_odom_left, Status.OK, "", reported_tracks, stats)
 
-    def _lost(self, left: Image, right: Image, followed: Followed) -> Result:
+    def _lost(self, left: Image, right: Image, tracks: StereoTracks) -> Result:
         """No pose for this frame; the next frame starts from a view of this one at the last known pose."""
-        reason = "few_tracks" if len(followed.uv_px) < self._settings.min_points else "no_model"
-        if self._tracker.look(left, right):
+        reason = "few_tracks" if len(tracks.left_px) < self._settings.min_points else "no_model"
+        if self._tracker.set_keyframe(left, right):
             self._T_odom_view = self._T_odom_now
-        return Result(None, Status.LOST, reason, stats={"tracks": len(followed.uv_px)})
+        return Result(None, Status.LOST, reason, stats={"tracks": len(tracks.left_px)})

@@ -104,23 +104,23 @@ class WheelVisual:
             return Result(None, Status.LOST, "no_reading")
         self._roll(frame.encoders)
         rolled = self._rolled.pose
-        if not self._tracker.has_view:
+        if not self._tracker.has_keyframe:
             return self._look(left, right, rolled, Status.INIT)
 
         T_view_now = se3.inverse(self._T_body_view) @ pose_matrix(rolled) @ self._T_body_view
-        followed = self._tracker.follow(left, right, se3.inverse(T_view_now))
-        fit = self._tracker.fit(followed)
+        tracks = self._tracker.follow(left, right, se3.inverse(T_view_now))
+        fit = self._tracker.fit(tracks)
         if fit is None:
             return self._look(left, right, rolled, Status.DEGRADED, "wheels")
 
         step, is_slipping = self._fused(fit)
         stats = {
-            "tracks": len(followed.uv_px),
+            "tracks": len(tracks.left_px),
             "slip": float(is_slipping),
             "length_gain": self._length.value,
         }
-        if followed.flow_px >= self._settings.keep_below_px:
-            self._tracker.learn(followed, fit.T_now_last)
+        if tracks.flow_px >= self._settings.keep_below_px:
+            self._tracker.update_offset(tracks, fit.T_now_last)
             result = self._look(left, right, step, Status.OK)
             return replace(result, stats=stats)
         return Result(pose_matrix(compose(self._view_pose, step)), stats=stats)
@@ -187,7 +187,7 @@ class WheelVisual:
     def _look(self, left: Image, right: Image, step: Array, status: Status, reason: str = "") -> Result:
         """Take a new view at this step from the old one; if it has too few points, keep the old one."""
         now = compose(self._view_pose, step)
-        if self._tracker.look(left, right):
+        if self._tracker.set_keyframe(left, right):
             self._view_pose = now
             self._rolled = Rolled(np.zeros(3))
         return Result(pose_matrix(now), status, reason)

@@ -224,3 +224,12 @@ def test_an_order_that_was_misread_is_not_taken_for_a_rotated_body() -> None:
     gt, est = loop()
     mismatch = found(gt.trajectory.T_world_frame, reordered(est.trajectory).T_world_frame)
     assert mismatch.kind == "quaternion_order"
+
+
+@pytest.mark.parametrize(("turn_rad", "is_found"), [(0.02, False), (0.045, True)])
+def test_a_small_turn_of_the_body_is_a_fault_beyond_three_hundredths_of_a_radian(turn_rad, is_found) -> None:
+    gt, _ = loop()
+    T_gt = gt.trajectory.T_world_frame
+    turned = se3.transform(se3.rotation_z(turn_rad), np.zeros(3))
+    mismatch = found(T_gt, T_gt @ turned)
+    assert (mismatch is not None) == is_found

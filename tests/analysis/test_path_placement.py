@@ -24,7 +24,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking, stereo_rig
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
-from vobench.scene.mesh import flat, flipped
+from vobench.scene.mesh import flat_shaded, flipped
 from vobench.scene.scene import Scene, triangles
 from vobench.scene.triangles import Thing
 
@@ -64,7 +64,7 @@ def hall(*, pillar: bool = False) -> Scene:
         )
         corners_m = corners[faces]
         vertices = corners_m.reshape(-1, 3)
-        mesh = flat(vertices, np.arange(len(vertices)).reshape(-1, 3), np.zeros((len(vertices), 2)))
+        mesh = flat_shaded(vertices, np.arange(len(vertices)).reshape(-1, 3), np.zeros((len(vertices), 2)))
         outward = np.einsum("ij,ij->i", mesh.vertex_normals[::3], corners_m.mean(1) - corners.mean(0)) > 0
         turned = flipped(mesh) if outward.all() == inward else mesh
         things.append(Thing(f"box_{number}", turned, "paint"))

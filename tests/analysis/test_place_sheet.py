@@ -4,12 +4,24 @@ import cv2
 import numpy as np
 import pytest
 
+from tests.analysis.test_scene_survey import scene
 from tests.generated import write_cell
 from vobench.analysis import place_sheet
-from vobench.analysis.place_sheet import save_place_sheet
-from vobench.analysis.scene_sheet import GAP_PX, PLACE_HEIGHT_PX, PLACE_WIDTH_PX
+from vobench.analysis.place_sheet import (
+    GAP_PX,
+    PLACE_HEIGHT_PX,
+    PLACE_WIDTH_PX,
+    _widest_view,
+    contact_sheet,
+    save_place_sheet,
+)
+from vobench.analysis.scene_survey import scene_survey
+from vobench.asset.shape import at, block
 from vobench.errors import SuiteError, UnknownNameError
 from vobench.rendering.bake import BakeSettings
+from vobench.scene.mesh import flipped, moved
+from vobench.scene.scene import triangles
+from vobench.scene.triangles import Thing
 
 pytestmark = pytest.mark.slow  # light is computed; run by `pytest -m slow`, and by CI
 CELL_PX = PLACE_WIDTH_PX + PLACE_HEIGHT_PX + GAP_PX  # a view and a plan
@@ -45,3 +57,27 @@ def test_a_scene_without_a_generator_and_an_unknown_one_are_refused(tmp_path):
     with pytest.raises(UnknownNameError, match="no scene named 'flatt'"):
         save_place_sheet("flatt", tmp_path / "it.png", seeds=2)
     assert not (tmp_path / "it.png").exists()
+
+
+def test_pictures_of_a_sheet_stand_side_by_side_with_white_between_them() -> None:
+    black = np.zeros((5, 7, 3), np.uint8)
+    page = contact_sheet([black, black])
+    assert page.shape == (5 + GAP_PX, 2 * (7 + GAP_PX), 3)
+    assert (page[:GAP_PX] == 255).all()
+    assert (page[:, :GAP_PX] == 255).all()
+    assert (page[GAP_PX:, GAP_PX : GAP_PX + 7] == 0).all()
+
+
+def test_a_last_row_that_is_not_full_is_filled_with_white() -> None:
+    black = np.zeros((5, 7, 3), np.uint8)
+    page = contact_sheet([black] * 5)
+    assert page.shape == (2 * (5 + GAP_PX), 4 * (7 + GAP_PX), 3)
+    assert (page[5 + GAP_PX :, 7 + GAP_PX :] == 255).all()
+
+
+def test_a_view_of_a_place_looks_along_the_corridor() -> None:
+    corridor = moved(flipped(block((3.0, 20.0, 2.6), bevel_m=0)), at(0.0, 0.0, 1.3))
+    place = scene(Thing("corridor", corridor, "grey"))
+    viewpoint = _widest_view(triangles(place, t_ns=0), scene_survey(place))
+    along_y = abs(np.sin(np.deg2rad(viewpoint.yaw_deg)))
+    assert along_y > np.cos(np.deg2rad(25.0))

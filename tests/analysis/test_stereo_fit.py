@@ -119,6 +119,7 @@ def test_rows_that_contradict_the_motion_are_left_to_the_lens():
     assert combined_yaw(Uncertain(0.016, 0.003), motion) == (motion, "motion")  # 3.2 standard deviations apart
     assert combined_yaw(Uncertain(0.014, 0.003), motion)[1] == "rows and motion"  # 2.8
     assert combined_yaw(Uncertain(-0.016, 0.003), motion) == (motion, "motion")
+    assert combined_yaw(Uncertain(15.0, 3.0), Uncertain(0.0, 4.0))[1] == "rows and motion"  # exactly 3
 
 
 def test_without_motion_small_yaws_are_believed_of_rows():

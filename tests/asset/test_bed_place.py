@@ -1,7 +1,7 @@
 """Bedside tables stand beside the head of their bed."""
 
 from tests.asset.flats import SEEDS, flat
-from vobench.asset.interior import corners_of
+from vobench.asset.room_layout import corners_of
 
 
 def test_bedside_tables_touch_the_wall_at_the_head_of_a_bed_on_both_sides_at_most_once() -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.asset.flats import SEEDS, flat
-from vobench.asset.interior import corners_of
+from vobench.asset.room_layout import corners_of
 
 
 def test_a_pendant_hangs_over_the_middle_of_every_dining_table() -> None:

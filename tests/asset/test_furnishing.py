@@ -7,8 +7,8 @@ import pytest
 
 from vobench.asset import furnishing
 from vobench.asset.floor_plan import FloorPlan, Rect, Room, Window
-from vobench.asset.interior import RoomLayout
 from vobench.asset.palette import home_style
+from vobench.asset.room_layout import RoomLayout
 from vobench.scene.material import emitted_cd_m2
 
 ROOM = Room("study_1", "study", Rect(-2, -2, 2, 2))

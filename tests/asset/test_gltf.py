@@ -273,9 +273,9 @@ def test_faces_are_counted_before_they_are_read(monkeypatch):
         everything = list(file.nodes(np.eye(4)))
         if is_refused:
             with pytest.raises(ModelError, match="has 3 faces, more than 2"):
-                file.require_few(everything)
+                file.require_few_faces(everything)
         else:
-            file.require_few(everything)
+            file.require_few_faces(everything)
 
 
 @pytest.mark.parametrize(("mode", "corners"), [(LIST, 9), (STRIP, 5), (FAN, 5)])
@@ -287,7 +287,7 @@ def test_the_count_of_faces_is_never_too_small(monkeypatch, mode, corners):
     monkeypatch.setattr(gltf, "MOST_FACES", faces - 1)
     file = read(glb)
     with pytest.raises(ModelError, match="more than 2"):
-        file.require_few(list(file.nodes(np.eye(4))))
+        file.require_few_faces(list(file.nodes(np.eye(4))))
 
 
 # Lights

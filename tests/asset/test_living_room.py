@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.asset.flats import SEEDS, flat
-from vobench.asset.interior import PlacedPiece, corners_of
+from vobench.asset.room_layout import PlacedPiece, corners_of
 
 
 def middle_m(piece: PlacedPiece) -> np.ndarray:

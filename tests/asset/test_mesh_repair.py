@@ -14,7 +14,7 @@ def test_faces_without_area_are_dropped_and_counted(read: Reader) -> None:
     points = [*CORNERS, [2, 0, 0], [0.5, 0, 0]]
     glb.tree["meshes"] = [{"primitives": [glb.primitive(points, [[0, 1, 2], [0, 0, 1], [0, 1, 3], [4, 1, 2]])]}]
     model = read(glb)
-    assert (len(only(model).faces), model.dropped) == (2, 2)
+    assert (len(only(model).faces), model.dropped_faces) == (2, 2)
 
 
 def cube(size: float) -> tuple[Any, Any]:

@@ -312,7 +312,7 @@ def test_a_mover_has_its_things_about_its_own_origin(read: Reader) -> None:
     assert (door.name, [thing.name for thing in door.things]) == ("hinge", ["door"])
     np.testing.assert_allclose(door.origin_m, z_up([2, 1, 0]))
     np.testing.assert_allclose(door.things[0].mesh.triangles[0], z_up([[0, 0, -1], [1, 0, -1], [0, 1, -1]]))
-    np.testing.assert_allclose(model.everything[1].mesh.triangles[0], z_up([[2, 1, -1], [3, 1, -1], [2, 2, -1]]))
+    np.testing.assert_allclose(model.all_things[1].mesh.triangles[0], z_up([[2, 1, -1], [3, 1, -1], [2, 2, -1]]))
 
 
 def test_a_lamp_is_named_and_one_without_light_is_refused(read: Reader) -> None:
@@ -511,7 +511,7 @@ def test_many_large_pictures_are_made_smaller(read: Reader, monkeypatch: pytest.
     glb.tree["materials"] = [{"pbrMetallicRoughness": {"baseColorTexture": glb.texture(np.full((64, 32, 3), 7))}}]
     model = read(glb)
     (stuff,) = model.materials.values()
-    assert model.notes == ("1 of its pictures are reduced to fit into memory",)
+    assert model.notes == ("1 of its textures are reduced to fit into memory",)
     assert stuff.texture is not None
     assert stuff.texture.pixels().shape == (16, 8, 3)
 
@@ -556,7 +556,7 @@ def test_an_obj_stands_upright_with_the_colour_of_its_material(read: Reader, tmp
     np.testing.assert_allclose(only(model).vertex_normals, [[0, -1, 0]] * 3)
     assert model.materials["red"].colour == pytest.approx((1, 0, 0))
     assert (model.materials["red"].metal, model.materials["red"].eta) == (0, 1.5)
-    assert model.notes[0] == ".obj has no unit and no axes: read as 1 m each, y up"
+    assert model.notes[0] == ".obj has no unit and no axes: one unit was read as 1 m, and y as up"
     assert model.things[0].name == "thing.obj"
 
 

@@ -79,7 +79,7 @@ def test_a_hall_that_was_exported_with_the_wrong_axis_up_is_doubted_and_one_with
 
 
 def points_of(model: Model) -> np.ndarray:
-    return np.concatenate([thing.mesh.vertices for thing in model.everything])
+    return np.concatenate([thing.mesh.vertices for thing in model.all_things])
 
 
 def test_a_corridor_that_is_higher_than_wide_is_not_doubted(tmp_path: Path) -> None:

@@ -7,7 +7,8 @@ import pytest
 
 from vobench.asset import home, place_check
 from vobench.asset.furniture import WHITE, stood
-from vobench.asset.interior import FLOOR, Interior, PlacedPiece
+from vobench.asset.interior import Interior
+from vobench.asset.room_layout import FLOOR, PlacedPiece
 from vobench.asset.shape import at
 from vobench.scene.light import AreaLight
 

@@ -143,7 +143,7 @@ WRONG = [
     (("run", "tiny", "--out", "suites/tiny.yaml"), "out should be a folder that can be written (File exists): suites/tiny.yaml"),
     (("list", "scene_s"), "no kind named 'scene_s'. Did you mean 'scenes'? Known: estimators, scenarios, scenes, suites"),
     (("score", "no.tum", "no.tum"), "cannot read no.tum: No such file or directory"),
-    (("score", "suites/tiny.yaml", "no.tum"), "suites/tiny.yaml:1: no format of trajectories has 2 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, or 13 with a frame number first, TartanAir 7, EuRoC 8 and commas"),
+    (("score", "suites/tiny.yaml", "no.tum"), "suites/tiny.yaml:1: no format of trajectories has 2 columns: TUM has 8 columns (t x y z qx qy qz qw); KITTI has 12, or 13 with a frame number in front; TartanAir has 7; EuRoC has 8, separated by commas"),
     (("score", "a", "b", "--align", "sm3"), "no alignment named 'sm3'. Did you mean 'sim3'? Known: none, origin, scale, se3, sim3, yaw"),
     (("score", "a", "b", "--t-max-diff", "nan"), "--t-max-diff should be 0 to 1e+06 seconds, got nan"),
     (("report", "suites"), "not the folder of a run (no cases/*/estimates/*/*/score.json in it): suites"),

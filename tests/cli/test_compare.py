@@ -36,7 +36,7 @@ def test_totals_and_changed_cells_are_tables_and_equal_cells_are_counted(capsys)
     assert "dark" in printed
     assert "light" not in printed
     assert "2 of 3 cells are the same to the last digit" in printed
-    assert "The runs differ in what can change scores: CPU: a and b" in printed
+    assert "The runs differ in settings that can change scores: CPU: a and b" in printed
 
 
 def test_without_changes_there_is_no_table(capsys):

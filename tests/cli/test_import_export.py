@@ -46,7 +46,7 @@ def test_an_import_says_all_that_it_assumed(vobench, sequence):
     vobench("export", sequence, "out", "--form", "kitti")
     said = vobench("import", "out", "back")
     assert "- The body is the left grey camera" in said.out
-    assert said.out.endswith("frames of a recording of the form 'kitti': back\n")
+    assert said.out.endswith("frames (form: kitti): back\n")
     assert "The body is the left grey camera" in vobench("info", "back").out
 
 
@@ -58,9 +58,7 @@ def test_an_import_of_one_frame_says_frame(vobench, sequence, here):
     for name in ("times.txt", "poses.txt"):
         first_line = (here / "out" / name).read_text().splitlines()[0]
         (here / "out" / name).write_text(f"{first_line}\n")
-    assert vobench("import", "out", "back").out.endswith(
-        "\nimported 1 frame of a recording of the form 'kitti': back\n"
-    )
+    assert vobench("import", "out", "back").out.endswith("\nimported 1 frame (form: kitti): back\n")
 
 
 def test_info_names_topics_cameras_truth_and_the_hash(vobench, sequence):

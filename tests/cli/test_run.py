@@ -302,14 +302,14 @@ def test_the_board_and_the_page_say_where_the_figures_come_from(vobench, ran, he
 
 
 def test_compare_names_what_differs_between_two_machines(vobench, ran, here):
-    assert "differ in what can change scores" not in vobench("compare", "runs/tiny", "runs/tiny").out
+    assert "differ in settings that can change scores" not in vobench("compare", "runs/tiny", "runs/tiny").out
     elsewhere = here / "elsewhere"
     shutil.copytree(ran / "latest", elsewhere, symlinks=True)
     stated = json.loads((elsewhere / "environment.json").read_text())
     stated["processors"] = [{"model": "another", "simd": "x86-64-v3"}]
     (elsewhere / "environment.json").write_text(json.dumps(stated))
     said = vobench("compare", "runs/tiny", "elsewhere").out
-    assert "The runs differ in what can change scores: processor " in said
+    assert "The runs differ in settings that can change scores: processor " in said
     assert "→ another (x86-64-v3)" in said
 
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vobench.dataset.calibration_file import LONGEST_SHOWN, MOST_BRACKETS, MOST_CHARACTERS, read_yaml, shown
+from vobench.dataset.calibration_file import MOST_BRACKETS, MOST_CHARACTERS, MOST_VALUE_CHARACTERS, read_yaml, shown
 from vobench.dataset.calibration_value import AboveZero, Number, Numbers, Resolution, RigidTransform, Text, ZeroOrMore
 from vobench.errors import InputError
 from vobench.geometry import se3
@@ -144,7 +144,7 @@ def test_a_mistake_of_yaml_has_its_line_and_column(path: Path) -> None:
 
 def test_a_long_value_is_shortened_and_one_at_the_limit_is_not() -> None:
     assert shown(None) == "nothing"
-    assert shown("a" * (LONGEST_SHOWN - 2)) == repr("a" * (LONGEST_SHOWN - 2))
-    long = shown("a" * (LONGEST_SHOWN - 1))
-    assert len(long) == LONGEST_SHOWN
+    assert shown("a" * (MOST_VALUE_CHARACTERS - 2)) == repr("a" * (MOST_VALUE_CHARACTERS - 2))
+    long = shown("a" * (MOST_VALUE_CHARACTERS - 1))
+    assert len(long) == MOST_VALUE_CHARACTERS
     assert long.endswith("a...")

@@ -45,7 +45,7 @@ def test_of_single_cameras_of_both_pairs_one_is_read_and_the_other_one_is_named(
     recording = read(scene.kitti(tmp_path, pair=pair))
     assert recording.rig.right is None
     assert f"There is one camera: {pair[0]} has no partner." in recording.notes
-    assert f"The pictures of {pair[1]} were dropped." in recording.notes
+    assert f"The pictures of {pair[1]} were not used." in recording.notes
 
 
 def test_rotations_of_seven_digits_are_made_exact(scene, tmp_path):

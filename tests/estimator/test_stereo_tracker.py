@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from vobench.estimator.stereo import stereo_pair
-from vobench.estimator.stereo_tracker import Followed, StereoTracker, TrackerSettings
+from vobench.estimator.stereo_tracker import StereoTracker, StereoTracks, TrackerSettings
 from vobench.geometry import se3
 from vobench.geometry.rig import paper_lens, stereo_rig
 
@@ -51,47 +51,54 @@ STEP = se3.transform(se3.rotation_z(0.01), [0.02, -0.015, 0.06])
 @pytest.fixture(scope="module")
 def tracker():
     tracker = StereoTracker(PAIR, SETTINGS)
-    assert not tracker.has_view
-    assert tracker.look(*pair_at(np.eye(4)))
+    assert not tracker.has_keyframe
+    assert tracker.set_keyframe(*pair_at(np.eye(4)))
     return tracker
 
 
 def test_the_disparities_of_a_view_are_those_of_its_wall(tracker):
-    followed = tracker.follow(*pair_at(np.eye(4)), np.eye(4))
-    np.testing.assert_allclose(followed.disparity_last_px, PAIR.focal_baseline / 2.0, atol=0.3)
-    np.testing.assert_allclose(followed.disparity_px, followed.disparity_last_px, atol=0.1)
-    assert followed.flow_px < 0.05
+    tracks = tracker.follow(*pair_at(np.eye(4)), np.eye(4))
+    np.testing.assert_allclose(tracks.keyframe_disparity_px, PAIR.focal_baseline / 2.0, atol=0.3)
+    np.testing.assert_allclose(tracks.disparity_px, tracks.keyframe_disparity_px, atol=0.1)
+    assert tracks.flow_px < 0.05
 
 
 @pytest.mark.parametrize("guess", [np.eye(4), STEP], ids=["none", "the motion itself"])
 def test_a_known_motion_is_found_again_whatever_the_guess(tracker, guess):
-    followed = tracker.follow(*pair_at(STEP), se3.inverse(guess))
-    fit = tracker.fit(followed)
+    tracks = tracker.follow(*pair_at(STEP), se3.inverse(guess))
+    fit = tracker.fit(tracks)
     np.testing.assert_allclose(fit.T_now_last, se3.inverse(STEP), atol=2e-3)
     assert fit.inlier.mean() > 0.9
     expected_px = PAIR.focal_baseline / (2.0 - 0.06)
-    assert np.nanmedian(followed.disparity_px) == pytest.approx(expected_px, abs=0.2)
+    assert np.nanmedian(tracks.disparity_px) == pytest.approx(expected_px, abs=0.2)
 
 
 def test_a_picture_without_texture_is_no_view_and_leaves_the_old_one(tracker):
     blank = np.full(SIZE, 90, np.uint8)
-    assert not tracker.look(blank, blank)
-    assert tracker.has_view
+    assert not tracker.set_keyframe(blank, blank)
+    assert tracker.has_keyframe
     assert tracker.fit(tracker.follow(*pair_at(STEP), np.eye(4))) is not None
 
 
 def test_in_the_dark_no_point_is_found_and_no_motion_fits(tracker):
     dark = np.zeros(SIZE, np.uint8)
-    followed = tracker.follow(dark, dark, np.eye(4))
-    assert len(followed.uv_px) < SETTINGS.min_points
-    assert tracker.fit(followed) is None
+    tracks = tracker.follow(dark, dark, np.eye(4))
+    assert len(tracks.left_px) < SETTINGS.min_points
+    assert tracker.fit(tracks) is None
 
 
 def test_the_flow_is_the_median_length_of_the_tracks_and_zero_without_any():
     start = np.zeros((3, 2), np.float32)
     end = np.array([[3, 4], [0, 1], [0, 20]], np.float32)
-    assert Followed(start, end, np.zeros(3), np.zeros(3)).flow_px == 5.0
-    assert Followed(start[:0], end[:0], np.zeros(0), np.zeros(0)).flow_px == 0.0
+    assert tracks_between(start, end).flow_px == 5.0
+    assert tracks_between(start[:0], end[:0]).flow_px == 0.0
+
+
+def tracks_between(start, end):
+    disparity_px = np.zeros(len(start))
+    return StereoTracks(
+        keyframe_left_px=start, left_px=end, keyframe_disparity_px=disparity_px, disparity_px=disparity_px
+    )
 
 
 def test_points_are_followed_only_from_a_keyframe():

@@ -159,3 +159,21 @@ def test_the_tolerance_of_a_rotation_is_that_of_its_product_with_its_transpose(t
 def test_a_transpose_is_the_inverse_of_a_rotation() -> None:
     R = random_transforms(20)[:, :3, :3]
     np.testing.assert_allclose(se3.transposed(R) @ R, np.broadcast_to(np.eye(3), R.shape), atol=1e-14)
+
+
+def rotation_x(angle_rad: Array) -> Array:
+    return se3.rotation_z(angle_rad)[..., [2, 0, 1], :][..., [2, 0, 1]]
+
+
+def test_roll_pitch_and_yaw_make_the_rotation_again() -> None:
+    R = random_transforms(200)[:, :3, :3]
+    roll, pitch, yaw = se3.roll_pitch_yaw_rad(R).T
+    Ry = rotation_x(pitch)[..., [2, 0, 1], :][..., [2, 0, 1]]
+    np.testing.assert_allclose(se3.rotation_z(yaw) @ Ry @ rotation_x(roll), R, atol=1e-12)
+
+
+@pytest.mark.parametrize("pitch", [np.pi / 2, -np.pi / 2])
+def test_where_roll_and_yaw_are_one_yaw_has_it_all(pitch: float) -> None:
+    Ry = rotation_x(pitch)[[2, 0, 1], :][:, [2, 0, 1]]
+    roll, found, yaw = se3.roll_pitch_yaw_rad(se3.rotation_z(0.3) @ Ry)
+    assert (roll, found, yaw) == pytest.approx((0.0, pitch, 0.3))

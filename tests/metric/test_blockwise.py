@@ -1,9 +1,17 @@
 """Work in blocks gives the same arrays as work at once."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from vobench.metric import blockwise
+
+
+@dataclass(frozen=True)
+class Both:
+    same: np.ndarray
+    negative: np.ndarray
 
 
 @pytest.mark.parametrize("n", [0, 1, 3, 4, 5, 8])
@@ -12,13 +20,13 @@ def test_blocks_are_joined_in_order(monkeypatch: pytest.MonkeyPatch, n: int) -> 
     values = np.arange(n, dtype=float)
     sizes = []
 
-    def work(block: slice) -> tuple[np.ndarray, np.ndarray]:
+    def work(block: slice) -> Both:
         part = values[block]
         sizes.append(len(part))
-        return part, -part
+        return Both(part, -part)
 
-    same, negative = blockwise.in_blocks(n, work)
-    np.testing.assert_array_equal(same, values)
-    np.testing.assert_array_equal(negative, -values)
+    whole = blockwise.in_blocks(n, work)
+    np.testing.assert_array_equal(whole.same, values)
+    np.testing.assert_array_equal(whole.negative, -values)
     assert max(sizes) <= 4
     assert sum(sizes) == n

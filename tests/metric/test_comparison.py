@@ -202,3 +202,17 @@ def test_a_changed_comparison_has_no_results_of_the_one_it_was_made_of():
     before = first.once(last_x)
     changed = replace(first, T_moving=3 * second.T_moving)
     assert changed.once(last_x) == 3 * second.T_moving[-1, 0, 3] != before
+
+
+@given(SEEDS, st.sampled_from(["xy", "xz", "yz"]))
+def test_in_a_plane_a_pose_keeps_its_euler_angle_about_the_normal_and_its_place_along_the_plane(seed, plane):
+    rng = np.random.default_rng(seed)
+    q = rng.normal(size=(20, 4))
+    T = se3.transform(se3.from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True)), rng.normal(size=(20, 3)))
+    (normal,) = {0, 1, 2} - {"xyz".index(axis) for axis in plane}
+    flat = in_plane(T, plane)
+    angles = Rotation.from_matrix(T[:, :3, :3]).as_euler("xyz")
+    expected = Rotation.from_rotvec(angles * np.eye(3)[normal]).as_matrix()
+    np.testing.assert_allclose(flat[:, :3, :3], expected, atol=1e-12)
+    np.testing.assert_array_equal(flat[:, :3, 3], T[:, :3, 3] * (1 - np.eye(3)[normal]))
+    np.testing.assert_allclose(in_plane(flat, plane), flat, atol=1e-12)

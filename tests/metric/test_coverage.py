@@ -109,9 +109,9 @@ def test_a_hole_in_the_truth_is_no_time_that_could_be_covered():
 
 def test_a_dense_truth_of_less_than_two_slots_is_one_slot():
     t_ns = np.arange(61) * 5_000_000  # 0.3 s
-    assert slots(t_ns, "auto").tolist() == [0] * 61
+    assert slots(t_ns, "auto").of_frame.tolist() == [0] * 61
     assert coverage(t_ns, np.array([30]), rule="auto").ratio == 1.0
-    assert slots(np.arange(81) * 5_000_000, "auto").tolist() == [0] * 40 + [1] * 41  # 0.4 s
+    assert slots(np.arange(81) * 5_000_000, "auto").of_frame.tolist() == [0] * 40 + [1] * 41  # 0.4 s
 
 
 @pytest.mark.parametrize(("step_ns", "is_time"), [(29_999_999, True), (30_000_000, False)])

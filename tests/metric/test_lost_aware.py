@@ -21,7 +21,9 @@ FAIL_M = st.floats(1e-3, 1e3)
 
 def scored(errors_m, frames, fail_m, t_ns=T_NS_failure):
     kept = np.array(sorted(frames), np.int64)
-    return tracking_result(errors_m[kept], slots(t_ns, "auto")[kept], coverage(t_ns, kept, rule="auto"), fail_m=fail_m)
+    return tracking_result(
+        errors_m[kept], slots(t_ns, "auto").of_frame[kept], coverage(t_ns, kept, rule="auto"), fail_m=fail_m
+    )
 
 
 PACES = pytest.mark.parametrize("t_ns", [T_NS_failure, T_NS_failure // 5], ids=["frames", "time"])

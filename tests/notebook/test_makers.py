@@ -23,7 +23,7 @@ def make(seed):
 @pytest.fixture
 def strange(tmp_path, monkeypatch):
     """The maker of somebody else, on a machine without a sandbox, for a program in another folder."""
-    python_gate = trust.Gate(trust._tell_nobody, ours=lambda: (Path.cwd(),), folder=lambda: None)
+    python_gate = trust.Gate(trust._ignore, trusted_folders=lambda: (Path.cwd(),), hash_folder=lambda: None)
     monkeypatch.setattr(trust, "_gates", [python_gate])
     monkeypatch.setattr(maker_file, "_is_contained", lambda: False)
     (tmp_path / "mine").mkdir()
@@ -37,7 +37,7 @@ def strange(tmp_path, monkeypatch):
 def build(maker):
     """What is said of a scene that cannot be built, because its maker is refused or makes nothing."""
     with pytest.raises(SuiteError) as raised:
-        create_scene(maker, seed=1, scene="hall")
+        create_scene(maker, seed=1, scene_name="hall")
     return str(raised.value)
 
 

@@ -8,7 +8,7 @@ from vobench.errors import InputError, UnknownNameError
 
 
 def test_a_case_of_a_suite_is_simulated_once(here):
-    first = vobench.simulate("tiny", name="short", quiet=True)
+    first = vobench.simulate("tiny", case_name="short", quiet=True)
     made = (first.path / "sensors.mcap").stat().st_mtime_ns
     again = vobench.simulate(vobench.check("tiny").plan.cases[0], quiet=True)
     assert again.path == first.path
@@ -28,6 +28,6 @@ def test_pictures_and_truth_go_together(here):
 
 def test_a_case_that_is_not_there_is_named(here):
     with pytest.raises(UnknownNameError, match=r"no case named 'shirt'. Did you mean 'short'"):
-        vobench.simulate("tiny", name="shirt")
+        vobench.simulate("tiny", case_name="shirt")
     with pytest.raises(InputError, match="leave them out for a case object"):
-        vobench.simulate(vobench.check("tiny").plan.cases[0], name="short")
+        vobench.simulate(vobench.check("tiny").plan.cases[0], case_name="short")

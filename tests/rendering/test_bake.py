@@ -34,7 +34,7 @@ from vobench.rendering.texel_owner import owners
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Flicker, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Material, Picture, fresnel
-from vobench.scene.mesh import flat, flipped, make_mesh, moved, quad
+from vobench.scene.mesh import flat_shaded, flipped, make_mesh, moved, quad
 from vobench.scene.panorama import PanoramaMap
 from vobench.scene.scene import Scene, ceiling_light, triangles
 from vobench.scene.triangles import Thing
@@ -357,7 +357,7 @@ def test_the_number_of_threads_changes_no_byte(threads: int, monkeypatch: pytest
 
 def solid(name: str, shape: trimesh.Trimesh, *, smooth: bool = False, inside: bool = False) -> Thing:
     vertices, faces = np.asarray(shape.vertices, float), np.asarray(shape.faces, np.int32)
-    mesh = flat(vertices, faces, vertices[:, :2])
+    mesh = flat_shaded(vertices, faces, vertices[:, :2])
     if smooth:
         mesh = make_mesh(vertices, faces, vertices[:, :2].copy(), np.asarray(shape.vertex_normals, float))
     return Thing(name, flipped(mesh) if inside else mesh, "grey")

@@ -43,15 +43,15 @@ def test_holes_are_found_on_faces_of_that_material_alone() -> None:
     things.append(Thing("wall", quad([0, 0, 1], [1, 0, 0], [0, 1, 0]), "wall"))
     faces = triangle_table(things, [-1, -1], [-1, -1])
     cut_outs = CutOuts(faces, {"leaf": LEAF, "wall": Material()})
-    assert cut_outs.material_of_face.tolist() == [0, 0, -1, -1, -1]
+    assert cut_outs.cutout_of_face.tolist() == [0, 0, -1, -1, -1]
     weights = RNG.dirichlet(np.ones(3), 400)
     face = RNG.integers(0, 4, 400).astype(np.int32)
     hits = Hits(face, weights[:, 1], weights[:, 2], np.ones(400))
     uv = hits.at(faces.uv)
-    is_hole = cut_outs.holes(hits)
+    is_hole = cut_outs.are_in_holes(hits)
     phase = uv[:, 0] / LEAF.tile_m % 1
     clear = np.abs(phase % 0.5 - 0.25) < 0.2
     np.testing.assert_array_equal(is_hole[clear], ((face < 2) & (phase > 0.5))[clear])
     assert is_hole.any()
     nothing = Hits(np.full(1, -1, np.int32), np.zeros(1), np.zeros(1), np.full(1, np.nan))
-    assert not cut_outs.holes(nothing).any()
+    assert not cut_outs.are_in_holes(nothing).any()

@@ -16,7 +16,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import AreaLight, Sky
 from vobench.scene.material import LUMINANCE, Material, Picture, linear
-from vobench.scene.mesh import flat, make_mesh, quad, textured
+from vobench.scene.mesh import flat_shaded, make_mesh, quad, textured
 from vobench.scene.scene import Scene, ceiling_light
 from vobench.scene.triangles import Thing
 
@@ -133,7 +133,7 @@ def test_a_soup_of_the_same_triangles_cut_otherwise_gives_the_same_picture(snap:
         np.concatenate(parts)[np.concatenate([order, order + len(order), order + 2 * len(order)])]
         for parts in zip(middle, *others, strict=True)
     ]
-    soup = flat(cut[0].reshape(-1, 3), np.arange(3 * len(cut[0])).reshape(-1, 3), cut[1].reshape(-1, 2))
+    soup = flat_shaded(cut[0].reshape(-1, 3), np.arange(3 * len(cut[0])).reshape(-1, 3), cut[1].reshape(-1, 2))
     one, other = (snap(scene((mesh, "print"))) for mesh in (whole, soup))
     # Which triangle a sample on an edge belongs to is all that differs, and the level of detail there.
     assert (np.abs(one - other) < 1e-3 * LIGHT).mean() > 0.999

@@ -16,14 +16,14 @@ from vobench.rendering.occlusion import Occluders
 from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.light import AreaLight, Light, PointLight, SpotLight, Sun
 from vobench.scene.material import Material
-from vobench.scene.mesh import flat
+from vobench.scene.mesh import flat_shaded
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
 from vobench.scene.triangles import Thing
 
 
 def icosphere(center_m: Sequence[float], radius_m: float, *, splits: int) -> Trimesh:
     ball = creation.icosphere(subdivisions=splits, radius=radius_m)
-    return flat(ball.vertices + np.asarray(center_m), ball.faces, np.zeros((len(ball.vertices), 2)))
+    return flat_shaded(ball.vertices + np.asarray(center_m), ball.faces, np.zeros((len(ball.vertices), 2)))
 
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -47,7 +47,7 @@ def shards(seed: int) -> list[Thing]:
     corners_m = middles_m + sizes_m * rng.uniform(-1, 1, (60, 3, 3))
     things = []
     for index, corners in enumerate(corners_m):
-        mesh = flat(corners, [[0, 1, 2]], np.zeros((3, 2)))
+        mesh = flat_shaded(corners, [[0, 1, 2]], np.zeros((3, 2)))
         things.append(Thing(f"shard {index}", mesh, "glass" if index % 10 == 0 else "diffuse"))
     return things
 

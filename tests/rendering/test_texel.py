@@ -10,7 +10,7 @@ from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material, fresnel
-from vobench.scene.mesh import flat, make_mesh, quad, two_sided
+from vobench.scene.mesh import flat_shaded, make_mesh, quad, two_sided
 from vobench.scene.triangles import Thing, Triangles, triangle_table
 
 MATERIALS = {"grey": Material(), "wax": Material(eta=1.5)}
@@ -26,7 +26,7 @@ def points_of(faces: Triangles, spacing_m: float, *, seed: int = 0) -> tuple[Tex
 def shape(made: trimesh.Trimesh, *, smooth: bool) -> trimesh.Trimesh:
     vertices, faces = np.asarray(made.vertices, float), np.asarray(made.faces, np.int32)
     if not smooth:
-        return flat(vertices, faces, vertices[:, :2])
+        return flat_shaded(vertices, faces, vertices[:, :2])
     return make_mesh(vertices, faces, vertices[:, :2].copy(), np.asarray(made.vertex_normals, float))
 
 

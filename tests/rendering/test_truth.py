@@ -25,7 +25,7 @@ from vobench.rendering.lamp import lamp_of
 from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.light import PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import flat, flipped, joined, moved, quad, two_sided
+from vobench.scene.mesh import flat_shaded, flipped, joined, moved, quad, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
 from vobench.scene.triangles import Thing, Triangles
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame
@@ -446,7 +446,7 @@ def icosphere(center_m, radius_m: float, *, splits: int) -> Trimesh:
         four = ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))
         faces = unit(np.concatenate([np.stack(three, 1) for three in four])) if len(faces) else faces
     vertices = np.asarray(center_m) + radius_m * unit(faces.reshape(-1, 3))
-    return flat(vertices, np.arange(len(vertices)).reshape(-1, 3), np.zeros((len(vertices), 2)))
+    return flat_shaded(vertices, np.arange(len(vertices)).reshape(-1, 3), np.zeros((len(vertices), 2)))
 
 
 def _is_face(corners: Array, which: tuple[int, ...]) -> bool:
@@ -503,7 +503,9 @@ def shards(count: int, seed: int) -> Scene:
     things = [
         Thing(
             f"shard {n}",
-            two_sided(flat(c, [[0, 1, 2]], np.zeros((3, 2)))) if n % 3 else flat(c, [[0, 1, 2]], np.zeros((3, 2))),
+            two_sided(flat_shaded(c, [[0, 1, 2]], np.zeros((3, 2))))
+            if n % 3
+            else flat_shaded(c, [[0, 1, 2]], np.zeros((3, 2))),
             "diffuse",
         )
         for n, c in enumerate(corners)

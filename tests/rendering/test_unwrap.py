@@ -17,7 +17,7 @@ from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.scene.material import Material
-from vobench.scene.mesh import flat, joined, make_mesh, quad, two_sided
+from vobench.scene.mesh import flat_shaded, joined, make_mesh, quad, two_sided
 from vobench.scene.triangles import Thing, Triangles, triangle_table
 
 MATERIALS = {"grey": Material()}
@@ -26,15 +26,15 @@ MATERIALS = {"grey": Material()}
 def shape(made: trimesh.Trimesh, *, smooth: bool) -> Trimesh:
     vertices, faces = np.asarray(made.vertices, float), np.asarray(made.faces, np.int32)
     if not smooth:
-        return flat(vertices, faces, vertices[:, :2])
+        return flat_shaded(vertices, faces, vertices[:, :2])
     return make_mesh(vertices, faces, vertices[:, :2].copy(), np.asarray(made.vertex_normals, float))
 
 
 def zoo() -> Triangles:
     """Floors and boxes, round things, a sheet with a back, faces too thin for a texel, and some without area."""
     sheet = two_sided(quad([3, 0, 0.5], [0.5, 0, 0.2], [0, 0.7, 0]))
-    needle = flat([[0, 3, 0], [1, 3, 0], [0.5, 3.0001, 0]], [[0, 1, 2]], np.zeros((3, 2)))
-    nothing = flat([[0, 0, 0], [2, 0, 0], [1, 0, 0], [2, 1.5, 0]], [[0, 1, 2], [1, 1, 3]], np.zeros((4, 2)))
+    needle = flat_shaded([[0, 3, 0], [1, 3, 0], [0.5, 3.0001, 0]], [[0, 1, 2]], np.zeros((3, 2)))
+    nothing = flat_shaded([[0, 0, 0], [2, 0, 0], [1, 0, 0], [2, 1.5, 0]], [[0, 1, 2], [1, 1, 3]], np.zeros((4, 2)))
     meshes = [
         joined([quad([0, 0, 0], [2, 0, 0], [0, 1.5, 0]), nothing]),
         shape(trimesh.creation.box((0.3, 0.5, 0.7)), smooth=False),

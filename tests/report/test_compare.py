@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vobench.errors import InputError
+from vobench.metric.significance import PairedDifference
 from vobench.report.compare import (
     ALIKE,
     BETTER,
@@ -16,6 +17,8 @@ from vobench.report.compare import (
     SAME,
     UNDECIDED,
     WORSE,
+    CellPair,
+    _difference_on_these_cases,
     compare,
     environment_differences,
 )
@@ -263,3 +266,18 @@ def test_totals_come_first_by_name_and_then_every_cell(trials, scored):
         ("a", "y"),
         ("b", "y"),
     ]
+
+
+def test_the_chance_in_a_mean_over_equal_cells_falls_with_the_root_of_their_number(trials):
+    (old,) = trials(cases=1, repeats=8).cells
+    (new,) = trials(cases=1, repeats=8, seed=1).cells
+    pair = CellPair(old, new)
+    unknown = PairedDifference(1, 0.0, np.nan)  # over cases
+
+    def standard_error(count):
+        difference = _difference_on_these_cases([pair] * count, unknown)
+        return difference.std / np.sqrt(difference.units)
+
+    log_losses = [np.log(cell.losses) for cell in (old, new)]
+    assert standard_error(1) == pytest.approx(np.sqrt(sum(np.var(losses, ddof=1) / 8 for losses in log_losses)))
+    assert standard_error(4) == pytest.approx(standard_error(1) / 2)

@@ -68,3 +68,16 @@ def test_unknown_kinds_and_names_are_refused(folder):
         RunFigures(folder, cases=["hall-*"])
     with pytest.raises(InputError, match="sequence is no longer in the cache"):
         RunFigures(folder).draw("strip")
+
+
+@pytest.mark.parametrize(
+    ("kind", "labels_of_axes"),
+    [
+        ("path", ["y (m)"]),
+        ("axes", ["x (m)", "y (m)", "z (m)"]),
+        ("error", ["position error (mm)", "rotation error (°)"]),
+    ],
+)
+def test_a_kind_of_figure_has_the_axes_that_it_is_named_for(kind, labels_of_axes):
+    figure = FileFigures(case_of(path(0.01))).draw(kind)
+    assert [axes.get_ylabel() for axes in figure.axes] == labels_of_axes

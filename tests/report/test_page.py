@@ -10,6 +10,7 @@ import pandas as pd
 import pytest
 
 from vobench.report import page
+from vobench.report.leaderboard import Board
 from vobench.report.practice import PRACTICES
 from vobench.report.thumbnail import Thumbnails
 from vobench.runner.environment import ENVIRONMENT, ENVIRONMENTS, Environment, Processor
@@ -234,3 +235,10 @@ def test_a_run_without_any_number_has_a_page(tmp_path, scored, write_run):
     folder = write_run(tmp_path / "suite" / "stamp", trials)
     made = page.run_board(folder, [])
     assert '<option value="ate" selected>ATE % of path</option>' in page.board_page(folder, [], made, tmp_path)
+
+
+def test_a_page_without_the_ate_begins_with_its_first_metric(run, mixed, monkeypatch):
+    board = page.run_board(run, mixed)
+    others = [name for name in board.metrics if name != "ate"]
+    monkeypatch.setattr(Board, "metrics", others)
+    assert f'<option value="{others[0]}" selected>' in page.board_page(run, mixed, board, run.path)

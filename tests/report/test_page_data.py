@@ -14,7 +14,7 @@ from vobench.report.page_data import page_data
 from vobench.report.practice import PRACTICES
 from vobench.report.thumbnail import Thumbnails
 from vobench.runner.folder import SEQUENCE
-from vobench.runner.frames import COLUMNS, FRAMES, new_table
+from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, new_table
 
 
 def data_of(folder, trials, *, metrics=("ate",), answered=None, beside=None):
@@ -156,3 +156,12 @@ def test_a_long_curve_keeps_its_peak(scored, write_run, tmp_path):
     detail = data_of(folder, [trial])["details"]["0|0"]
     assert len(detail["e"]) == len(detail["t"]) == 160
     assert dict(zip(detail["t"], detail["e"], strict=True))[77.7] == 250.0
+
+
+def test_a_case_without_a_ground_truth_has_details_but_no_true_path(scored, write_run, tmp_path):
+    trial = scored("a")
+    folder = write_run(tmp_path / "run", [trial])
+    (folder.case(trial.case) / GROUND_TRUTH).unlink(missing_ok=True)
+    data = data_of(folder, [trial])
+    assert data["truths"] == {}
+    assert "0|0" in data["details"]

@@ -68,3 +68,9 @@ def test_gaps_are_rows_of_nan_before_the_frame_after_them():
     values = np.array([[1.0], [2.0], [3.0]])
     interrupted = with_gaps(values, np.array([0, 1, 5]))
     np.testing.assert_array_equal(interrupted[:, 0], [1, 2, np.nan, 3])
+
+
+def test_a_coordinate_has_a_quarter_of_its_range_above_and_below_it():
+    axes = axes_figure(case_of(path(0.01)), 3.5).axes[0]
+    lowest_m, highest_m = 0.0, 2.0  # x of the ground truth
+    assert axes.get_ylim() == pytest.approx((lowest_m - 0.5, highest_m + 0.5))

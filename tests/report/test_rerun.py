@@ -6,6 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+import rerun as rr
 from rerun.chunk import RrdReader
 
 from vobench.report import rerun
@@ -284,3 +285,19 @@ def test_each_status_has_its_colour_and_an_unknown_one_is_grey(run_viewer, tmp_p
     assert colors["ok"] == (60, 200, 90)
     assert colors["lost"] == (235, 60, 60)
     assert list(colors) == ["init", "ok", "stationary", "degraded", "lost", "no output", "odd"]
+
+
+def test_the_quality_of_pictures_that_never_fit_ends_at_the_worst(monkeypatch):
+    qualities = []
+
+    def recoded(encoded, *, frame, form, quality):
+        qualities.append(quality)
+        return encoded
+
+    monkeypatch.setattr(rerun, "_recoded", recoded)
+    monkeypatch.setattr(rerun, "FRAME_BYTES", 1)
+    picture = encode(np.zeros((4, 4), np.uint8), None, "black")
+    stream = rr.RecordingStream("quality")
+    rerun._log_pictures(stream, [EncodedFrame(0, 0, "png", picture, None)], "jpeg")
+    assert qualities[0] == rerun.BEST_QUALITY
+    assert min(qualities) == qualities[-1] == rerun.WORST_QUALITY

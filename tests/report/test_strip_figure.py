@@ -7,7 +7,7 @@ import pytest
 
 from vobench.errors import InputError
 from vobench.report import strip_figure as module
-from vobench.report.strip_figure import shown_frames, strip_figure
+from vobench.report.strip_figure import _lost_spans, shown_frames, strip_figure
 from vobench.runner.folder import SEQUENCE
 from vobench.runner.frames import FrameRow
 
@@ -90,3 +90,16 @@ def test_a_run_whose_pictures_are_gone_says_how_to_make_them_again(scored, write
     folder = write_run(Path(tmp_path / "run"), [scored("a")])
     with pytest.raises(InputError, match="run the suite again to recreate it"):
         strip_figure(folder, scored("a"), 6.0)
+
+
+@pytest.mark.parametrize(
+    ("lost", "spans"),
+    [
+        ([1, 1, 1, 1], [(0.0, 4.0)]),
+        ([0, 1, 0, 1], [(0.5, 1.5), (3.0, 4.0)]),
+        ([1, 0, 0, 0], [(0.0, 0.5)]),
+        ([0, 0, 0, 0], []),
+    ],
+)
+def test_a_lost_span_ends_halfway_to_its_neighbours_and_at_the_ends_of_the_trial(lost, spans):
+    assert _lost_spans(np.array([0.0, 1.0, 2.0, 4.0]), np.array(lost, bool)) == spans

@@ -167,3 +167,9 @@ def test_of_two_with_the_same_score_the_cheaper_one_is_efficient(scored):
     costs = {("down", "a"): EstimatorStatistics(3.0), ("down", "b"): EstimatorStatistics(2.0)}
     made = make_board([scored("a"), scored("b")], costs)
     assert {total.estimator: total.is_efficient for total in made.totals} == {"a": False, "b": True}
+
+
+def test_the_error_of_a_total_is_that_of_the_median_repeat(scored):
+    repeats = [scored("a", repeat=repeat, ate_m=ate_m) for repeat, ate_m in enumerate((0.01, 0.02, 0.09))]
+    (total,) = make_board(repeats, {}).totals
+    assert total.ate_percent == pytest.approx(2.0)

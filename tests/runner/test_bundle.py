@@ -14,6 +14,7 @@ from vobench.runner.folder import (
     NO_SEQUENCE,
     SCORE,
     SUITE,
+    UNTIL,
     RunFolder,
     TrialScore,
     read_tum,
@@ -151,3 +152,16 @@ def test_another_case_of_the_same_name_cannot_be_merged(make):
     runs = [make("a"), make("b", truth_m=0.1)]
     with pytest.raises(InputError, match="case 'ahead' is another one in b"), merged(runs, ["a", "b"]):
         pass
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_a_merged_run_keeps_what_an_adaptive_run_had_shown(make, which):
+    runs = [make("a"), make("b")]
+    (runs[which].path / UNTIL).write_text('{"ratio": 1.5}')
+    with merged(runs, ["a", "b"]) as both:
+        assert (both.path / UNTIL).read_text() == '{"ratio": 1.5}'
+
+
+def test_merged_runs_that_were_not_adaptive_say_nothing_of_it(make):
+    with merged([make("a"), make("b")], ["a", "b"]) as both:
+        assert not (both.path / UNTIL).exists()

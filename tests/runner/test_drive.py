@@ -2,12 +2,14 @@
 
 import csv
 import io
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.runner.conftest import CLOSET
 from vobench.errors import SuiteError, UnknownNameError
+from vobench.runner import drive
 from vobench.runner.drive import chosen_trajectories, drive_plan
 from vobench.suite.suite import read_plan
 from vobench.trajectory.tum import parse_tum
@@ -125,3 +127,18 @@ def test_an_unknown_name_is_refused_and_a_suite_of_scenarios_is_driven(read, tmp
 def test_a_target_out_of_reach_names_its_line(read):
     with pytest.raises(SuiteError, match=r"suite.yaml:6: trajectories.legs: target 1 at \(0.3, 0\) m was not entered"):
         drive_plan(read(("tolerance_m: 0.05", "max_time_s: 1")))
+
+
+def test_a_drive_through_several_places_has_no_outlines_but_their_shape(read):
+    log = drive_plan(read()).drives[0]
+    assert replace(log, place=None).outlines_m().shape == (0, 2, 2)
+
+
+def test_a_place_that_cannot_be_built_has_no_outlines(read, monkeypatch):
+    def fails(_):
+        raise SuiteError("there is no floor")
+
+    monkeypatch.setattr(drive, "floor_outlines_m", fails)
+    log = drive_plan(read()).drives[0]
+    assert log.place is not None
+    assert log.outlines_m().shape == (0, 2, 2)

@@ -25,6 +25,19 @@ from vobench.temporary import temporary_folder
 pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI
 
 
+@pytest.mark.parametrize(("number", "code"), [(signal.SIGTERM, 143), (signal.SIGINT, 130), (0, 1)])
+def test_a_worker_leaves_with_the_exit_code_of_the_signal_that_stops_it(monkeypatch, number, code):
+    def left(exit_code):
+        raise SystemExit(exit_code)
+
+    monkeypatch.setattr(executor.os, "_exit", left)
+    monkeypatch.setattr(executor.stop, "clean_up_all", lambda: None)
+    monkeypatch.setattr(executor.stop, "requested", lambda: number)
+    with pytest.raises(SystemExit) as ended:
+        executor._leave()
+    assert ended.value.code == code
+
+
 def task(name: str, stage: str = "sequence", needs: tuple[str, ...] = ()) -> Task:
     return Task(stage, None, {"name": name}, needs)
 

@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Camera
+from vobench.geometry.camera import Camera, Pinhole
 from vobench.rendering.renderer import Radiance, View
 from vobench.runner.motion import body_motion
 from vobench.runner.stereo_camera import Displacement, StereoCamera, World
-from vobench.scene.material import LUMINANCE, Rgb
+from vobench.scene.material import LUMINANCE, Material, Rgb
+from vobench.scene.mesh import flat_shaded
+from vobench.scene.scene import Mover, Scene, WaypointMotion
+from vobench.scene.triangles import Thing
 from vobench.suite.case import Case
 from vobench.suite.suite import read_plan
 
@@ -179,3 +182,14 @@ class TestDisplacement:
             rig.left, rig.T_body_left, rig.T_body_left, start_ns=0, end_ns=100_000_000
         )
         assert largest == pytest.approx(658.2857 / (0.4 - 0.2) * 0.01, rel=1e-4)
+
+
+def test_a_face_of_a_mover_moves_in_the_picture_of_a_camera_at_rest() -> None:
+    """The scene has one face alone, so that no other one hides that it is taken for a stationary one."""
+    corners_m = np.array([[-3.0, -3.0, 2.0], [3.0, -3.0, 2.0], [0.0, 5.0, 2.0]])
+    face = Thing("face", flat_shaded(corners_m, [[0, 2, 1]], np.zeros((3, 2))), "grey")
+    across = WaypointMotion(np.array([0.0, 1.0]), np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]]), np.zeros(2))
+    scene = Scene("one face", (), {"grey": Material()}, (), (Mover("mover", (face,), across),))
+    camera = Pinhole(64, 48, 100.0, 100.0, 31.5, 23.5)
+    moved_px = Displacement(scene).largest_px(camera, np.eye(4), np.eye(4), start_ns=0, end_ns=10**9)
+    assert moved_px == pytest.approx(100.0 * 0.1 / 2.0)

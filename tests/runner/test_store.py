@@ -405,3 +405,11 @@ def test_a_limit_that_is_no_number_is_said_before_a_run(store, monkeypatch, limi
     monkeypatch.setenv("VOBENCH_CACHE_GB", limit)
     with pytest.raises(InputError, match="VOBENCH_CACHE_GB should be a number of gigabytes above 0"):
         store.in_use(str).__enter__()
+
+
+def test_a_result_that_is_forgotten_is_made_again_and_others_stay(store):
+    forgotten = store.get("kind", {"a": 1}, write("old"))
+    other = store.get("kind", {"a": 2}, write("other"))
+    store.forget([str(forgotten.relative_to(store.root)), "kind/never-made"])
+    assert (store.get("kind", {"a": 1}, write("new")) / "result").read_text() == "new"
+    assert (other / "result").read_text() == "other"

@@ -12,7 +12,7 @@ from vobench.geometry.vector import unit
 from vobench.scene.mesh import (
     as_arrays,
     copies,
-    flat,
+    flat_shaded,
     flipped,
     has_texture_coordinates,
     joined,
@@ -29,7 +29,7 @@ T = se3.transform(se3.rotation_z(0.4), [0.3, -2.0, 1.0])
 
 def tetrahedron() -> Trimesh:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], float)
-    return flat(vertices, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], vertices[:, :2])
+    return flat_shaded(vertices, [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]], vertices[:, :2])
 
 
 def volume(mesh: Trimesh) -> float:

@@ -166,7 +166,7 @@ def test_a_chunk_ends_at_the_first_new_stamp_after_a_mebibyte(tmp_path):
     with BagWriter(tmp_path / "a", IMAGE_TOPICS, encoded=True) as bag:
         for t_ns in range(10):
             for topic in IMAGE_TOPICS:
-                bag.write(topic, t_ns, serialise(image_message(t_ns, "cam_left", bytes(400_000), "png")))
+                bag.write(topic, t_ns, serialise(image_message(t_ns, "cam_left", bytes(400_000), codec="png")))
     chunks = Bag.open(tmp_path / "a").summary.chunk_indexes
     assert [chunk.message_start_time for chunk in chunks] == [0, 2, 4, 6, 8]
 

@@ -17,8 +17,8 @@ STAMPS = st.integers(0, 2**31 * 10**9 - 1)
 
 @given(STAMPS, st.binary(max_size=9), st.sampled_from(["png", "jpeg"]), st.text("abcdefgh", max_size=9))
 def test_a_picture_in_a_template_is_the_message_and_comes_out_as_it_went_in(t_ns, encoded, form, frame):
-    made = with_picture(serialise(image_message(0, frame, b"", form)), t_ns, encoded)
-    assert made == serialise(image_message(t_ns, frame, encoded, form))
+    made = with_picture(serialise(image_message(0, frame, b"", codec=form)), t_ns, encoded)
+    assert made == serialise(image_message(t_ns, frame, encoded, codec=form))
     found_ns, found_form, colour, found = parse_picture(memoryview(made))
     assert colour == "mono8"
     assert (found_ns, found_form, bytes(found)) == (t_ns, form, encoded)
@@ -38,7 +38,7 @@ def test_a_stamp_that_ros_cannot_hold_is_refused(t_ns):
 
 
 def test_a_message_cut_anywhere_is_no_picture():
-    whole = serialise(image_message(7, "cam_left", b"12345", "png"))
+    whole = serialise(image_message(7, "cam_left", b"12345", codec="png"))
     for end in range(len(whole)):
         with pytest.raises((ValueError, struct.error)):
             parse_picture(memoryview(whole[:end]))

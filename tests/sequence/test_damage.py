@@ -117,7 +117,9 @@ def test_pictures_that_are_no_pairs_are_refused(recording, tmp_path, right_ns, s
             bag.write(topic, 0, serialise(info))
         for t_ns, topic in sorted(shots, key=lambda shot: shot[0]):
             bag.write(
-                topic, t_ns, serialise(image_message(t_ns, "cam", encode(recording.left[0], rig.left, "a"), "png"))
+                topic,
+                t_ns,
+                serialise(image_message(t_ns, "cam", encode(recording.left[0], rig.left, "a"), codec="png")),
             )
     with pytest.raises(SequenceError, match=said):
         list(Sequence.open(tmp_path).frames())

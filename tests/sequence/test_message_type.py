@@ -14,7 +14,7 @@ CAMERA = Pinhole(720, 480, 658.3, 545.1, 359.5, 239.5)
 def test_every_type_survives_serialisation():
     for message in (
         camera_info_message(5, "cam_left", CAMERA),
-        image_message(5, "cam_left", b"png", "png"),
+        image_message(5, "cam_left", b"png", codec="png"),
         stamped_message(ENCODERS, 5, BODY, left=-(2**62), right=2**62),
         odometry_message(5, np.eye(4), np.arange(6.0)),
         tf_message(5, "map", {"base_link": np.eye(4)}),

@@ -251,7 +251,7 @@ def test_a_recording_of_the_time_before_exposure_imu_and_true_rig_still_reads(re
         for topic, info in zip(INFO_TOPICS, infos, strict=True):
             bag.write(topic, 0, info)
         for topic, picture in zip(IMAGE_TOPICS, (recording.left[0], recording.right[0]), strict=True):
-            bag.write(topic, 0, serialise(image_message(0, "cam_left", encode(picture, rig.left, "a"), "png")))
+            bag.write(topic, 0, serialise(image_message(0, "cam_left", encode(picture, rig.left, "a"), codec="png")))
     with BagWriter(tmp_path / "truth.mcap", TRUTH_TOPICS, encoded=False) as bag:
         write_mounts(bag, rig, 0)
         bag.write(ODOMETRY, 0, serialise(odometry_message(0, np.eye(4), np.zeros(6))))

@@ -26,7 +26,7 @@ def read(monkeypatch, tmp_path):
 
         def read_model(path, *, scale=1.0):
             scales.append(scale)
-            return SimpleNamespace(everything=things, lights=lights, materials=materials or {"grey": grey(GREY)})
+            return SimpleNamespace(all_things=things, lights=lights, materials=materials or {"grey": grey(GREY)})
 
         monkeypatch.setattr(model_module, "read_model", read_model)
         return bare_model_scene(tmp_path / name), scales

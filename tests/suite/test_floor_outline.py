@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vobench.scene.mesh import flat
+from vobench.scene.mesh import flat_shaded
 from vobench.scene.triangles import Thing, triangle_table
 from vobench.suite import floor_outline
 from vobench.suite.floor_outline import CUT_HEIGHTS_M, floor_outlines_m, section_m
@@ -22,7 +22,7 @@ UV = np.zeros((4, 2))
 
 
 def faces_of(vertices_m):
-    return triangle_table([Thing("it", flat(vertices_m, SIDES, UV), "grain")], [-1], [-1])
+    return triangle_table([Thing("it", flat_shaded(vertices_m, SIDES, UV), "grain")], [-1], [-1])
 
 
 @pytest.mark.parametrize("height_m", [0.25, 1.0, 1.75])
@@ -41,7 +41,7 @@ def test_nothing_is_cut_above_below_and_at_the_height_of_a_face():
 
 
 def test_a_cut_does_not_depend_on_the_order_of_corners():
-    turned = [Thing("it", flat(TETRAHEDRON_M, np.roll(SIDES, 1, axis=1), UV), "grain")]
+    turned = [Thing("it", flat_shaded(TETRAHEDRON_M, np.roll(SIDES, 1, axis=1), UV), "grain")]
     usual = section_m(faces_of(TETRAHEDRON_M), 0.5)
     others = section_m(triangle_table(turned, [-1], [-1]), 0.5)
     for segment in usual:

@@ -41,7 +41,7 @@ def make(tmp_path):
         path.parent.mkdir(exist_ok=True)
         lines = "".join(f"    {line}\n" for line in body.splitlines())
         path.write_text(f"{HEAD}\ndef make(seed):\n{lines}")
-        return create_scene(path, seed=seed, scene="theirs")
+        return create_scene(path, seed=seed, scene_name="theirs")
 
     return run
 
@@ -54,9 +54,9 @@ def test_it_gets_the_seed_and_its_scene_arrives(make) -> None:
 
 def test_one_of_ours_makes_the_same_in_the_sandbox(monkeypatch) -> None:
     ramp = builtin_root() / "scenes" / "ramp" / "maker.py"
-    in_this_process = encode(create_scene(ramp, seed=2, scene="ramp"))
+    in_this_process = encode(create_scene(ramp, seed=2, scene_name="ramp"))
     monkeypatch.setattr(maker, "builtin_root", lambda: Path("/nowhere"))
-    assert encode(create_scene(ramp, seed=2, scene="ramp")) == in_this_process
+    assert encode(create_scene(ramp, seed=2, scene_name="ramp")) == in_this_process
 
 
 def test_it_may_read_the_files_beside_it(make, tmp_path) -> None:
@@ -132,7 +132,7 @@ def test_a_file_without_make_is_named_once(tmp_path, monkeypatch, is_builtin) ->
     if is_builtin:
         monkeypatch.setattr(maker, "builtin_root", lambda: tmp_path)
     with pytest.raises(SuiteError) as raised:
-        create_scene(path, seed=0, scene="theirs")
+        create_scene(path, seed=0, scene_name="theirs")
     assert str(raised.value) == f"{path}: has no function make(seed)"
 
 
@@ -166,7 +166,7 @@ def generate(tmp_path):
     def run(old="", new="", *, seed=3, lighting="day"):
         assert old in GENERATOR
         scene = write_cell(tmp_path / "strangers", GENERATOR.replace(old, new, 1) if old else GENERATOR)
-        return generate_place(scene.with_name("generator.py"), seed=seed, lighting=lighting, scene="cell")
+        return generate_place(scene.with_name("generator.py"), seed=seed, lighting=lighting, scene_name="cell")
 
     return run
 
@@ -194,9 +194,9 @@ def test_a_generator_gives_the_same_bytes_in_the_sandbox_and_in_this_process(gen
 
 def test_a_generator_of_ours_gives_the_same_bytes_in_the_sandbox(monkeypatch):
     flat = builtin_root() / "scenes" / "flat" / "generator.py"
-    in_this_process = encode(generate_place(flat, seed=2, lighting="overcast", scene="flat"))
+    in_this_process = encode(generate_place(flat, seed=2, lighting="overcast", scene_name="flat"))
     monkeypatch.setattr(maker, "builtin_root", lambda: Path("/nowhere"))
-    assert encode(generate_place(flat, seed=2, lighting="overcast", scene="flat")) == in_this_process
+    assert encode(generate_place(flat, seed=2, lighting="overcast", scene_name="flat")) == in_this_process
 
 
 @needs_a_sandbox

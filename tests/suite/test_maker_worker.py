@@ -3,7 +3,7 @@
 import pytest
 
 from vobench.suite.maker_message import decode
-from vobench.suite.maker_worker import ERROR, MAKE, SCENE, call, main
+from vobench.suite.maker_worker import ERROR_FILE, MAKE, SCENE_FILE, call, main
 
 HEAD = """
 from vobench.plugin import Material, Thing, quad
@@ -37,10 +37,10 @@ def maker(tmp_path, monkeypatch):
 def test_a_scene_is_left_as_data_that_is_the_scene_of_the_call(maker, tmp_path):
     path = maker(GREY)
     main(path, MAKE, [3])
-    made = decode((tmp_path / "work" / SCENE).read_bytes())
+    made = decode((tmp_path / "work" / SCENE_FILE).read_bytes())
     assert made.materials == call(path, MAKE, [3]).materials
     assert made.materials["paint"].colour[0] == pytest.approx(0.3)
-    assert not (tmp_path / "work" / ERROR).exists()
+    assert not (tmp_path / "work" / ERROR_FILE).exists()
 
 
 COUNTING = (
@@ -78,10 +78,10 @@ def test_a_file_that_was_just_edited_is_read_anew(maker):
 )
 def test_an_error_is_left_as_one_line_and_no_scene(maker, tmp_path, text, sentence):
     main(maker(text), MAKE, [0])
-    left = (tmp_path / "work" / ERROR).read_text()
+    left = (tmp_path / "work" / ERROR_FILE).read_text()
     assert sentence in left
     assert "\n" not in left
-    assert not (tmp_path / "work" / SCENE).exists()
+    assert not (tmp_path / "work" / SCENE_FILE).exists()
 
 
 def test_a_maker_that_wants_to_end_the_process_ends_it(maker):

@@ -1,10 +1,14 @@
 """Lightings set the power and the level of a scene's lights."""
 
+from pathlib import Path
+
 import pytest
 
 from vobench.errors import SuiteError
 from vobench.scene.light import Flicker, Steady
+from vobench.suite.scene_lighting import require_possible
 from vobench.suite.scene_spec import LevelSpec, LightOverride
+from vobench.suite.yaml_source import YamlFile
 
 
 def test_a_lighting_changes_levels_and_leaves_the_light_itself_alone(hall):
@@ -41,3 +45,20 @@ def test_a_light_that_is_nothing_cannot_be_made_brighter(hall):
         SuiteError, match="'bulb' is 0 in the scene, so it cannot be set to 5; increase it in the scene"
     ):
         hall("power_lm: 500", "power_lm: 0", lighting={"bulb": LightOverride(power_lm=5)})
+
+
+SCENE = YamlFile(
+    Path("hall.yaml"),
+    {"room": {"size_m": [4, 3, 2]}, "lamps": [{"name": "bulb"}, {"power_lm": 5}], "meshes": [{"name": 3}], "sun": {}},
+)
+
+
+@pytest.mark.parametrize("name", ["bulb", "bulb.left", "sun"])
+def test_a_light_of_a_scene_that_is_not_built_may_be_any_name_in_its_file_or_daylight(name):
+    require_possible(name, SCENE)
+
+
+@pytest.mark.parametrize("name", ["blub", "sky", "room"])
+def test_a_light_that_no_scene_built_of_this_file_can_have_is_named(name):
+    with pytest.raises(SuiteError, match=f"lighting: no light named '{name}'"):
+        require_possible(name, SCENE)

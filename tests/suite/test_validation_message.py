@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from vobench.errors import SettingError
 from vobench.setting import settings
-from vobench.suite.validation_message import location, validation_mistakes
+from vobench.suite.validation_message import pydantic_location, validation_mistakes
 from vobench.suite.yaml_file import checked, json_schema
 from vobench.suite.yaml_parser import parse_text
 from vobench.suite.yaml_source import YamlFile
@@ -100,10 +100,10 @@ def test_a_mistake_is_where_the_settings_say_it_is():
     text = "radius_m: 1\nheight_m: 1\nspan:\n  first_s: 3\n"
     error, _ = error_of(text)
     (entry,) = error.errors()
-    assert location(entry) == ("span", "first_s")
+    assert pydantic_location(entry) == ("span", "first_s")
     assert said(text) == ["4: span.first_s: should be at most last_s (got 3)"]
 
 
 def test_a_place_of_pydantic_is_that_of_the_file_where_no_setting_says_otherwise():
     error, _ = error_of("radius_m: 1\nheight_m: 1\nsizes: [1, 2, x]\n")
-    assert [location(entry) for entry in error.errors()] == [("sizes", 2)]
+    assert [pydantic_location(entry) for entry in error.errors()] == [("sizes", 2)]

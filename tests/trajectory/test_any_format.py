@@ -50,7 +50,7 @@ def test_crlf_blank_lines_tabs_and_comments_change_nothing(text):
         ("\n \r\n", "no pose, because the file is empty: run.txt"),
         ("# only\n# comments\n", "no pose, because all lines are comments: run.txt"),
         ("version https://git-lfs.github.com/spec/v1\noid sha256:0\n", "a Git-LFS pointer, not the file itself; fetch it with git lfs pull: run.txt"),
-        ("a b c\n", "run.txt:1: no format of trajectories has 3 columns: TUM has 8 (t x y z qx qy qz qw), KITTI 12, or 13 with a frame number first, TartanAir 7, EuRoC 8 and commas"),
+        ("a b c\n", "run.txt:1: no format of trajectories has 3 columns: TUM has 8 columns (t x y z qx qy qz qw); KITTI has 12, or 13 with a frame number in front; TartanAir has 7; EuRoC has 8, separated by commas"),
         (TUM + "3.5 1 2 3 0", "run.txt:3: a pose has 8 columns (t x y z qx qy qz qw), this line has 5 (the last row: was the file cut off?)"),
         (KITTI + "1 0 0", "this line has 3 (the last row: was the file cut off?)"),
         (EUROC + "1600000000,1,2", "run.txt:3: a pose has 8 columns (t x y z qw qx qy qz), this line has 3 (the last row: was the file cut off?)"),

@@ -39,7 +39,7 @@ def motion_disagreement(T_gt: Array, T_est: Array) -> float | None:
 
 
 def _motions(T: Array, step: int) -> Array:
-    """The motions (W, 4, 4) over so many poses, one after the other."""
+    """The consecutive motions (W, 4, 4), each over a number of poses."""
     poses = T[::step]
     motions: Array = se3.inverse(poses[:-1]) @ poses[1:]
     return motions

@@ -1,21 +1,39 @@
 """Draws the contact sheet of a generator: one picture for each seed, in light that is computed coarsely."""
 
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 
+import cv2
+import numpy as np
+
 from vobench import stop
-from vobench.analysis.scene_sheet import Rgb8, contact_sheet, place_picture
-from vobench.analysis.scene_survey import scene_survey
-from vobench.rendering.bake import BakeSettings, bake
+from vobench.analysis.scene_plan import CELL_HEIGHT_PX, CELL_WIDTH_PX, Rgb8, plan
+from vobench.analysis.scene_sheet import FONT_SCALE, VIEW_PITCH_DEG, VIEW_WHITE
+from vobench.analysis.scene_survey import EYE_HEIGHT_M, SceneSurvey, scene_survey
+from vobench.geometry.camera import Pinhole
+from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
+from vobench.rendering.renderer import Renderer, single_instant
 from vobench.runner.store import SILENT, Progress
+from vobench.scene.material import srgb
+from vobench.scene.triangles import Triangles
 from vobench.sequence.picture import write_png
 from vobench.suite.scene_build import build
 from vobench.suite.scene_entry import DRAWN, generated_scene
 from vobench.suite.scene_file import read_place
 from vobench.suite.scene_spec import SceneFile
+from vobench.suite.viewpoint import COARSE_LENS, Viewpoint, around
+from vobench.suite.white import fitting_white_cd_m2, look_around
 
 COARSE = BakeSettings(spacing_m=0.06, light_rays=4, indirect_spacing_m=0.25, indirect_rays=36)
+PLACE_WIDTH_PX = 340  # of the view of a place, which stands beside its plan
+PLACE_HEIGHT_PX = 224
+PLACE_COLUMNS = 4
+GAP_PX = 6
+PLACE_LENS = Pinhole(PLACE_WIDTH_PX, PLACE_HEIGHT_PX, 190.0, 190.0, 169.5, 111.5)
+DIRECTIONS = 16  # in which a view may look
 
 
 def save_place_sheet(
@@ -46,4 +64,53 @@ def _picture(place: SceneFile) -> Rgb8:
     scene = build(place, {})
     baked = bake(scene, COARSE)
     with closing(RasterRenderer(baked)) as renderer:
-        return place_picture(baked, scene_survey(scene), renderer, place.place_name)
+        return _view_beside_plan(baked, scene_survey(scene), renderer, place.place_name)
+
+
+def _view_beside_plan(baked: BakedScene, survey: SceneSurvey, renderer: Renderer, label: str) -> Rgb8:
+    """A view (H, W, 3) of a place from its free circle, in the direction in which most is seen, beside its plan."""
+    seen = look_around(baked)
+    white_cd_m2 = fitting_white_cd_m2(seen.luminance(), seen.is_source)
+    viewpoint = _widest_view(baked.faces, survey)
+    radiance = renderer.radiance(PLACE_LENS, single_instant(PLACE_LENS, viewpoint.T_world_camera()), weights=None)
+    view = srgb(radiance / (VIEW_WHITE * white_cd_m2))
+    whole_plan = plan(baked.scene, survey)
+    left_px = (CELL_WIDTH_PX - CELL_HEIGHT_PX) // 2
+    square = whole_plan[:, left_px : left_px + CELL_HEIGHT_PX]
+    small_plan = cv2.resize(square, (PLACE_HEIGHT_PX, PLACE_HEIGHT_PX), interpolation=cv2.INTER_AREA)
+    picture = np.hstack([view, small_plan])
+    position_px = (8, PLACE_HEIGHT_PX - 10)
+    for colour, width_px in (((0, 0, 0), 3), ((255, 255, 255), 1)):
+        cv2.putText(picture, label, position_px, cv2.FONT_HERSHEY_SIMPLEX, FONT_SCALE, colour, width_px, cv2.LINE_AA)
+    return picture
+
+
+def _widest_view(faces: Triangles, survey: SceneSurvey) -> Viewpoint:
+    """The viewpoint from which the surfaces in view are farthest away; without a free circle, one from around."""
+    free = survey.free_circle
+    if free is None or not survey.is_place:
+        return around(survey.low_m, survey.high_m, count=1)[0]
+    eye_m = (free.x_m, free.y_m, free.floor_m + EYE_HEIGHT_M)
+    caster = RayCaster(faces)
+    best = Viewpoint(eye_m, 0.0, VIEW_PITCH_DEG)
+    farthest_m = -1.0
+    for yaw_deg in np.linspace(0, 360, DIRECTIONS, endpoint=False).tolist():
+        viewpoint = Viewpoint(eye_m, yaw_deg, VIEW_PITCH_DEG)
+        rays = viewpoint.rays(COARSE_LENS)
+        hits = caster.hits(np.tile(eye_m, (len(rays), 1)), rays)
+        distance_m = float(np.median(np.where(hits.face >= 0, hits.distance, 0.0)))
+        if distance_m > farthest_m:
+            farthest_m = distance_m
+            best = viewpoint
+    return best
+
+
+def contact_sheet(pictures: Sequence[Rgb8]) -> Rgb8:
+    """Pictures of one size in rows of four, with white gaps between them."""
+    margins_px = ((GAP_PX, 0), (GAP_PX, 0), (0, 0))
+    framed = [np.pad(picture, margins_px, constant_values=255) for picture in pictures]
+    missing = -len(framed) % PLACE_COLUMNS if len(framed) > PLACE_COLUMNS else 0
+    framed += [np.full_like(framed[0], 255)] * missing
+    columns = min(len(framed), PLACE_COLUMNS)
+    rows = [np.hstack(framed[first : first + columns]) for first in range(0, len(framed), columns)]
+    return np.vstack(rows)

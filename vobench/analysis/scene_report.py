@@ -134,6 +134,6 @@ def _notes(models: Sequence[ModelSpec]) -> list[str]:
             continue
         model = read_model(path, scale=spec.scale, roles=spec.roles, up=spec.up)
         notes += [f"{path.name}: {note}" for note in model.notes]
-        if model.dropped:
-            notes.append(f"{path.name}: {model.dropped} faces without area were dropped")
+        if model.dropped_faces:
+            notes.append(f"{path.name}: {model.dropped_faces} faces without area were dropped")
     return notes

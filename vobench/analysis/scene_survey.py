@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Texture
@@ -14,8 +15,9 @@ from vobench.scene.weld import distinct_rows, open_edges, welded
 from vobench.suite.free_space import FreeCircle, largest_free_circle
 from vobench.suite.viewpoint import is_place
 
-EYE_HEIGHT_M = 1.2  # the height of the viewer above the floor
+EYE_HEIGHT_M = 1.2  # the height of the viewer above the floor, about that of a robot's mast
 DIRECTIONS = 4096  # the number of random directions in which a survey looks for the backs of faces
+SEED = 0  # of these directions, so that a survey is repeatable
 MAX_FACES_OF_RECTANGLE = 2  # an object with more faces should be a closed surface
 
 
@@ -57,10 +59,7 @@ def scene_survey(scene: Scene) -> SceneSurvey:
     high_m = corners_m.max(0)
 
     free_circle = largest_free_circle(faces, caster)
-    eye_m = (low_m + high_m) / 2
-    if free_circle:
-        eye_m = np.array([free_circle.x_m, free_circle.y_m, free_circle.floor_m + EYE_HEIGHT_M])
-
+    eye_m = (low_m + high_m) / 2 if free_circle is None else _above_floor_m(free_circle)
     point_ids = _point_ids(faces)
     texture_bytes = sum(texture.pixels().nbytes for texture in _textures(scene))
     return SceneSurvey(
@@ -77,6 +76,11 @@ def scene_survey(scene: Scene) -> SceneSurvey:
         free_circle=free_circle,
         is_place=is_place(faces, caster, free_circle),
     )
+
+
+def _above_floor_m(circle: FreeCircle) -> Array:
+    """The position (3,) of a viewer at the centre of a free circle."""
+    return np.array([circle.x_m, circle.y_m, circle.floor_m + EYE_HEIGHT_M])
 
 
 def _textures(scene: Scene) -> set[Texture]:
@@ -118,7 +122,9 @@ def _duplicate_face_count(point_ids: NDArray[np.intp]) -> int:
 
 def _back_facing_share(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:
     """The share of directions from a viewpoint (3,) in which the nearest face shows its back."""
-    directions = unit(np.random.default_rng(0).standard_normal((DIRECTIONS, 3)))
+    directions = unit(np.random.default_rng(SEED).standard_normal((DIRECTIONS, 3)))
     hits = caster.hits(np.tile(eye_m, (DIRECTIONS, 1)), directions)
-    is_back = np.einsum("ij,ij->i", faces.plane[hits.face], directions) > 0
-    return float(((hits.face >= 0) & is_back).mean())
+    is_hit = hits.face >= 0
+    normals = faces.plane[hits.face[is_hit]]  # (K, 3), of the hit faces
+    is_back = np.einsum("ij,ij->i", normals, directions[is_hit]) > 0
+    return float(np.count_nonzero(is_back) / DIRECTIONS)

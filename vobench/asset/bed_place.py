@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 from vobench.asset import bedroom, furnishing
 from vobench.asset.floor_plan import Rect
-from vobench.asset.interior import GAP_M, RoomLayout, Spot
 from vobench.asset.palette import Style
+from vobench.asset.room_layout import GAP_M, RoomLayout, Spot
 
 
 def add_bed(layout: RoomLayout, style: Style, widths_m: Sequence[float]) -> Spot | None:

@@ -4,9 +4,9 @@ import numpy as np
 
 from vobench.asset import furnishing, household
 from vobench.asset.daylight import lamp_colour
-from vobench.asset.interior import CEILING, RoomLayout, corners_of
 from vobench.asset.palette import Style
 from vobench.asset.picture import one_of
+from vobench.asset.room_layout import CEILING, RoomLayout, corners_of
 from vobench.scene.mesh import quad
 
 TABLE_PENDANT_LM = 800.0

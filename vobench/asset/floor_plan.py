@@ -373,7 +373,7 @@ def windows_along(rng: Rng, room: Room, side: Side, style: WindowStyle) -> Itera
 
 @dataclass(frozen=True, slots=True)
 class Symmetry:
-    """A way to turn or mirror a plan: x and y are exchanged, and each is negated or not."""
+    """A rotation or reflection of a plan: x and y may be exchanged, and each may be negated."""
 
     exchanges: bool
     x_sign: int
@@ -691,7 +691,7 @@ def without_obstructing_leaves(rooms: Sequence[Room], passages: Sequence[Passage
 
 
 def _is_near(room: Room, hole: Rect, other: Rect) -> bool:
-    """Whether what swings open at one hole of a room gets in the way of another one."""
+    """Whether the leaf of one door of a room obstructs another door."""
     width_m = max(hole.width_m, hole.depth_m)
     return _before(room, hole, width_m + 0.1).overlaps(_before(room, other, 0.8))
 

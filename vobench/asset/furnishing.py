@@ -10,9 +10,9 @@ from vobench.asset import bedroom, fitting, furniture, household, houseplant, ki
 from vobench.asset.daylight import lamp_colour
 from vobench.asset.floor_plan import SIDES, FloorPlan, Rect, Side, Window, along_m
 from vobench.asset.furniture import DARK, Part, cloth, coated, put, stood
-from vobench.asset.interior import GAP_M, SHELL, WALL, RoomLayout, Span, Spot, corners_of
 from vobench.asset.palette import Style
 from vobench.asset.picture import Rng, one_of
+from vobench.asset.room_layout import GAP_M, SHELL, WALL, RoomLayout, Span, Spot, corners_of
 from vobench.asset.shape import tube
 
 BOOK_SEEDS = 6

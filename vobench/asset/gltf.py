@@ -137,7 +137,7 @@ class Gltf:
         parts = {name: self.file.accessor(index) for name, index in attributes.items()}
         return _transforms(parts)
 
-    def require_few(self, nodes: Sequence[Node]) -> None:
+    def require_few_faces(self, nodes: Sequence[Node]) -> None:
         """Raise ModelError if the nodes have too many faces. The faces are counted before any of them is read."""
         faces = 0
         for node in nodes:

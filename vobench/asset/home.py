@@ -10,18 +10,12 @@ from vobench.asset.daylight import Daylight, daylight
 from vobench.asset.floor_plan import SIDES, FloorPlan, Room, Side
 from vobench.asset.furniture import wood
 from vobench.asset.home_room import FURNISH
-from vobench.asset.interior import (
-    Interior,
-    RoomFinish,
-    RoomLayout,
-    door_fittings,
-    most_faces,
-    shell,
-    skirtings,
-    without_excess,
-)
+from vobench.asset.interior import Interior, most_faces, without_excess
+from vobench.asset.interior_shell import RoomFinish, shell
 from vobench.asset.palette import Style, home_style
 from vobench.asset.picture import Rng
+from vobench.asset.room_fitting import door_fittings, skirtings
+from vobench.asset.room_layout import RoomLayout
 
 PANORAMAS = ("city", "city", "suburb", "country")
 FLOOR_HEIGHTS_M = (1.2, 4.0, 7.0, 10.0, 16.0)  # of the flat above the ground
@@ -56,7 +50,7 @@ def furnished_flat(seed: int, lighting: str) -> Interior:
 
 
 def _outside(plan: FloorPlan, rng: Rng, lighting: str) -> Daylight:
-    """The daylight and what is seen through the windows."""
+    """The daylight and the view through the windows."""
     return daylight(
         rng,
         lighting,

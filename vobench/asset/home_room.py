@@ -4,10 +4,10 @@ from collections.abc import Callable
 
 from vobench.asset import bathroom, bedroom, fitting, furnishing, furniture, household
 from vobench.asset.bed_place import add_bed
-from vobench.asset.interior import GAP_M, WALL, RoomLayout, Spot
 from vobench.asset.living_room import furnish_living_room
 from vobench.asset.palette import Style
 from vobench.asset.picture import one_of
+from vobench.asset.room_layout import GAP_M, WALL, RoomLayout, Spot
 
 BATH_CLOTHS = ("#8fb3c7", "#d8c3a0", "#b4533a", "#8a9a7b", "#e6e1d6", "#6b4353", "#3d7a7c")
 

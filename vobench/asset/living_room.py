@@ -4,8 +4,8 @@ from typing import NamedTuple
 
 from vobench.asset import bed_place, furnishing, household
 from vobench.asset.floor_plan import Rect, Side
-from vobench.asset.interior import GAP_M, RoomLayout, Span, Spot
 from vobench.asset.palette import Style
+from vobench.asset.room_layout import GAP_M, RoomLayout, Span, Spot
 
 OPPOSITE: dict[Side, Side] = {"east": "west", "west": "east", "north": "south", "south": "north"}
 SOFA_DEPTH_M = 0.92
@@ -52,7 +52,7 @@ def _add_dining_table(layout: RoomLayout, style: Style) -> None:
 
 
 class _Corner(NamedTuple):
-    """Where a television, a sofa and a coffee table stand, in the frame of the spot of the television.
+    """The places of a television, a sofa and a coffee table, in the frame of the spot of the television.
 
     `sofa_spot` is the spot at the wall behind the sofa; the sofa stands at it only if `is_at_wall`.
     `table_x` is the middle of the coffee table, None without one.

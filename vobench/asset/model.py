@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -30,6 +31,7 @@ from vobench.scene.triangles import Thing
 Key = TypeVar("Key")
 GLTF_SUFFIXES = (".glb", ".gltf")
 Z_UP_SUFFIXES = (".stl", ".ply")  # by convention, because these formats do not define the up axis
+NO_ROLES: Mapping[str, str] = MappingProxyType({})
 Y_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # T_model_file of a file with y up
 
 
@@ -48,7 +50,7 @@ class Model:
 
     `lamps` lists the names of the things that are lamps.
     `notes` are sentences about what was read differently from the file, and about probable mistakes in the file.
-    `dropped` is the number of faces that were removed because they have no area.
+    `dropped_faces` is the number of faces that were removed because they have no area.
     """
 
     things: tuple[Thing, ...]
@@ -57,10 +59,10 @@ class Model:
     movers: tuple[ModelMover, ...] = ()
     lamps: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
-    dropped: int = 0
+    dropped_faces: int = 0
 
     @property
-    def everything(self) -> list[Thing]:
+    def all_things(self) -> list[Thing]:
         """All things at their positions in the file, including those of movers."""
         moving = [_shifted(thing, mover.origin_m) for mover in self.movers for thing in mover.things]
         return [*self.things, *moving]
@@ -79,8 +81,8 @@ class _Part:
 class _Content(NamedTuple):
     """The primitives and lights of the nodes of a file, in the frame of the model."""
 
-    primitives: list[Primitive]
-    lights: list[ModelLight]
+    primitives: tuple[Primitive, ...]
+    lights: tuple[ModelLight, ...]
 
 
 class _Ancestor(NamedTuple):
@@ -94,7 +96,7 @@ def read_model(
     path: Path | str,
     *,
     scale: float = 1.0,
-    roles: Mapping[str, str] = {},
+    roles: Mapping[str, str] = NO_ROLES,
     up: str | None = None,
 ) -> Model:
     """Read a glTF, OBJ, STL or PLY file.
@@ -113,14 +115,14 @@ def read_model(
         up_axis = up or _default_up_axis(suffix)
         notes = []
         if suffix not in GLTF_SUFFIXES:
-            notes.append(f"{suffix} has no unit and no axes: read as {scale:g} m each, {up_axis} up")
+            notes.append(f"{suffix} has no unit and no axes: one unit was read as {scale:g} m, and {up_axis} as up")
         gltf, notes_on_missing_files = _read_gltf(path, is_gltf=suffix in GLTF_SUFFIXES)
         notes += notes_on_missing_files
         content = _visible_content(gltf, _T_model_file(scale, up_axis), roles)
         model = _model(content, roles)
 
         notes += _notes_on_reading(gltf, content.primitives)
-        corners_m = np.concatenate([face_corners(thing.mesh) for thing in model.everything])  # (F, 3, 3)
+        corners_m = np.concatenate([face_corners(thing.mesh) for thing in model.all_things])  # (F, 3, 3)
         if not up:  # otherwise the user has chosen the axis
             notes += axis_notes(corners_m, file_name=path.name, up_axis=up_axis)
         notes += unit_notes(corners_m)
@@ -152,15 +154,16 @@ def _visible_content(gltf: Gltf, T_model_file: Array, roles: RoleByGlob) -> _Con
     nodes = sorted(gltf.nodes(T_model_file), key=lambda node: node.names)
     require_matching_nodes(roles, nodes)
     visible_nodes = [node for node in nodes if node_role(node, roles).name != "ignored"]
-    gltf.require_few(visible_nodes)
+    gltf.require_few_faces(visible_nodes)
 
     poses = {node.index: node.poses[-1] for node in nodes}
-    content = _Content([], [])
+    primitives: list[Primitive] = []
+    lights: list[ModelLight] = []
     for node in visible_nodes:
         with located(str(node)):
-            content.primitives.extend(repaired(primitive) for primitive in gltf.primitives(node, poses))
-            content.lights.extend(gltf.lights(node))
-    return content
+            primitives.extend(repaired(primitive) for primitive in gltf.primitives(node, poses))
+            lights.extend(gltf.lights(node))
+    return _Content(tuple(primitives), tuple(lights))
 
 
 def _notes_on_reading(gltf: Gltf, primitives: Sequence[Primitive]) -> list[str]:
@@ -168,7 +171,7 @@ def _notes_on_reading(gltf: Gltf, primitives: Sequence[Primitive]) -> list[str]:
     notes = []
     reduced = len(gltf.materials.reduced)
     if reduced:
-        notes.append(f"{reduced} of its pictures are reduced to fit into memory")
+        notes.append(f"{reduced} of its textures are reduced to fit into memory")
     notes += gltf.file.notes
     for primitive in primitives:
         notes += [*primitive.look.notes, *primitive.notes]
@@ -178,8 +181,11 @@ def _notes_on_reading(gltf: Gltf, primitives: Sequence[Primitive]) -> list[str]:
 def _require_file(path: Path) -> None:
     if not path.is_file():
         raise ModelError("there is no such file")
-    if not 0 < path.stat().st_size <= MOST_BYTES:
-        raise ModelError("is empty or too large")
+    size_bytes = path.stat().st_size
+    if size_bytes == 0:
+        raise ModelError("is empty")
+    if size_bytes > MOST_BYTES:
+        raise ModelError(f"has {size_bytes:,} bytes, more than {MOST_BYTES:,}")
 
 
 def _model(content: _Content, roles: RoleByGlob) -> Model:
@@ -196,7 +202,7 @@ def _model(content: _Content, roles: RoleByGlob) -> Model:
         lights=_renamed(content.lights),
         movers=_movers(parts),
         lamps=_lamps(parts),
-        dropped=sum(primitive.dropped for primitive in content.primitives),
+        dropped_faces=sum(primitive.dropped for primitive in content.primitives),
     )
 
 

@@ -48,7 +48,16 @@ from vobench.asset.shape import (
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.scene.material import Material, Picture
-from vobench.scene.mesh import as_arrays, face_corners, flat, flipped, joined, make_mesh, moved, texture_coordinates
+from vobench.scene.mesh import (
+    as_arrays,
+    face_corners,
+    flat_shaded,
+    flipped,
+    joined,
+    make_mesh,
+    moved,
+    texture_coordinates,
+)
 from vobench.scene.scene import jointed
 
 if TYPE_CHECKING:
@@ -602,7 +611,7 @@ def rock(rng: Rng, size_m: float = 0.6) -> list[Part]:
         one_of(rng, "#c9c4ba", "#a8a59e", "#b9ad9a"),
         picture.ground("concrete", 3, 1024, 1.4),
     )
-    boulder = flat(points_m, mesh.faces, texture_coordinates(mesh))
+    boulder = flat_shaded(points_m, mesh.faces, texture_coordinates(mesh))
     return [put(boulder, stone, z=0.12 * size_m, yaw=rng.uniform(0, 360))]
 
 

@@ -132,7 +132,7 @@ class _Canvas:
         self._haze = band
 
     def finished(self) -> PanoramaMap:
-        """The map in cd/m² per lux of the sky, which level ground amid it gets."""
+        """The map in cd/m² per lux of the sky, measured on level ground at the middle of the map."""
         upper = self.colour[: ROWS // 2] @ np.array(LUMINANCE, np.float32)
         sine = 1 - (np.arange(ROWS // 2) + 0.5) * (2 / ROWS)
         level_lx = float((upper.sum(1, dtype=float) * sine).sum()) * CELL_SR

@@ -8,7 +8,8 @@ import numpy as np
 import scipy
 
 from vobench.asset.floor_plan import Room
-from vobench.asset.interior import CEILING, FLOOR, SHELL, WALL, Interior, PlacedPiece
+from vobench.asset.interior import Interior
+from vobench.asset.room_layout import CEILING, FLOOR, SHELL, WALL, PlacedPiece
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Sky, Sun
 

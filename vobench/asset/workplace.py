@@ -9,21 +9,12 @@ from vobench.asset.daylight import daylight, lamp_colour
 from vobench.asset.floor_plan import SIDES, Room, Side
 from vobench.asset.furnishing import TABLE_M
 from vobench.asset.furniture import STEEL, Part, coated, wood
-from vobench.asset.interior import (
-    CEILING,
-    GAP_M,
-    Interior,
-    RoomFinish,
-    RoomLayout,
-    Spot,
-    door_fittings,
-    most_faces,
-    shell,
-    skirtings,
-    without_excess,
-)
+from vobench.asset.interior import Interior, most_faces, without_excess
+from vobench.asset.interior_shell import RoomFinish, shell
 from vobench.asset.palette import Style, office_style
 from vobench.asset.picture import one_of
+from vobench.asset.room_fitting import door_fittings, skirtings
+from vobench.asset.room_layout import CEILING, GAP_M, RoomLayout, Spot
 from vobench.scene.material import Material
 from vobench.scene.mesh import quad
 

@@ -8,12 +8,11 @@ from typing import Annotated
 
 import typer
 
-from vobench import stop
+from vobench import stop, trust
 from vobench.cli.command_group import CommandGroup
 from vobench.cli.error_report import DEBUG, discard_output, flush_output, report_and_exit
 from vobench.cli.terminal import warn
 from vobench.errors import VobenchError
-from vobench.trust import gate
 
 SUMMARY = "Simulate, run and score visual odometry, and find out why it fails."
 app = typer.Typer(
@@ -28,15 +27,12 @@ app = typer.Typer(
 
 def run() -> None:
     """Run a command. An error that the user can correct is printed as one line, and the exit code is 1."""
-    with suppress(OSError, ValueError, AttributeError, RuntimeError):  # there is no file for standard error
-        # If a fault in a library ends vobench, the calls of every thread are printed.
-        faulthandler.enable()
-    for stream in filter(None, (sys.stdout, sys.stderr)):
-        stream.reconfigure(errors="replace")  # a terminal that cannot show ° shows ?
+    _print_stacks_on_crash()
+    _replace_unprintable_characters()
     try:
         _call_command()
-    except SystemExit as end:
-        if not isinstance(end.__context__, BrokenPipeError):
+    except SystemExit as exit_request:
+        if not isinstance(exit_request.__context__, BrokenPipeError):
             raise
         discard_output()  # a reader that stops early, such as `head`, is not an error
     except (VobenchError, OSError) as error:
@@ -44,13 +40,26 @@ def run() -> None:
         report_and_exit(error)
 
 
+def _print_stacks_on_crash() -> None:
+    """Let Python print the call stack of every thread if a library crashes."""
+    # Standard error can be closed, missing, or an object that is not a file; each raises another error.
+    with suppress(OSError, ValueError, AttributeError, RuntimeError):
+        faulthandler.enable()
+
+
+def _replace_unprintable_characters() -> None:
+    """Let a terminal that cannot show a character, such as °, show a question mark."""
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        stream.reconfigure(errors="replace")
+
+
 def _call_command() -> None:
     """Call the command that the arguments name, and flush its output. Always raises SystemExit or an error."""
     try:
-        with gate(warn, ours=_trusted_folders, folder=_trusted_hashes):
+        with trust.gate(warn, trusted_folders=_trusted_folders, hash_folder=_hash_folder):
             # --debug is accepted before and after the command.
-            words = [word for word in sys.argv[1:] if word != DEBUG]
-            app(words, prog_name=app.info.name)
+            arguments = [argument for argument in sys.argv[1:] if argument != DEBUG]
+            app(arguments, prog_name=app.info.name)
     finally:
         flush_output()
 
@@ -62,7 +71,7 @@ def _trusted_folders() -> tuple[Path, ...]:
     return builtin_root(), Path.cwd()
 
 
-def _trusted_hashes() -> Path:
+def _hash_folder() -> Path:
     """The folder that holds the hashes of the scene makers that the user trusts."""
     from vobench.runner.key import cache_folder
 

@@ -27,7 +27,7 @@ def compare_command(
     ] = None,
     json: Json = False,
 ) -> None:
-    """Print the scores that differ between two runs; exit code 3 if one is worse or a trial fails that did not."""
+    """Print the scores that differ between two runs; exit code 3 if one is worse or a trial newly fails."""
     comparison = compare_runs(old, new, terminal.warn, at_most=at_most)
     if json:
         content = {
@@ -45,20 +45,22 @@ def compare_command(
 def _print_changes(changes: Sequence[ScoreChange], environment_differences: Sequence[str]) -> None:
     """Print the scores over all cases, the cells that changed, and the differences between the environments."""
     console = terminal.console()
-    totals = [change for change in changes if not change.case]  # over all cases
+    totals = [change for change in changes if not change.case]  # a change over all cases names no case
     cells = [change for change in changes if change.case]
     changed_cells = [cell for cell in cells if cell.verdict != SAME]
 
     if totals:
-        rows = [_row(change) for change in totals]
-        console.print(terminal.table("lost-aware score over all cases", HEADINGS, rows))
+        total_rows = [_row(total) for total in totals]
+        console.print(terminal.table("lost-aware score over all cases", HEADINGS, total_rows))
     if changed_cells:
-        rows = [[cell.case, *_row(cell)] for cell in changed_cells]
-        console.print(terminal.table("ATE (% of path length)", ["case", *HEADINGS], rows))
+        cell_rows = [[cell.case, *_row(cell)] for cell in changed_cells]
+        console.print(terminal.table("ATE (% of path length)", ["case", *HEADINGS], cell_rows))
+    if totals or changed_cells:
+        console.print(RATIO_EXPLANATION)
     same_count = len(cells) - len(changed_cells)
-    console.print(f"{same_count} of {len(cells)} cells are the same to the last digit; {RATIO_EXPLANATION}")
+    console.print(f"{same_count} of {len(cells)} cells are the same to the last digit")
     if environment_differences:
-        console.print(f"The runs differ in what can change scores: {'; '.join(environment_differences)}")
+        console.print(f"The runs differ in settings that can change scores: {'; '.join(environment_differences)}")
 
 
 def _row(change: ScoreChange) -> list[str]:

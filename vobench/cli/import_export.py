@@ -13,7 +13,7 @@ from vobench.dataset.conversion import convert
 from vobench.errors import counted
 from vobench.runner.import_recording import import_dataset
 
-COMMAND_CLASS = FormCommand
+COMMAND_CLASS = FormCommand  # both commands are of this class, which lists the known forms in its help
 
 
 @with_option_groups
@@ -29,16 +29,11 @@ def import_command(
     options = recording_options.read_options(imu)
     imported = import_dataset(path, out, form=recording_options.form, options=options)
     if json:
-        content = {
-            "form": imported.form,
-            "path": str(out),
-            "frames": imported.frame_count,
-            "notes": imported.notes,
-        }
+        content = {"form": imported.form, "path": str(out), "frames": imported.frame_count, "notes": imported.notes}
         terminal.print_json(content)
         return
     frames = counted(imported.frame_count, "frame")
-    _print_result(imported.notes, f"imported {frames} of a recording of the form '{imported.form}': {out}")
+    _print_result(imported.notes, f"imported {frames} (form: {imported.form}): {out}")
 
 
 def export_command(
@@ -48,14 +43,14 @@ def export_command(
     form: Annotated[str, typer.Option(help="The form to write")],
     json: Json = False,
 ) -> None:
-    """Write a sequence in another layout, or a trajectory in another form, and print what was lost."""
+    """Write a sequence in another layout, or a trajectory in another format, and print what was lost."""
     exported = convert(source, out, form)
     if json:
         content = {"form": form, "path": str(out), "files": exported.file_count, "notes": exported.notes}
         terminal.print_json(content)
         return
     files = counted(exported.file_count, "file")
-    _print_result(exported.notes, f"exported {files} of the form '{form}': {out}")
+    _print_result(exported.notes, f"exported {files} (form: {form}): {out}")
 
 
 def _print_result(notes: Iterable[str], sentence: str) -> None:

@@ -1,7 +1,8 @@
 """Reads calibration files in YAML, and checks their sections against frozen dataclasses."""
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -19,12 +20,13 @@ from vobench.setting import MESSAGES as SETTING_MESSAGES
 MOST_CHARACTERS = 1 << 16  # a typical calibration file has 1000 to 2000 characters
 OPENCV_HEAD = re.compile(r"\A%YAML:1\.0[^\n]*")  # OpenCV requires this first line, which YAML forbids
 MOST_BRACKETS = 500  # a camera has about 12; the parser's time grows with the square of their nesting depth
-LONGEST_SHOWN = 120  # the largest number of characters of a value in a message
+MOST_VALUE_CHARACTERS = 120  # of a value in a message
+MOST_ERROR_CHARACTERS = 200  # of the parser's error in a message
 
 Model = TypeVar("Model")
 
-
 # The message for each of pydantic's error types. The fields in braces are filled in from the context of the error.
+# Some differ from those of settings, because they are followed by the value.
 MESSAGES = {
     **SETTING_MESSAGES,
     "float_type": "should be a finite number",
@@ -53,7 +55,9 @@ class CalibrationFile:
         return self.tree.get(key) is not None
 
     def checked(self, kind: type[Model], section: str = "") -> Model:
-        """The file, or one of its sections, as an instance of the dataclass `kind`. Keys that it lacks are ignored.
+        """The file, or one of its sections, as an instance of the dataclass `kind`.
+
+        Keys of the file that the dataclass does not have are ignored.
 
         Raises InputError with the file, the key, the wrong value and what would be right.
         """
@@ -79,8 +83,10 @@ class CalibrationFile:
         if first["type"] == "missing":
             return self.missing_key_error(key, first["input"])
 
-        template = MESSAGES.get(first["type"], first["msg"])
-        requirement = template.format(**first.get("ctx", {}))
+        template = MESSAGES.get(first["type"])
+        requirement = first["msg"]
+        if template is not None:
+            requirement = template.format(**first.get("ctx", {}))
         return InputError(f"{self.path}: {key} {requirement}, but is {shown(first['input'])}")
 
 
@@ -88,19 +94,13 @@ def read_yaml(path: Path) -> CalibrationFile:
     """Read a YAML 1.2 file. Raises InputError with the line and column, if they are known."""
     text = OPENCV_HEAD.sub("", read_text(path), count=1)
     _require_small(text, path)
-    try:
+    with _parser_errors(path):
         alias = _first_alias(text)
-        tree = None if alias else YAML(typ="safe", pure=True).load(text)
-    except MarkedYAMLError as error:
-        mark = error.problem_mark
-        place = f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)
-        raise InputError(f"{place}: not valid YAML: {_one_line(error.problem or error)}") from None
-    except Exception as error:  # the parser raises many types of errors for malformed text
-        raise InputError(f"{path}: not valid YAML: {type(error).__name__} {_one_line(error)}") from None
-
     if alias is not None:
         line = alias.start_mark.line + 1
         raise InputError(f"{path}:{line}: a calibration may not use a YAML alias (*{alias.anchor})")
+    with _parser_errors(path):
+        tree = YAML(typ="safe", pure=True).load(text)
     if not isinstance(tree, dict):
         raise InputError(f"{path}: should be keys with values, but is {shown(tree)}")
     return CalibrationFile(path, tree)
@@ -115,6 +115,19 @@ def _require_small(text: str, path: Path) -> None:
         raise InputError(f"{path}: a calibration in YAML should have at most {MOST_BRACKETS} brackets, not {brackets}")
 
 
+@contextmanager
+def _parser_errors(path: Path) -> Iterator[None]:
+    """Raise InputError with the place in the file for each error of the YAML parser in the block."""
+    try:
+        yield
+    except MarkedYAMLError as error:
+        mark = error.problem_mark
+        place = f"{path}:{mark.line + 1}:{mark.column + 1}" if mark else str(path)
+        raise InputError(f"{place}: not valid YAML: {_one_line(error.problem or error)}") from None
+    except Exception as error:  # the parser raises many types of errors for malformed text
+        raise InputError(f"{path}: not valid YAML: {type(error).__name__} {_one_line(error)}") from None
+
+
 def _first_alias(text: str) -> AliasEvent | None:
     """The first alias in a YAML text. A few nested aliases can expand to more than fits into memory."""
     for event in YAML(typ="safe", pure=True).parse(text):
@@ -126,7 +139,7 @@ def _first_alias(text: str) -> AliasEvent | None:
 def _one_line(error: object) -> str:
     """The text of an error as one line, shortened."""
     words = str(error).split()
-    return " ".join(words)[:200]
+    return " ".join(words)[:MOST_ERROR_CHARACTERS]
 
 
 def shown(value: Any) -> str:
@@ -135,6 +148,6 @@ def shown(value: Any) -> str:
 
 
 def _shortened(text: str) -> str:
-    if len(text) <= LONGEST_SHOWN:
+    if len(text) <= MOST_VALUE_CHARACTERS:
         return text
-    return f"{text[: LONGEST_SHOWN - 3]}..."
+    return f"{text[: MOST_VALUE_CHARACTERS - 3]}..."

@@ -12,6 +12,7 @@ from vobench.dataset.kitti_folder import (
     GREY_PAIR,
     PAIRS,
     POSES,
+    POSES_FOLDER,
     T_BODY_GREY,
     TIMES,
     matrix_name,
@@ -33,6 +34,7 @@ TRUTH_DESCRIPTION = (
 
 
 def _is_kitti(folder: Path) -> bool:
+    """Whether a folder has pictures of a left camera."""
     return any((folder / left).is_dir() for left, _ in PAIRS)
 
 
@@ -50,16 +52,45 @@ def read_kitti(folder: Path, options: ReadOptions) -> Recording:
     stream = picture_files(t_ns, *pictures)
     calibration = _calibrated_rig(folder, cameras.names, stream.size_px, options)
 
-    root = folder.absolute()
-    poses_name = f"{root.name}.txt"
-    truth_paths = [root / POSES, root / poses_name]
-    truth_paths += [parent / "poses" / poses_name for parent in root.parents[:2]]
-    truth, truth_notes = truth_file(options, truth_paths, t_ns, TRUTH_DESCRIPTION, T_BODY_GREY)
+    truth, truth_notes = truth_file(
+        options,
+        beside=_truth_paths(folder),
+        frames_ns=t_ns,
+        whose=TRUTH_DESCRIPTION,
+        turn=T_BODY_GREY,
+    )
 
-    notes = ["The body is the left grey camera, x ahead, y left, z up."]
-    notes += [*cameras.notes, *calibration.notes, *truth_notes]
-    notes += unread(folder, *GREY_PAIR, *COLOUR_PAIR, CALIBRATION, TIMES, POSES, poses_name)
-    return assemble("kitti", calibration.rig, stream, t_ns, truth=truth, notes=notes, calibration=calibration.source)
+    known_names = [*GREY_PAIR, *COLOUR_PAIR, CALIBRATION, TIMES, POSES, _named_poses(folder)]
+    notes = [
+        "The body is the left grey camera, x ahead, y left, z up.",
+        *cameras.notes,
+        *calibration.notes,
+        *truth_notes,
+        *unread(folder, *known_names),
+    ]
+    return assemble(
+        form="kitti",
+        rig=calibration.rig,
+        stream=stream,
+        t_ns=t_ns,
+        truth=truth,
+        notes=notes,
+        calibration=calibration.source,
+    )
+
+
+def _named_poses(folder: Path) -> str:
+    """The name of a file of poses that has the name of the sequence, such as 00.txt."""
+    return f"{folder.absolute().name}.txt"
+
+
+def _truth_paths(folder: Path) -> list[Path]:
+    """The files that can hold the ground truth of a sequence, in order of preference; see TRUTH_NAMES."""
+    root = folder.absolute()
+    poses_name = _named_poses(folder)
+    beside_pictures = [root / POSES, root / poses_name]
+    in_poses_folder = [parent / POSES_FOLDER / poses_name for parent in root.parents[:2]]
+    return [*beside_pictures, *in_poses_folder]
 
 
 class _CameraFolders(NamedTuple):
@@ -87,7 +118,9 @@ def _camera_folders(folder: Path) -> _CameraFolders:
 def _note_on_unused(present: list[str], used: tuple[str, ...]) -> Notes:
     """A note on the camera folders that are present but not used; empty if all are used."""
     unused = [name for name in present if name not in used]
-    return (f"The pictures of {' and '.join(unused)} were dropped.",) if unused else ()
+    if not unused:
+        return ()
+    return (f"The pictures of {' and '.join(unused)} were not used.",)
 
 
 def _calibrated_rig(
@@ -118,12 +151,16 @@ def _rig_of_calib_txt(path: Path, camera_folders: tuple[str, ...], size_px: tupl
             raise InputError(f"{path}: no matrix {name}, the projection matrix of {camera_folder}")
     rig = on_body(rig_of_matrices(path, matrices, used, size_px), T_BODY_GREY)
     unused = [name for name in matrices if name not in used]
-    notes = (f"{', '.join(unused)} of {CALIBRATION} were not used.",) if unused else ()
-    return CalibratedRig(rig, str(path), notes)
+    if not unused:
+        return CalibratedRig(rig, str(path), notes=())
+    note = f"{', '.join(unused)} of {CALIBRATION} were not used."
+    return CalibratedRig(rig, str(path), notes=(note,))
 
 
-# Truth beside the pictures, in a file of that name or of the name of its folder, or in the folder `poses`.
-TRUTH_NAMES = r"[^/]*/poses\.txt|(?P<sequence>[^/]+)/(?P=sequence)\.txt|poses/[^/]*\.txt"
+POSES_IN_SEQUENCE = r"[^/]*/poses\.txt"  # 00/poses.txt
+NAMED_POSES_IN_SEQUENCE = r"(?P<sequence>[^/]+)/(?P=sequence)\.txt"  # 00/00.txt
+POSES_IN_POSES_FOLDER = rf"{POSES_FOLDER}/[^/]*\.txt"  # poses/00.txt
+TRUTH_NAMES = "|".join([POSES_IN_SEQUENCE, NAMED_POSES_IN_SEQUENCE, POSES_IN_POSES_FOLDER])
 LAYOUTS = (
     Layout(
         name="kitti",

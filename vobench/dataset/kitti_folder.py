@@ -8,6 +8,7 @@ PAIRS = (GREY_PAIR, COLOUR_PAIR)  # in order of preference
 CALIBRATION = "calib.txt"
 TIMES = "times.txt"
 POSES = "poses.txt"
+POSES_FOLDER = "poses"  # beside the folders of the sequences
 # The body has its origin in the left grey camera. The body's axes are x ahead, y left, z up; the camera's are x right,
 # y down, z ahead.
 T_BODY_GREY = looking(pitch_deg=0.0, position_m=(0.0, 0.0, 0.0))

@@ -29,6 +29,7 @@ from vobench.trajectory.trajectory import Trajectory
 class ExportSource:
     """A sequence with its readings and ground truth. What was not recorded is None.
 
+    `true_rig` is the rig with its true calibration; without ground truth, it is the nominal one.
     `truth` is the trajectory of the body.
     `twist` (N, 6) is the linear velocity (m/s) and the angular velocity (rad/s) of the body, in the axes of the body.
     `channels` lists the recorded channels of per-pixel ground truth.
@@ -55,10 +56,10 @@ class ExportSource:
 def open_source(folder: Path) -> ExportSource:
     """Open the sequence in a folder for an export. Raises SequenceError if one of its files is incomplete."""
     sequence = Sequence.open(folder)
-    imu = sequence.imu()
-    readings = imu if len(imu.t_ns) else None
+    readings = sequence.imu()
+    imu = readings if len(readings.t_ns) else None
     if not has_truth(folder):
-        return ExportSource(folder, sequence, sequence.rig, imu=readings)
+        return ExportSource(folder, sequence, sequence.rig, imu=imu)
 
     truth = read_truth(folder)
     bias = read_imu_bias(folder)
@@ -69,7 +70,7 @@ def open_source(folder: Path) -> ExportSource:
         truth=truth if len(truth) else None,
         twist=read_twist(folder),
         bias=bias if len(bias.t_ns) else None,
-        imu=readings,
+        imu=imu,
         channels=truth_channels(folder),
         case=_case(folder),
     )
@@ -78,7 +79,7 @@ def open_source(folder: Path) -> ExportSource:
 def _case(folder: Path) -> Mapping[str, Any] | None:
     """The description of the simulated case; None if the sequence has none.
 
-    Raises SequenceError if the attachment is damaged or is not JSON.
+    JSON that is not an object is no description. Raises SequenceError if the attachment is damaged or is not JSON.
     """
     if not has_case(folder):
         return None

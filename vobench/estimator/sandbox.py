@@ -24,7 +24,8 @@ class Sandbox:
 
     `sees` lists what the estimator could see besides its own files and processes.
     `read` lists the folders that the user has opened to all estimators.
-    `why` is the reason why the kernel did not allow a private mount tree; empty if it did.
+    `why` is the reason why there is no private mount tree: the sandbox is switched off, the system is not Linux, or the
+    kernel did not allow it. It is empty if there is one.
     """
 
     level: Level
@@ -57,6 +58,6 @@ def from_guard_report(visible: Sequence[str], no_mount_tree_reason: str) -> Sand
 
 
 def unsandboxed() -> Sandbox:
-    """The record of a program that is not isolated, because the user has switched the sandbox off or it needs Linux."""
+    """The record of a program that is not isolated, because the user has switched it off or the system is not Linux."""
     reason = f"{SWITCH_VARIABLE}={OFF}" if is_switched_off() else "not Linux"
     return Sandbox("none", sees=EVERYTHING, why=reason)

@@ -554,7 +554,7 @@ def drawn_calibration_error(
     center_y_px = error.center_px[1] + usual_center_y_px * center_y
 
     def turn_deg(shift_px: float, arm_px: float) -> float:
-        """The angle that shifts a point at this distance by so many pixels."""
+        """The angle that shifts a point at this distance by a number of pixels."""
         return float(np.degrees(np.arctan(shift_px / arm_px)))
 
     return replace(

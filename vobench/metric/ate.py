@@ -7,7 +7,7 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.metric.blockwise import ErrorArrays, in_blocks
+from vobench.metric.blockwise import in_blocks
 from vobench.metric.comparison import HARTLEY, OURS, POSES, STURM_ATE, ZHANG, Comparison, MetricDefinition
 from vobench.metric.motion_error import MatrixErrors, PoseErrors, angle_rad, matrix_errors
 
@@ -17,19 +17,19 @@ def absolute_errors(T_gt: Array, T_est: Array) -> PoseErrors:
 
     The rotation error is the angle of R_est⁻¹ R_gt. Source: Sturm et al. (2012), section V-B.
     """
-    return PoseErrors(*in_blocks(len(T_gt), partial(_absolute_errors, T_gt, T_est)))
+    return in_blocks(len(T_gt), partial(_errors_of_block, T_gt, T_est))
 
 
-def _absolute_errors(T_gt: Array, T_est: Array, block: slice) -> ErrorArrays:
-    """The translation errors in m and rotation errors in rad of a block of poses (K, 4, 4)."""
+def _errors_of_block(T_gt: Array, T_est: Array, block: slice) -> PoseErrors:
+    """The errors of a block of poses (K, 4, 4)."""
     gt = T_gt[block]
     est = T_est[block]
     offset_m = est[:, :3, 3] - gt[:, :3, 3]
     R_est_gt = se3.transposed(est[:, :3, :3]) @ gt[:, :3, :3]
-    return np.linalg.norm(offset_m, axis=1), angle_rad(R_est_gt)
+    return PoseErrors(np.linalg.norm(offset_m, axis=1), angle_rad(R_est_gt))
 
 
-def absolute(comparison: Comparison) -> PoseErrors:
+def errors_of_comparison(comparison: Comparison) -> PoseErrors:
     """The absolute errors of the matched poses of a comparison."""
     return absolute_errors(comparison.matched.T_gt, comparison.T_aligned)
 
@@ -38,7 +38,7 @@ def _matrix_errors(comparison: Comparison) -> MatrixErrors:
     """The matrix errors of the error poses T_est⁻¹ T_gt of a comparison."""
     T_gt = comparison.matched.T_gt
     T_est = comparison.T_aligned
-    return MatrixErrors(*in_blocks(len(T_gt), partial(_matrix_errors_of_block, T_gt, T_est)))
+    return in_blocks(len(T_gt), partial(_matrix_errors_of_block, T_gt, T_est))
 
 
 def _matrix_errors_of_block(T_gt: Array, T_est: Array, block: slice) -> MatrixErrors:
@@ -66,8 +66,8 @@ def _axis_measure(axis: str) -> Callable[[Comparison], Array]:
     return lambda comparison: comparison.once(_axis_errors)[axis]
 
 
-BLIND_TO_PLACE = "where along the path an error arose: one early rotation error displaces all later poses"
-BLIND_TO_LOST = "frames without a pose: see coverage"
+PLACE_OF_ERROR = "where along the path an error arose: one early rotation error displaces all later poses"
+UNTRACKED_FRAMES = "frames without a pose: see coverage"
 _pose_metric = partial(MetricDefinition, settings=POSES)
 METRICS = (
     _pose_metric(
@@ -76,9 +76,9 @@ METRICS = (
         unit="m",
         formula="‖p_est − p_gt‖ of each aligned pose",
         source=STURM_ATE,
-        blind=f"{BLIND_TO_PLACE}; {BLIND_TO_LOST}",
+        blind=f"{PLACE_OF_ERROR}; {UNTRACKED_FRAMES}",
         full=False,
-        measure=lambda comparison: comparison.once(absolute).trans_m,
+        measure=lambda comparison: comparison.once(errors_of_comparison).trans_m,
     ),
     _pose_metric(
         id="ate_rot",
@@ -86,9 +86,9 @@ METRICS = (
         unit="deg",
         formula="angle of R_est⁻¹ R_gt of each aligned pose",
         source=STURM_ATE,
-        blind=f"a rotation that the alignment cannot observe: see alignment.unobservable; {BLIND_TO_LOST}",
+        blind=f"a rotation that the alignment cannot observe: see alignment.unobservable; {UNTRACKED_FRAMES}",
         full=False,
-        measure=lambda comparison: np.rad2deg(comparison.once(absolute).rot_rad),
+        measure=lambda comparison: np.rad2deg(comparison.once(errors_of_comparison).rot_rad),
     ),
     _pose_metric(
         id="ate_rot_chordal",
@@ -96,7 +96,7 @@ METRICS = (
         unit="1",
         formula="‖R_est⁻¹ R_gt − I‖_F = 2√2 sin(angle / 2)",
         source=HARTLEY,
-        blind=f"the same as ate_rot on another scale; {BLIND_TO_LOST}",
+        blind=f"what ate_rot does not show: it is ate_rot on another scale; {UNTRACKED_FRAMES}",
         measure=lambda comparison: comparison.once(_matrix_errors).rotation,
     ),
     _pose_metric(
@@ -105,9 +105,8 @@ METRICS = (
         unit="1",
         formula="‖T_est⁻¹ T_gt − I‖_F",
         source="evo's full",
-        blind=(
-            f"the difference between translation and rotation: their sum depends on the unit of length; {BLIND_TO_LOST}"
-        ),
+        blind="the difference between translation and rotation: their sum depends on the unit of length; "
+        f"{UNTRACKED_FRAMES}",
         measure=lambda comparison: comparison.once(_matrix_errors).full,
     ),
     *(
@@ -117,7 +116,7 @@ METRICS = (
             unit="m",
             formula=f"{axis} of p_est − p_gt, with its sign",
             source=OURS,
-            blind=f"errors along the other axes; {BLIND_TO_LOST}",
+            blind=f"errors along the other axes; {UNTRACKED_FRAMES}",
             measure=_axis_measure(axis),
         )
         for axis in ("x", "y", "z")
@@ -129,7 +128,7 @@ METRICS = (
             unit="deg",
             formula=f"{axis} of R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll), with its sign",
             source=ZHANG,
-            blind=f"roll and yaw separately at a pitch near 90°, where their axes coincide; {BLIND_TO_LOST}",
+            blind=f"roll and yaw separately at a pitch near 90°, where their axes coincide; {UNTRACKED_FRAMES}",
             measure=_axis_measure(axis),
         )
         for axis in ("roll", "pitch", "yaw")

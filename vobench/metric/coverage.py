@@ -17,6 +17,8 @@ MOTION_CAPTURE_STEP_NS = 30_000_000  # ground truth with a shorter median step i
 SLOT_NS = 200_000_000  # a camera at 10 Hz has an image in every slot
 END_NS = 100_000_000  # the largest time from the last image of a camera at 10 Hz to the end of the recording
 
+SlotKind = Literal["frames", "time"]
+
 
 @dataclass(frozen=True, slots=True)
 class Coverage:
@@ -28,9 +30,12 @@ class Coverage:
     A track is a run of estimated poses without a gap. Every track after the first one is a relocalisation.
 
     `ratio` is the share of slots with an estimated pose.
+    `gaps` and `relocalisations` are counts.
     `longest_gap_frames` and `longest_gap_s` are the number of true poses in the gap with the most slots, and its
-    duration.
+    duration. Another gap can last longer.
     `first_lost_frame` is the index of the first true pose in a gap, None without gaps.
+    `time_to_first_pose_s` is measured from the start of the ground truth; it is None without poses.
+    `longest_track_s` is the longest duration of a track, 0 without poses.
     `ends_lost` is whether the last slot has no pose or, for slots of 0.2 s, the last 0.1 s has none.
     """
 
@@ -39,15 +44,28 @@ class Coverage:
     longest_gap_frames: int
     longest_gap_s: float
     first_lost_frame: int | None
-    slot_kind: Literal["frames", "time"]
+    slot_kind: SlotKind
     time_to_first_pose_s: float | None
     longest_track_s: float
     relocalisations: int
     ends_lost: bool
 
 
-def slots(gt_t_ns: Stamps, rule: CoverageOf) -> Index:
-    """The index (N,), from 0, of the slot of each true pose. A complete estimate has a pose in every slot.
+@dataclass(frozen=True, slots=True)
+class Slots:
+    """The slots of N true poses: the index (N,) of the slot of each pose, from 0, and what a slot is."""
+
+    of_frame: Index
+    kind: SlotKind
+
+    @property
+    def count(self) -> int:
+        """The number of slots."""
+        return int(self.of_frame[-1] + 1)
+
+
+def slots(gt_t_ns: Stamps, rule: CoverageOf) -> Slots:
+    """The slots of a ground truth with stamps (N,). A complete estimate has a pose in every slot.
 
     With "frames", each true pose is a slot. With "auto", each true pose is a slot unless the ground truth is from
     motion capture, which has more poses than a camera has frames; then each interval of 0.2 s is a slot.
@@ -56,11 +74,12 @@ def slots(gt_t_ns: Stamps, rule: CoverageOf) -> Index:
     steps_ns = np.diff(gt_t_ns)
     has_frames = not len(steps_ns) or np.median(steps_ns) >= MOTION_CAPTURE_STEP_NS
     if rule == "frames" or has_frames:
-        return np.arange(len(gt_t_ns))
+        return Slots(np.arange(len(gt_t_ns)), "frames")
     elapsed_ns = gt_t_ns - gt_t_ns[0]
     interval_count = max(int(elapsed_ns[-1] // SLOT_NS), 1)
     interval = np.minimum(elapsed_ns // SLOT_NS, interval_count - 1)  # the last interval includes the remainder
-    return np.unique(interval, return_inverse=True)[1]  # intervals without a true pose are not slots
+    _, slot_of_frame = np.unique(interval, return_inverse=True)  # intervals without a true pose are not slots
+    return Slots(slot_of_frame, "time")
 
 
 def coverage(gt_t_ns: Stamps, estimated_frames: Index, *, rule: CoverageOf = "frames") -> Coverage:
@@ -69,10 +88,8 @@ def coverage(gt_t_ns: Stamps, estimated_frames: Index, *, rule: CoverageOf = "fr
     `estimated_frames` (K,) are the indices of the true poses for which the estimate has a pose.
     """
     frames = np.unique(estimated_frames)
-    slot = slots(gt_t_ns, rule)
-    slot_count = int(slot[-1] + 1)
-    has_time_slots = slot_count < len(gt_t_ns)
-    intervals = _intervals(gt_t_ns, frames, slot)
+    gt_slots = slots(gt_t_ns, rule)
+    intervals = _intervals(gt_t_ns, frames, gt_slots)
     is_gap = intervals.lost_slots > 0
     longest_gap = _longest_gap(intervals)
 
@@ -83,16 +100,16 @@ def coverage(gt_t_ns: Stamps, estimated_frames: Index, *, rule: CoverageOf = "fr
         longest_track_s = _longest_track_ns(intervals) / NS_PER_S
 
     return Coverage(
-        ratio=len(np.unique(slot[frames])) / slot_count,
+        ratio=len(np.unique(gt_slots.of_frame[frames])) / gt_slots.count,
         gaps=int(np.count_nonzero(is_gap)),
         longest_gap_frames=longest_gap.frames,
         longest_gap_s=longest_gap.duration_ns / NS_PER_S,
         first_lost_frame=_first_lost_frame(intervals),
-        slot_kind="time" if has_time_slots else "frames",
+        slot_kind=gt_slots.kind,
         time_to_first_pose_s=time_to_first_pose_s,
         longest_track_s=longest_track_s,
         relocalisations=int(np.count_nonzero(is_gap[1:-1])),
-        ends_lost=_ends_lost(intervals, has_time_slots=has_time_slots),
+        ends_lost=_ends_lost(intervals, gt_slots.kind),
     )
 
 
@@ -113,19 +130,18 @@ class _Intervals:
     lost_slots: Index
 
 
-def _intervals(gt_t_ns: Stamps, frames: Index, slot: Index) -> _Intervals:
-    """The intervals between the frames (K,) that have a pose; `slot` (N,) is the slot of each true pose."""
+def _intervals(gt_t_ns: Stamps, frames: Index, gt_slots: Slots) -> _Intervals:
+    """The intervals between the frames (K,) that have a pose."""
     frame_count = len(gt_t_ns)
-    slot_count = int(slot[-1] + 1)
     border_frames = np.concatenate([[-1], frames, [frame_count]])
-    border_slots = np.concatenate([[-1], slot[frames], [slot_count]])
+    border_slots = np.concatenate([[-1], gt_slots.of_frame[frames], [gt_slots.count]])
     border_ns = gt_t_ns[np.clip(border_frames, 0, frame_count - 1)]
     return _Intervals(
         begin_frame=border_frames[:-1],
         end_frame=border_frames[1:],
         begin_ns=border_ns[:-1],
         end_ns=border_ns[1:],
-        lost_slots=np.maximum(np.diff(border_slots) - 1, 0),
+        lost_slots=np.maximum(np.diff(border_slots) - 1, 0),  # two poses can be in one slot
     )
 
 
@@ -165,11 +181,11 @@ def _longest_track_ns(intervals: _Intervals) -> float:
     return float(durations_ns.max())
 
 
-def _ends_lost(intervals: _Intervals, *, has_time_slots: bool) -> bool:
+def _ends_lost(intervals: _Intervals, slot_kind: SlotKind) -> bool:
     """Whether the last slot has no pose or, for slots of 0.2 s, the last 0.1 s has none."""
     time_after_last_pose_ns = intervals.end_ns[-1] - intervals.begin_ns[-1]
     is_last_slot_lost = intervals.lost_slots[-1] > 0
-    is_end_late = has_time_slots and time_after_last_pose_ns > END_NS
+    is_end_late = slot_kind == "time" and time_after_last_pose_ns > END_NS
     return bool(is_last_slot_lost or is_end_late)
 
 

@@ -4,11 +4,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from vobench.metric import ate, coverage, lost_aware, nees, rpe, segment
+from vobench.metric import ate, coverage, lost_aware, nees, part_error, rpe, segment
 from vobench.metric.comparison import DEFAULTS, MetricDefinition
 from vobench.metric.settings import ScoreSettings
 
-FAMILIES = (ate, rpe, segment, nees, coverage, lost_aware)
+FAMILIES = (ate, rpe, part_error, segment, nees, coverage, lost_aware)
 METRICS = [metric for family in FAMILIES for metric in family.METRICS]
 DEFINITIONS: dict[str, MetricDefinition] = {metric.id: metric for metric in METRICS}
 

@@ -2,13 +2,12 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.metric.blockwise import ErrorArrays, in_blocks
+from vobench.metric.blockwise import in_blocks
 from vobench.trajectory.associate import Index
 
 
@@ -23,7 +22,8 @@ class PoseErrors:
         return len(self.trans_m)
 
 
-class MatrixErrors(NamedTuple):
+@dataclass(frozen=True, slots=True)
+class MatrixErrors:
     """Frobenius norms (N,) of E - I for error poses E: of the rotation part, and of the whole matrix.
 
     evo calls these errors rot_part and full.
@@ -69,7 +69,7 @@ def motion_errors(T_gt_first_last: Array, T_est_first_last: Array) -> PoseErrors
     """Errors of estimated motions (N, 4, 4) relative to the true ones."""
     gt = _pose_columns(T_gt_first_last)
     est = _pose_columns(T_est_first_last)
-    return PoseErrors(*_relative_errors(gt, est))
+    return _relative_errors(gt, est)
 
 
 def errors_between(T_gt: Array, T_est: Array, first: Index, last: Index) -> PoseErrors:
@@ -79,7 +79,7 @@ def errors_between(T_gt: Array, T_est: Array, first: Index, last: Index) -> Pose
     Source: Sturm et al. (2012), section V-A: (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j).
     """
     block_errors = partial(_errors_of_pairs, _pose_columns(T_gt), _pose_columns(T_est), first, last)
-    return PoseErrors(*in_blocks(len(first), block_errors))
+    return in_blocks(len(first), block_errors)
 
 
 # The functions below store N poses as an array (3, 4, N). They take two thirds of the time that numpy takes for N small
@@ -92,7 +92,7 @@ def _pose_columns(T: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(upper_rows, 0, -1))
 
 
-def _errors_of_pairs(gt: Array, est: Array, first: Index, last: Index, block: slice) -> ErrorArrays:
+def _errors_of_pairs(gt: Array, est: Array, first: Index, last: Index, block: slice) -> PoseErrors:
     """The `_relative_errors` of the motions between a block of pairs of poses, given as arrays (3, 4, K)."""
     first = first[block]
     last = last[block]
@@ -111,12 +111,12 @@ def _relative_poses(first: Array, last: Array) -> Array:
     return np.concatenate([R, t[:, None]], axis=1)
 
 
-def _relative_errors(gt: Array, est: Array) -> ErrorArrays:
-    """Translation errors (N,) in m and rotation errors (N,) in rad of poses `est` relative to `gt`, both (3, 4, N)."""
+def _relative_errors(gt: Array, est: Array) -> PoseErrors:
+    """The errors of poses `est` relative to `gt`, both (3, 4, N)."""
     E = _relative_poses(gt, est)
     t = E[:, 3]
     length = np.sqrt(np.einsum("in,in->n", t, t))
-    return length, _angle_of_columns_rad(E[:, :3])
+    return PoseErrors(length, _angle_of_columns_rad(E[:, :3]))
 
 
 def _angle_of_columns_rad(R: Array) -> Array:

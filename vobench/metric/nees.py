@@ -55,7 +55,7 @@ def consistency(
 
 
 def independent_samples(nees: Array) -> float:
-    """How many independent samples the normalised squared errors (K,) along a path are worth, at least 1.
+    """The effective number of independent samples in the normalised squared errors (K,) along a path, at least 1.
 
     Errors of successive poses are correlated. Their number is divided by the integrated autocorrelation time of their
     logarithm. An autocorrelation that is measured about the mean of the same samples looks too short;

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from vobench.errors import counted
 from vobench.geometry.se3 import Array
 from vobench.metric import nees
-from vobench.metric.ate import absolute
+from vobench.metric.ate import errors_of_comparison
 from vobench.metric.comparison import DEFAULTS, Comparison, MetricDefinition, OverLengths, compare
 from vobench.metric.coverage import SLOT_NS, Coverage, coverage, slots
 from vobench.metric.definitions import DEFINITIONS, identity
@@ -263,9 +263,9 @@ def score(
     samples = _samples(comparison, metrics)
     scored = tuple(part.metric(complete_settings, n=n, of=len(gt)) for part in samples)
 
-    ate = comparison.once(absolute)
+    ate = comparison.once(errors_of_comparison)
     covered = coverage(gt.t_ns, frames, rule=settings.coverage_of)
-    slot = slots(gt.t_ns, settings.coverage_of)[frames]
+    slot = slots(gt.t_ns, settings.coverage_of).of_frame[frames]
     path_m = float(comparison.distances_m[-1])
     warnings = (*_matching_warnings(comparison, covered), *_missing_warnings(comparison, scored))
     return Score(

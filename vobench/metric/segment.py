@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.metric.blockwise import ErrorArrays, in_blocks
+from vobench.metric.blockwise import in_blocks
 from vobench.metric.comparison import POSES, Comparison, MetricDefinition, OverLengths
 from vobench.metric.motion_error import PoseErrors, distances_between, errors_between
 from vobench.metric.settings import INDOOR_LENGTHS_M, Mean, Precision
@@ -65,7 +65,7 @@ def segment_errors(
 
     if precision == "devkit":
         divisor_m = divisor_m.astype(np.float32)
-        errors = PoseErrors(*in_blocks(len(first), partial(_devkit_errors, T_gt, T_est, first, last)))
+        errors = in_blocks(len(first), partial(_devkit_errors, T_gt, T_est, first, last))
     else:
         errors = errors_between(T_gt, T_est, first, last)
     return SegmentErrors(
@@ -136,7 +136,7 @@ def _devkit_errors(
     first: Index,
     last: Index,
     block: slice,
-) -> ErrorArrays:
+) -> PoseErrors:
     """The errors of a block of segments with the devkit's rounding.
 
     Inverses are computed in float64, then everything in float32, and angles from their cosine.
@@ -153,7 +153,7 @@ def _devkit_errors(
     trace = (xx + yy + zz).astype(np.float64)
     cosine = (0.5 * (trace - 1.0)).astype(np.float32)
     clipped = np.clip(cosine, np.float32(-1), np.float32(1))
-    return length, np.arccos(clipped)
+    return PoseErrors(length, np.arccos(clipped))
 
 
 def segments(comparison: Comparison) -> SegmentErrors:

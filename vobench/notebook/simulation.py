@@ -34,43 +34,47 @@ class Simulation:
     @property
     def ground_truth(self) -> "Trajectory":
         """The true trajectory of the left camera."""
-        return read_trajectory(self.path)
+        return read_trajectory(self.path)  # of a sequence's folder, this is the truth of its left camera
 
     def __repr__(self) -> str:
         return f"Simulation({self.case.name}, {self.path})"
 
 
 def simulate(
-    case: AnyCase | str,
+    suite_or_case: str | AnyCase,
     *,
-    name: str | None = None,
+    case_name: str | None = None,
     changes: Mapping[str, Any] | None = None,
     quiet: bool = False,
 ) -> Simulation:
     """Simulate a case, or import it if it is a recording. A cached result is reused.
 
-    `case` is a case from `check(suite).plan.cases`, or the name or path of a suite.
-    `name` selects a case of the suite; without it, the first case is used.
+    `suite_or_case` is the name or path of a suite, or a case from `check(suite).plan.cases`.
+    `case_name` selects a case of the suite; without it, the first case is used.
     `changes` modify the suite, as in `run`.
     Raises SuiteError if the suite is wrong, UnknownNameError if there is no such suite or case, and InputError if
-    `name` or `changes` are given without a suite.
+    `case_name` or `changes` are given with a case.
     """
-    chosen = _chosen_case(case, name, changes)
-    folder = perform_tasks(sequence_tasks(chosen), display=choose_display(is_quiet=quiet))
-    return Simulation(chosen, folder)
+    case = _selected_case(suite_or_case, case_name, changes)
+    folder = perform_tasks(sequence_tasks(case), display=choose_display(is_quiet=quiet))
+    return Simulation(case, folder)
 
 
-def _chosen_case(case: AnyCase | str, name: str | None, changes: Mapping[str, Any] | None) -> AnyCase:
+def _selected_case(
+    suite_or_case: str | AnyCase,
+    case_name: str | None,
+    changes: Mapping[str, Any] | None,
+) -> AnyCase:
     """The given case, or the case of the given suite that has this name."""
-    if not isinstance(case, str):
-        if name or changes:
-            raise InputError("name and changes select and modify a case of a suite; leave them out for a case object")
-        return case
+    if not isinstance(suite_or_case, str):
+        if case_name or changes:
+            raise InputError("case_name and changes are for the cases of a suite; leave them out for a case object")
+        return suite_or_case
 
-    cases = plan(case, changes=changes).cases
-    if name is None:
+    cases = plan(suite_or_case, changes=changes).cases
+    if case_name is None:
         return cases[0]
-    names = [each.name for each in cases]
-    if name not in names:
-        raise UnknownNameError(unknown_name_sentence("case", name, names))
-    return cases[names.index(name)]
+    cases_by_name = {case.name: case for case in cases}
+    if case_name not in cases_by_name:
+        raise UnknownNameError(unknown_name_sentence("case", case_name, list(cases_by_name)))
+    return cases_by_name[case_name]

@@ -77,7 +77,7 @@ class Geometry:
 
 @dataclass(frozen=True, slots=True)
 class _Parts:
-    """What is known of triangles (T,) of the watertight mesh by the faces that they are parts of."""
+    """The properties of triangles (T,) of the watertight mesh, taken from the faces that they are parts of."""
 
     thing: NDArray[Any]
     mover: NDArray[Any]
@@ -122,7 +122,7 @@ def geometry(
 
 
 def _watertight_by_mover(faces: Triangles) -> WatertightMesh:
-    """The faces, watertight among those that move together."""
+    """The faces, made watertight separately for each rigid body."""
     corners_m = []
     parents = []
     weights = []

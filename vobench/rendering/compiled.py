@@ -32,7 +32,7 @@ IS_CACHED = _is_cached()
 def compiled(function: Function) -> Function:
     """Compile a function when it is first called. It runs without Python's lock, so threads run it side by side.
 
-    Where the cache folder cannot be written, each process compiles the function anew.
+    If the cache folder cannot be written, each process compiles the function again.
     """
     kernel: Any = numba.njit(nogil=True, cache=IS_CACHED, error_model="numpy")(function)
     return cast("Function", kernel)

@@ -107,7 +107,7 @@ class Context:
         EGL.eglDestroyContext(self._display, self._context)
 
     def facts(self) -> DriverFacts:
-        """What drives the context, which must be current."""
+        """The driver of the context, which must be current."""
         from OpenGL import GL
 
         renderer, gl_version, vendor = (

@@ -3,6 +3,7 @@
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Mask
@@ -14,33 +15,39 @@ from vobench.scene.triangles import Triangles
 class CutOuts:
     """Finds the hits that lie in the hole of a cut-out.
 
-    `material_of_face` (F + 1,) is the index of each face's material among those with cut-outs, or -1. The last element
-    is -1, so that a ray that hits no face, whose face is -1, finds no material.
+    `cutout_of_face` (F + 1,) is the index of each face's material among those with cut-outs, or -1. The last element is
+    -1, so that a ray that hits no face, whose face is -1, finds no material.
     """
 
     def __init__(self, faces: Triangles, materials: dict[str, Material]) -> None:
-        self._with_holes = {name: material for name, material in materials.items() if _has_holes(material)}
-        index_by_name = {name: index for index, name in enumerate(self._with_holes)}
+        self._materials_with_holes = {name: material for name, material in materials.items() if _has_holes(material)}
+        index_by_name = {name: index for index, name in enumerate(self._materials_with_holes)}
         index_by_thing = np.array([index_by_name.get(thing.material, -1) for thing in faces.things], np.int32)
-        self.material_of_face = np.append(index_by_thing[faces.thing], -1)
+        self.cutout_of_face = np.append(index_by_thing[faces.thing], -1)
         self._uv = faces.uv
 
-    def holes(self, hits: Hits) -> Mask:
+    def are_in_holes(self, hits: Hits) -> Mask:
         """Which of R hits are in a hole; a ray that hits no face is not."""
         is_hole = np.zeros(len(hits.face), bool)
-        if not self._with_holes:
+        if not self._materials_with_holes:
             return is_hole
-        material_of_hit = self.material_of_face[hits.face]
-        for index, material in enumerate(self._with_holes.values()):
-            rows = np.flatnonzero(material_of_hit == index)
-            second_weight = hits.u[rows, None]
-            third_weight = hits.v[rows, None]
-            first_weight = 1 - second_weight - third_weight
-            corners_uv_m = self._uv[hits.face[rows]]  # (K, 3, 2), of the K hits on this material
-            first_uv_m, second_uv_m, third_uv_m = np.moveaxis(corners_uv_m, 1, 0)
-            uv_m = first_weight * first_uv_m + second_weight * second_uv_m + third_weight * third_uv_m
+        cutout_of_hit = self.cutout_of_face[hits.face]
+        for index, material in enumerate(self._materials_with_holes.values()):
+            rows = np.flatnonzero(cutout_of_hit == index)
+            uv_m = self._texture_coordinates_m(hits, rows)
             is_hole[rows] = ~is_opaque(material, uv_m / material.tile_m)
         return is_hole
+
+    def _texture_coordinates_m(self, hits: Hits, rows: NDArray[np.intp]) -> Array:
+        """The texture coordinates (K, 2), in metres, of some hits, interpolated between the corners of their faces.
+
+        `hits.u` and `hits.v` are the barycentric weights of the second and the third corner.
+        """
+        second_weight = hits.u[rows, None]
+        third_weight = hits.v[rows, None]
+        first_weight = 1 - second_weight - third_weight
+        first_uv_m, second_uv_m, third_uv_m = np.moveaxis(self._uv[hits.face[rows]], 1, 0)  # each (K, 2)
+        return np.asarray(first_weight * first_uv_m + second_weight * second_uv_m + third_weight * third_uv_m)
 
 
 def _has_holes(material: Material) -> bool:
@@ -63,13 +70,12 @@ def is_opaque(material: Material, uv_tiles: Array) -> Mask:
 @lru_cache(maxsize=64)
 def _opacity(material: Material) -> Floats:
     """The alpha channel (H, W) of a material's texture, from 0 to 1; a single opaque pixel if it has none."""
-    if material.texture is None:
-        return np.ones((1, 1), np.float32)
-    pixels = material.texture.pixels()
-    has_opacity = pixels.ndim == 3 and pixels.shape[-1] == 4
-    if not has_opacity:
-        return np.ones((1, 1), np.float32)
-    return np.asarray(pixels[..., 3] / 255, np.float32)
+    if material.texture is not None:
+        pixels = material.texture.pixels()
+        has_opacity = pixels.ndim == 3 and pixels.shape[-1] == 4
+        if has_opacity:
+            return np.asarray(pixels[..., 3] / 255, np.float32)
+    return np.ones((1, 1), np.float32)
 
 
 def _sampled(tile: Floats, uv_tiles: Array) -> Array:

@@ -1,4 +1,4 @@
-"""Draws pictures: batches of triangles, mirrors and what is seen in them, the background, panes."""
+"""Draws pictures: batches of triangles, mirrors with their reflections, the background, and panes."""
 
 from collections.abc import Mapping, Sequence
 
@@ -49,7 +49,7 @@ class BatchDraw:
 
     @property
     def mirrors_in_colour(self) -> bool:
-        """Whether some surface tints what it mirrors or what is seen through it."""
+        """Whether a surface tints its reflections or the light that it transmits."""
         for defines in self._calls.shader_defines:
             shows_others = bool(defines & {ShaderDefine.IS_PLANAR, ShaderDefine.IS_PANE})
             is_tinting = bool(defines & {ShaderDefine.IS_MIRROR, ShaderDefine.IS_PANE, ShaderDefine.HAS_METAL})
@@ -88,7 +88,7 @@ class BatchDraw:
                 part = followed.get(mirror.index)
                 self._draw_mirror(mirror, view, target, box=box, visible=visible, part=part)
 
-        self._calls.background(view, canvas, target.weights)
+        self._calls.draw_background(view, canvas, target.weights)
         # How much of what is behind passes between leaves does not depend on the order in which rims are blended.
         self._draw_unmirrored(self._with_holes, visible, view, canvas, ShaderDefine.IS_RIM)
         self._draw_unmirrored(self._panes, visible, view, canvas)
@@ -105,12 +105,12 @@ class BatchDraw:
         share: float,
     ) -> None:
         """Add the mean of a target's samples in a box, times a share, to a total."""
-        self._calls.add(target, total, box, share)
+        self._calls.add_mean(target, total, box, share)
 
     def _begin(self, view: PinholeView, target: RenderTarget, box: Box) -> Canvas:
         canvas = target.canvases[view.depth]
         canvas.begin(box)
-        self._calls.begin(view, canvas, target.weights, self._probe)
+        self._calls.begin_view(view, canvas, target.weights, self._probe)
         return canvas
 
     def _draw_unmirrored(
@@ -129,12 +129,12 @@ class BatchDraw:
             if batch.index in visible:
                 shows_probe = self._probe and batch.has_gloss and probe_share(batch.material) > 0
                 probe_defines = [ShaderDefine.HAS_PROBE] if shows_probe else []
-                self._calls.surface(batch, visible, view, canvas, frozenset([*probe_defines, *defines]))
+                self._calls.draw_surface(batch, visible, view, canvas, frozenset([*probe_defines, *defines]))
 
     def _boxes(self, view: PinholeView, visible: Runs) -> dict[int, Box]:
         """Mirrors whose mirroring side is seen, all or those of which something is visible: boxes in the picture.
 
-        Where they are more than are followed, the choice must be the same whatever part of a picture is drawn.
+        If there are more mirrors than are drawn, the selection must be the same for every part of a picture.
         """
         is_choice = len(self._mirrors) > FOLLOWED[min(view.depth, MIRRORS - 1)]
         candidates = [mirror for mirror in self._mirrors if is_choice or self._is_visible(mirror, visible)]
@@ -166,7 +166,7 @@ class BatchDraw:
         boxes: dict[int, Box],
         box: Box,
     ) -> dict[int, Box]:
-        """Mirrors in a picture that are drawn again from behind, those that show most, and where in a box of it."""
+        """The mirrors in a picture whose reflections are drawn, largest first, each with its box of pixels."""
         if view.depth == MIRRORS or (self.needs_probe and not self._probe):
             return {}
         least_px = LEAST_SHARE * view.camera.width_px * view.camera.height_px
@@ -208,7 +208,7 @@ class BatchDraw:
             reflected = ShaderDefine.HAS_REFLECTION
         for batch in self._batches_of[mirror.index]:
             if batch.index in visible:
-                self._calls.surface(batch, visible, view, canvas, frozenset({reflected}))
+                self._calls.draw_surface(batch, visible, view, canvas, frozenset({reflected}))
 
 
 def _plane_towards(mirror: PlanarMirror, view: PinholeView) -> Plane | None:

@@ -33,6 +33,7 @@ class DrawCalls:
     """The draw calls of a scene, and the shader programs and buffers that they share.
 
     The OpenGL context in which an instance was created must be current whenever the instance is used.
+    In the methods, `weights` are the shares of red, green and blue in the luminance of a mono canvas.
     `light` is the id of the light-map texture.
     `panoramas` maps the index of a sky to its panorama; skies without a panorama are absent.
     The attribute `shader_defines` lists, for each batch, the preprocessor names of its shader.
@@ -53,16 +54,16 @@ class DrawCalls:
 
         self._elements = Elements(geometry.vertices, geometry.indices)
         self._empty_vertex_array = GL.glGenVertexArrays(1)
-        self._uploaded_poses = b""
-        self._pass_values = np.zeros((), PASS.dtype)
-        self._pass = Blocks(PASS.binding, self._pass_values[None])
-        self._batch_values = np.zeros(len(self._batches), BATCH.dtype)
+        self._pass_uniforms = np.zeros((), PASS.dtype)
+        self._pass_buffer = Blocks(PASS.binding, self._pass_uniforms[None])
+        self._batch_uniforms = np.zeros(len(self._batches), BATCH.dtype)
         for batch, textures in zip(self._batches, self._textures, strict=True):
-            set_batch(self._batch_values[batch.index], batch, textures.body)
-        self._block = Blocks(BATCH.binding, self._batch_values)
+            set_batch(self._batch_uniforms[batch.index], batch, textures.body)
+        self._batch_buffer = Blocks(BATCH.binding, self._batch_uniforms)
+        self._uploaded_poses = b""  # the bytes of the mover poses that the buffer of the batches holds
         set_initial_state()
 
-    def begin(
+    def begin_view(
         self,
         view: PinholeView,
         canvas: Canvas,
@@ -70,14 +71,14 @@ class DrawCalls:
         probe: Probe | None,
     ) -> None:
         """Set the uniforms, textures and state that are the same for all draw calls of a view."""
-        values = self._pass_values
-        values[...] = np.zeros((), PASS.dtype)
-        set_view(values, view, canvas, weights)
+        uniforms = self._pass_uniforms
+        uniforms[...] = np.zeros((), PASS.dtype)
+        set_view(uniforms, view, canvas, weights)
         if probe:
-            set_probe(values, view, probe)
+            set_probe(uniforms, view, probe)
             bind(PROBE_UNIT, probe.texture.id, GL.GL_TEXTURE_CUBE_MAP)
-        self._pass.update(0, values)
-        self._pass.use(0)
+        self._pass_buffer.update(0, uniforms)
+        self._pass_buffer.use(0)
         self._upload_mover_poses(view)
         # Each reflection reverses the winding order of the faces.
         GL.glFrontFace(GL.GL_CW if view.depth % 2 else GL.GL_CCW)
@@ -92,13 +93,13 @@ class DrawCalls:
         for batch in self._batches:
             if batch.mover < 0:
                 continue
-            values = self._batch_values[batch.index]
-            values["model"] = view.pose(batch.mover).T
+            uniforms = self._batch_uniforms[batch.index]
+            uniforms["model"] = view.pose(batch.mover).T
             if batch.mirror:
-                values["plane"] = view.plane(batch.mirror.plane, batch.mover).coefficients
-            self._block.update(batch.index, values)
+                uniforms["plane"] = view.plane(batch.mirror.plane, batch.mover).coefficients
+            self._batch_buffer.update(batch.index, uniforms)
 
-    def surface(
+    def draw_surface(
         self,
         batch: Batch,
         visible: Runs,
@@ -115,7 +116,7 @@ class DrawCalls:
         if view.mirror:
             all_defines |= {ShaderDefine.IS_MIRRORED}
         self._program("surface", "surface", all_defines).use()
-        self._block.use(batch.index)
+        self._batch_buffer.use(batch.index)
         textures = self._textures[batch.index]
         if textures.body:
             bind(BODY_UNIT, textures.body.id)
@@ -130,7 +131,7 @@ class DrawCalls:
         else:
             self._elements.draw(runs, canvas.layers)
 
-    def background(self, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
+    def draw_background(self, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
         """Draw the sum of all skies in the pixels without a surface."""
         # These pixels are black, so additive blending yields the sum.
         with blending(GL.GL_ONE, GL.GL_ONE):
@@ -161,7 +162,7 @@ class DrawCalls:
         )
         self._cover(canvas.layers)
 
-    def add(
+    def add_mean(
         self,
         target: RenderTarget,
         total: FlatTarget,
@@ -180,18 +181,18 @@ class DrawCalls:
             weight=share / canvas.layers * np.array([*channel_weights, 0.0]),
         )
         with blending(GL.GL_ONE, GL.GL_ONE), disabled(GL.GL_DEPTH_TEST):
-            self._cover(1)
+            self._cover(layers=1)
 
-    def _cover(self, copies: int) -> None:
-        """Cover the whole picture with one triangle, drawn by the current program."""
+    def _cover(self, layers: int) -> None:
+        """Cover the whole picture in all layers with one triangle each, drawn by the current program."""
         with disabled(GL.GL_CULL_FACE):
             GL.glBindVertexArray(self._empty_vertex_array)
-            GL.glDrawArraysInstanced(GL.GL_TRIANGLES, 0, 3, copies)
+            GL.glDrawArraysInstanced(GL.GL_TRIANGLES, 0, 3, layers)
 
     def _draw_pane(
         self,
         runs: Sequence[tuple[int, int]],
-        copies: int,
+        layers: int,
         *,
         is_grey: bool,
     ) -> None:
@@ -201,16 +202,16 @@ class DrawCalls:
         """
         transmittance = GL.GL_SRC_ALPHA if is_grey else GL.GL_SRC1_COLOR
         with disabled(GL.GL_CULL_FACE), without_depth_writes(), blending(GL.GL_ONE, transmittance):
-            self._elements.draw(runs, copies)
+            self._elements.draw(runs, layers)
 
-    def _draw_rim(self, runs: Sequence[tuple[int, int]], copies: int) -> None:
+    def _draw_rim(self, runs: Sequence[tuple[int, int]], layers: int) -> None:
         """Blend the partly transparent rims of holes over the surfaces behind them.
 
         A rim is not drawn over the opaque part of its own surface, which has the same depth.
         """
         opacity_blending = blending(GL.GL_SRC_ALPHA, GL.GL_ONE_MINUS_SRC_ALPHA)
         with without_depth_writes(), strictly_nearer(), opacity_blending:
-            self._elements.draw(runs, copies)
+            self._elements.draw(runs, layers)
 
 
 def _canvas_defines(canvas: Canvas) -> Defines:

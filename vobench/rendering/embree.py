@@ -27,7 +27,7 @@ BEYOND_M = 1e9  # farther than any ray leads
 
 @dataclass(frozen=True, slots=True)
 class Hits:
-    """Where rays end: face (R,) int32, -1 for none; u, v (R,) are the weights of its second and third corner.
+    """The hits of R rays: `face` (R,) int32, -1 for none; `u`, `v` (R,) are the weights of its second and third corner.
 
     distance (R,) is in lengths of the ray's direction, NaN for none.
     """

@@ -80,7 +80,7 @@ class FrameRenderer:
         return total.read(total.whole)
 
     def _room_probe(self, baked: BakedScene, faces: Triangles) -> Probe:
-        """The probe of what is stationary, with every lamp that varies at level 1."""
+        """The probe of the stationary things, with every lamp of variable level at level 1."""
         lights = tuple(_steady(light) for light in self._lights)
         skies = Background(lights).skies(0, 0)
         if all(isinstance(light.level, Steady) for light in self._lights):

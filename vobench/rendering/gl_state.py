@@ -49,7 +49,7 @@ def without_depth_writes() -> Iterator[None]:
 
 @contextmanager
 def strictly_nearer() -> Iterator[None]:
-    """Draw only what is nearer than the depth buffer, and not what has the same depth."""
+    """Draw only fragments that are nearer than the depth buffer; those at the same depth are not drawn."""
     GL.glDepthFunc(GL.GL_GREATER)
     try:
         yield

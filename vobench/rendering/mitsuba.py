@@ -79,7 +79,7 @@ def working_library() -> Path:
 
 
 def candidates() -> Iterator[Path]:
-    """Libraries worth trying: the one the environment names, then the system's, newest first."""
+    """The libraries to try: the one that the environment names, then those of the system, newest first."""
     named = os.environ.get(VARIABLE)
     if named:
         yield Path(named)

@@ -96,7 +96,7 @@ class Bodies:
         self._bodies = [self._body(index, is_pane) for index in range(body_count)]
 
     def visible(self, directions: Array, T_bodies_camera: Sequence[Array]) -> Hits:
-        """What a camera sees along unit directions (R, 3) in its frame, at a distance of NaN where that is nothing."""
+        """The hits of a camera's rays along unit directions (R, 3) in its frame; without a hit, the distance is NaN."""
         world, *movers = self._bodies
         origins_m, world_directions = rays_in(T_bodies_camera[0], directions)
         hits = self._first_hits(world, origins_m, world_directions)
@@ -117,7 +117,7 @@ class Bodies:
         T_bodies_camera: Sequence[Array],
         distance_m: Array,
     ) -> Mask:
-        """Whether glass is before what is seen at some distance (R,), or before nothing where that is NaN."""
+        """Whether a pane is in front of the hit at a distance (R,); NaN stands for a ray without a hit."""
         is_behind = np.zeros(len(directions), bool)
         limit_m = np.nan_to_num(distance_m, nan=REACH_M)
         for body, T_body_camera in zip(self._bodies, T_bodies_camera, strict=True):
@@ -161,7 +161,7 @@ class Bodies:
     def stationary_occluders(self) -> Occluders:
         """All stationary triangles that can stop light."""
         rows = np.flatnonzero(self._is_solid & (self.body[:-1] == 0) & (self._height_m[:-1] > 0))
-        is_cut_out = self._cut_outs.material_of_face[rows] >= 0
+        is_cut_out = self._cut_outs.cutout_of_face[rows] >= 0
         return Occluders(self.faces.corners_m[rows], ~is_cut_out)
 
     def _body(self, index: int, is_pane: Mask) -> Body:
@@ -179,7 +179,7 @@ class Bodies:
             return TriangleCaster(self.faces.corners_m, rows, robust=False)
 
         is_solid = self._is_solid
-        is_cut_out = self._cut_outs.material_of_face[:-1] >= 0
+        is_cut_out = self._cut_outs.cutout_of_face[:-1] >= 0
         has_holes = is_member & is_solid & is_cut_out
         is_glass = is_member & is_pane
         visible = caster(is_solid)
@@ -210,7 +210,7 @@ class Bodies:
             if not len(rays):
                 break
             hits = body.holed.hits(start_m, ahead_m, 1.0)
-            is_hole = self._cut_outs.holes(hits)
+            is_hole = self._cut_outs.are_in_holes(hits)
             is_stopped[rays[(hits.face >= 0) & ~is_hole]] = True
             offset = RAY_OFFSET_M / np.linalg.norm(ahead_m, axis=1)
             step = (hits.distance + offset)[:, None]
@@ -241,9 +241,9 @@ class Bodies:
     def _float32_hits(
         self, body: Body, origins_m: Array, directions: Array, most: int = MOST_PASSED
     ) -> tuple[Hits, Array]:
-        """What rays meet by Embree, backs and holes passed, and the cosines (R,) to the faces' normals."""
+        """The first hits of rays that are neither backs nor holes, and the cosines (R,) to the normals of the faces."""
         hits = body.visible.hits(origins_m, directions, REACH_M)
-        is_hole = self._cut_outs.holes(hits)
+        is_hole = self._cut_outs.are_in_holes(hits)
         cosine = self._turn_to_fronts(hits.face, directions)
         passed = np.flatnonzero((cosine >= 0) | is_hole)
         if len(passed) and most:
@@ -343,7 +343,7 @@ def _least_height_m(corners_m: Array) -> Array:
 
 
 def back_faces(faces: Triangles) -> Indices:
-    """The face (F + 1,) of the same thing with the same corners that looks the other way, -1 for none."""
+    """The face (F + 1,) of the same thing with the same corners and the opposite normal, -1 for none."""
     points_m = faces.corners_m.reshape(-1, 3)
     corner = _numbered(points_m).reshape(-1, 3)
     corner_sets = np.sort(corner, axis=1)

@@ -93,7 +93,7 @@ def _halved(
     values: NDArray[np.uint16],
     times: int,
 ) -> NDArray[np.uint16]:
-    """A picture (H, W, ...) whose sides in pixels are halved so many times."""
+    """A picture (H, W, ...) whose sides in pixels are halved a number of times."""
     if not times:
         return values
     width = max(1, values.shape[1] >> times)
@@ -330,7 +330,7 @@ def _cube(pictures: Sequence[Radiance]) -> Any:
 
 @dataclass(frozen=True, slots=True)
 class Grid:
-    """Where in a pixel samples lie, one a layer, and how many mipmap levels finer than OpenGL's each takes."""
+    """The position of each sample in a pixel, one per layer, and the number of mipmap levels by which it is finer."""
 
     points: tuple[tuple[float, float], ...]
     lod_bias: tuple[float, ...]
@@ -417,7 +417,7 @@ def _layers(
     internal: int,
     form: int,
 ) -> Any:
-    """An empty texture of a width and height in pixels and so many layers."""
+    """An empty texture with a width and height in pixels and a number of layers."""
     texture = GL.glGenTextures(1)
     GL.glBindTexture(GL.GL_TEXTURE_2D_ARRAY, texture)
     GL.glTexImage3D(GL.GL_TEXTURE_2D_ARRAY, 0, internal, *size, 0, form, GL.GL_FLOAT, None)

@@ -131,7 +131,7 @@ def _free_place(corners_m: Array) -> Array:
 
 
 def _irradiance(pictures: Array) -> Array:
-    """Coefficients (4,) of irradiance over π by what is around (6, N, N, 3), to first order in the normal."""
+    """Coefficients (4,) of the irradiance over π from the surroundings (6, N, N, 3), to first order in the normal."""
     places = (np.arange(SIZE_PX) + 0.5) / SIZE_PX * 2 - 1
     vectors = np.stack([*np.meshgrid(places, places), np.ones((SIZE_PX, SIZE_PX))], -1)
     distance = np.linalg.norm(vectors, axis=-1)
@@ -152,7 +152,7 @@ def glints(
     start_ns: int,
     end_ns: int,
 ) -> Array:
-    """Lamps (G, 3, 4) that no picture shows, the sun among them: those that shine most on an eye (3,).
+    """The lamps (G, 3, 4) that no picture shows, including the sun: those with the highest illuminance at an eye (3,).
 
     Each: place and 1, or direction and 0; intensity or illuminance of three channels, and the angle at which a spot
     ends; the spot's direction, and 1 / the angle over which it fades.

@@ -102,7 +102,7 @@ def _surfaces(scene: Scene) -> SurfacePoints | None:
 
 
 def _mean_reflectance(material: Material | None) -> float:
-    """Luminous reflectance of a body or mirror; 0 of what is neither."""
+    """The luminous reflectance of a body or mirror; 0 for other materials."""
     if material is None or material.kind == "pane":
         return 0.0
     if material.kind == "mirror":

@@ -230,7 +230,7 @@ class PyrenderScene:
     def _background(self, levels: Sequence[float]) -> Array:
         """Stored red, green, blue and alpha (4,) where nothing is: the mean of the sky above the horizon.
 
-        Of a panorama it is the mean of what is less than 30 degrees above or below the horizon.
+        For a panorama, it is the mean of the band within 30 degrees of the horizon.
         """
         colour = np.zeros(3)
         for light, level in zip(self._scene.lights, levels, strict=True):

@@ -36,7 +36,7 @@ def require_pyrender() -> None:
 
 
 def texture_tile_m(material: Material) -> float:
-    """What one repeat covers of the texture coordinates, of which pyrender takes one set."""
+    """The texture coordinates that one repeat covers. pyrender supports one set of texture coordinates."""
     texture = material.texture or material.emission_texture
     return texture.tile_m if texture else TILE_EDGES_M
 

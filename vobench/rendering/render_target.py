@@ -1,4 +1,4 @@
-"""What pictures are drawn on: a canvas for each depth of mirrors, and the total of sub-frames."""
+"""The targets that pictures are drawn on: a canvas for each depth of mirrors, and the sum of sub-frames."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ class RenderTarget:
 
     @property
     def canvas(self) -> Canvas:
-        """What the picture itself is drawn on."""
+        """The canvas of the picture itself."""
         return self.canvases[0]
 
 

@@ -157,7 +157,7 @@ class _Surfaces:
     def scattered(self, rays: _Rays, hits: Hits) -> Array:
         """The luminous reflectance (R,) of the body that each ray hits, below its coat; 0 if it hits no body."""
         result = np.zeros(len(hits.face))
-        is_body = self._is_front(rays, hits) & (self._kind[hits.face] == "body") & ~self._cutouts.holes(hits)
+        is_body = self._is_front(rays, hits) & (self._kind[hits.face] == "body") & ~self._cutouts.are_in_holes(hits)
         rows = np.flatnonzero(is_body)
         leaving = 1 - self._coat(rays, hits)[rows]
         result[rows] = leaving * self._reflectance(hits.take(rows))
@@ -201,7 +201,7 @@ class _Surfaces:
         cosine = np.einsum("ij,ij->i", planes, rays.directions)
         is_front = self._is_front(rays, hits)
         is_pane = (self._kind[face] == "pane") & (face >= 0)
-        is_absent = (face >= 0) & ~is_pane & (~is_front | self._cutouts.holes(hits))
+        is_absent = (face >= 0) & ~is_pane & (~is_front | self._cutouts.are_in_holes(hits))
         is_mirroring = is_front & ~is_pane & ~is_absent & (self._lamp[face] < 0)
 
         share = np.zeros(len(face))

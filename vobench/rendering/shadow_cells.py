@@ -117,7 +117,7 @@ def _plane(corners_m: Array, normal: Array, lift_m: float) -> ReceiverPlane:
 
 @dataclass(frozen=True, slots=True)
 class ShadowCells:
-    """What is known in the cells of a plane: `decided` and `hidden` (H·W + 1,) have a bit for each lamp.
+    """The known shadows in the cells of a plane: `decided` and `hidden` (H·W + 1,) have a bit for each lamp.
 
     The last cell stands for all points outside the grid, where nothing is decided.
     """
@@ -128,7 +128,7 @@ class ShadowCells:
 
 
 def shadow_cells(plane: ReceiverPlane, lamps: tuple[Lamp, ...], occluders: Occluders) -> ShadowCells:
-    """What can be proven for the cells of a plane about stationary lamps, given all stationary occluders."""
+    """The shadows of stationary lamps that can be proven for the cells of a plane, given all stationary occluders."""
     largest_m = max(1.0, float(np.abs(occluders.corners_m).max(initial=0.0)))
     error_m = RAY_ERROR * largest_m
     count = plane.height * plane.width
@@ -384,10 +384,10 @@ def _boxes(vertices: Array) -> tuple[Array, Array]:
 
 
 class KnownShadows:
-    """What is known about the shadows of some stationary lamps on large planes.
+    """The known shadows of stationary lamps on large planes.
 
     The cells of a plane are computed once many pixels have shown it, so that a single picture costs little more.
-    What is known changes the time that ground truth takes, never its values.
+    They reduce the time that ground truth takes, and never change its values.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""Where the camera and a scene's bodies are while a picture is taken, also row by row of a rolling shutter."""
+"""The poses of the camera and of movers while a picture is taken, also row by row for a rolling shutter."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from vobench.scene.scene import Mover
 
 @dataclass(frozen=True, slots=True)
 class CameraShot:
-    """Where a camera is and when it takes a picture: a pose (4, 4) and an instant, or (H, 4, 4) and (H,) by row."""
+    """The pose (4, 4) and the instant of a camera's picture, or the poses (H, 4, 4) and instants (H,) of its rows."""
 
     T_world_camera: Array
     t_ns: NDArray[np.int64] | int
@@ -48,7 +48,7 @@ def _poses(
     movers: Sequence[Mover],
     t_ns: NDArray[np.int64],
 ) -> list[Array]:
-    """Where the bodies are at an instant () or at several (H,): (4, 4) each, or (H, 4, 4) for what moves."""
+    """The poses of the bodies at an instant () or at several (H,): (4, 4) each, or (H, 4, 4) for a body that moves."""
     T_world_bodies: list[Array] = [np.eye(4)]
     for mover in movers:
         T_world_body = np.array([mover.path.pose(t) for t in np.ravel(t_ns).tolist()])

@@ -170,7 +170,7 @@ def _whole_sr(seen: Floats, normal: tuple[float, float, float]) -> float:
 
 @compiled
 def _cut_sr(seen: Floats, normal: tuple[float, float, float]) -> float:
-    """The weighted solid angle of what is above the plane with a normal through the point."""
+    """The weighted solid angle of the part above the plane through the point with a normal."""
     depth = seen[DEPTH]
     corners = (
         (seen[X0], seen[Y0], depth),

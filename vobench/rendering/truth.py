@@ -44,7 +44,7 @@ class FaceIds:
 
 @dataclass(frozen=True, slots=True)
 class LitLamps:
-    """A group of lamps, and what is known about their shadows before any ray is cast."""
+    """A group of lamps, and the shadows that are known before any ray is cast."""
 
     group: LampGroup
     known: KnownShadows
@@ -136,7 +136,7 @@ class Band:
         return turned
 
     def _shadow(self) -> NDArray[np.uint16]:
-        """How many lamps (R,) that what is seen is turned to shine on it, hidden by nothing."""
+        """The number of lamps (R,) in front of the visible face that are hidden from it."""
         picture = self._picture
         here = picture.here
         rows = self._uv_px[:, 1]

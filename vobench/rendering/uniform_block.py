@@ -48,7 +48,7 @@ class UniformBlock:
 
     @property
     def dtype(self) -> np.dtype[np.void]:
-        """The structured type whose bytes are those that the block is read from."""
+        """The structured type with the memory layout of the block."""
         offsets = [offset for offset, _ in self._placed()]
         end = max(offset + _bytes(field) for offset, field in self._placed())
         return np.dtype(

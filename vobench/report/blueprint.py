@@ -33,7 +33,6 @@ ESTIMATOR_COLORS = {
     "cyan": (120, 220, 220),
 }
 GRID_COLOR = (255, 255, 255, 24)
-FRAMES_AROUND_REPLAY = 15
 REPLAY_FPS = 5.0  # slow enough to see each frame
 
 # Relative heights of views in a column, and relative widths of columns.
@@ -41,7 +40,7 @@ PATHS_SHARE = 6.0
 PLOT_SHARE = 2.2
 STATUS_SHARE = 1.2
 STATUS_SHARE_PER_ESTIMATOR = 0.4
-NUMBERS_SHARE = 2.0
+PLOT_TABS_SHARE = 2.0
 PICTURE_SHARE = 3.0
 SUMMARY_SHARE = 2.6
 COLUMN_SHARES = [3, 2]
@@ -52,7 +51,8 @@ class LayoutOptions:
     """What a recording shows besides paths and errors.
 
     `replayed_frames` are the first and last frame of the initial replay; without them, the recording starts paused.
-    `labels` are the names of the estimators, at most as many as ESTIMATOR_COLORS. Each has a picture with its tracks.
+    `labels` are the names of the estimators. Each has a picture with its tracks. Rerun shows one colour for each, so
+    there can be no more labels than ESTIMATOR_COLORS.
     `channels` are the channels of per-pixel ground truth. They are shown in one tab per camera.
     `has_stats` and `has_costs` add a plot of the numbers that an estimator reports, and of the cost of each frame.
     """
@@ -85,7 +85,8 @@ def layout(truth_m: Array, estimates_m: Array, options: LayoutOptions) -> rrb.Bl
 def _paths_column(truth_m: Array, estimates_m: Array, options: LayoutOptions) -> rrb.Vertical:
     """The 3-D view of the paths, with plots of errors, statuses and numbers below it."""
     shown_m = near_truth(truth_m, estimates_m)
-    status_share = STATUS_SHARE + STATUS_SHARE_PER_ESTIMATOR * (len(options.labels) - 1)
+    further_estimators = len(options.labels) - 1
+    status_share = STATUS_SHARE + STATUS_SHARE_PER_ESTIMATOR * further_estimators
     views: list[rrb.View | rrb.Container] = [
         _paths_view(truth_m, shown_m, options.labels),
         rrb.Horizontal(_plot(POSITION_ERROR, "Position error"), _plot(ROTATION_ERROR, "Rotation error")),
@@ -99,7 +100,7 @@ def _paths_column(truth_m: Array, estimates_m: Array, options: LayoutOptions) ->
         plots.append(rrb.TimeSeriesView(origin=COSTS, name="Latency (ms), exposure (ms), gain (dB)"))
     if plots:
         views.append(rrb.Tabs(*plots, active_tab=0))
-        shares.append(NUMBERS_SHARE)
+        shares.append(PLOT_TABS_SHARE)
     return rrb.Vertical(*views, row_shares=shares)
 
 
@@ -125,8 +126,8 @@ def _plot(origin: str, name: str) -> rrb.TimeSeriesView:
 def _left_picture(label: str, labels: Sequence[str]) -> rrb.Spatial2DView:
     """The left picture with the tracks of one of the estimators."""
     hidden = [f"- {EstimatorEntities(other).tracks}/**" for other in labels if other != label]
-    owner = f" of {label}" if len(labels) > 1 else ""
-    name = f"Left, tracks{owner}: inliers green, outliers red, true epipolar lines white"
+    of_label = f" of {label}" if len(labels) > 1 else ""
+    name = f"Left, tracks{of_label}: inliers green, outliers red, true epipolar lines white"
     return rrb.Spatial2DView(origin=TRUTH_LEFT, name=name, contents=["$origin/**", *hidden])
 
 
@@ -162,7 +163,7 @@ def _paths_view(truth_m: Array, shown_m: Array, labels: Sequence[str]) -> rrb.Sp
 def _time_panel(replayed_frames: tuple[int, int] | None) -> rrb.TimePanel:
     """The panel of the timeline `frame`, which is paused at its start or replays some frames.
 
-    A blueprint cannot set the time cursor. A loop that plays moves it to the loop's start.
+    A blueprint cannot move the time cursor. Only a replay of selected frames does; it begins at the first of them.
     """
     if replayed_frames is None:
         return rrb.TimePanel(timeline=FRAME_TIMELINE, play_state="paused", state="collapsed")

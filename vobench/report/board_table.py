@@ -178,22 +178,32 @@ def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
 
     The columns of costs are left out if no cost is known, and that of decisions if nothing is tested.
     """
-    omitted = set[str]()
-    if all(total.cpu_ms is None for total in board.totals):
-        omitted |= {COST, MEMORY}
-    if all(total.decided_above is None for total in board.totals):
-        omitted.add(DECIDED)
-    headings = [heading for heading in HEADINGS if heading not in omitted]
-    groups = list(dict.fromkeys(total.group for total in board.totals))
+    headings = _headings_of_totals(board.totals)
+    totals_by_group: dict[str, list[Total]] = {}
+    for total in board.totals:
+        totals_by_group.setdefault(total.group, []).append(total)
+
     tables = []
-    for group in groups:
-        members = [total for total in board.totals if total.group == group]
-        first = members[0]
-        counts = [counted(first.cases, "case"), counted(first.drives, "drive"), counted(first.places, "place")]
-        scope = ", ".join([group, *counts] if group else counts)
+    for group, members in totals_by_group.items():
         rows = [_total_row(total, headings) for total in members]
-        tables.append((scope, [headings, *rows]))
+        tables.append((_division_title(group, members[0]), [headings, *rows]))
     return tables
+
+
+def _headings_of_totals(totals: Sequence[Total]) -> list[str]:
+    """The headings of the columns in which at least one total has a value."""
+    omitted = set[str]()
+    if all(total.cpu_ms is None for total in totals):
+        omitted |= {COST, MEMORY}
+    if all(total.decided_above is None for total in totals):
+        omitted.add(DECIDED)
+    return [heading for heading in HEADINGS if heading not in omitted]
+
+
+def _division_title(group: str, total: Total) -> str:
+    """The name of a division, if it has one, and how many cases, drives and places its totals are over."""
+    counts = [counted(total.cases, "case"), counted(total.drives, "drive"), counted(total.places, "place")]
+    return ", ".join([group, *counts] if group else counts)
 
 
 def _total_row(total: Total, headings: Sequence[str]) -> list[str]:
@@ -212,7 +222,7 @@ def remarks(board: Board) -> list[str]:
 
 
 def _undecided(above: Total, total: Total) -> str:
-    """What the board could have decided of two neighbours, and what a chosen ratio would take."""
+    """A sentence on two undecided neighbours: the ratio that would have been decided, and what a chosen one takes."""
     order = f"The order of {above.estimator} and {total.estimator} is not decided (p = {total.p_above:.2g})"
     found = f"a ratio of losses of {number(total.smallest_ratio)} would have been"
     more = (total.places_needed or 0) - total.places

@@ -88,7 +88,7 @@ def _whole_number(value: Any) -> int | None:
 
 
 def _drive(content: Mapping[str, Any]) -> str:
-    """What determines the path of a case, as text; empty if unknown."""
+    """The settings that determine the path of a case, as text; empty if unknown."""
     trajectory = content.get("trajectory")
     if not trajectory:
         return ""

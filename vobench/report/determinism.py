@@ -15,28 +15,35 @@ def determinism_remarks(folder: RunFolder, scores: Sequence[TrialScore]) -> list
     A statement of determinism is believed once two answers to one sequence were equal in every byte. Such repeats say
     nothing more than one trial does.
     """
-    repeats = dict[tuple[str, str], list[TrialScore]]()
-    for score in scores:
-        if NOT_DETERMINISTIC not in score.claims and score.status in FINISHED_TRIAL:
-            repeats.setdefault((score.estimator, score.case), []).append(score)
-    compared = Counter[str]()
+    compared = Counter[str]()  # the number of cases with repeats, by estimator
     differing = Counter[str]()
-    for (estimator, _), trials in repeats.items():
-        if len(trials) > 1:
-            answers = {_answer(folder, trial) for trial in trials}
-            compared[estimator] += 1
-            differing[estimator] += len(answers) > 1
+    for trials in _repeats(scores):
+        estimator = trials[0].estimator
+        answers = {_answer(folder, trial) for trial in trials}
+        compared[estimator] += 1
+        differing[estimator] += len(answers) > 1
 
     sentences = []
     equal = [estimator for estimator in sorted(compared) if not differing[estimator]]
     if equal:
-        known = f"Repeats of {', '.join(equal)} are equal in every byte and count once"
-        sentences.append(f"{known}; noise_seeds draws new noise instead")
+        names = ", ".join(equal)
+        sentences.append(
+            f"Repeats of {names} are equal in every byte and count once; noise_seeds draws new noise instead"
+        )
     for estimator in sorted(compared):
         if differing[estimator]:
             cases = f"{differing[estimator]} of {counted(compared[estimator], 'case')}"
             sentences.append(f"{estimator} states that it is deterministic, but its repeats differ in {cases}")
     return sentences
+
+
+def _repeats(scores: Sequence[TrialScore]) -> list[list[TrialScore]]:
+    """The finished trials of each deterministic estimator on each case that it has answered more than once."""
+    by_cell = dict[tuple[str, str], list[TrialScore]]()
+    for score in scores:
+        if NOT_DETERMINISTIC not in score.claims and score.status in FINISHED_TRIAL:
+            by_cell.setdefault((score.estimator, score.case), []).append(score)
+    return [trials for trials in by_cell.values() if len(trials) > 1]
 
 
 def _answer(folder: RunFolder, trial: TrialScore) -> bytes:

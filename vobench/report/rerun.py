@@ -50,6 +50,7 @@ STATUS_COLORS: dict[str, Color] = {
 }
 OTHER_STATUS_COLOR = (128, 128, 128)
 FAILED = ("lost", NO_OUTPUT)
+FRAMES_AROUND_REPLAY = 15  # before and after the frame that is replayed
 FRUSTUM_LINE = -1.5  # negative: in points of the screen, whatever the zoom
 FRAME_BYTES = 45_000  # of both pictures of a frame, out of 60,000 with tracks
 BEST_QUALITY = 85
@@ -127,7 +128,7 @@ def first_failure(statuses: Sequence[str]) -> FrameRange | None:
 
 def _around(index: int, count: int) -> FrameRange:
     """The first and the last of the frames around one of `count`."""
-    reach = blueprint.FRAMES_AROUND_REPLAY
+    reach = FRAMES_AROUND_REPLAY
     return max(0, index - reach), min(count - 1, index + reach)
 
 

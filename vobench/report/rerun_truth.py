@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import rerun as rr
@@ -16,13 +16,28 @@ from vobench.sequence import StereoTruth
 TRANSPARENT = (0, 0, 0, 0)
 TRANSLUCENT_WHITE = (255, 255, 255, 160)
 MASKS = [name for name, channel in CHANNELS.items() if channel.dtype is np.bool_]
-# The names of the values 0 and 1 of channels that are not ids. Rerun chooses the colours of larger values itself.
-VALUE_NAMES = {**{mask: ("", mask) for mask in MASKS}, "shadow": ("lit", "one light hidden")}
+
+
+class ValueNames(NamedTuple):
+    """The names of the values 0 and 1 of a channel. Rerun chooses the colours of larger values itself."""
+
+    zero: str
+    one: str
+
+
+# A mask has the value 1 in the pixels that it is named for. The shadow channel counts hidden lights.
+VALUE_NAMES = {mask: ValueNames("", mask) for mask in MASKS}
+VALUE_NAMES["shadow"] = ValueNames("lit", "one light hidden")
 
 
 @dataclass(frozen=True, slots=True)
 class TruthView:
-    """The recorded channels, the names of ids, and a function that returns an iterator over all frames."""
+    """The per-pixel ground truth of a sequence.
+
+    `channels` lists the recorded channels, such as depth; a single frame may lack some of them.
+    `names` are the names of the instance and material ids.
+    `frames` returns an iterator over all frames.
+    """
 
     channels: tuple[str, ...]
     names: TruthNames
@@ -30,10 +45,7 @@ class TruthView:
 
 
 def log_truth(stream: rr.RecordingStream, view: TruthView) -> None:
-    """Log all channels of both cameras. Only one frame is in memory at a time.
-
-    The recorded channels get names of their classes. The channels of a frame are logged as the frame has them.
-    """
+    """Log all channels of both cameras, and the names of their classes. Only one frame is in memory at a time."""
     _log_classes(stream, view)
     for frame in view.frames():
         _log_frame(stream, frame)
@@ -59,14 +71,14 @@ def _log_frame(stream: rr.RecordingStream, frame: StereoTruth) -> None:
 
 
 def _columns(channel: str, values: NDArray[np.generic]) -> Any:
-    """The columns of one frame of a channel.
+    """The columns of one frame of a channel, given its values (H, W) or (H, W, C).
 
     Depth is logged as a depth image; ids, counts and masks as classes; and directions as colours.
     """
     if channel == "depth":
         depth_format = _format(values, rr.ChannelDatatype.F32)
         return rr.DepthImage.columns(buffer=[_bytes(values)], format=[depth_format], meter=[1.0])
-    if CHANNELS[channel].depth == 1:
+    if values.ndim == 2:  # one value per pixel: an id, a count or a mask
         classes = values.astype(np.uint16)
         class_format = _format(classes, rr.ChannelDatatype.U16)
         return rr.SegmentationImage.columns(buffer=[_bytes(classes)], format=[class_format])
@@ -96,8 +108,11 @@ def _classes(channel: str, names: TruthNames) -> list[rr.AnnotationInfo]:
     if channel in id_names:
         return _named_ids(channel, id_names[channel])
     if channel in VALUE_NAMES:
-        name_of_0, name_of_1 = VALUE_NAMES[channel]
-        return [rr.AnnotationInfo(0, name_of_0, TRANSPARENT), rr.AnnotationInfo(1, name_of_1, TRANSLUCENT_WHITE)]
+        names_of_values = VALUE_NAMES[channel]
+        return [
+            rr.AnnotationInfo(0, names_of_values.zero, TRANSPARENT),
+            rr.AnnotationInfo(1, names_of_values.one, TRANSLUCENT_WHITE),
+        ]
     return []
 
 

@@ -25,7 +25,7 @@ INTERVALS = {"ranks": "rank", "error_interval": "error_ratio"}
 
 
 def board_frame(board: Board) -> "pd.DataFrame":
-    """One row per estimator over all cases, the best first; the column `group` tells divisions apart."""
+    """One row per estimator over all cases, the best first; the column `group` names the division."""
     import pandas as pd
 
     table = pd.DataFrame([_total_record(total) for total in board.totals])

@@ -112,7 +112,7 @@ def scored_files(
 
 
 def file_labels(paths: Sequence[Path]) -> list[str]:
-    """The shortest ends of paths, without the ending of the file, that tell all of them apart."""
+    """The shortest ends of paths, without the suffix of the file, that are all different."""
     parts = [path.with_suffix("").parts for path in paths]
     for length in range(1, max(map(len, parts)) + 1):
         labels = ["/".join(part[-length:]) for part in parts]

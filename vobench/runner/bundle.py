@@ -301,32 +301,51 @@ def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFo
         yield folders[0]
         return
     with temporary_folder() as temporary:
-        made = RunFolder(temporary / "merged" / "runs")
-        made.path.mkdir(parents=True)
-        environments = [stated for folder in folders if (stated := read_environment(folder))]
-        write_json(made.path / ENVIRONMENT, merged_environment(environments))
-        until = [folder.path / UNTIL for folder in folders if (folder.path / UNTIL).is_file()]
-        if until:
-            copyfile(until[0], made.path / UNTIL)  # the units of the merged run depend on what they showed, too
-        known = dict[str, Any]()
+        together = RunFolder(temporary / "merged" / "runs")
+        together.path.mkdir(parents=True)
+        _merge_environments(folders, together)
+        _copy_first_decision(folders, together)
+        first_facts: dict[str, Any] = {}  # by the label of an estimator, of the first run that has the label
         for folder, name in zip(folders, map(_plain_name, names), strict=True):
-            facts = {each["label"]: each for each in _stated(folder)}
+            facts = {entry["label"]: entry for entry in _stated(folder)}
             for score in folder.scores():
-                _link_case(folder, made, score.case, name)
                 label = score.estimator
-                if known.setdefault(label, facts.get(label)) != facts.get(label):
-                    label = f"{label} of {name}"
-                others = made.case(score.case) / ESTIMATES / label
-                repeat = len(list(others.glob("*"))) if others.is_dir() else 0
-                place = made.estimate(score.case, label, repeat)
-                place.mkdir(parents=True)
-                source = folder.estimate(score.case, score.estimator, score.repeat)
-                for path in source.iterdir():
-                    if path.name != SCORE:
-                        (place / path.name).symlink_to(path.resolve())
-                again = score.model_copy(update={"estimator": label, "repeat": repeat})
-                write_json(place / SCORE, again.model_dump(mode="json"))
-        yield made
+                is_same_estimator = first_facts.setdefault(label, facts.get(label)) == facts.get(label)
+                _link_case(folder, together, score.case, name)
+                _link_trial(folder, together, score, label if is_same_estimator else f"{label} of {name}")
+        yield together
+
+
+def _merge_environments(folders: Sequence[RunFolder], together: RunFolder) -> None:
+    """Write the environment of a merged run."""
+    environments = [environment for folder in folders if (environment := read_environment(folder))]
+    write_json(together.path / ENVIRONMENT, merged_environment(environments))
+
+
+def _copy_first_decision(folders: Sequence[RunFolder], together: RunFolder) -> None:
+    """Copy the first file which states that the units of a run depend on what they showed.
+
+    The units of the merged run then do so, too.
+    """
+    for folder in folders:
+        decision = folder.path / UNTIL
+        if decision.is_file():
+            copyfile(decision, together.path / UNTIL)
+            return
+
+
+def _link_trial(folder: RunFolder, together: RunFolder, score: TrialScore, label: str) -> None:
+    """Add a trial of a run to a merged run, as the next repeat of the estimator with this label."""
+    repeats = together.case(score.case) / ESTIMATES / label
+    repeat = len(list(repeats.glob("*"))) if repeats.is_dir() else 0
+    place = together.estimate(score.case, label, repeat)
+    place.mkdir(parents=True)
+    source = folder.estimate(score.case, score.estimator, score.repeat)
+    for path in source.iterdir():
+        if path.name != SCORE:
+            (place / path.name).symlink_to(path.resolve())
+    merged_score = score.model_copy(update={"estimator": label, "repeat": repeat})
+    write_json(place / SCORE, merged_score.model_dump(mode="json"))
 
 
 def _stated(folder: RunFolder) -> list[dict[str, Any]]:

@@ -246,37 +246,52 @@ def wrong_truths(folder: RunFolder) -> dict[str, str]:
     Nothing is rendered, and no code of a scene is executed. The truth of recordings, of bodies that wander through
     their scene, and of cases that another version of vobench wrote, cannot be checked.
     """
-    wrong = {}
-    paths: dict[str, Trajectory] = {}
+    truth_check = _TruthCheck()
+    reasons = {}
     for place in sorted((folder.path / "cases").iterdir()):
         stop.check()
+        reason = truth_check.reason(place)
+        if reason is not None:
+            reasons[place.name] = reason
+    return reasons
+
+
+class _TruthCheck:
+    """Compares ground truths with the paths that follow from their cases. Each path is computed once."""
+
+    def __init__(self) -> None:
+        self._paths: dict[str, Trajectory] = {}  # by the settings that determine them, as JSON
+
+    def reason(self, place: Path) -> str | None:
+        """Why the ground truth in the folder of a case is wrong; None if it is right or cannot be checked."""
         truth = place / GROUND_TRUTH
         try:
             case = _case(place / CASE)
         except InputError as error:
-            wrong[place.name] = _one_line(error)
-            continue
+            return _one_line(error)
         if case is None or not truth.is_file():
-            continue
+            return None
         if isinstance(case.trajectory, Wander):
-            continue  # its path depends on the scene, whose code is not executed
+            return None  # its path depends on the scene, whose code is not executed
         try:
             stated = read_tum(truth)
         except VobenchError as error:
-            wrong[place.name] = _one_line(error)
-            continue
+            return _one_line(error)
+        return self._difference(stated, case, place / CASE)
+
+    def _difference(self, stated: Trajectory, case: Case, case_file: Path) -> str | None:
+        """Why a stated truth is not the path of a case; None if it is, or if that path cannot be computed here."""
         try:
-            key = json.dumps(_settings_of_path(place / CASE), sort_keys=True)
-            if key not in paths:
-                paths[key] = _true_path(case)
+            settings = json.dumps(_settings_of_path(case_file), sort_keys=True)
+            if settings not in self._paths:
+                self._paths[settings] = _true_path(case)
         except MotionError as error:
-            wrong[place.name] = f"its {CASE} gives no path ({_one_line(error)})"
-            continue
+            return f"its {CASE} gives no path ({_one_line(error)})"
         except (VobenchError, OSError, ValueError, LookupError, AssertionError):
-            continue  # for example, a camera file is on another machine
-        if not _is_same(stated, paths[key]):
-            wrong[place.name] = f"its {GROUND_TRUTH} is not the path that its {CASE} gives"
-    return wrong
+            return None  # for example, a camera file is on another machine
+        if _is_same(stated, self._paths[settings]):
+            return None
+        return f"its {GROUND_TRUTH} is not the path that its {CASE} gives"
 
 
 def _case(path: Path) -> Case | None:

@@ -118,7 +118,7 @@ def run_suite(
 
 
 def _with_hidden_truth(suite: Plan, root: Path) -> Plan:
-    """The plan with everything hidden that tells the truth: the runs below `root`, and all recordings of the suite."""
+    """The plan, in which the runs below `root` and all recordings of the suite are hidden, as they contain truth."""
     hidden = [root.resolve()]
     for case in suite.recorded:
         truth = case.source.truth

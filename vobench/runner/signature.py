@@ -1,7 +1,7 @@
 """Signatures of bundles by OpenSSH: `ssh-keygen -Y` signs and verifies with the SSH keys that users already have."""
 
 import shutil
-from contextlib import ExitStack
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from subprocess import DEVNULL, TimeoutExpired, run
@@ -63,10 +63,12 @@ def _signature_path(bundle: Path) -> Path:
 def _sentence_on_key(bundle: Path, signature: Path) -> str:
     """The key that signed the bundle; nothing is known about its owner."""
     result = _ssh_keygen("check-novalidate", "-n", NAMESPACE, "-s", str(signature.absolute()), stdin=bundle)
+    if not result.succeeded:
+        return f"its signature is NOT that of this file ({result.message})"
     # OpenSSH prints: Good "vobench-bundle" signature with ED25519 key SHA256:uNiVztksCsDhcc0u9e8BrqXhK...
     _, separator, key = result.message.rpartition(" key ")
-    if not (result.succeeded and separator and key):
-        return f"its signature is NOT that of this file ({result.message})"
+    if not separator or not key:
+        return f"its signature is NOT verified: ssh-keygen names no key ({result.message})"
     return f"signed by {key}, not verified: pass --allowed-signers to verify"
 
 
@@ -91,8 +93,8 @@ def _ssh_keygen(operation: str, *arguments: str, stdin: Path | None = None) -> _
     if program is None:
         raise MissingDependencyError("signatures need OpenSSH's ssh-keygen; run: apt install openssh-client")
     command = [program, "-Y", operation, *arguments]
-    with ExitStack() as stack:
-        source = stack.enter_context(stdin.open("rb")) if stdin else DEVNULL
+    opened_file = stdin.open("rb") if stdin else nullcontext(DEVNULL)
+    with opened_file as source:
         try:
             completed = run(command, stdin=source, capture_output=True, timeout=TIMEOUT_S, check=False)
         except TimeoutExpired:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import get_args
+from typing import NamedTuple, get_args
 
 import numpy as np
 
@@ -22,6 +22,7 @@ ORDERS: tuple[QuaternionOrder, ...] = get_args(QuaternionOrder)
 TRUTH = "truth.mcap"
 SENSORS = "sensors.mcap"
 HEAD_BYTES = 4096  # enough to distinguish text from a recording
+MOST_BYTES_OF_CHARACTER = 4  # in UTF-8; the head can end in the middle of a character
 TRUTH_WORDS = re.compile(r"(?<![a-z])(gt|ground[ _-]?truth|truth|reference)(?![a-z])", re.IGNORECASE)
 BY_ROW = "neither file has stamps: poses are paired by row, and a second is a row; --times names a file with stamps"
 BY_FRAME = (
@@ -70,14 +71,22 @@ class TrajectoryPair:
     by_frame: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class _Read:
-    parsed: ParsedTrajectory
+class _Interpretation(NamedTuple):
+    """How the user wants a file to be read. None means that the file's format decides."""
+
+    unit: StampUnit | None
+    order: QuaternionOrder | None
+    conventions: tuple[PoseConvention, ...]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class _ReadFile:
+    """The poses in a file as they were parsed, and what is known about them."""
+
     path: Path
-    moves: tuple[PoseConvention, ...]
-    mentions_ground_truth: bool
-    unit: StampUnit | None = None  # as specified by the user; it overrides the file
-    order: QuaternionOrder | None = None
+    parsed: ParsedTrajectory
+    interpretation: _Interpretation
+    mentions_ground_truth: bool = False
 
 
 def read_pair(
@@ -87,123 +96,132 @@ def read_pair(
 
     `any_unit` tries finer units if stamps are too large for seconds. Raises InputError.
     """
-    reads = [_read(gt, any_unit=any_unit), _read(est, any_unit=any_unit)]
-    unstamped = [read for read in reads if read.parsed.t_ns is None]
+    files = [_read(gt, any_unit=any_unit), _read(est, any_unit=any_unit)]
+    unstamped = [file for file in files if file.parsed.t_ns is None]
     if times:
         if not unstamped:
             raise InputError(f"--times is for files without stamps, but both files have theirs: {times[0]}")
-        gt_read, est_read = (_stamp(read, times) for read in reads)
+        gt_file, est_file = (_stamped(file, times) for file in files)
     elif len(unstamped) == 1:
         raise InputError(f"no stamps in {unstamped[0].path}; name the file that has them with --times")
     else:
         _require_same_frames(unstamped)
-        gt_read, est_read = (_numbered(read) for read in reads)
-    notes = (*_notes(reads[0]), *_notes(reads[1]))
-    by_frame = None if times else _pairing(unstamped)
-    return TrajectoryPair(_reading(gt_read), _reading(est_read), notes, by_frame)
+        gt_file, est_file = (_stamped_by_frame(file) for file in files)
+    return TrajectoryPair(
+        gt=_reading(gt_file),
+        est=_reading(est_file),
+        notes=(*_notes(files[0]), *_notes(files[1])),
+        by_frame=None if times else _pairing(unstamped),
+    )
 
 
-def _pairing(unstamped: Sequence[_Read]) -> str | None:
+def _pairing(unstamped: Sequence[_ReadFile]) -> str | None:
     """The pairing of files without stamps; None if there are none."""
     if not unstamped:
         return None
-    has_frames = any(read.parsed.frames is not None for read in unstamped)
+    has_frames = any(file.parsed.frames is not None for file in unstamped)
     return BY_FRAME if has_frames else BY_ROW
 
 
-def _require_same_frames(unstamped: Sequence[_Read]) -> None:
+def _require_same_frames(unstamped: Sequence[_ReadFile]) -> None:
     """Raise InputError if files without stamps cannot have the same frames."""
-    by_row = [read for read in unstamped if read.parsed.frames is None]
-    row_counts = {len(read.parsed.T) for read in by_row}
+    by_row = [file for file in unstamped if file.parsed.frames is None]
+    row_counts = {len(file.parsed.T) for file in by_row}
     if len(row_counts) > 1:
-        counts = " and ".join(f"{len(read.parsed.T)} in {read.path}" for read in by_row)
+        counts = " and ".join(f"{len(file.parsed.T)} in {file.path}" for file in by_row)
         raise InputError(f"files without stamps pair by row, but have {counts} rows; {SAY_WHICH}")
     if not by_row:
         return
     rows = len(by_row[0].parsed.T)
-    for read in unstamped:
-        frames = read.parsed.frames
+    for file in unstamped:
+        frames = file.parsed.frames
         if frames is not None and frames[-1] >= rows:
             raise InputError(
                 f"frames should be below {rows}, the number of rows in {by_row[0].path}, but there is {frames[-1]} "
-                f"in {read.path}"
+                f"in {file.path}"
             )
 
 
-def _notes(read: _Read) -> list[str]:
-    frames = read.parsed.frames
-    notes = list(read.parsed.notes)
+def _notes(file: _ReadFile) -> list[str]:
+    """The notes on how a file was read."""
+    frames = file.parsed.frames
+    notes = list(file.parsed.notes)
     if frames is not None:
         count = f"{len(frames)} poses for frames {frames[0]} to {frames[-1]}"
-        notes.append(f"the first of 13 columns was read as the number of a frame ({count}): {read.path}")
+        notes.append(f"the first of 13 columns was read as the number of a frame ({count}): {file.path}")
     return notes
 
 
 def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: bool = False) -> TrajectoryReading:
     """Read a single file. A file without stamps needs `times`. Raises InputError."""
-    read = _read(source, any_unit=any_unit)
+    file = _read(source, any_unit=any_unit)
     if times:
-        read = _stamp(read, times)
-    if read.parsed.t_ns is None:
+        file = _stamped(file, times)
+    if file.parsed.t_ns is None:
         raise InputError(f"no stamps in {source.path}; name the file that has them as `times`")
-    return _reading(read)
+    return _reading(file)
 
 
-def _reading(read: _Read) -> TrajectoryReading:
-    parsed = read.parsed
+def _reading(file: _ReadFile) -> TrajectoryReading:
+    """The trajectory in a file with stamps, in the usual convention."""
+    parsed = file.parsed
     assert parsed.t_ns is not None
     T = parsed.T
-    for move in read.moves:
-        T = move.apply(T)
+    for convention in file.interpretation.conventions:
+        T = convention.apply(T)
+    unit = file.interpretation.unit
     return TrajectoryReading(
         Trajectory(parsed.t_ns, T),
         unit=parsed.unit,
-        format_unit=read.unit or parsed.format_unit,
-        order=None if read.order else parsed.order,
-        mentions_ground_truth=read.mentions_ground_truth,
-        is_unit_given=read.unit is not None,
+        format_unit=unit or parsed.format_unit,
+        order=None if file.interpretation.order else parsed.order,
+        mentions_ground_truth=file.mentions_ground_truth,
+        is_unit_given=unit is not None,
     )
 
 
-def _stamp(read: _Read, times: Sequence[Path]) -> _Read:
-    """The poses with stamps from the only file of times that fits them."""
-    clocks = {path: parse_times(_text(path), name=str(path)) for path in times}
-    parsed = read.parsed
+def _stamped(file: _ReadFile, times: Sequence[Path]) -> _ReadFile:
+    """The file with stamps from the only file of times that fits its poses; a file that has stamps is unchanged."""
+    stamps_by_path = {path: parse_times(_text(path), name=str(path)) for path in times}
+    parsed = file.parsed
     if parsed.t_ns is not None:
-        return read
+        return file
     fitting = {}
-    for path, clock in clocks.items():
-        stamps = parsed.stamped_by(clock)
+    for path, frames_ns in stamps_by_path.items():
+        stamps = parsed.stamped_by(frames_ns)
         if stamps is not None:
             fitting[path] = stamps
     if not fitting:
         given = f"none of {len(times)} files of times is"
         if len(times) == 1:
-            given = f"{len(clocks[times[0]])} stamps in {times[0]}"
-        raise InputError(f"{given} for {len(parsed.T)} poses in {read.path}; {SAY_WHICH}")
+            given = f"{len(stamps_by_path[times[0]])} stamps in {times[0]}"
+        raise InputError(f"{given} for {len(parsed.T)} poses in {file.path}; {SAY_WHICH}")
     first, *others = fitting.values()
     if any(not np.array_equal(stamps, first) for stamps in others):
         names = " and ".join(map(str, fitting))
-        raise InputError(f"one file of times should fit the {len(parsed.T)} poses in {read.path}, but {names} do")
-    return replace(read, parsed=replace(parsed, t_ns=first, unit="s", format_unit="s"))
+        raise InputError(f"one file of times should fit the {len(parsed.T)} poses in {file.path}, but {names} do")
+    return replace(file, parsed=replace(parsed, t_ns=first, unit="s", format_unit="s"))
 
 
-def _numbered(read: _Read) -> _Read:
-    """The poses with stamps that increase by one second per frame instead of the missing ones."""
-    parsed = read.parsed
+def _stamped_by_frame(file: _ReadFile) -> _ReadFile:
+    """The file with stamps that increase by one second per frame; a file that has stamps is unchanged."""
+    parsed = file.parsed
     if parsed.t_ns is not None:
-        return read
+        return file
     frames = parsed.frames
     if frames is None:
         frames = np.arange(len(parsed.T), dtype=np.int64)
-    return replace(read, parsed=replace(parsed, t_ns=frames * NS_PER_S))
+    return replace(file, parsed=replace(parsed, t_ns=frames * NS_PER_S))
 
 
-def _read(source: TrajectorySource, *, any_unit: bool) -> _Read:
+def _read(source: TrajectorySource, *, any_unit: bool) -> _ReadFile:
+    """Read a recording or a text file. `any_unit` tries finer units if stamps are too large for seconds."""
     if _is_recording(source.path):
         return _read_recording(source)
     path = source.path
-    unit, order, moves = _words(source.words)
+    interpretation = _interpretation(source.words)
+    unit = interpretation.unit
+    order = interpretation.order
     if source.topic:
         raise InputError(f"a topic is for a recording, but this is a text file: {path}")
     text = _text(path)
@@ -214,16 +232,22 @@ def _read(source: TrajectorySource, *, any_unit: bool) -> _Read:
         raise InputError(f"no stamps to read as {unit} in {path}")
     if order and parsed.order is None:
         raise InputError(f"no quaternions to read as {order} in {path}")
-    return _Read(parsed, path, moves, mentions_ground_truth, unit, order)
+    return _ReadFile(
+        path=path,
+        parsed=parsed,
+        interpretation=interpretation,
+        mentions_ground_truth=mentions_ground_truth,
+    )
 
 
-def _read_recording(source: TrajectorySource) -> _Read:
-    unit, order, moves = _words(source.words)
-    if unit or order:
+def _read_recording(source: TrajectorySource) -> _ReadFile:
+    """Read the poses of a topic, or the ground truth of a sequence."""
+    interpretation = _interpretation(source.words)
+    if interpretation.unit or interpretation.order:
         raise InputError(f"a recording states its stamps' unit and quaternions' order itself: {source.path}")
     trajectory = _recorded(source.path, source.topic)
-    parsed = ParsedTrajectory(trajectory.t_ns, trajectory.T_world_frame, "ns", "ns")
-    return _Read(parsed, source.path, moves, mentions_ground_truth=False)
+    parsed = ParsedTrajectory(trajectory.t_ns, trajectory.T_world_frame, unit="ns", format_unit="ns")
+    return _ReadFile(path=source.path, parsed=parsed, interpretation=interpretation)
 
 
 def _parse(
@@ -239,32 +263,38 @@ def _parse(
         raise
 
 
-def _words(words: Iterable[str]) -> tuple[StampUnit | None, QuaternionOrder | None, tuple[PoseConvention, ...]]:
+def _interpretation(words: Iterable[str]) -> _Interpretation:
+    """The interpretation that words such as ns, wxyz or axes:z,-x,-y specify; later words override earlier ones."""
     unit: StampUnit | None = None
     order: QuaternionOrder | None = None
-    moves = []
+    conventions = []
     for word in words:
         if word in UNITS:
             unit = word
         elif word in ORDERS:
             order = word
         else:
-            moves.append(parse_pose_convention(word))
-    return unit, order, tuple(moves)
+            conventions.append(parse_pose_convention(word))
+    return _Interpretation(unit, order, tuple(conventions))
 
 
 def _is_recording(path: Path) -> bool:
+    """Whether a path is a folder or a binary file."""
     if path.is_dir():
         return True
     head = _bytes(path, HEAD_BYTES)
+    if b"\0" in head:
+        return True
     try:
         head.decode("utf-8")
     except UnicodeDecodeError as error:
-        return error.start < len(head) - 4 or b"\0" in head
-    return b"\0" in head
+        is_cut_character = error.start >= len(head) - MOST_BYTES_OF_CHARACTER
+        return not is_cut_character
+    return False
 
 
 def _bytes(path: Path, most: int = -1) -> bytes:
+    """The content of a file, at most that many bytes. Raises InputError if it cannot be read."""
     try:
         with path.open("rb") as file:
             return file.read(most)
@@ -273,6 +303,7 @@ def _bytes(path: Path, most: int = -1) -> bytes:
 
 
 def _text(path: Path) -> str:
+    """The content of a text file. Raises InputError if it cannot be read or is not UTF-8."""
     content = _bytes(path)
     try:
         return content.decode("utf-8")

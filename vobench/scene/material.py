@@ -20,7 +20,7 @@ class Texture(Protocol):
 
     @property
     def tile_m(self) -> float:
-        """What one repeat covers of a mesh's texture coordinates, which are metres for most."""
+        """The texture coordinates of a mesh that one repeat covers, in metres for most meshes."""
 
     def pixels(self) -> NDArray[Any]:
         """Linear reflectance (H, W) float32, or (H, W, 3 or 4) uint8 in sRGB, the fourth the opacity."""
@@ -67,7 +67,7 @@ class Material:
 
     @property
     def tile_m(self) -> float:
-        """What one repeat of the texture covers; 1 where there is none."""
+        """The length that one repeat of the texture covers; 1 without a texture."""
         return self.texture.tile_m if self.texture else 1.0
 
 
@@ -81,7 +81,7 @@ def linear(srgb: ArrayLike) -> Map:
 
 
 def srgb(values: ArrayLike) -> NDArray[np.uint8]:
-    """Linear values in [0, 1] as sRGB in uint8; what is beyond is cut off. Source: IEC 61966-2-1."""
+    """Linear values as sRGB in uint8; values outside of [0, 1] are clipped. Source: IEC 61966-2-1."""
     c = np.clip(values, 0, 1)
     encoded = np.where(c <= 0.0031308, 12.92 * c, 1.055 * c ** (1 / 2.4) - 0.055)
     return np.asarray(np.rint(255 * encoded), np.uint8)
@@ -140,7 +140,7 @@ def inner_reflectance(eta: float) -> float:
 
 
 def under_coat(albedo: Array, eta: float) -> Array:
-    """What a texture of albedo (...) reflects per light let in and out of its coat, all inner bounces added.
+    """The reflectance of a texture of albedo (...) below its coat, with all inner reflections, per light transmitted.
 
     Outgoing luminance = under_coat · E_in (1 - F(out)) / π, where E_in is the illuminance that enters,
     weighted by 1 - F(in). Source: the plastic of Mitsuba 3 (nonlinear), after Jakob (2010).

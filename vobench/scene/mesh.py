@@ -1,4 +1,4 @@
-"""Meshes as `trimesh.Trimesh`: how they are made, moved and joined.
+"""Creates, transforms and joins meshes, which are instances of `trimesh.Trimesh`.
 
 A mesh is a `trimesh.Trimesh` that was created with process=False, which preserves the order of its vertices.
 
@@ -44,8 +44,7 @@ def make_mesh(
 ) -> "Trimesh":
     """A mesh with vertices (V, 3), faces (F, 3), texture coordinates (V, 2) and normals (V, 3).
 
-    The arrays are copied, and their order is preserved. The mesh does not use embree, because its set-up takes longer
-    than all other steps together.
+    The arrays are copied, and their order is preserved.
     """
     from trimesh import Trimesh
     from trimesh.visual import TextureVisuals
@@ -60,7 +59,7 @@ def make_mesh(
         vertex_normals=vertex_normals,
         visual=visual,
         process=False,
-        use_embree=False,
+        use_embree=False,  # its set-up takes longer than all other steps of creating a mesh together
     )
 
 
@@ -126,14 +125,14 @@ def textured(mesh: "Trimesh", uv: ArrayLike) -> "Trimesh":
 
 
 def joined(meshes: Sequence["Trimesh"]) -> "Trimesh":
-    """One mesh with the faces of all meshes, in their order."""
+    """One mesh with the faces of all meshes, in their order. A single mesh is returned as it is."""
     if len(meshes) == 1:
         return meshes[0]
     return as_mesh(joined_arrays([as_arrays(mesh) for mesh in meshes]))
 
 
-def flat(vertices_m: ArrayLike, faces: ArrayLike, uv: ArrayLike) -> "Trimesh":
-    """A mesh with sharp edges: each face has three vertices that no other face shares.
+def flat_shaded(vertices_m: ArrayLike, faces: ArrayLike, uv: ArrayLike) -> "Trimesh":
+    """A mesh with flat shading, that is, sharp edges: each face has three vertices that no other face shares.
 
     `vertices_m` (V, 3), `faces` (F, 3) and `uv` (V, 2) describe the mesh with shared vertices.
     """

@@ -43,7 +43,7 @@ class PanoramaMap:
 
     @cached_property
     def around_horizon(self) -> Array:
-        """Mean daylight (3,) of what is less than 30 degrees from the horizon, in cd/m² per lux of the sky."""
+        """The mean daylight (3,) within 30 degrees of the horizon, in cd/m² per lux of the sky."""
         quarter = len(self.daylight) // 4  # of the rows, which are even in the sine
         return np.asarray(self.daylight[quarter:-quarter].mean((0, 1), dtype=float))
 

@@ -12,7 +12,8 @@ from vobench.sensor.response import FULL_SCALE_DN, Grey
 from vobench.setting import NonNegative, Positive, settings
 
 MS_PER_S = 1e3
-# A smaller error of the exposure (natural logarithm) is not corrected, so that noise and flicker do not change it.
+# A smaller error of the exposure (natural logarithm) is not corrected, so that noise and flicker do not change it. The
+# value is an assumption.
 DEAD_BAND = 0.02
 
 
@@ -35,7 +36,7 @@ class AutoExposure:
 
     The loop raises the exposure time up to its limit before it raises the gain.
     `target_share` is the linear brightness that a picture should have, as a share of full scale.
-    `percentile` selects which brightness of a picture is measured; without it, the mean is.
+    `percentile` is the percentile of brightness that is measured; None measures the mean.
     `lag_frames` is the number of pictures from a measurement to the first picture with the new exposure.
     `damping` is the share of the error that remains after one correction.
     Source: onsemi MT9V034 data sheet (exposure before gain; settings take effect in the picture after the next).
@@ -78,17 +79,16 @@ def next_exposures(
     The target follows from the exposure with which the picture was taken, not from the newest one. The loop therefore
     does not oscillate for any lag.
     """
-    first_positive = float(linear_of_grey[linear_of_grey > 0][0])
-    darkest = first_positive / 2  # a black pixel may have up to half a grey value
-    measured = max(_brightness(loop, grey, linear_of_grey), darkest)
+    measured = max(_brightness(loop, grey, linear_of_grey), _black_share(linear_of_grey))
     target = _exposure_of_level(loop, _level_s(pending[0]) * loop.target_share / measured)
 
     newest = pending[-1]
     error = math.log(_level_s(target) / _level_s(newest))
-    if abs(error) > _dead_band(loop, linear_of_grey):
-        correction = math.exp((1 - loop.damping) * error)
-        newest = _exposure_of_level(loop, _level_s(newest) * correction)
-    return (*pending[1:], newest)
+    if abs(error) <= _dead_band(loop, linear_of_grey):
+        return (*pending[1:], newest)
+    correction = math.exp((1 - loop.damping) * error)
+    corrected = _exposure_of_level(loop, _level_s(newest) * correction)
+    return (*pending[1:], corrected)
 
 
 def _level_s(exposure: Exposure) -> float:
@@ -103,6 +103,12 @@ def _exposure_of_level(loop: AutoExposure, level_s: float) -> Exposure:
     time_s = min(max(level_s, shortest_s), longest_s)
     gain_db = 20 * math.log10(level_s / time_s)
     return Exposure(time_s, min(max(gain_db, 0.0), loop.gain_max_db))
+
+
+def _black_share(linear_of_grey: Array) -> float:
+    """The largest signal that can look black, as a share of full scale: half of that of the first grey value above."""
+    first_positive = float(linear_of_grey[linear_of_grey > 0][0])
+    return first_positive / 2
 
 
 def _brightness(loop: AutoExposure, grey: Grey, linear_of_grey: Array) -> float:

@@ -267,7 +267,7 @@ class CameraSettings:
 
     @property
     def weights(self) -> tuple[float, float, float] | None:
-        """The weights of red, green and blue in the chip's one number; None where it tells them apart."""
+        """The weights of red, green and blue in the value of a mono chip; None for a chip in colour."""
         return self.spectrum if self.colour == "mono" else None
 
     @property

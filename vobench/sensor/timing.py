@@ -18,7 +18,7 @@ WIDEST_JITTER = 3.0  # standard deviations; larger draws are clipped
 
 @settings()
 class Timing:
-    """What happens to pictures and readings between sensors and their stamps.
+    """Delays, losses and repetitions of pictures and readings between the sensors and their stamps.
 
     Of all frames `drop_share` are lost, `drop_burst` in a row; `repeat_share` of them show the picture before again.
     A picture is taken `jitter_ms` (standard deviation) beside its stamp, the right one `right_delay_ms` later still.

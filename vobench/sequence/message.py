@@ -1,6 +1,6 @@
 """Creates the ROS 2 messages of a sequence, and reads their stamps and poses."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,9 @@ from vobench.sequence.topic import BODY, IMU, IMU_FRAME, LEFT_IMAGE, ODOMETRY, T
 from vobench.trajectory.nanoseconds import NS_PER_S
 
 END_OF_STAMPS_NS = 2**31 * NS_PER_S  # ROS counts seconds in 31 bits
-UNKNOWN_COVARIANCE = -1.0  # the first element of the covariance of an unknown quantity; see sensor_msgs/Imu
+# The rules of sensor_msgs/Imu: a covariance of zeros is unknown; if its first element is -1, the message lacks
+# the quantity.
+UNKNOWN_COVARIANCE = -1.0
 
 
 def split_stamp(t_ns: int) -> tuple[int, int]:
@@ -75,6 +77,7 @@ def image_message(
     t_ns: int,
     frame_id: str,
     encoded: bytes,
+    *,
     codec: str,
     colour: str = MONO,
 ) -> Any:
@@ -87,7 +90,9 @@ def image_message(
     if colour != MONO:
         compressed_as = "bgr8" if colour == RGB else MONO
         format_name = f"{colour}; {codec} compressed {compressed_as}"
-    return stamped_message(LEFT_IMAGE, t_ns, frame_id, format=format_name, data=np.frombuffer(encoded, np.uint8))
+    data = np.frombuffer(encoded, np.uint8)
+    # All image topics have the same type.
+    return stamped_message(LEFT_IMAGE, t_ns, frame_id, format=format_name, data=data)
 
 
 def imu_message(
@@ -100,7 +105,7 @@ def imu_message(
 ) -> Any:
     """A sensor_msgs/Imu with the angular velocity (3,) and the acceleration (3,) of one reading.
 
-    The variances are those of one axis in (rad/s)² and (m/s²)²; 0 means unknown.
+    The variances are those of one axis in (rad/s)² and (m/s²)²; 0 means that they are unknown.
     """
     no_rotation = new_message("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
     return stamped_message(
@@ -176,18 +181,29 @@ def stamp_ns(message: Any) -> int:
     return int(stamp.sec) * NS_PER_S + int(stamp.nanosec)
 
 
-def pose_fields(message: Any) -> tuple[float, ...]:
-    """The translation and quaternion (x, y, z, qx, qy, qz, qw) of a Transform or Pose message."""
-    if hasattr(message, "translation"):
-        t = message.translation
-        q = message.rotation
-    else:
-        t = message.position
-        q = message.orientation
-    return (t.x, t.y, t.z, q.x, q.y, q.z, q.w)
+class PoseFields(NamedTuple):
+    """The translation and the quaternion of a pose message."""
+
+    x: float
+    y: float
+    z: float
+    qx: float
+    qy: float
+    qz: float
+    qw: float
+
+
+def pose_fields(message: Any) -> PoseFields:
+    """The fields of a geometry_msgs/Transform or geometry_msgs/Pose."""
+    is_transform = hasattr(message, "translation")
+    t = message.translation if is_transform else message.position
+    q = message.rotation if is_transform else message.orientation
+    return PoseFields(t.x, t.y, t.z, q.x, q.y, q.z, q.w)
 
 
 def poses_from_fields(fields: ArrayLike) -> Array:
-    """Transforms (..., 4, 4) from values (..., 7) of `pose_fields`."""
+    """Transforms (..., 4, 4) from rows (..., 7) in the order of PoseFields."""
     values = np.asarray(fields, float)
-    return se3.transform(se3.from_quaternion(values[..., 3:]), values[..., :3])
+    positions_m = values[..., :3]
+    quaternions = values[..., 3:]
+    return se3.transform(se3.from_quaternion(quaternions), positions_m)

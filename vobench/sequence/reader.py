@@ -21,7 +21,7 @@ from vobench.sequence.bag import Bag
 from vobench.sequence.calibration import read_rig
 from vobench.sequence.cdr import parse_picture
 from vobench.sequence.mcap_file import parsing, part_of
-from vobench.sequence.message import UNKNOWN_COVARIANCE, pose_fields, poses_from_fields, stamp_ns
+from vobench.sequence.message import UNKNOWN_COVARIANCE, PoseFields, pose_fields, poses_from_fields, stamp_ns
 from vobench.sequence.picture import MONO, Image, decode
 from vobench.sequence.pixel_truth import names_from_json, pixel_truth_topics, truth_topic, truth_values
 from vobench.sequence.topic import (
@@ -226,7 +226,7 @@ def _bias_fields(message: Any) -> tuple[float, ...]:
     return *_xyz(message.gyro), *_xyz(message.accel)
 
 
-def _pose_fields(message: Any) -> tuple[float, ...]:
+def _pose_fields(message: Any) -> PoseFields:
     return pose_fields(message.pose.pose)
 
 

@@ -174,7 +174,7 @@ class SequenceWriter:
         t_ns = int(t_ns)
         if form != self._form:
             self._form = form
-            blanks = [image_message(0, name, b"", form, self._colour) for name in NAMES]
+            blanks = [image_message(0, name, b"", codec=form, colour=self._colour) for name in NAMES]
             self._blank = [serialise(blank) for blank in blanks]
         for topic, info in zip(INFO_TOPICS, self._info, strict=False):
             self._sensors.write(topic, t_ns, with_stamp(info, t_ns))

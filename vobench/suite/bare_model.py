@@ -33,7 +33,7 @@ def bare_model_scene(path: Path) -> SceneFile:
     from vobench.suite.default_light import DAYLIGHT_SKY, DAYLIGHT_SUN, DUSK_SKY, default_light
 
     model = read_model(path)
-    corners_m = np.concatenate([thing.mesh.vertices for thing in model.everything])
+    corners_m = np.concatenate([thing.mesh.vertices for thing in model.all_things])
     extent_m = float(np.ptp(corners_m, axis=0).max())
     scale = CENTIMETRE if extent_m > LARGEST_M else 1.0
     if scale != 1:
@@ -44,12 +44,12 @@ def bare_model_scene(path: Path) -> SceneFile:
     spec = SceneFile(name=name, meshes=(whole_model,))
 
     properties = {name: _optical_properties(material) for name, material in model.materials.items()}
-    properties_by_thing = np.array([properties[thing.material] for thing in model.everything])  # (T, 2)
+    properties_by_thing = np.array([properties[thing.material] for thing in model.all_things])  # (T, 2)
     emission_cd_m2 = properties_by_thing[:, 0]
     absorption = 1 - properties_by_thing[:, 1]
-    light = default_light(Scene(name, tuple(model.everything), {}, ()), absorption)
+    light = default_light(Scene(name, tuple(model.all_things), {}, ()), absorption)
 
-    area_m2 = np.array([areas_m2(face_corners(thing.mesh)).sum() for thing in model.everything])  # (T,)
+    area_m2 = np.array([areas_m2(face_corners(thing.mesh)).sum() for thing in model.all_things])  # (T,)
     emitted_lm = _lamp_power_lm(model.lights) + float(np.pi * area_m2 @ emission_cd_m2)
     own_lx = _daylight_lx(model.lights) + emitted_lm / light.absorption_m2
     if own_lx >= LEAST_LX:

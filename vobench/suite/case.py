@@ -16,7 +16,7 @@ from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_spec import EXACT, Rendering, TruthNoise, Window
 from vobench.suite.trajectory import TrajectorySpec
 
-NOISE_SEED_STEP = 1_000_000  # between the seeds of two draws of noise for one case
+NOISE_SEED_STEP = 1_000_000  # between the seeds of two draws of noise; far above the seeds that users choose
 CALIBRATION_STREAM = 7_301  # an arbitrary number that separates calibration errors from a seed's other random streams
 
 
@@ -24,8 +24,8 @@ CALIBRATION_STREAM = 7_301  # an arbitrary number that separates calibration err
 class Case:
     """One sequence to simulate, with all settings that determine it.
 
-    `name` is unique within the suite and valid as the name of a folder. It joins the names in `variant` that differ
-    within the suite.
+    `name` is unique within the suite and valid as the name of a folder, for example office-dim. It joins those names
+    of `variant` that are not the same in the whole suite.
     `variant` maps each axis to the name of the scene, lighting, rig, trajectory or camera.
     `replayed` is the text of the replayed trajectory in TUM format, None for a trajectory that is generated.
     `truth` lists the channels of per-pixel ground truth to record, such as depth.
@@ -76,9 +76,11 @@ class Case:
 
 
 def with_noise_seeds(cases: Iterable[Case], count: int) -> Iterator[Case]:
-    """Each case with a number of draws of all noise: of sensors, of slipping wheels, and of calibration errors.
+    """Each case `count` times, with different noise: of the sensors, of wheel slip, and of calibration errors.
 
-    They share place and drive, so that a board averages them within one unit.
+    The first copy is the case itself. The others have the same scene and trajectory and other seeds, and the number
+    of the copy is appended to their names, as in office-noise2. A leaderboard averages over the copies of a case
+    before it computes confidence intervals.
     """
     for case in cases:
         yield case

@@ -62,7 +62,10 @@ def _seeds(suite: Suite) -> int:
 
 
 def joined(plans: Sequence[Plan]) -> Plan:
-    """One plan with the cases of several draws of a suite. Cases whose names collide are told apart by their draw."""
+    """One plan with the cases of several draws of a suite.
+
+    The number of the draw is added to the names of cases that collide.
+    """
     taken = set[str]()
     cases = list[Case]()
     for number, plan in enumerate(plans):

@@ -14,12 +14,34 @@ Kind = Literal["scene", "suite", "scenario", "estimator"]
 # SceneFile and Manifest has a field of that name, which a test checks, and if the name does not occur in other YAML.
 DISTINCTIVE_KEYS: dict[Kind, frozenset[str]] = {
     "suite": frozenset(
-        {"estimators", "scenes", "scenarios", "source", "rigs", "trajectories", "cameras", "lightings", "repeats"}
+        {
+            "estimators",
+            "scenes",
+            "scenarios",
+            "source",
+            "rigs",
+            "trajectories",
+            "cameras",
+            "lightings",
+            "repeats",
+        }
     ),
     "scenario": frozenset({"base", "severity"}),
     "scene": frozenset(
-        {"white_cd_m2", "room", "lamps", "materials", "furniture", "boxes", "boards", "meshes"}
-        | {"maker", "generator", "sun", "sky"}
+        {
+            "white_cd_m2",
+            "room",
+            "lamps",
+            "materials",
+            "furniture",
+            "boxes",
+            "boards",
+            "meshes",
+            "maker",
+            "generator",
+            "sun",
+            "sky",
+        }
     ),
     "estimator": frozenset({"class", "command", "stream", "needs", "pose_of", "params"}),
 }
@@ -34,7 +56,10 @@ TOP_LEVEL_KEY = re.compile(r"^(\w+)\s*:", re.MULTILINE)  # a key that is not ind
 
 
 def kind_of_keys(keys: Collection[str]) -> Kind | None:
-    """The kind of file that has the most of these top-level keys; None if no kind has any of them."""
+    """The kind of file that has the most of these top-level keys; None if no kind has any of them.
+
+    Of two kinds with equally many, it is the one that is first in DISTINCTIVE_KEYS.
+    """
     counts = {kind: len(distinctive_keys & set(keys)) for kind, distinctive_keys in DISTINCTIVE_KEYS.items()}
     likeliest = max(counts, key=lambda kind: counts[kind])
     return likeliest if counts[likeliest] > 0 else None

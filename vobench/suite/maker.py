@@ -24,41 +24,41 @@ from vobench.estimator.program import EstimatorFailure, OutputFailure, Program, 
 from vobench.scene.generated_place import GeneratedPlace
 from vobench.suite.catalog import builtin_root
 from vobench.suite.maker_message import decode
-from vobench.suite.maker_worker import ERROR, GENERATE, MAKE, SCENE, call
+from vobench.suite.maker_worker import ERROR_FILE, GENERATE, MAKE, SCENE_FILE, call
 
 LIMITS = Limits(trial_s=600.0, threads=os.cpu_count() or 1)
 WORKER = (sys.executable, "-P", "-m", "vobench.suite.maker_worker")
-SCENE_BYTES = 2 << 30
-ERROR_BYTES = 1 << 16
+MAX_SCENE_BYTES = 2 << 30  # so that a hostile maker cannot exhaust the memory
+MAX_ERROR_BYTES = 1 << 16
 NO_SCENE = "returned no scene"
 
 
-def create_scene(maker: Path, *, seed: int, scene: str) -> GeneratedPlace:
-    """The scene that a maker creates from a seed. `scene` is the name of the scene.
+def create_scene(maker: Path, *, seed: int, scene_name: str) -> GeneratedPlace:
+    """The scene that a maker creates from a seed.
 
     Raises SuiteError if the maker fails, or if this machine has no sandbox and the user does not trust the maker.
     """
-    return _run(maker, MAKE, (seed,), scene)
+    return _run(maker, MAKE, (seed,), scene_name)
 
 
-def generate_place(generator: Path, *, seed: int, lighting: str, scene: str) -> GeneratedPlace:
-    """The place that a generator creates from a seed. `scene` is the name of the scene.
+def generate_place(generator: Path, *, seed: int, lighting: str, scene_name: str) -> GeneratedPlace:
+    """The place that a generator creates from a seed.
 
     Raises SuiteError if the generator fails, or if this machine has no sandbox and the user does not trust it.
     """
-    return _run(generator, GENERATE, (seed, lighting), scene)
+    return _run(generator, GENERATE, (seed, lighting), scene_name)
 
 
-def _run(file: Path, function: str, arguments: Sequence[Any], scene: str) -> GeneratedPlace:
-    """What a function of a file returns, run in this process if the file is included in vobench."""
+def _run(file: Path, function: str, arguments: Sequence[Any], scene_name: str) -> GeneratedPlace:
+    """The scene that a function of a file returns; it runs in this process if the file is included in vobench."""
     if file.resolve().is_relative_to(builtin_root().resolve()):
         return _run_trusted(file, function, arguments)
-    trust.admit(file, sources(file), scene, is_contained=_is_contained())
+    trust.admit(file, sources(file), scene_name, is_contained=_is_contained())
     return _run_sandboxed(file, function, arguments)
 
 
 def _run_trusted(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
-    """What a function returns in this process."""
+    """The scene that a function returns in this process."""
     try:
         return call(str(file), function, arguments)
     except Exception as error:
@@ -71,7 +71,7 @@ def _is_contained() -> bool:
 
 
 def sources(maker: Path) -> Iterator[bytes]:
-    """The name and content of the maker, followed by those of all other Python files in its folder and subfolders."""
+    """What is hashed of a maker: the names and contents of its file and of all Python files in its folder and below."""
     others = [path for path in maker.parent.rglob("*.py") if path != maker and path.is_file()]
     for path in [maker, *sorted(others)]:
         yield str(path.relative_to(maker.parent)).encode()
@@ -79,7 +79,7 @@ def sources(maker: Path) -> Iterator[bytes]:
 
 
 def _run_sandboxed(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
-    """What a function returns in a worker process in the sandbox."""
+    """The scene that a function returns in a worker process in the sandbox."""
     try:
         return decode(_worker_output(file, function, arguments))
     except EstimatorFailure as failure:
@@ -95,15 +95,16 @@ def _worker_output(file: Path, function: str, arguments: Sequence[Any]) -> bytes
     """
     command = [*WORKER, str(file.resolve()), function, json.dumps(arguments)]
     with ExitStack() as stack:
-        # Nobody reads what the code prints, nor what could not be removed: the log is deleted with the home.
-        home = stack.enter_context(Home(log=Path(os.devnull)))
-        log = home.path.parent / "log.txt"
-        program = stack.enter_context(Program(command, log=log, limits=LIMITS, home=home, folder=file.parent.resolve()))
+        home = stack.enter_context(Home(log=Path(os.devnull)))  # files that cannot be removed are not reported
+        output_log = home.path.parent / "log.txt"  # what the code prints is removed with the home
+        program = stack.enter_context(
+            Program(command, log=output_log, limits=LIMITS, home=home, folder=file.parent.resolve())
+        )
         program.wait()
-        error_text = _read_if_written(program, ERROR, ERROR_BYTES)
+        error_text = _read_if_written(program, ERROR_FILE, MAX_ERROR_BYTES)
         if error_text:
             raise SuiteError(in_one_line(error_text.decode("utf-8", "replace")))
-        return program.read(SCENE, most_bytes=SCENE_BYTES)
+        return program.read(SCENE_FILE, most_bytes=MAX_SCENE_BYTES)
 
 
 def _failure_reason(failure: EstimatorFailure) -> str:
@@ -111,7 +112,7 @@ def _failure_reason(failure: EstimatorFailure) -> str:
     if failure.kind == "timeout":
         return f"took more than {LIMITS.trial_s:g} s"
     if isinstance(failure, OutputFailure):
-        return NO_SCENE if failure.problem is None else f"{NO_SCENE}: {SCENE} {failure.problem}"
+        return NO_SCENE if failure.problem is None else f"{NO_SCENE}: {SCENE_FILE} {failure.problem}"
     return failure.reason
 
 

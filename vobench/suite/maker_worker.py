@@ -15,8 +15,8 @@ from vobench.errors import SuiteError, error_sentence
 from vobench.scene.generated_place import GeneratedPlace
 from vobench.suite.maker_message import checked, checked_place, encode
 
-SCENE = "scene.bin"
-ERROR = "error.txt"
+SCENE_FILE = "scene.bin"
+ERROR_FILE = "error.txt"
 MAKE = "make"
 GENERATE = "generate"
 PARAMETERS = {MAKE: "seed", GENERATE: "seed, lighting"}
@@ -35,9 +35,9 @@ def call(file: str, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
 def main(file: str, function: str, arguments: Sequence[Any]) -> None:
     """Call the function, and write its scene or its error to a file in the working folder."""
     try:
-        Path(SCENE).write_bytes(encode(call(file, function, arguments)))
+        Path(SCENE_FILE).write_bytes(encode(call(file, function, arguments)))
     except Exception as error:  # the user's code may raise anything
-        Path(ERROR).write_text(error_sentence(error), encoding="utf-8")
+        Path(ERROR_FILE).write_text(error_sentence(error), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -18,7 +18,7 @@ from vobench.suite.trajectory import TrajectorySpec
 
 MOST_SEVERE = 5
 SEVERITY_COUNT = MOST_SEVERE + 1  # with severity 0, the base
-PLACE_KEYS = ("scene", "scene_changes", "lighting", "trajectory")  # of a setup, which belong to a place and a drive
+PLACE_KEYS = ("scene", "scene_changes", "lighting", "trajectory")  # the keys of a setup that describe place and drive
 DEFAULT_CAMERA = CameraSettings()
 
 
@@ -63,31 +63,36 @@ class Scenario:
 
     @property
     def suits_any_place(self) -> bool:
-        """Whether it changes only the rig and the camera, so that it can be laid over any place and drive."""
-        first = self.setups[0]
-        return not first.lighting and all(
-            getattr(setup, key) == getattr(first, key) for setup in self.setups for key in PLACE_KEYS
-        )
+        """Whether it needs only a rig and a camera, so that it can be combined with any scene and trajectory.
+
+        Then no severity changes the place or the drive, and the base has no lighting of its own.
+        """
+        changed_keys = [key for key in PLACE_KEYS if self._is_changed_by_any_severity(key)]
+        return not changed_keys and not self.setups[0].lighting
+
+    def _is_changed_by_any_severity(self, key: str) -> bool:
+        """Whether a key of the setup differs from that of severity 0 at another severity."""
+        base_value = getattr(self.setups[0], key)
+        return any(getattr(setup, key) != base_value for setup in self.setups)
 
     def variant_names(self, severity: int, scene: str) -> dict[str, str]:
         """The name of the variant on each axis, as in `Case.variant`; `scene` is the name of the scene.
 
-        A name ends with the severity if the setup of this severity differs on the axis from that of severity 0. So
-        severity 3 of a scenario `dim` that only dims the lamps has {"scene": "office", "lighting": "dim.3", "rig":
-        "dim", "trajectory": "dim", "camera": "dim"}.
+        It is the name of the scenario, followed by the severity if this severity changes the axis. Severity 3 of a
+        scenario `dim` that only dims the lamps has the lighting "dim.3" and the rig "dim".
         """
-        names = {axis: self._with_severity(self.name, severity, field=axis) for axis in AXES}
+        names = {axis: self._with_severity(self.name, severity, key=axis) for axis in AXES}
         return {**names, "scene": self._scene_name(severity, scene)}
 
     def _scene_name(self, severity: int, scene: str) -> str:
         """The name of the scene; with changes, it is followed by the name of the scenario, as in office.dim.3."""
         if not self.setups[severity].scene_changes:
             return scene
-        return self._with_severity(f"{scene}.{self.name}", severity, field="scene_changes")
+        return self._with_severity(f"{scene}.{self.name}", severity, key="scene_changes")
 
-    def _with_severity(self, name: str, severity: int, *, field: str) -> str:
-        """The name, followed by the severity if it changes this field of the setup."""
-        is_unchanged = getattr(self.setups[severity], field) == getattr(self.setups[0], field)
+    def _with_severity(self, name: str, severity: int, *, key: str) -> str:
+        """The name, followed by the severity if it changes this key of the setup."""
+        is_unchanged = getattr(self.setups[severity], key) == getattr(self.setups[0], key)
         return name if is_unchanged else f"{name}.{severity}"
 
 
@@ -99,12 +104,15 @@ def read_scenario(path: Path, replaced: Mapping[str, Any] = MappingProxyType({})
     reading = yaml_file.read_all(path, ScenarioFile, kind="scenario")
     if reading.mistakes:
         raise SuiteError(*reading.mistakes)
+    source = reading.source
+    scenario_file = reading.model
+
     # The changes are applied to the base as written, so that they can change single keys of its sections.
-    written_base = {**reading.source.plain["base"], **replaced}
+    written_base = {**source.plain["base"], **replaced}
     setups: list[Setup] = []
     mistakes: list[Mistake] = []
-    for severity, changes in enumerate(reading.model.severity):
-        place = reading.source.place(("severity", severity))
+    for severity, changes in enumerate(scenario_file.severity):
+        place = source.place(("severity", severity))
         merged = merged_over(written_base, changes)
         try:
             setup = yaml_file.checked_section(Setup, merged, place)
@@ -114,4 +122,4 @@ def read_scenario(path: Path, replaced: Mapping[str, Any] = MappingProxyType({})
             setups.append(setup)
     if mistakes:
         raise SuiteError(*mistakes)
-    return Scenario(reading.model.name, path, tuple(setups))
+    return Scenario(scenario_file.name, path, tuple(setups))

@@ -173,7 +173,7 @@ def _from_maker(spec: SceneFile) -> Iterator[Contents]:
     """The contents that the scene's maker returns, if the scene has a maker."""
     if spec.maker is not None:
         maker = import_module(MAKER_MODULE)
-        place: GeneratedPlace = maker.create_scene(Path(spec.maker), seed=spec.seed, scene=spec.name)
+        place: GeneratedPlace = maker.create_scene(Path(spec.maker), seed=spec.seed, scene_name=spec.name)
         yield Contents(tuple(place.things), place.materials, tuple(place.lights))
 
 
@@ -183,7 +183,7 @@ def _generated(spec: SceneFile) -> Contents:
         raise SuiteError(f"'{spec.name}' is no place of a generator; give it a generator and a seed")
     maker = import_module(MAKER_MODULE)
     place: GeneratedPlace = maker.generate_place(
-        Path(spec.generator), seed=spec.generated.seed, lighting=spec.generated.lighting, scene=spec.name
+        Path(spec.generator), seed=spec.generated.seed, lighting=spec.generated.lighting, scene_name=spec.name
     )
     return Contents(tuple(place.things), place.materials, tuple(place.lights))
 
@@ -207,7 +207,7 @@ def _model(spec: ModelSpec) -> Contents:
     T_world_model = at(*spec.at_m, yaw=spec.yaw_deg)
     prefix = f"{spec.name}." if spec.name else ""
     placed_things = []
-    for thing in model.everything:
+    for thing in model.all_things:
         mesh = moved(thing.mesh, T_world_model)
         placed = replace(thing, name=prefix + thing.name, mesh=mesh, material=prefix + thing.material)
         placed_things.append(placed)

@@ -1,7 +1,7 @@
 """Turns pydantic's validation errors into messages for the authors of YAML files.
 
-A place has three forms here. A `loc` is a place in pydantic's data, which can contain parts that are not keys of the
-file. A `key_path` has the keys of the file only. A FilePlace also has the line, and is made by the file itself.
+Pydantic's location of an error (`loc`) is not yet a place in the file, because it also names kinds of sections. The
+schema distinguishes these from keys (`_schema_place`). The keys are the `key_path`, from which the file finds the line.
 """
 
 from collections.abc import Collection, Iterator
@@ -12,11 +12,11 @@ from pydantic import ValidationError
 from pydantic_core import ErrorDetails
 
 from vobench.errors import Mistake, SettingError
-from vobench.setting import MESSAGES, wrong_value_message
+from vobench.setting import MESSAGES, with_wrong_value, wrong_value_message
 from vobench.suite.yaml_source import Keys, YamlFile
 
 Schema = dict[str, Any]  # a JSON Schema or a section of one
-Loc = Keys
+PydanticLocation = tuple[int | str, ...]
 UNKNOWN_KEY = "unexpected_keyword_argument"  # pydantic's type of the error
 
 
@@ -31,11 +31,11 @@ def validation_mistakes(
     already been reported.
     """
     errors = sorted(error.errors(), key=lambda details: details["type"] != UNKNOWN_KEY)
-    wrong_locs = [*unread, *map(location, errors)]
+    wrong_locs = [*unread, *map(pydantic_location, errors)]
     misspelt_locs = _misspelt_locs(errors, schema)
 
     for details in errors:
-        loc = location(details)
+        loc = pydantic_location(details)
         key_path = _schema_place(schema, loc).key_path
         if key_path in unread:
             continue
@@ -48,29 +48,29 @@ def validation_mistakes(
         yield Mistake(_message(details, schema, source), (source.place(key_path),))
 
 
-def location(details: ErrorDetails) -> Loc:
-    """The place of one of pydantic's errors. If a SettingError caused it, the keys that it names are appended."""
+def pydantic_location(details: ErrorDetails) -> PydanticLocation:
+    """Pydantic's location of an error. If a SettingError caused it, the keys that it names are appended."""
     cause = details.get("ctx", {}).get("error")
     if isinstance(cause, SettingError):
         return (*details["loc"], *cause.keys)
     return details["loc"]
 
 
-def _misspelt_locs(errors: Collection[ErrorDetails], schema: Schema) -> set[Loc]:
-    """The place of the known key that each unknown key probably stands for."""
-    locs: set[Loc] = set()
+def _misspelt_locs(errors: Collection[ErrorDetails], schema: Schema) -> set[PydanticLocation]:
+    """The location of the known key that each unknown key probably stands for."""
+    locs: set[PydanticLocation] = set()
     for details in errors:
         if details["type"] != UNKNOWN_KEY:
             continue
-        *section_loc, unknown_key = location(details)
+        *section_loc, unknown_key = pydantic_location(details)
         nearest_key = _nearest_key(str(unknown_key), _known_keys(details, schema))
         if nearest_key:
             locs.add((*section_loc, nearest_key))
     return locs
 
 
-def _contains_any(loc: Loc, others: Collection[Loc]) -> bool:
-    """Whether one of the other places is inside the section at this place."""
+def _contains_any(loc: PydanticLocation, others: Collection[PydanticLocation]) -> bool:
+    """Whether one of the other locations is inside the section at this location."""
     return any(len(other) > len(loc) and other[: len(loc)] == loc for other in others)
 
 
@@ -82,7 +82,7 @@ def _nearest_key(unknown_key: str, known_keys: Collection[str]) -> str | None:
 
 def _known_keys(details: ErrorDetails, schema: Schema) -> list[str]:
     """The keys that are allowed in the section that contains an unknown key, sorted."""
-    section_loc = location(details)[:-1]
+    section_loc = pydantic_location(details)[:-1]
     return sorted(_schema_place(schema, section_loc).schema.get("properties", {}))
 
 
@@ -96,7 +96,7 @@ def _message(details: ErrorDetails, schema: Schema, source: YamlFile) -> str:
         return cause.sentence
     template = MESSAGES.get(details["type"])
     if template is None:
-        return wrong_value_message(details["msg"], details["input"], {})
+        return with_wrong_value(details["msg"], details["input"])
     return wrong_value_message(template, details["input"], context)
 
 
@@ -106,7 +106,7 @@ def _unknown_key_message(details: ErrorDetails, schema: Schema, source: YamlFile
     if other_kinds_message is not None:
         return other_kinds_message
     known_keys = _known_keys(details, schema)
-    nearest_key = _nearest_key(str(location(details)[-1]), known_keys)
+    nearest_key = _nearest_key(str(pydantic_location(details)[-1]), known_keys)
     guess = f" Did you mean {nearest_key!r}?" if nearest_key else ""
     return f"unknown key.{guess} Known: {', '.join(known_keys)}"
 
@@ -114,19 +114,17 @@ def _unknown_key_message(details: ErrorDetails, schema: Schema, source: YamlFile
 def _other_kinds_message(details: ErrorDetails, schema: Schema, source: YamlFile) -> str | None:
     """The message about a key that this kind of section does not have, but other kinds of it have.
 
-    For example, a lamp of the kind `point` has no `size_m`, but a `panel` has.
-    None if no kind has the key, or if only the unit is missing in the key, as in `power` for `power_lm`.
+    For example, a lamp of the kind `point` has no `size_m`, but a `panel` has. None if the key belongs to no kind, or
+    if it probably lacks a unit, as `power` does, which stands for `power_lm`.
     """
-    loc = location(details)
-    if len(loc) < 2:
+    loc = pydantic_location(details)
+    lacks_unit = any(known_key.startswith(f"{loc[-1]}_") for known_key in _known_keys(details, schema))
+    if len(loc) < 2 or lacks_unit:
         return None
     *section_loc, kind, key = loc
     section = _schema_place(schema, tuple(section_loc))
-    if str(kind) not in _references_by_kind(section.schema):
-        return None
     kinds_with_key = _kinds_with_key(schema, section.schema, key)
-    lacks_unit = any(known_key.startswith(f"{key}_") for known_key in _known_keys(details, schema))
-    if not kinds_with_key or lacks_unit:
+    if str(kind) not in _references_by_kind(section.schema) or not kinds_with_key:
         return None
 
     is_kind_written = source.place((*section.key_path, "kind")).value is not None
@@ -156,11 +154,11 @@ class _SchemaPlace(NamedTuple):
     schema: Schema
 
 
-def _schema_place(schema: Schema, loc: Loc) -> _SchemaPlace:
-    """Follow one of pydantic's places through a schema.
+def _schema_place(schema: Schema, loc: PydanticLocation) -> _SchemaPlace:
+    """Follow one of pydantic's locations through a schema.
 
-    Two kinds of parts of a `loc` are not keys of the file: the kind of a section, and "[key]", which says that a key is
-    wrong instead of its value.
+    Two kinds of its parts are not keys of the file: the kind of a section, and "[key]", which says that a key is wrong
+    instead of its value.
     """
     key_path: Keys = ()
     section = _without_alternatives(schema, schema)

@@ -18,7 +18,7 @@ from vobench.setting import MESSAGES, hints, unit_of
 from vobench.suite import catalog, file_kind
 from vobench.suite.display_path import display_path
 from vobench.suite.file_kind import Kind
-from vobench.suite.validation_message import location, validation_mistakes
+from vobench.suite.validation_message import pydantic_location, validation_mistakes
 from vobench.suite.yaml_parser import parse_file, parse_text
 from vobench.suite.yaml_source import Keys, YamlFile, line_of, plain_tree
 
@@ -176,7 +176,7 @@ def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistak
         if not all_mistakes:
             return FileReading(whole, source)
     except ValidationError as error:
-        wrong_places += [location(each) for each in error.errors()]
+        wrong_places += [pydantic_location(each) for each in error.errors()]
         all_mistakes += validation_mistakes(source, error, json_schema(model), unread)
 
     sections, kept = _intact_sections(model, data, wrong_places)

@@ -20,9 +20,9 @@ TARTANAIR_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 FORMATS_WITHOUT_COMMAS = (TUM_COLUMNS, KITTI_COLUMNS, NUMBERED_COLUMNS, TARTANAIR_COLUMNS)
 COLUMNS_BY_COUNT = {len(columns): columns for columns in FORMATS_WITHOUT_COMMAS}
 KNOWN_FORMATS = (
-    f"TUM has {len(TUM_COLUMNS)} ({' '.join(TUM_COLUMNS)}), KITTI {len(KITTI_COLUMNS)}, "
-    f"or {len(NUMBERED_COLUMNS)} with a frame number first, "
-    f"TartanAir {len(TARTANAIR_COLUMNS)}, EuRoC {len(EUROC_COLUMNS)} and commas"
+    f"TUM has {len(TUM_COLUMNS)} columns ({' '.join(TUM_COLUMNS)}); KITTI has {len(KITTI_COLUMNS)}, "
+    f"or {len(NUMBERED_COLUMNS)} with a frame number in front; TartanAir has {len(TARTANAIR_COLUMNS)}; "
+    f"EuRoC has {len(EUROC_COLUMNS)}, separated by commas"
 )
 
 
@@ -56,8 +56,8 @@ class ParsedTrajectory:
         if self.frames is None:
             has_equal_counts = len(frames_ns) == len(self.T)
             return frames_ns if has_equal_counts else None
-        has_every_frame = self.frames[-1] < len(frames_ns)
-        return frames_ns[self.frames] if has_every_frame else None
+        are_frames_known = self.frames[-1] < len(frames_ns)
+        return frames_ns[self.frames] if are_frames_known else None
 
 
 def parse_any(
@@ -88,7 +88,7 @@ def parse_any(
         return _parse_unstamped(table, order or "xyzw")
     if columns is NUMBERED_COLUMNS:
         return _parse_numbered_matrices(table)
-    return ParsedTrajectory(None, matrix_poses(table))
+    return ParsedTrajectory(t_ns=None, T=matrix_poses(table))
 
 
 def _first_row(text: str, name: str) -> str:
@@ -136,11 +136,11 @@ def _parse_unstamped(table: TextTable, order: QuaternionOrder) -> ParsedTrajecto
     """The poses of rows with a position and a quaternion."""
     R = rotations(table, table.values[:, 3:], order)
     T = se3.transform(R, table.values[:, :3])
-    return ParsedTrajectory(None, T, order=order)
+    return ParsedTrajectory(t_ns=None, T=T, order=order)
 
 
 def _parse_numbered_matrices(table: TextTable) -> ParsedTrajectory:
     """The poses of rows with a frame number and a matrix."""
     distinct = increasing_rows(table, frame_numbers(table), "frame number")
     T = matrix_poses(table)[distinct.rows]
-    return ParsedTrajectory(None, T, frames=distinct.numbers, notes=distinct.notes)
+    return ParsedTrajectory(t_ns=None, T=T, frames=distinct.numbers, notes=distinct.notes)
