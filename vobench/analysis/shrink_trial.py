@@ -131,7 +131,8 @@ def _search(trial: FinishedTrial, run_plan: PlanRunner, trials: int) -> Shrunk:
     stamps_ns = body_motion(trial.case).t_ns.tolist()
     whole = (first, first + len(stamps_ns))
     is_likely = _likely_windows(trial, dict(enumerate(stamps_ns, first)), wanted)
-    return shrink(trial.case, whole, is_likely, nuisances_of(trial.case), fails_alike, trials=trials)
+    nuisances = [nuisance for nuisance in nuisances_of(trial.case) if not nuisance.is_circumstance]
+    return shrink(trial.case, whole, is_likely, nuisances, fails_alike, trials=trials)
 
 
 def _likely_windows(
