@@ -4,6 +4,7 @@ Repeat i before and repeat i after the change share their seed, so they are comp
 """
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 
 import numpy as np
@@ -82,11 +83,15 @@ def sign_flip_p(differences: Array) -> float:
     is 1 / 2^n. Source: Fisher (1935), "The Design of Experiments", section 21.
     """
     count = len(differences)
-    if count <= MOST_EXACT:
-        signs = np.array(list(product((1.0, -1.0), repeat=count)))
-    else:
-        drawn = np.random.default_rng(0).integers(0, 2, (SIGN_DRAWS - 1, count)) * 2.0 - 1
-        signs = np.concatenate([np.ones((1, count)), drawn])
-    sums = signs @ differences
+    sums = _signs(count) @ differences
     tolerance = 1e-12 * np.abs(differences).sum()
     return float((sums >= differences.sum() - tolerance).mean())
+
+
+@cache
+def _signs(count: int) -> Array:
+    """All signs (2^n, n) of n differences or, of many, some that are drawn (SIGN_DRAWS, n); the first are positive."""
+    if count <= MOST_EXACT:
+        return np.array(list(product((1.0, -1.0), repeat=count)))
+    drawn = np.random.default_rng(0).integers(0, 2, (SIGN_DRAWS - 1, count)) * 2.0 - 1
+    return np.concatenate([np.ones((1, count)), drawn])
