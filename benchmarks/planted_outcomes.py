@@ -1,4 +1,4 @@
-"""How often `explain` is right, on weaknesses that are drawn by seed and whose effect is known. No pictures are drawn.
+"""How often `explain` is right, on weaknesses that are drawn by seed and whose effect is known, without pictures.
 
     python benchmarks/planted_outcomes.py [--draws 600] [--seed 1]
 

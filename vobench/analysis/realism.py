@@ -55,32 +55,42 @@ class Statistic:
 
 
 ERRORS = "calibration_error (right_roll_deg, right_pitch_deg)"
-# Advice on a setting says what else it moves.
-MORE_LIGHT = "more exposure_gain (raises gradients, the spread of grey and burnt pixels)"
-LESS_LIGHT = "less exposure_gain (lowers gradients, the spread of grey and burnt pixels)"
-MORE_BLUR = "more blur_sigma_px (lowers gradients, their kurtosis and the slope)"
-LESS_BLUR = "less blur_sigma_px (raises gradients, their kurtosis and the slope)"
-MORE_NOISE = "more gain_db with exposure_gain divided by 10^(dB / 20) (gain alone brightens, with more burnt pixels)"
+MORE_NOISE = "more gain_db with less exposure_gain"
+# What else the settings of the advice move, besides the statistic that they are advised for.
+SIDE_EFFECTS = {
+    "exposure_gain": "more raises gradients, the standard deviation of grey and saturated pixels together",
+    "gain_db": "divide exposure_gain by 10^(dB / 20), or gain also brightens: wider grey, more saturated pixels",
+    "blur_sigma_px": "more lowers gradients, their kurtosis and the slope of the spectrum together",
+    "rate_hz": "more makes tracks longer and more of them consistent, and costs as many more pictures",
+}
 STATISTICS = (
     Statistic("row_error_px", "row error of the pair", "px", 0.15, 0.5, f"more {ERRORS}", f"less {ERRORS}"),
     Statistic("gradient_p99", "gradient, 99th percentile", "DN", 55, 75,
-              f"contrast: sun, {MORE_LIGHT}, {LESS_BLUR}", f"softer light, {MORE_BLUR}"),
+              "contrast: sun, exposure_gain, less blur_sigma_px", "softer light, more blur_sigma_px"),
     Statistic("gradient_kurtosis", "gradient, kurtosis", "", 15, 35,
               "plain surfaces beside detailed ones", f"texture on more surfaces, {MORE_NOISE}"),
     Statistic("spectrum_slope", "slope of the power spectrum", "", -3.2, -2.5,
-              f"fine texture, {LESS_BLUR}, {MORE_NOISE}", f"large shapes and shadows, {MORE_BLUR}"),
+              f"fine texture, less blur_sigma_px, {MORE_NOISE}", "large shapes and shadows, more blur_sigma_px"),
     Statistic("corner_unevenness", "unevenness of corners", "", 0.35, 0.7,
               "plain walls or sky beside texture", "texture on plain surfaces"),
     Statistic("tracks_home", "consistent tracks", "%", 50, 75,
-              "smaller steps: more rate_hz, less speed (also longer tracks)",
-              "larger steps: less rate_hz, more speed (also shorter tracks)"),
+              "smaller steps: more rate_hz, less speed",
+              "larger steps: less rate_hz, more speed"),
     Statistic("track_life", "track length, of 13", "pictures", 3, 5,
-              "smaller steps: more rate_hz, less speed (also more consistent tracks)",
-              "larger steps: less rate_hz, more speed (also fewer consistent tracks), movers"),
+              "smaller steps: more rate_hz, less speed",
+              "larger steps: less rate_hz, more speed, movers"),
     Statistic("grey_sd", "standard deviation of grey", "DN", 50, 75,
-              "sun and shadow, darker and brighter materials", f"softer light, {LESS_LIGHT}"),
-    Statistic("burnt", "pixels at 254 or more", "%", 4, 10, f"{MORE_LIGHT}, sky or windows", LESS_LIGHT),
+              "sun and shadow, darker and brighter materials", "softer light, less exposure_gain"),
+    Statistic("burnt", "pixels at 254 or more", "%", 4, 10, "more exposure_gain, sky or windows", "less exposure_gain"),
 )  # fmt: skip
+
+
+def side_effects(advice: Iterable[str]) -> list[str]:
+    """What else each setting in some advice moves, a sentence for each setting."""
+    text = " ".join(advice)
+    return [f"{setting}: {effect}" for setting, effect in SIDE_EFFECTS.items() if setting in text]
+
+
 FIGURES_WITHOUT_RANGE = ("grey_mean", "noise_dn", "edge_px", "corners", "flow_px")
 OFFSET_BAND_PX = (0.0, 0.9)
 
