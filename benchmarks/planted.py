@@ -144,11 +144,12 @@ def explain_all(world: World, out: Path, chosen: Sequence[Sequence[str]], repeat
         found = explain_trial(trial, run_plan=plan_runner(out), repeats=repeats).explanation
         ranked = [*found.singles[:3], *found.pairs[:2]]
         told = ", ".join(f"{'+'.join(c.removed)} {c.mended:.0%} [{c.low:.0%}, {c.high:.0%}]" for c in ranked)
-        right += (is_right := wanted == set(found.named))
+        right += (is_right := wanted == set(found.named).union(*found.alternatives))
+        everything = "none" if found.everything is None else f"{found.everything.mended:.0%}"
         print(
             f"{'+'.join(planted):20} {estimator:12} {score.status:8} {found.loss:6.1%} "
-            f"{'right' if is_right else 'WRONG'}: {' and '.join(found.named) or 'none'}; {told}; all "
-            f"{found.everything.mended:.0%}; {time.process_time() - began:.0f} s",
+            f"{'right' if is_right else 'WRONG'}: {found.relation}: {' and '.join(found.named)}; {told}; "
+            f"all {everything}; {found.trials} trials, {time.process_time() - began:.0f} s",
             flush=True,
         )
     return right
@@ -215,6 +216,7 @@ SHOWN = {
     "rolling shutter": {"rolling"},
     "calibration": {"calibration"},
     "moving things": {"moving"},
+    "low light": {"darkness", "black", "noise"},
     "burnt pixels": {"burnt"},
     "low texture": {"faintness"},
     "unlike eyes": {"unlike_eyes"},
