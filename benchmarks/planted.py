@@ -8,6 +8,7 @@ Prints which cause was planted and which were found; with --errors only how much
 """
 
 import argparse
+import json
 import time
 from collections.abc import Mapping, Sequence
 from copy import deepcopy
@@ -15,7 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import yaml
+from ruamel.yaml import YAML
 
 from vobench.analysis.causes import attribute
 from vobench.analysis.explain_trial import explain_trial
@@ -58,10 +59,20 @@ class World:
             suite["trajectories"] |= change.get("trajectories", {})
         place = folder / name
         place.mkdir(parents=True, exist_ok=True)
-        (place / f"{scene['name']}.yaml").write_text(yaml.safe_dump(scene))
+        (place / f"{scene['name']}.yaml").write_text(as_yaml(scene))
         suite |= {"name": name, "scenes": [scene["name"]], "estimators": list(estimators)}
-        (place / "suite.yaml").write_text(yaml.safe_dump(suite))
+        (place / "suite.yaml").write_text(as_yaml(suite))
         return place / "suite.yaml"
+
+
+def read_world(path: Path) -> World:
+    """The world in a YAML file."""
+    return World(**YAML(typ="safe").load(path))
+
+
+def as_yaml(tree: Any) -> str:
+    """A tree as text that YAML reads, without references between its parts."""
+    return json.dumps(tree, indent=1)
 
 
 def small_lens() -> None:
@@ -133,11 +144,12 @@ def explain_all(world: World, out: Path, chosen: Sequence[Sequence[str]], repeat
         found = explain_trial(trial, run_plan=plan_runner(out), repeats=repeats).explanation
         ranked = [*found.singles[:3], *found.pairs[:2]]
         told = ", ".join(f"{'+'.join(c.removed)} {c.mended:.0%} [{c.low:.0%}, {c.high:.0%}]" for c in ranked)
-        right += (is_right := wanted == set(found.named))
+        right += (is_right := wanted == set(found.named).union(*found.alternatives))
+        everything = "none" if found.everything is None else f"{found.everything.mended:.0%}"
         print(
             f"{'+'.join(planted):20} {estimator:12} {score.status:8} {found.loss:6.1%} "
-            f"{'right' if is_right else 'WRONG'}: {' and '.join(found.named) or 'none'}; {told}; all "
-            f"{found.everything.mended:.0%}; {time.process_time() - began:.0f} s",
+            f"{'right' if is_right else 'WRONG'}: {found.relation}: {' and '.join(found.named)}; {told}; "
+            f"all {everything}; {found.trials} trials, {time.process_time() - began:.0f} s",
             flush=True,
         )
     return right
@@ -204,6 +216,7 @@ SHOWN = {
     "rolling shutter": {"rolling"},
     "calibration": {"calibration"},
     "moving things": {"moving"},
+    "low light": {"darkness", "black", "noise"},
     "burnt pixels": {"burnt"},
     "low texture": {"faintness"},
     "unlike eyes": {"unlike_eyes"},
@@ -225,7 +238,7 @@ def main() -> None:
     args = asked.parse_args()
     small_lens()
     coarse_light()
-    world = World(**yaml.safe_load(args.world.read_text()))
+    world = read_world(args.world)
     out = args.out / world.scene["name"]
     chosen = (
         [name.split("+") for name in args.only] if args.only else [*([name] for name in world.planted), *world.pairs]

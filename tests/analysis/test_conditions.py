@@ -7,7 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from vobench.analysis.conditions import CONDITIONS, SubsampledCamera, _contrast, chip_noise_dn, conditions
+from vobench.analysis.conditions import (
+    CONDITIONS,
+    SubsampledCamera,
+    _contrast,
+    _inverse_steps,
+    chip_noise_dn,
+    conditions,
+)
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import CalibrationError, CameraError, custom_stereo_pair, looking, stereo_rig
@@ -506,3 +513,20 @@ def test_bodies_without_a_texture_have_no_contrast_and_mirrors_none_that_is_know
     assert _contrast(Material()) == 0
     assert np.isnan(_contrast(None))
     assert np.isnan(_contrast(MirrorSpec().build()))
+
+
+def test_darkness_is_the_inverse_of_the_mean_grey_value(wall: Case) -> None:
+    assert one(wall, "darkness", left=(grey(50), grey(50))) == pytest.approx(1 / 50)
+    assert one(wall, "darkness", left=(grey(0), grey(0))) == 1
+
+
+def test_frames_are_counted_from_the_start(wall: Case) -> None:
+    assert conditions_of(wall)["since_start"].tolist() == [0, 1]
+
+
+def test_a_short_step_is_one_over_its_length_and_a_stop_counts_a_tenth_of_the_median_step() -> None:
+    positions_m = np.array([[0.0, 0, 0], [0.5, 0, 0], [1.0, 0, 0], [1.0, 0, 0]])
+    gt = Trajectory(np.arange(4) * STEP_NS, se3.transform(np.eye(3), positions_m))
+    assert _inverse_steps(gt) == pytest.approx([2, 2, 2, 20])
+    still = Trajectory(gt.t_ns, np.repeat(gt.T_world_frame[:1], 4, axis=0))
+    assert _inverse_steps(still).tolist() == [0, 0, 0, 0]

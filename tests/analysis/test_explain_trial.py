@@ -1,10 +1,14 @@
 """A trial that fails for noise is run again, and noise is named."""
 
+import re
+from types import SimpleNamespace
+
 import pytest
 
 from tests.analysis.conftest import NoisyRun
-from vobench.analysis.explain import Change, Explanation
-from vobench.analysis.explain_trial import TrialExplanation, explain_trial
+from vobench.analysis import explain_trial as explain_trial_module
+from vobench.analysis.explain import Change, Explanation, effort
+from vobench.analysis.explain_trial import TrialExplanation, _Forecast, explain_trial
 from vobench.errors import InputError, UnknownNameError
 
 slow = pytest.mark.slow  # run by `pytest -m slow`, and by CI
@@ -18,14 +22,15 @@ def test_noise_is_named_and_mends_the_trial(noisy_run: NoisyRun) -> None:
     )
     assert (found.case, found.estimator, found.named) == ("short", "blind", ("noise",))
     first = found.rows()[0]
-    assert (first["removed"], first["verdict"]) == (("noise",), "mends it")
-    assert first["survived"] == first["repeats"] >= 4  # of so few frames one repeat is too little
+    assert (first["removed"], first["verdict"]) == (("noise",), "fixes it")
+    assert first["survived"] == first["repeats"] == 6  # those that confirm it
+    assert found.sentences[0].startswith("Cause of the failure: noise. With a chip without noise, the error drops by")
     assert found.as_dict()["named"] == ("noise",)
 
     frame = found.to_frame()
     assert frame["removed"].iloc[0] == "noise"
     assert frame["removed"].iloc[-1] == " and ".join(found.explanation.everything.removed)
-    assert "no difference" in set(frame["verdict"])
+    assert {"no difference", "undecided"} & set(frame["verdict"])
 
 
 @slow
@@ -65,35 +70,119 @@ def test_a_sequence_that_is_gone_from_the_cache_is_a_sentence(noisy_run: NoisyRu
         explain_trial(copied / "short" / "wheel_odometry", run_plan=never)
 
 
+@slow
+@pytest.mark.usefixtures("cheap_pictures")
+def test_the_number_of_trials_is_announced_before_each_stage(noisy_run: NoisyRun) -> None:
+    said = []
+    progress = SimpleNamespace(say=said.append)
+    found = explain_trial(
+        noisy_run.trial("blind"), run_plan=noisy_run.run_plan, estimator=noisy_run.estimator, progress=progress
+    )
+    assert re.fullmatch(r"trials 1 to \d+ of at most \d+: each of \d+ nuisances removed, with 3 seeds", said[0])
+    assert said[-1].startswith("trials ")
+    assert f"to {found.explanation.trials} of at most" in said[-1]
+
+
+def test_the_time_of_a_stage_follows_from_the_trials_before(monkeypatch) -> None:
+    said = []
+    clock = iter([0.0, 60.0, 60.0, 80.0])
+    monkeypatch.setattr(explain_trial_module, "time", SimpleNamespace(monotonic=lambda: next(clock)))
+    forecast = _Forecast(SimpleNamespace(say=said.append), effort(3, is_deterministic=True), 10)
+    with forecast.stage(30):
+        pass
+    with forecast.stage(12):
+        pass
+    most = effort(3, is_deterministic=True).most_trials(10)
+    assert said[1] == f"trials 31 to 42 of at most {most}, about 24 s"
+
+
 # --- Rows and verdicts, without a run ---
 
 
-def change(*removed: str, mended: float, low: float, high: float = 1.0) -> Change:
-    return Change(removed, 0.1, mended, low, high, 2, 3)
+def change(*removed: str, mended: float, is_sure: bool = True, high: float = 1.0) -> Change:
+    low = mended - 0.1 if is_sure else mended - 0.5
+    return Change(
+        removed,
+        loss=0.1,
+        mended=mended,
+        low=low,
+        high=high,
+        survived=2,
+        repeats=6,
+        p_less=0.01 if is_sure and mended > 0 else 0.5,
+        p_more=0.01 if is_sure and mended < 0 else 0.5,
+        is_confirmed=is_sure,
+    )
 
 
-EVERYTHING = change("blur", "noise", "gloss", mended=0.9, low=0.8)
-SINGLES = (
-    change("blur", mended=0.8, low=0.7),
-    change("noise", mended=0.2, low=0.1),
-    change("gloss", mended=-0.2, low=-0.3, high=-0.1),
-)
-PAIR = change("blur", "noise", mended=0.3, low=-0.1)
+EVERYTHING = change("blur", "noise", "gloss", mended=0.9)
+BLUR = change("blur", mended=0.8)
+NOISE = change("noise", mended=0.2)
+GLOSS = change("gloss", mended=-0.2)
+FLARE = change("flare", mended=0.05, is_sure=False, high=0.1)
+JPEG = change("JPEG", mended=0.1, is_sure=False, high=0.6)
+PAIR = change("blur", "noise", mended=0.3, is_sure=False)
+ALL_SINGLES = (BLUR, NOISE, JPEG, FLARE, GLOSS)
 
 
-def explained(everything: Change = EVERYTHING, singles: tuple[Change, ...] = SINGLES) -> TrialExplanation:
-    return TrialExplanation("walk", "mine", Explanation(0.5, "lost", True, everything, singles, {}, (PAIR,)))
+def explained(
+    everything: Change = EVERYTHING, singles: tuple[Change, ...] = ALL_SINGLES, pairs: tuple[Change, ...] = (PAIR,)
+) -> TrialExplanation:
+    return TrialExplanation("walk", "mine", Explanation(0.5, "lost", True, everything, singles, {}, pairs, 40))
 
 
 def test_each_variant_has_its_verdict_and_everything_comes_last() -> None:
     rows = explained().rows()
-    assert [row["verdict"] for row in rows] == ["mends it", "helps", "harms", "no difference", "mends it"]
-    assert [row["removed"] for row in rows][3:] == [PAIR.removed, EVERYTHING.removed]
+    verdicts = [row["verdict"] for row in rows]
+    assert verdicts == ["fixes it", "helps", "undecided", "no difference", "harms", "undecided", "fixes it"]
+    assert [row["removed"] for row in rows][5:] == [PAIR.removed, EVERYTHING.removed]
     assert rows[0]["instead"] == "a short exposure and a sharp lens"
-    assert rows[3]["instead"] == ""
-    assert (rows[0]["mended"], rows[0]["survived"], rows[0]["repeats"]) == (0.8, 2, 3)
+    assert rows[5]["instead"] == ""
+    assert (rows[0]["mended"], rows[0]["survived"], rows[0]["repeats"]) == (0.8, 2, 6)
 
 
 def test_a_single_nuisance_is_listed_once() -> None:
-    single = change("blur", mended=0.8, low=0.7)
+    single = change("blur", mended=0.8)
     assert [row["removed"] for row in explained(single, (single,)).rows()] == [("blur",), PAIR.removed]
+
+
+def test_one_cause_is_said_with_its_remedy_what_else_helps_and_what_harms() -> None:
+    assert explained().sentences == (
+        "Cause of the failure: blur. With a short exposure and a sharp lens, the error drops by 80% "
+        "(95 % CI 70% to 100%).",
+        "It also depends on noise (20% less).",
+        "Diffuse surfaces would make it worse: the error grows by 20%.",
+    )
+
+
+def test_alternatives_and_pairs_are_said_as_such() -> None:
+    either = explained(singles=(BLUR, change("noise", mended=0.7)))
+    assert either.sentences[0] == (
+        "Cause of the failure: blur together with noise (70% less). Either change suffices: the error drops by 80% "
+        "(95 % CI 70% to 100%)."
+    )
+    assert [row["verdict"] for row in either.rows()][:2] == ["fixes it", "fixes it"]
+    singles = (change("blur", mended=0.2, is_sure=False), NOISE)
+    together = explained(singles=singles, pairs=(change("blur", "noise", mended=0.85),))
+    assert together.sentences == (
+        "Causes of the failure: blur and noise, each by itself. Only both together fix it: the error drops by 85% "
+        "(95 % CI 75% to 100%).",
+    )
+    assert together.rows()[2]["verdict"] == "fixes it"
+
+
+def test_where_nothing_is_named_it_is_said_what_was_ruled_out_and_what_is_open() -> None:
+    nothing = change("blur", "flare", mended=0.02, is_sure=False, high=0.2)
+    assert explained(nothing, (JPEG, FLARE), ()).sentences == (
+        "None of these explains the failure: the cause is the estimator, its path or the scene.",
+        "With all nuisances removed, the error drops by 2% (95 % CI -48% to 20%).",
+        "Ruled out, by the share of the error that they can cost: flare (at most 10%).",
+        "Not decided with so few repeats: JPEG (up to 60%).",
+    )
+
+
+def test_the_dictionary_has_what_is_concluded() -> None:
+    facts = explained().as_dict()
+    assert (facts["named"], facts["relation"], facts["alternatives"]) == (("blur",), "one", ())
+    assert (facts["contributing"], facts["harmful"]) == ([("noise",)], [("gloss",)])
+    assert facts["ruled_out"] == [("flare",)]

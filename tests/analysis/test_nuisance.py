@@ -11,8 +11,10 @@ from vobench.analysis.conditions import conditions
 from vobench.analysis.nuisance import COATED_FINISHES, FAINT_FINISHES, NUISANCES, nuisances_of, without
 from vobench.geometry import se3
 from vobench.geometry.rig import looking
+from vobench.motion.wander import Wander
 from vobench.scene.material import reflectance
 from vobench.sensor.image_sensor import CameraDifference, CameraDifferences, NoiseStreams, expose
+from vobench.sensor.imu import FLAWLESS, IMUS
 from vobench.sequence.reader import StereoFrame
 from vobench.suite.case import Case
 from vobench.suite.scene_build import build
@@ -20,9 +22,11 @@ from vobench.suite.scene_spec import (
     STEADY,
     BoxSpec,
     DiffuseSpec,
+    GeneratedSpec,
     GlassSpec,
     LevelSpec,
     LightOverride,
+    SceneFile,
     SkySpec,
     SunKey,
     SunSpec,
@@ -30,7 +34,12 @@ from vobench.suite.scene_spec import (
 from vobench.trajectory.trajectory import Trajectory
 
 BURNT = "burnt pixels"
-NAMES = [nuisance.name for nuisance in NUISANCES]
+LOW_LIGHT = "low light"  # more light than there is can always be had
+REPEATABLE = (BURNT, LOW_LIGHT)
+# What the fixtures do not have: an IMU, a generator, and a case that can be simulated.
+ABSENT = ("IMU errors",)
+REMOVABLE = [nuisance for nuisance in NUISANCES if not nuisance.is_circumstance and nuisance.name not in ABSENT]
+NAMES = [nuisance.name for nuisance in REMOVABLE]
 
 
 def changes(before: Any, after: Any, path: str = "") -> Iterator[tuple[str, Any]]:
@@ -45,6 +54,11 @@ def changes(before: Any, after: Any, path: str = "") -> Iterator[tuple[str, Any]
             yield from changes(before.get(key), after.get(key), f"{path}.{key}")
     else:
         yield path.lstrip("."), after
+
+
+def removable(case: Case) -> list[str]:
+    """The nuisances of a case that are no circumstances."""
+    return [nuisance.name for nuisance in nuisances_of(case) if not nuisance.is_circumstance]
 
 
 def with_camera(case: Case, **settings: Any) -> Case:
@@ -98,8 +112,7 @@ def test_a_removal_sets_exactly_the_settings_of_its_nuisance(worst: Case, name: 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_removal_removes_its_nuisance_and_leaves_all_others(hard: Case, name: str) -> None:
-    left = [nuisance.name for nuisance in nuisances_of(without(hard, [name]))]
-    assert left == [other for other in NAMES if other != name or name == BURNT]
+    assert removable(without(hard, [name])) == [other for other in NAMES if other != name or name in REPEATABLE]
 
 
 # --- What the frames show ---
@@ -269,27 +282,102 @@ def test_the_sun_becomes_a_uniform_sky_of_the_illuminance_of_both(hard: Case) ->
 
 
 def test_a_case_with_everything_has_every_nuisance_and_without_them_none_but_its_range(hard: Case) -> None:
-    names = [nuisance.name for nuisance in nuisances_of(hard)]
-    assert names == [nuisance.name for nuisance in NUISANCES]
-    assert [nuisance.name for nuisance in nuisances_of(without(hard, names))] == [BURNT]
+    names = removable(hard)
+    assert names == NAMES
+    assert removable(without(hard, names)) == [LOW_LIGHT, BURNT]
 
 
 def test_what_removals_make_can_be_built_and_in_any_order_is_the_same(hard: Case) -> None:
-    for nuisance in NUISANCES:
-        without(hard, [nuisance.name]).build_scene()
-    names = [nuisance.name for nuisance in NUISANCES]
-    assert without(hard, names) == without(hard, names[::-1])
+    for name in NAMES:
+        without(hard, [name]).build_scene()
+    assert without(hard, NAMES) == without(hard, NAMES[::-1])
 
 
 def test_a_removal_leaves_the_way_and_the_seed(hard: Case) -> None:
-    for nuisance in NUISANCES:
+    for nuisance in REMOVABLE:
+        if nuisance.name in ("wheel slip", "encoder errors"):
+            continue
         changed = nuisance.remove(hard)
         assert (changed.trajectory, changed.seed, changed.name) == (hard.trajectory, hard.seed, hard.name)
 
 
 def test_what_is_not_seen_in_any_frame_is_not_removed(hard: Case) -> None:
     kept = {nuisance.name for nuisance in nuisances_of(hard, {"mirror": 0.002, "moving": 0.003})}
-    assert kept == set(NAMES) - {"mirrors"}
+    assert kept & set(NAMES) == set(NAMES) - {"mirrors"}
+    for darkest_dn, is_dark in ((79, True), (81, False)):
+        names = {nuisance.name for nuisance in nuisances_of(hard, {"darkness": 1 / darkest_dn})}
+        assert (LOW_LIGHT in names) == is_dark
+
+
+# --- Light, wheels, inertia and circumstances ---
+
+
+@pytest.fixture
+def possible(hard: Case) -> Case:
+    """The case without the delay of an IMU that it has not got, so that it can be simulated."""
+    return with_camera(hard, timing=replace(hard.camera.timing, imu_delay_ms=0.0))
+
+
+def test_more_light_is_four_times_the_photons_at_the_same_exposure(hard: Case) -> None:
+    brighter = without(hard, [LOW_LIGHT])
+    assert dict(changes(hard, brighter)) == {"camera.exposure_gain": 4 * hard.camera.exposure_gain}
+    assert brighter.camera.white_e == pytest.approx(4 * hard.camera.white_e)
+
+
+def test_wheels_neither_slip_nor_differ_from_their_nominal_size(hard: Case) -> None:
+    assert dict(changes(hard, without(hard, ["wheel slip"]))) == {"trajectory.slip": "none"}
+    assert dict(changes(hard, without(hard, ["encoder errors"]))) == {"trajectory.encoders": "exact"}
+
+
+def test_an_exact_imu_stays_where_it_is(hard: Case) -> None:
+    imu = replace(IMUS["mpu6000"], position_m=(0.1, 0.0, 0.2)) if "mpu6000" in IMUS else next(iter(IMUS.values()))
+    case = replace(hard, rig=replace(hard.rig, imu=imu))
+    exact = without(case, ["IMU errors"]).rig.imu
+    assert exact is not None
+    assert (exact.gyro, exact.accel) == (FLAWLESS, FLAWLESS)
+    assert (exact.rate_hz, exact.position_m) == (imu.rate_hz, imu.position_m)
+    assert without(hard, ["IMU errors"]) == hard
+
+
+def test_circumstances_are_offered_where_the_changed_case_can_be_simulated(possible: Case) -> None:
+    names = {nuisance.name for nuisance in nuisances_of(possible) if nuisance.is_circumstance}
+    assert {"speed", "low frame rate", "short baseline"} <= names
+    assert "this place" not in names  # the scene has no generator
+    long_exposure = with_camera(possible, exposure_ms=150.0, shutter="global", readout_ms=None, auto_exposure=None)
+    names = {nuisance.name for nuisance in nuisances_of(long_exposure)}
+    assert "low frame rate" not in names  # a frame would be shorter than its exposure
+
+
+def test_only_nuisances_that_an_estimator_notices_are_offered(possible: Case) -> None:
+    of_mono = {nuisance.name for nuisance in nuisances_of(possible, sensors=["mono"])}
+    assert not {"wheel slip", "encoder errors", "short baseline"} & of_mono
+    assert {"speed", "blur"} <= of_mono
+    of_wheels = {nuisance.name for nuisance in nuisances_of(possible, sensors=["stereo", "encoders"])}
+    assert {"wheel slip", "encoder errors", "short baseline"} <= of_wheels
+    assert "speed" not in of_wheels  # the replayed path has no wheels
+
+
+def test_twice_the_baseline_keeps_the_middle_between_the_cameras(possible: Case) -> None:
+    wide = without(possible, ["short baseline"])
+    before = possible.build_rig()
+    after = wide.build_rig()
+    assert after.baseline_m == pytest.approx(2 * before.baseline_m)
+    middles_m = []
+    for rig in (before, after):
+        left_m = rig.T_body_camera("left")[:3, 3]
+        right_m = rig.T_body_camera("right")[:3, 3]
+        middles_m.append((left_m + right_m) / 2)
+    np.testing.assert_allclose(middles_m[0], middles_m[1], atol=1e-12)
+
+
+def test_another_place_is_that_of_the_next_seed_in_the_same_lighting(hard: Case) -> None:
+    scene = SceneFile(name="flat", generator="maker.py", generated=GeneratedSpec(seed=4, lighting="night"))
+    wander = Wander(length_m=3.0)
+    case = replace(hard, scene=scene, trajectory=wander)
+    elsewhere = without(case, ["this place"])
+    assert elsewhere.scene.generated == GeneratedSpec(seed=5, lighting="night")
+    assert elsewhere.variant["scene"] == "flat.5.night"
+    assert without(replace(case, trajectory=hard.trajectory), ["this place"]).scene == scene
 
 
 def test_shadowless_light_is_as_strong_and_dims_as_the_strongest_lamp_did(hard: Case) -> None:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from tests.analysis.test_image_noise import as_grey, boards
-from vobench.analysis.image_statistics import gradients, picture_statistics
+from vobench.analysis.image_statistics import gradients, picture_statistics, spectrum
 from vobench.analysis.realism import (
     STATISTICS,
     WINDOW,
@@ -17,6 +17,7 @@ from vobench.analysis.realism import (
     pair_sentences,
     residual,
     shots_of,
+    side_effects,
     window_starts,
 )
 from vobench.analysis.stereo_fit import StereoFit, Uncertain
@@ -25,6 +26,7 @@ from vobench.errors import InputError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import stereo_rig
 from vobench.runner.recording import read_recording
+from vobench.sensor.image_sensor import CAMERAS, CameraSettings, NoiseStreams, expose
 
 RIG = stereo_rig(Pinhole(320, 240, 300.0, 300.0, 159.5, 119.5), pitch_deg=0)
 
@@ -244,3 +246,60 @@ def test_inside_counts_the_statistics_in_their_ranges() -> None:
         assert statistic.verdict(statistic.low - 0.01) == "low"
         assert statistic.knob(statistic.low - 0.01) == statistic.raised_by
         assert statistic.knob(statistic.high + 0.01) == statistic.lowered_by
+
+
+# --- Advice ---
+
+
+def figures(*, level: float = 0.25, sigma_px: float = 0.8, gain_db: float = 0.0, gain: float = 1.0) -> dict[str, float]:
+    """The statistics of an image of boards in light of some level, by a camera with these settings."""
+    radiance = (boards(sigma_px=sigma_px) / 220) ** 2.2 * level
+    camera = CameraSettings(chip=CAMERAS["mt9v034"], gain_db=gain_db, exposure_gain=gain)
+    streams = NoiseStreams(np.random.default_rng(0), np.random.default_rng(1))
+    image = expose(radiance.astype(np.float32), camera, streams, exposure=camera.exposure)
+    return {**picture_statistics(image), "spectrum_slope": spectrum([image])[0]}
+
+
+def advice(name: str) -> tuple[str, str]:
+    """What raises and what lowers a statistic."""
+    (statistic,) = (statistic for statistic in STATISTICS if statistic.name == name)
+    return statistic.raised_by, statistic.lowered_by
+
+
+def test_advice_on_exposure_holds_with_its_side_effects() -> None:
+    before = figures(level=1.0)
+    after = figures(level=1.0, gain=2.0)
+    for name in ("gradient_p99", "burnt"):
+        assert "exposure_gain" in advice(name)[0]
+    for name in ("grey_sd", "burnt"):
+        assert "less exposure_gain" in advice(name)[1]
+    for name in ("gradient_p99", "burnt", "grey_sd"):
+        assert after[name] > before[name], name
+    (sentence,) = side_effects([advice("burnt")[0]])
+    assert sentence.startswith("exposure_gain: more raises gradients, the standard deviation of grey and saturated")
+
+
+def test_advice_on_blur_holds_with_its_side_effects() -> None:
+    before = figures()
+    after = figures(sigma_px=1.6)
+    for name in ("gradient_p99", "spectrum_slope"):
+        assert "less blur_sigma_px" in advice(name)[0]
+        assert "more blur_sigma_px" in advice(name)[1]
+    for name in ("gradient_p99", "spectrum_slope", "gradient_kurtosis"):
+        assert after[name] < before[name], name
+
+
+@pytest.mark.parametrize("gain_db", [10.0, 15.0])
+def test_advice_on_gain_holds_where_the_light_is_reduced_as_much_and_not_otherwise(gain_db: float) -> None:
+    before = figures()
+    noisier = figures(gain_db=gain_db, gain=10 ** (-gain_db / 20))
+    assert "more gain_db with less exposure_gain" in advice("gradient_kurtosis")[1]
+    assert "more gain_db with less exposure_gain" in advice("spectrum_slope")[0]
+    assert any("divide exposure_gain by 10^(dB / 20)" in each for each in side_effects([advice("spectrum_slope")[0]]))
+    assert side_effects(["texture on plain surfaces", ""]) == []
+    assert noisier["gradient_kurtosis"] < before["gradient_kurtosis"]
+    assert noisier["spectrum_slope"] > before["spectrum_slope"]
+    assert noisier["grey_mean"] == pytest.approx(before["grey_mean"], rel=0.03)
+    brighter = figures(level=1.0, gain_db=gain_db)
+    assert brighter["burnt"] > figures(level=1.0)["burnt"]
+    assert brighter["grey_mean"] > 1.2 * figures(level=1.0)["grey_mean"]

@@ -1,13 +1,16 @@
 """What the errors of a run depend on, for each of its estimators."""
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tests.analysis.conftest import NoisyRun
+from vobench.analysis import run_causes
 from vobench.analysis.causes import ErrorSeries, attribute
-from vobench.analysis.run_causes import EstimatorCauses, RunCauses, find_causes
+from vobench.analysis.run_causes import EstimatorCauses, RunCauses, _symptoms, find_causes
 from vobench.errors import UnknownNameError
 
 
@@ -43,6 +46,7 @@ def test_of_too_few_frames_trials_are_listed_and_no_cause_is_named(noisy_run: No
     assert blind.attribution is None
     assert blind.trials() == [{"case": "short", "repeat": 0, "status": "lost", "first_divergence_frame": 1}]
     assert "causes" not in blind.as_dict()
+    assert "are too few to learn causes from" in blind.as_dict()["reason"]
     assert found.to_frame().empty
 
 
@@ -80,3 +84,36 @@ def test_the_dictionary_has_the_factors_of_cases_and_eight_segments_unless_more_
     assert facts["explained"] == attribution.explained
     (factors,) = facts["cases"].values()
     assert factors == [[cause.conditions, factor] for cause, factor in attribution.cases["walk"]]
+
+
+def test_nothing_is_said_of_an_oracle_or_a_baseline(monkeypatch) -> None:
+    (course,) = planted().estimators[0].courses
+    monkeypatch.setattr(run_causes, "read_error_series", lambda *_: course)
+    monkeypatch.setattr(run_causes, "read_symptoms", lambda *_: {})
+    for claims, sentence in ((("oracle",), "given the ground truth"), (("baseline",), "it is a baseline")):
+        score = SimpleNamespace(case="walk", status="ok", claims=claims)
+        found = run_causes._causes_of(None, "mine", [score], {"walk": {}})
+        assert found.attribution is None
+        assert sentence in found.reason
+    score = SimpleNamespace(case="walk", status="ok", claims=("Sim(3)",))
+    assert run_causes._causes_of(None, "mine", [score], {"walk": {}}).attribution is not None
+
+
+def test_what_the_estimator_reports_is_a_symptom_and_takes_nothing_from_the_causes() -> None:
+    (found,) = planted().estimators
+    (course,) = found.courses
+    few_tracks = 1 / (1 + 100 / np.sqrt(course.conditions["blur"]))
+    (symptom,) = _symptoms([course], [{"few_tracks": few_tracks}])
+    assert "few_tracks" in symptom.conditions
+    assert symptom.factor > 1
+    assert _symptoms([course], [{}]) == ()
+    assert found.attribution.causes[0].conditions == ("blur",)
+
+
+def test_cases_on_one_drive_are_recognised() -> None:
+    (found,) = planted().estimators
+    (course,) = found.courses
+    same = replace(course, case="other", place="hall", drive="round")
+    assert found.has_one_drive
+    assert not replace(found, courses=(course, same)).has_one_drive
+    assert replace(found, courses=(replace(course, drive="round"), same)).has_one_drive

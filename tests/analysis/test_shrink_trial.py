@@ -1,6 +1,6 @@
 """A failed trial is shrunk to a suite that still fails in the same way."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,8 +9,17 @@ import pytest
 from tests.analysis.conftest import NoisyRun
 from vobench.analysis import shrink_trial as shrink_trial_module
 from vobench.analysis.shrink import Failure
-from vobench.analysis.shrink_trial import _fails, _first_without_pose_ns, _likely_windows, _part, shrink_trial
-from vobench.analysis.trial_data import read_paths
+from vobench.analysis.shrink_trial import (
+    AccuracyFailure,
+    StatusFailure,
+    _fails,
+    _first_without_pose_ns,
+    _likely_windows,
+    _part,
+    failure_of,
+    shrink_trial,
+)
+from vobench.analysis.trial_data import TrialPaths, read_paths
 from vobench.errors import InputError
 from vobench.runner.finished_trial import FinishedTrial, read_finished_trial
 from vobench.suite.suite import read_plan
@@ -40,7 +49,9 @@ def test_a_trial_that_does_not_fail_is_refused_before_anything_is_run(noisy_run:
     def never(plan, /):
         raise AssertionError("nothing should be run")
 
-    with pytest.raises(InputError, match="wheel_odometry on short is ok: nothing fails"):
+    with pytest.raises(
+        InputError, match=r"wheel_odometry on short is ok, with an error of 0\.\d\d% of the path: nothing fails"
+    ):
         shrink_trial(noisy_run.trial("wheel_odometry"), run_plan=never, folder=tmp_path / "small")
     assert not (tmp_path / "small").exists()
 
@@ -72,7 +83,8 @@ def test_after_a_crash_windows_with_the_first_frame_without_a_pose_are_likely(fi
     failed = numbers[failing]
     rows = [Row(t_ns, "ok" if number < failed else "") for number, t_ns in stamps_ns.items()]
     monkeypatch.setattr(shrink_trial_module, "read_frames", lambda _: rows)
-    is_likely = _likely_windows(finished, stamps_ns, Failure.of("crashed", "it does not say"))
+    crash = StatusFailure(Failure.of("crashed", "it does not say"), "")
+    is_likely = _likely_windows(finished, stamps_ns, crash)
     for first in numbers:
         for end in range(first + 1, numbers[-1] + 2):
             assert is_likely((first, end)) == (first <= failed < end), (first, end)
@@ -91,7 +103,8 @@ def test_where_every_frame_has_a_pose_the_first_is_taken(finished, monkeypatch) 
 def test_windows_are_judged_by_the_poses_that_the_trial_has_in_them(finished: FinishedTrial) -> None:
     stamps_ns = stamps_of(finished)
     first, last = min(stamps_ns), max(stamps_ns)
-    is_likely = _likely_windows(finished, stamps_ns, Failure.of(finished.score.status, finished.score.reason))
+    as_before = StatusFailure(Failure.of(finished.score.status, finished.score.reason), "")
+    is_likely = _likely_windows(finished, stamps_ns, as_before)
     assert finished.score.status == "ok"
     assert is_likely((first, last + 1))
     assert is_likely((first, first + 4))
@@ -114,3 +127,53 @@ def test_a_part_has_the_poses_from_one_stamp_to_another(finished: FinishedTrial)
 )
 def test_a_partial_trial_fails_if_it_has_a_reason(status: str, reason: str, fails: bool) -> None:
     assert _fails(SimpleNamespace(status=status, reason=reason)) == fails
+
+
+# --- Failures of accuracy ---
+
+
+def drifting(paths: TrialPaths, *, from_frame: int) -> TrialPaths:
+    """Paths with an estimate whose steps are 40 % too long from some frame on."""
+    T = paths.gt.T_world_frame.copy()
+    steps_m = np.diff(T[:, :3, 3], axis=0)
+    steps_m[from_frame:] *= 1.4
+    T[1:, :3, 3] = T[0, :3, 3] + np.cumsum(steps_m, axis=0)
+    return TrialPaths(paths.gt, replace(paths.gt, T_world_frame=T), 1.0)
+
+
+def test_a_trial_that_ends_well_with_a_large_error_fails_in_accuracy(finished, monkeypatch) -> None:
+    paths = read_paths(finished.folder, finished.score)
+    monkeypatch.setattr(shrink_trial_module, "read_paths", lambda *_: drifting(paths, from_frame=0))
+    failure = failure_of(finished)
+    assert isinstance(failure, AccuracyFailure)
+    assert failure.loss == pytest.approx(0.4, abs=0.05)
+    assert failure.summary == f"wheel_odometry: ok, but with an error of {failure.loss:.1%} of the path"
+
+
+def test_a_part_and_another_trial_fail_alike_from_half_of_the_error_on(finished, monkeypatch) -> None:
+    paths = read_paths(finished.folder, finished.score)
+    late = drifting(paths, from_frame=len(paths.gt) // 2)
+    stamps_ns = paths.gt.t_ns.tolist()
+    middle = len(stamps_ns) // 2
+    early_part = _part(late, first_ns=stamps_ns[0], last_ns=stamps_ns[middle])
+    late_part = _part(late, first_ns=stamps_ns[middle], last_ns=stamps_ns[-1])
+    failure = AccuracyFailure(0.2, "")
+    assert failure.is_in_part(finished, late_part)
+    assert not failure.is_in_part(finished, early_part)
+
+    monkeypatch.setattr(shrink_trial_module, "read_paths", lambda *_: late_part)
+    for status, is_alike in (("ok", True), ("partial", True), ("lost", False), ("crashed", False)):
+        assert failure.is_in(finished.folder, SimpleNamespace(status=status)) == is_alike
+    assert not AccuracyFailure(0.9, "").is_in(finished.folder, SimpleNamespace(status="ok"))
+
+
+@pytest.mark.usefixtures("cheap_pictures")
+def test_a_failure_of_accuracy_shrinks_to_a_part_with_half_of_its_error(noisy_run, tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(shrink_trial_module, "MIN_SHRUNK_LOSS", 0.0)
+    found = shrink_trial(
+        noisy_run.trial("wheel_odometry"), run_plan=noisy_run.run_plan, trials=3, folder=tmp_path / "small"
+    )
+    first, end = found.found.window
+    assert end - first < found.frame_count
+    assert "but with an error of" in found.summary
+    assert any(fails for _, fails in found.found.tried)

@@ -1,10 +1,19 @@
 """Paths, outcomes, courses and conditions of trials in a run's folder."""
 
+from types import SimpleNamespace
+
 import numpy as np
 
 from tests.analysis.conftest import NoisyRun
+from vobench.analysis import trial_data
 from vobench.analysis.conditions import CONDITIONS
-from vobench.analysis.trial_data import read_conditions, read_error_series, read_outcome, read_paths
+from vobench.analysis.trial_data import (
+    read_conditions,
+    read_error_series,
+    read_outcome,
+    read_paths,
+    read_symptoms,
+)
 from vobench.runner.finished_trial import read_simulated_case
 
 
@@ -31,6 +40,7 @@ def test_a_course_has_one_error_per_frame_and_none_at_the_first(noisy_run: Noisy
     assert len(course.loss) == score.frames
     assert course.loss[0] == 0
     assert course.conditions is of_frames
+    assert (course.place, course.drive) == ("closet", "short")
 
 
 def test_every_condition_is_known_of_every_frame_and_noise_is_seen(noisy_run: NoisyRun) -> None:
@@ -40,3 +50,11 @@ def test_every_condition_is_known_of_every_frame_and_noise_is_seen(noisy_run: No
     assert {len(values) for values in of_frames.values()} == {noisy_run.score("blind").frames}
     assert (of_frames["noise"] > 0.3).all()
     assert np.any(of_frames["missing_frames"] > 0)
+
+
+def test_tracks_are_a_symptom_only_where_an_estimator_reports_them(noisy_run: NoisyRun, monkeypatch) -> None:
+    score = noisy_run.score("wheel_odometry")
+    assert read_symptoms(noisy_run.folder, score) == {}
+    rows = [SimpleNamespace(tracks=count) for count in (9, None, 99)]
+    monkeypatch.setattr(trial_data, "read_frames", lambda _: rows)
+    assert read_symptoms(noisy_run.folder, score)["few_tracks"].tolist() == [0.1, 1.0, 0.01]

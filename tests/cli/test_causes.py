@@ -14,11 +14,19 @@ def cause(*conditions, factor=2.0, is_sure=True):
 
 def attribution(*causes, constant=(), segments=()):
     cases = {"dark": [(each, each.factor) for each in causes]}
-    return SimpleNamespace(causes=causes, explained=0.734, constant=constant, cases=cases, segments=segments)
+    return SimpleNamespace(
+        causes=causes,
+        named=causes,
+        explained=0.734,
+        is_mostly_unexplained=False,
+        constant=constant,
+        cases=cases,
+        segments=segments,
+    )
 
 
 def test_a_cause_that_is_not_significant_says_so():
-    assert cli_causes._cause_row(cause("speed", "turn")) == ["speed + turn", "2.00", "1.50 to 2.50", ""]
+    assert cli_causes._cause_row(cause("speed", "turn")) == ["speed + turn", "2.00", "1.50 to 2.50", "significant"]
     assert cli_causes._cause_row(cause("speed", is_sure=False))[-1] == "not significant"
 
 
@@ -73,6 +81,22 @@ def test_what_cannot_be_separated_or_known_is_said(capsys, causes, constant, are
     assert ("unknown, because constant in all segments: gain" in printed) is is_constant
 
 
+@pytest.mark.parametrize(
+    ("causes", "is_mostly_unexplained", "sentence"),
+    [
+        ((cause("speed"),), False, "Significant: speed.\n"),
+        ((), False, "Significant: none of these.\n"),
+        ((cause("speed"),), True, "Most of the error has a cause that is not in this list"),
+    ],
+)
+def test_causes_are_named_unless_most_of_the_error_is_unexplained(capsys, causes, is_mostly_unexplained, sentence):
+    found = attribution(*causes)
+    found.is_mostly_unexplained = is_mostly_unexplained
+    cli_causes._print_attribution("lk", found, terminal.console())
+    assert sentence in capsys.readouterr().out
+
+
 def test_without_an_attribution_only_the_reason_is_printed(capsys):
-    cli_causes._print_causes(SimpleNamespace(estimator="lk", attribution=None), worst=3)
-    assert capsys.readouterr().out == "lk: too few frames, or too similar ones, to learn causes from\n"
+    refused = SimpleNamespace(estimator="lk", attribution=None, reason="it is a baseline")
+    cli_causes._print_causes(refused, worst=3)
+    assert capsys.readouterr().out == "lk: no answer. it is a baseline\n"

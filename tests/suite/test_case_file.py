@@ -60,6 +60,25 @@ def test_an_estimator_is_written_with_those_limits_alone_that_are_not_its_manife
     path = write_case(plan.simulated[0], plan.estimator_entries, tmp_path / "case", name="copy")
     estimators = YAML(typ="safe").load(path)["estimators"]
     assert estimators == [
-        {"name": "stand_still", "label": "slow", "params": {}, "limits": {"frame_s": 1.5}},
-        {"name": "constant_velocity", "label": "constant_velocity", "params": {"measure_s": 0.1}, "limits": {}},
+        {"name": "stand_still", "label": "slow", "limits": {"frame_s": 1.5}},
+        {"name": "constant_velocity", "params": {"measure_s": 0.1}},
     ]
+
+
+def test_only_what_differs_from_the_defaults_is_written(tmp_path: Path) -> None:
+    (tmp_path / "hall.yaml").write_text(SCENE)
+    text = SUITE.replace("WAY", "short: {targets_m: [[0.3, 0]], rate_hz: 5}")
+    text = text.replace("rigs: {down: {pitch_deg: 90, imu: mpu6000}}", "rigs: {down: {pitch_deg: 90}}")
+    text = text.replace("cameras: {noisy: {sensor: mt9v034, auto_exposure: {}, shutter: rolling, readout_ms: 10}}", "")
+    (tmp_path / "suite.yaml").write_text(text.replace("truth_noise: {position_m: 0.005}\n", ""))
+    plan = read_plan(str(tmp_path / "suite.yaml"))
+    written = write_case(plan.simulated[0], plan.estimator_entries, tmp_path / "away", name="again")
+    suite = YAML(typ="safe").load(written)
+    assert suite["rigs"] == {"down": {"pitch_deg": 90}}
+    assert suite["trajectories"] == {"short": {"kind": "waypoints", "targets_m": [[0.3, 0]], "rate_hz": 5}}
+    assert list(suite["cameras"].values()) == [{}]
+    assert not {"truth_noise", "rendering"} & set(suite)
+    scene = YAML(typ="safe").load(tmp_path / "away" / "hall.yaml")
+    assert scene["sky"] == {"kind": "overcast", "illuminance_lx": 100}
+    assert scene["materials"]["grain"]["kind"] == "polished"
+    assert "movers" not in scene

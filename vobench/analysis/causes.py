@@ -6,16 +6,23 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vobench.analysis.error_permutation import make_series_design, permuted_log_means
 from vobench.geometry.se3 import Array
 
 SEGMENT_FRAMES = 5
 MIN_SEGMENTS = 8  # fewer do not suffice for a regression
+MIN_FAILING_LOSS = 0.005  # an error that a segment must have before anything is said to cause it
+MIN_FAILING_SEGMENTS = 2
 MIN_LOSS = 1e-4  # smaller errors count as this one: differences below it say nothing about causes
 MIN_RELATIVE_SPREAD = 1e-6  # a condition that varies less, relative to its largest value, is constant
 COLLINEAR = 0.9  # conditions with this absolute correlation cannot be told apart
 RIDGE = 0.02  # times the number of segments, on standardised conditions: a few more segments without any effect
-RESAMPLES = 400
-INTERVAL_PERCENT = (2.5, 97.5)
+MIN_VARIANCE = 1e-12  # of the error's logarithm
+LARGEST_EFFECT = 50.0  # on the logarithm of the error
+PERMUTATIONS = 499
+SURE_P = 0.05  # the largest corrected p-value of a sure cause
+INTERVAL_PERCENT = 95.0
+MIN_EXPLAINED = 0.4  # where the conditions explain less of the error, most of it has a cause outside of the list
 USUAL_RANGE_PERCENT = (5.0, 95.0)  # from a low to a high value of a condition
 
 # A trial diverges where the error of a frame exceeds this multiple of the trial's median, within these limits.
@@ -27,13 +34,16 @@ MAX_DIVERGENCE_LOSS = 0.5
 class ErrorSeries:
     """The errors of a trial: the error (N,) since the previous frame, and the conditions (N,) of frames by name.
 
-    The error of the first frame is 0.
+    The error of the first frame is 0. `place` and `drive` are those of the case; an empty name means that no other
+    case shares it.
     """
 
     case: str
     repeat: int
     conditions: Mapping[str, Array]
     loss: Array
+    place: str = ""
+    drive: str = ""
 
     @property
     def first_divergence(self) -> int | None:
@@ -49,18 +59,20 @@ class Cause:
     """One or several collinear conditions, and the factor by which they multiply the error.
 
     The factor compares the 95th with the 5th percentile of the condition over all segments. `low` and `high` are its
-    95 % confidence interval.
+    95 % confidence interval. `p` is the probability that any condition is as closely related to errors that do not
+    depend on conditions.
     """
 
     conditions: tuple[str, ...]
     factor: float
     low: float
     high: float
+    p: float
 
     @property
     def is_sure(self) -> bool:
-        """Whether the confidence interval excludes 1, which stands for no effect."""
-        return self.low > 1 or self.high < 1
+        """Whether the error is significantly related to the conditions, given all others."""
+        return self.p <= SURE_P
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +92,8 @@ class Attribution:
     """The causes of an estimator's errors, the strongest first.
 
     `segments` have the largest error first. `cases` are the mean factors of each case. `constant` are conditions that
-    do not vary. `explained` is the share of the variance of the error's logarithm that the regression explains.
+    do not vary. `explained` is the share of the variance of the error's logarithm that the regression explains,
+    adjusted for the number of conditions.
     """
 
     causes: tuple[Cause, ...]
@@ -88,6 +101,18 @@ class Attribution:
     cases: Mapping[str, tuple[tuple[Cause, float], ...]]
     constant: tuple[str, ...]
     explained: float
+
+    @property
+    def is_mostly_unexplained(self) -> bool:
+        """Whether most of the error has a cause that is not one of the conditions."""
+        return self.explained < MIN_EXPLAINED
+
+    @property
+    def named(self) -> tuple[Cause, ...]:
+        """The sure causes that raise or lower the error; none if most of the error is unexplained."""
+        if self.is_mostly_unexplained:
+            return ()
+        return tuple(cause for cause in self.causes if cause.is_sure)
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,49 +138,113 @@ class _Window:
         return [self.mean(self.trial.conditions[name]) for name in names]
 
 
-def attribute(courses: Sequence[ErrorSeries]) -> Attribution | None:
-    """Regress the logarithm of the error on all conditions that vary; return None if there are too few segments.
-
-    Conditions whose correlation is COLLINEAR or more are merged. The confidence intervals come from resampling the
-    segments of each trial: they cover other frames of the same scenes, not other scenes.
-    """
+def reason_for_no_answer(courses: Sequence[ErrorSeries]) -> str:
+    """Why nothing can be said about the causes of the errors of some trials; empty if something can."""
     windows = list(_windows(courses))
     if len(windows) < MIN_SEGMENTS:
+        return f"{len(windows)} segments of {SEGMENT_FRAMES} frames are too few to learn causes from ({MIN_SEGMENTS})"
+    failing = sum(window.mean_loss() >= MIN_FAILING_LOSS for window in windows)
+    if failing < MIN_FAILING_SEGMENTS:
+        return f"the error is below {MIN_FAILING_LOSS:.1%} of the path nearly everywhere, so there is little to explain"
+    if not _varies(_levels(windows, tuple(courses[0].conditions))).any():
+        return "no condition varies in this run"
+    return ""
+
+
+def attribute(courses: Sequence[ErrorSeries]) -> Attribution | None:
+    """Regress the logarithm of the error on all conditions that vary; return None if there is a reason for no answer.
+
+    Conditions whose correlation is COLLINEAR or more are merged. Significance and confidence intervals come from
+    permuted errors (`error_permutation`), and are corrected for the number of conditions by the largest statistic.
+    """
+    if reason_for_no_answer(courses):
         return None
+    windows = list(_windows(courses))
 
     names = tuple(courses[0].conditions)
-    levels = np.sqrt(_mean_conditions(windows, names))  # (M, C)
-    largest = np.maximum(levels.max(0), MIN_RELATIVE_SPREAD)
-    varies = levels.std(0) > MIN_RELATIVE_SPREAD * largest
-    if not varies.any():
-        return None
+    levels = _levels(windows, names)  # (M, C)
+    varies = _varies(levels)
     varying = [names[index] for index in np.flatnonzero(varies)]
     constant = [names[index] for index in np.flatnonzero(~varies)]
 
     losses = np.array([window.mean_loss() for window in windows])  # (M,)
     log_losses = np.log(np.maximum(losses, MIN_LOSS))
     groups, predictors = _merge_collinear(varying, levels[:, varies])  # (M, K)
-    slopes = _ridge_slopes(predictors, log_losses)  # (K,)
+    fit = fit_ridge(predictors, log_losses[None])
+    null = fit_ridge(predictors, _permuted(courses))  # of PERMUTATIONS rows
+    slopes = fit.slopes[0]  # (K,)
+    half_widths = np.percentile(null.t, INTERVAL_PERCENT, axis=0) * fit.standard_errors[0]
+    p_values = corrected_p_values(fit.t[0], null.t)
 
-    resampled_slopes = _resampled_slopes(windows, predictors, log_losses)  # (RESAMPLES, K)
     ranges = _usual_ranges(predictors)
     causes = []
     for k, group in enumerate(groups):
-        interval = np.percentile(resampled_slopes[:, k] * ranges[k], INTERVAL_PERCENT)
-        effect = slopes[k] * ranges[k]
-        factor, low, high = np.exp([effect, *interval]).tolist()
-        causes.append(Cause(group, factor, low, high))
+        effects = np.array([slopes[k], slopes[k] - half_widths[k], slopes[k] + half_widths[k]]) * ranges[k]
+        factor, low, high = np.exp(effects.clip(-LARGEST_EFFECT, LARGEST_EFFECT)).tolist()
+        causes.append(Cause(group, factor, low, high, float(p_values[k])))
 
     contributions = (predictors - np.median(predictors, axis=0)) * slopes  # (M, K), to the logarithm of the error
-    predicted = (predictors - predictors.mean(0)) @ slopes
-    residual = log_losses - log_losses.mean() - predicted
     return Attribution(
         causes=tuple(sorted(causes, key=_strength, reverse=True)),
         segments=_segments(windows, losses, causes, contributions),
         cases=_factors_by_case(windows, causes, contributions),
         constant=tuple(constant),
-        explained=float(1 - residual.var() / max(log_losses.var(), 1e-12)),
+        explained=float(fit.explained[0]),
     )
+
+
+def _permuted(courses: Sequence[ErrorSeries]) -> Array:
+    """The logarithms (PERMUTATIONS, M) of the errors of segments if they did not depend on conditions."""
+    cases = [course.case for course in courses]
+    places = [course.place or course.case for course in courses]
+    drives = [course.drive or course.case for course in courses]
+    design = make_series_design(cases, places, drives)
+    losses = [course.loss[1:] for course in courses]
+    return permuted_log_means(losses, design, segment=SEGMENT_FRAMES, floor=MIN_LOSS, draws=PERMUTATIONS)
+
+
+@dataclass(frozen=True, slots=True)
+class RidgeFit:
+    """Ridge regressions of R series of values on K predictors.
+
+    `slopes` and `standard_errors` are (R, K). `explained` (R,) is the adjusted share of the variance.
+    """
+
+    slopes: Array
+    standard_errors: Array
+    explained: Array
+
+    @property
+    def t(self) -> Array:
+        """The absolute slopes (R, K) relative to their standard errors."""
+        return np.asarray(np.abs(self.slopes) / self.standard_errors)
+
+
+def fit_ridge(predictors: Array, values: Array) -> RidgeFit:
+    """Ridge regressions of each row of values (R, M) on predictors (M, K)."""
+    rows, columns = predictors.shape
+    centred = predictors - predictors.mean(0)
+    deviations = values - values.mean(1, keepdims=True)  # (R, M)
+    penalty = RIDGE * rows * np.eye(columns)
+    inverse = np.linalg.inv(centred.T @ centred + penalty)
+    slopes = deviations @ centred @ inverse  # (R, K)
+
+    residuals = deviations - slopes @ centred.T
+    degrees_of_freedom = max(rows - columns - 1, 1)
+    residual_variance = np.maximum((residuals**2).sum(1) / degrees_of_freedom, MIN_VARIANCE)
+    total_variance = np.maximum((deviations**2).sum(1) / (rows - 1), MIN_VARIANCE)
+    standard_errors = np.sqrt(residual_variance[:, None] * np.diag(inverse))
+    return RidgeFit(slopes, standard_errors, 1 - residual_variance / total_variance)
+
+
+def corrected_p_values(observed: Array, null: Array) -> Array:
+    """The p-values (K,) of observed statistics, corrected for their number by the largest of each draw (R, K).
+
+    Source: Westfall and Young (1993), "Resampling-based multiple testing", the single-step maxT procedure.
+    """
+    largest = null.max(1)  # (R,)
+    exceeding = (largest[:, None] >= observed).sum(0)
+    return np.asarray((exceeding + 1) / (len(null) + 1))
 
 
 def _windows(courses: Sequence[ErrorSeries]) -> Iterator[_Window]:
@@ -165,9 +254,16 @@ def _windows(courses: Sequence[ErrorSeries]) -> Iterator[_Window]:
             yield _Window(course, number, first)
 
 
-def _mean_conditions(windows: Sequence[_Window], names: Sequence[str]) -> Array:
-    """The mean of each condition over each segment (M, C)."""
-    return np.array([window.mean_conditions(names) for window in windows])
+def _levels(windows: Sequence[_Window], names: Sequence[str]) -> Array:
+    """The square root of the mean of each condition over each segment (M, C)."""
+    means = np.array([window.mean_conditions(names) for window in windows])
+    return np.asarray(np.sqrt(means))
+
+
+def _varies(levels: Array) -> NDArray[np.bool_]:
+    """Which levels (M, C) are not constant."""
+    largest = np.maximum(levels.max(0), MIN_RELATIVE_SPREAD)
+    return np.asarray(levels.std(0) > MIN_RELATIVE_SPREAD * largest)
 
 
 def _usual_ranges(predictors: Array) -> Array:
@@ -238,33 +334,3 @@ def _merge_collinear(names: Sequence[str], levels: Array) -> tuple[list[tuple[st
         merged_names.append(tuple(names[member] for member in members))
         columns.append((standardised[:, members] * signs).mean(1))
     return merged_names, np.stack(columns, 1)
-
-
-def _ridge_slopes(predictors: Array, values: Array) -> Array:
-    """Slopes (K,) of the ridge regression of values (M,) on predictors (M, K)."""
-    centred = predictors - predictors.mean(0)
-    penalty = RIDGE * len(predictors) * np.eye(predictors.shape[1])
-    normal_matrix = centred.T @ centred + penalty
-    right_side = centred.T @ (values - values.mean())
-    return np.asarray(np.linalg.solve(normal_matrix, right_side))
-
-
-def _resampled_slopes(windows: Sequence[_Window], predictors: Array, values: Array) -> Array:
-    """Slopes (RESAMPLES, K) of regressions on segments that are drawn with replacement within each trial."""
-    rng = np.random.default_rng(0)
-    trial_of_window = np.array([window.trial_number for window in windows])
-    rows_of_trials = [np.flatnonzero(trial_of_window == trial) for trial in np.unique(trial_of_window)]
-
-    slopes = []
-    for _ in range(RESAMPLES):
-        rows = _resampled_rows(rows_of_trials, rng)
-        slopes.append(_ridge_slopes(predictors[rows], values[rows]))
-    return np.array(slopes)
-
-
-def _resampled_rows(
-    rows_of_trials: Sequence[NDArray[np.intp]],
-    rng: np.random.Generator,
-) -> NDArray[np.intp]:
-    """As many rows of each trial as it has, drawn with replacement."""
-    return np.concatenate([rng.choice(rows, len(rows)) for rows in rows_of_trials])

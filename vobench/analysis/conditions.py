@@ -41,8 +41,18 @@ CONDITIONS: dict[str, tuple[str, str]] = {
     "light_jump": ("stops", "change of mean brightness since the previous frame, corrected for exposure"),
     "unlike_eyes": ("stops", "difference of mean brightness between the left and the right image"),
     "missing_frames": ("", "frames missing since the previous one"),
+    "darkness": ("", "inverse of the mean grey value of the left image"),
+    "short_steps": ("1/m", "inverse of the distance since the previous frame, over which an error is spread"),
+    "since_start": ("", "frames since the start"),
+}
+# What an estimator itself reports of a frame. It is a symptom, so it is never named as a cause.
+FEW_TRACKS = "few_tracks"
+SYMPTOMS: dict[str, tuple[str, str]] = {
+    FEW_TRACKS: ("", "inverse of the number of points that the estimator reports to track"),
 }
 RAYS_PER_ROW = 60  # about as many pixels of an image row are traced
+MIN_STEP_SHARE = 0.1  # of the median step; a shorter step counts as this long
+MIN_MEAN_DN = 1.0  # a darker image counts as this bright
 MIN_CONTRAST = 0.02  # keeps the faintness of a plain surface finite
 MIN_MEAN_REFLECTANCE = 1e-3
 RESPONSE_GAMMA = 2.2  # of grey values over the linear signal, approximately
@@ -86,12 +96,26 @@ def conditions(
         )
 
         exposure_stops = float(np.log2(exposure_s) + gain_db / DB_PER_STOP)
+        of_frame = {"darkness": 1 / max(_mean_dn(frame), MIN_MEAN_DN), "since_start": float(index)}
         current = _FrameState(exposure_stops, _brightness_stops(frame.left), T_world_left, frame.t_ns)
         changes = _changes(previous or current, current, usual_step_ns)
-        rows.append({**of_scene, **_image_conditions(frame), **of_camera, **changes})
+        rows.append({**of_scene, **_image_conditions(frame), **of_camera, **of_frame, **changes})
         previous = current
 
+    short_steps = _inverse_steps(gt)
+    for row, inverse_step in zip(rows, short_steps.tolist(), strict=False):
+        row["short_steps"] = inverse_step
     return {name: _column(rows, name) for name in CONDITIONS}
+
+
+def _inverse_steps(gt: Trajectory) -> Array:
+    """The inverse (N,) in 1/m of the distance from the previous frame; the first frame has that of the second."""
+    steps_m = np.diff(gt.distances_m())
+    if not len(steps_m) or not steps_m.any():
+        return np.zeros(len(gt))
+    steps_m = np.append(steps_m[:1], steps_m)
+    shortest_m = MIN_STEP_SHARE * np.median(steps_m[steps_m > 0])
+    return np.asarray(1 / np.maximum(steps_m, shortest_m))
 
 
 def _column(rows: list[dict[str, float]], name: str) -> Array:

@@ -1,11 +1,22 @@
 """Explains why a trial fails by running its case again without each of its nuisances."""
 
-from collections.abc import Mapping
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vobench.analysis.explain import Change, Explanation, Outcome, explain, is_sufficient
+from vobench.analysis.explain import (
+    MATERIAL,
+    Change,
+    Effort,
+    Explanation,
+    Outcome,
+    effort,
+    explain,
+    is_sufficient,
+)
 from vobench.analysis.nuisance import NUISANCES, Nuisance, nuisances_of
 from vobench.analysis.trial_data import read_conditions, read_outcome
 from vobench.errors import InputError
@@ -17,6 +28,9 @@ from vobench.suite.case import Case
 
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
+
+
+SECONDS_TO_SAY = 5.0  # a stage that took less needs no forecast
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,15 +46,32 @@ class TrialExplanation:
         """The nuisances that explain the failure; empty if none does."""
         return self.explanation.named
 
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What causes the failure, what harms, and what was ruled out, in sentences."""
+        explanation = self.explanation
+        sentences = [_cause_sentence(explanation)]
+        if explanation.contributing:
+            parts = ", ".join(_with_reduction(change) for change in explanation.contributing)
+            sentences.append(f"It also depends on {parts}.")
+        for change in explanation.harmful:
+            instead = _nuisance(change.removed[0]).instead
+            sentences.append(f"{_upper(instead)} would make it worse: the error grows by {-change.mended:.0%}.")
+        if not explanation.named:
+            sentences += _ruled_out_sentences(explanation)
+        return tuple(sentences)
+
     def verdict(self, change: Change) -> str:
-        """The effect of removing these nuisances: "mends it", "helps", "harms" or "no difference"."""
-        if is_sufficient(change, self.explanation.everything):
-            return "mends it"
-        if change.is_sure:
-            return "helps"
-        if change.high < 0:
+        """The effect of a change: "fixes it", "helps", "harms", "no difference", "ruled out" or "undecided"."""
+        if change.is_sure and change.mended >= MATERIAL:
+            is_named = set(change.removed) == set(self.named) or change.removed in self.explanation.alternatives
+            fixes = is_named or is_sufficient(change, self.explanation.everything)
+            return "fixes it" if fixes else "helps"
+        if change.is_harmful:
             return "harms"
-        return "no difference"
+        if change.is_sure or change.is_ruled_out:
+            return "no difference"
+        return "undecided"
 
     def rows(self) -> list[dict[str, Any]]:
         """One row per variant of the case: single nuisances removed, then pairs, then all of them.
@@ -50,8 +81,9 @@ class TrialExplanation:
         """
         explanation = self.explanation
         changes = [*explanation.singles, *explanation.pairs]
-        if len(explanation.everything.removed) > 1:
-            changes.append(explanation.everything)
+        everything = explanation.everything
+        if everything is not None and len(everything.removed) > 1 and everything not in changes:
+            changes.append(everything)
         return [self._row(change) for change in changes]
 
     def _row(self, change: Change) -> dict[str, Any]:
@@ -62,11 +94,67 @@ class TrialExplanation:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, as `vobench explain --json` prints them."""
-        return {**asdict(self.explanation), "named": self.named}
+        explanation = self.explanation
+        return {
+            **asdict(explanation),
+            "named": explanation.named,
+            "relation": explanation.relation,
+            "alternatives": explanation.alternatives,
+            "contributing": [change.removed for change in explanation.contributing],
+            "harmful": [change.removed for change in explanation.harmful],
+            "ruled_out": [change.removed for change in explanation.ruled_out],
+            "sentences": self.sentences,
+        }
 
     def to_frame(self) -> "DataFrame":
         """A pandas table of `rows`, with the names of the removed nuisances joined by " and "."""
         return data_frame({**row, "removed": " and ".join(row["removed"])} for row in self.rows())
+
+
+def _cause_sentence(explanation: Explanation) -> str:
+    """What causes the failure, in one sentence."""
+    names = " and ".join(explanation.named)
+    changes = {change.removed: change for change in (*explanation.singles, *explanation.pairs)}
+    if explanation.relation == "none":
+        return "None of these explains the failure: the cause is the estimator, its path or the scene."
+    cause = changes[explanation.named]
+    if explanation.relation == "together":
+        return f"Causes of the failure: {names}, each by itself. Only both together fix it: {_reduction(cause)}."
+    if explanation.relation == "either":
+        others = ", ".join(_with_reduction(changes[removed]) for removed in explanation.alternatives)
+        return f"Cause of the failure: {names} together with {others}. Either change suffices: {_reduction(cause)}."
+    remedy = _nuisance(explanation.named[0]).instead
+    return f"Cause of the failure: {names}. With {remedy}, {_reduction(cause)}."
+
+
+def _ruled_out_sentences(explanation: Explanation) -> list[str]:
+    """What was ruled out, by how much at most it matters, and what was left open."""
+    sentences = []
+    if explanation.everything is not None:
+        everything = explanation.everything
+        interval = f"95 % CI {everything.low:.0%} to {everything.high:.0%}"
+        sentences.append(f"With all nuisances removed, the error drops by {everything.mended:.0%} ({interval}).")
+    if explanation.ruled_out:
+        parts = ", ".join(f"{change.removed[0]} (at most {change.high:.0%})" for change in explanation.ruled_out)
+        sentences.append(f"Ruled out, by the share of the error that they can cost: {parts}.")
+    unclear = [change for change in explanation.singles if not (change.is_ruled_out or change.is_sure)]
+    if unclear:
+        parts = ", ".join(f"{change.removed[0]} (up to {change.high:.0%})" for change in unclear)
+        sentences.append(f"Not decided with so few repeats: {parts}.")
+    return sentences
+
+
+def _with_reduction(change: Change) -> str:
+    return f"{change.removed[0]} ({change.mended:.0%} less)"
+
+
+def _reduction(change: Change) -> str:
+    """By how much a change reduces the error."""
+    return f"the error drops by {change.mended:.0%} (95 % CI {change.low:.0%} to {change.high:.0%})"
+
+
+def _upper(sentence: str) -> str:
+    return sentence[:1].upper() + sentence[1:]
 
 
 def explain_trial(
@@ -82,9 +170,9 @@ def explain_trial(
     Args:
         trial: the trial as RUN/CASE/ESTIMATOR, or its folder in the run.
         run_plan: runs the variants of the case.
-        repeats: how many seeds each variant is run with; short cases get more.
+        repeats: how many seeds each variant is screened with; more for an estimator that is not deterministic.
         estimator: the folder of the estimator, if it cannot be found by its name.
-        progress: shows a note if the estimator has changed since the run.
+        progress: hears what the explanation will cost, and whether the estimator has changed since the run.
 
     Raises:
         InputError: there is no such trial, it is of a recording, or its case has no nuisance.
@@ -94,20 +182,55 @@ def explain_trial(
     finished = read_finished_trial(trial, estimator=estimator, progress=progress)
     nuisances = _present_nuisances(finished)
     suite_name = f"explain_{finished.score.case.replace('-', '_')}_{finished.score.estimator}"
+    seeds = effort(repeats, is_deterministic=finished.estimator_entry.manifest.deterministic)
+    forecast = _Forecast(progress, seeds, len(nuisances))
 
     def measure(cases: Mapping[str, Case]) -> dict[str, list[Outcome]]:
-        folder = run_variants(finished, cases, name=suite_name, run_plan=run_plan)
-        return {score.case: [read_outcome(folder, score)] for score in folder.scores()}
+        with forecast.stage(len(cases)):
+            folder = run_variants(finished, cases, name=suite_name, run_plan=run_plan)
+            return {score.case: [read_outcome(folder, score)] for score in folder.scores()}
 
-    explanation = explain(finished.case, nuisances, measure, repeats=repeats)
+    explanation = explain(finished.case, nuisances, measure, seeds=seeds)
     return TrialExplanation(finished.score.case, finished.score.estimator, explanation)
+
+
+@dataclass(slots=True)
+class _Forecast:
+    """Says how many trials an explanation runs, and how long the rest may take by the trials so far."""
+
+    progress: Progress
+    seeds: Effort
+    nuisances: int
+    done: int = 0
+    seconds: float = 0.0
+
+    @contextmanager
+    def stage(self, trials: int) -> Iterator[None]:
+        """Announce a stage of the explanation, and measure how long it takes."""
+        self.progress.say(self._sentence(trials))
+        began_s = time.monotonic()
+        yield
+        self.seconds += time.monotonic() - began_s
+        self.done += trials
+
+    def _sentence(self, trials: int) -> str:
+        most = self.seeds.most_trials(self.nuisances)
+        if self.done == 0:
+            return (
+                f"trials 1 to {trials} of at most {most}: each of {self.nuisances} nuisances removed, "
+                f"with {self.seeds.screening} seeds"
+            )
+        numbers = f"trials {self.done + 1} to {self.done + trials} of at most {most}"
+        if self.seconds < SECONDS_TO_SAY:
+            return numbers
+        return f"{numbers}, about {trials * self.seconds / self.done:.0f} s"
 
 
 def _present_nuisances(trial: FinishedTrial) -> tuple[Nuisance, ...]:
     """The nuisances that the frames of a trial show. Raises InputError if there are none."""
     frame_conditions = read_conditions(trial.folder, trial.case)
     largest = {name: float(values.max()) for name, values in frame_conditions.items()}
-    nuisances = nuisances_of(trial.case, largest)
+    nuisances = nuisances_of(trial.case, largest, trial.estimator_entry.manifest.needs)
     if not nuisances:
         known = ", ".join(nuisance.name for nuisance in NUISANCES)
         raise InputError(f"'{trial.case.name}' has nothing that can be removed. Known: {known}")

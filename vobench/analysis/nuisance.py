@@ -7,11 +7,18 @@ from typing import Any
 
 import numpy as np
 
+from vobench.analysis.retiming import at_half_speed, at_half_turn_rate, at_twice_the_rate
+from vobench.errors import VobenchError
 from vobench.geometry.rig import CalibrationError
+from vobench.motion.wander import Wander
+from vobench.motion.wheeled import Wheeled
+from vobench.runner.motion import body_motion, require_possible
 from vobench.sensor.image_sensor import CameraDifferences, CameraSensor
+from vobench.sensor.imu import FLAWLESS
 from vobench.sensor.response import FULL_SCALE_DN, linear_of_grey
 from vobench.suite.case import Case
 from vobench.suite.scene_check import materials_used
+from vobench.suite.scene_entry import generated_scene
 from vobench.suite.scene_spec import (
     STEADY,
     DiffuseSpec,
@@ -26,6 +33,7 @@ from vobench.suite.scene_spec import (
     SkySpec,
 )
 
+MIN_TURN_DEG = 1.0  # between two frames: slower turns are not tried at half the rate
 MIN_SHOWN_SHARE = 2e-3  # the smallest share of the pixels of a frame that must show a nuisance
 
 Change = Callable[[Case], Case]
@@ -35,24 +43,59 @@ Change = Callable[[Case], Case]
 class Nuisance:
     """One of NUISANCES: its name, the change that removes it, and a description of what replaces it.
 
-    A case does not have the nuisance if the change has no effect on the case, or if the condition `shown_by` is 0 in
-    all of its frames.
+    A case does not have the nuisance if the change has no effect on the case, or if the condition `shown_by` does not
+    exceed `shown_above` in any of its frames. A circumstance, such as speed, is changed by itself: it is not among
+    the nuisances that are removed together. `needs` are sensors without which an estimator does not notice it, and
+    `spoils` those that the change takes away.
     """
 
     name: str
     instead: str
     remove: Change
     shown_by: str | None = None
+    shown_above: float = MIN_SHOWN_SHARE
+    is_circumstance: bool = False
+    needs: frozenset[str] = frozenset()
+    spoils: frozenset[str] = frozenset()
 
 
-def nuisances_of(case: Case, largest: Mapping[str, float] = MappingProxyType({})) -> tuple[Nuisance, ...]:
-    """The NUISANCES that a case has. `largest` are the largest values of the known conditions."""
+def nuisances_of(
+    case: Case,
+    largest: Mapping[str, float] = MappingProxyType({}),
+    sensors: Iterable[str] | None = None,
+) -> tuple[Nuisance, ...]:
+    """The NUISANCES that a case has and that a change can remove.
+
+    `largest` are the largest values of the known conditions. `sensors` are those that the estimator needs; None stands
+    for all.
+    """
     present = []
     for nuisance in NUISANCES:
-        largest_share = largest.get(nuisance.shown_by or "", 1.0)
-        if largest_share > MIN_SHOWN_SHARE and nuisance.remove(case) != case:
+        is_shown = largest.get(nuisance.shown_by or "", np.inf) > nuisance.shown_above
+        if is_shown and _concerns(nuisance, sensors) and _is_possible(nuisance, case):
             present.append(nuisance)
     return tuple(present)
+
+
+def _concerns(nuisance: Nuisance, sensors: Iterable[str] | None) -> bool:
+    """Whether an estimator with these sensors notices a nuisance, and still has its sensors without it."""
+    if sensors is None:
+        return True
+    used = set(sensors)
+    return nuisance.needs <= used and not nuisance.spoils & used
+
+
+def _is_possible(nuisance: Nuisance, case: Case) -> bool:
+    """Whether a change has an effect on a case, and leaves one that can be simulated."""
+    try:
+        changed = nuisance.remove(case)
+        if changed == case:
+            return False
+        if nuisance.is_circumstance:
+            require_possible(changed, body_motion(changed))
+    except VobenchError:
+        return False
+    return True
 
 
 def without(case: Case, removed: Iterable[str]) -> Case:
@@ -131,6 +174,60 @@ def _without_saturation(case: Case) -> Case:
 
 def _with_true_calibration(case: Case) -> Case:
     return replace(case, rig=replace(case.rig, calibration_error=CalibrationError()))
+
+
+LIGHT_FACTOR = 4.0
+DARK_DN = 80.0  # pictures with a smaller mean grey value are dark
+
+
+def _with_more_light(case: Case) -> Case:
+    """Four times the light. The exposure time and the gain are as before, or follow from the light by auto-exposure.
+
+    The aperture stands for the light: exposed photons are proportional to both.
+    """
+    camera = case.camera
+    return replace(case, camera=replace(camera, exposure_gain=LIGHT_FACTOR * camera.exposure_gain))
+
+
+def _with_exact_imu(case: Case) -> Case:
+    """The IMU without noise, bias, scale and misalignment."""
+    imu = case.rig.imu
+    if imu is None:
+        return case
+    return replace(case, rig=replace(case.rig, imu=replace(imu, gyro=FLAWLESS, accel=FLAWLESS)))
+
+
+def _without_slip(case: Case) -> Case:
+    """A floor on which no wheel slips."""
+    trajectory = case.trajectory
+    if not isinstance(trajectory, Wheeled) or trajectory.mover != "pioneer":
+        return case
+    return replace(case, trajectory=replace(trajectory, slip="none", floor=()))
+
+
+def _with_exact_encoders(case: Case) -> Case:
+    """Wheels of exactly their nominal size."""
+    trajectory = case.trajectory
+    if not isinstance(trajectory, Wheeled | Wander):
+        return case
+    return replace(case, trajectory=replace(trajectory, encoders="exact"))
+
+
+def _with_twice_the_baseline(case: Case) -> Case:
+    """Cameras that are twice as far apart."""
+    return replace(case, rig=replace(case.rig, baseline_m=2 * case.rig.build().baseline_m))
+
+
+def _in_another_place(case: Case) -> Case:
+    """The place that the generator of the scene creates from the next seed, in the same lighting.
+
+    Only a trajectory that finds its way through a place can be driven in another one.
+    """
+    generated = case.scene.generated
+    if generated is None or not isinstance(case.trajectory, Wander):
+        return case
+    scene = generated_scene(case.scene, generated.seed + 1, generated.lighting)
+    return replace(case, scene=scene, variant={**case.variant, "scene": scene.place_name})
 
 
 # --- Materials and moving objects ---
@@ -286,6 +383,10 @@ def _overridden(nominal: float, override: float | None) -> float:
     return nominal if override is None else override
 
 
+ENCODERS = frozenset({"encoders"})
+IMU = frozenset({"imu"})
+STEREO = frozenset({"stereo"})
+
 NUISANCES = (
     Nuisance("mirrors", "diffuse stone, and panes without reflections", _with_materials(_diffuse_mirror), "mirror"),
     Nuisance("gloss", "diffuse surfaces", _with_materials(_without_coat), "gloss"),
@@ -293,6 +394,13 @@ NUISANCES = (
     Nuisance("changing light", "steady lamps and sun", _with_steady_light),
     Nuisance("moving things", "a static scene", _without_movers, "moving"),
     Nuisance("low texture", "strong patterns on faint surfaces", _with_materials(_with_strong_texture)),
+    Nuisance(
+        "low light",
+        "four times the light, exposed as before",
+        _with_more_light,
+        "darkness",
+        shown_above=1 / DARK_DN,
+    ),
     Nuisance(
         "burnt pixels", "an exposure that just fits white, and eight times the range", _without_saturation, "burnt"
     ),
@@ -310,4 +418,20 @@ NUISANCES = (
     Nuisance("flare", "a lens without stray light", _with_camera(flare=0, ghost=0)),
     Nuisance("JPEG", "lossless images", _with_camera(jpeg_quality=None)),
     Nuisance("calibration", "the true calibration", _with_true_calibration),
+    Nuisance("IMU errors", "an exact IMU", _with_exact_imu, needs=IMU),
+    Nuisance("wheel slip", "a floor without slip", _without_slip, needs=ENCODERS),
+    Nuisance("encoder errors", "wheels of nominal size", _with_exact_encoders, needs=ENCODERS),
+    Nuisance("speed", "the same path at half speed", at_half_speed, is_circumstance=True, spoils=ENCODERS),
+    Nuisance(
+        "fast turns",
+        "the same path at half the turn rate",
+        at_half_turn_rate,
+        "turn",
+        shown_above=MIN_TURN_DEG,
+        is_circumstance=True,
+        spoils=ENCODERS,
+    ),
+    Nuisance("low frame rate", "twice as many pictures", at_twice_the_rate, is_circumstance=True, spoils=ENCODERS),
+    Nuisance("short baseline", "twice the baseline", _with_twice_the_baseline, is_circumstance=True, needs=STEREO),
+    Nuisance("this place", "another place of the same generator", _in_another_place, is_circumstance=True),
 )

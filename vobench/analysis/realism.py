@@ -55,24 +55,42 @@ class Statistic:
 
 
 ERRORS = "calibration_error (right_roll_deg, right_pitch_deg)"
+MORE_NOISE = "more gain_db with less exposure_gain"
+# What else the settings of the advice move, besides the statistic that they are advised for.
+SIDE_EFFECTS = {
+    "exposure_gain": "more raises gradients, the standard deviation of grey and saturated pixels together",
+    "gain_db": "divide exposure_gain by 10^(dB / 20), or gain also brightens: wider grey, more saturated pixels",
+    "blur_sigma_px": "more lowers gradients, their kurtosis and the slope of the spectrum together",
+    "rate_hz": "more makes tracks longer and more of them consistent, and costs as many more pictures",
+}
 STATISTICS = (
     Statistic("row_error_px", "row error of the pair", "px", 0.15, 0.5, f"more {ERRORS}", f"less {ERRORS}"),
     Statistic("gradient_p99", "gradient, 99th percentile", "DN", 55, 75,
               "contrast: sun, exposure_gain, less blur_sigma_px", "softer light, more blur_sigma_px"),
     Statistic("gradient_kurtosis", "gradient, kurtosis", "", 15, 35,
-              "plain surfaces beside detailed ones", "texture on more surfaces, more gain_db"),
+              "plain surfaces beside detailed ones", f"texture on more surfaces, {MORE_NOISE}"),
     Statistic("spectrum_slope", "slope of the power spectrum", "", -3.2, -2.5,
-              "fine texture, less blur_sigma_px, more gain_db", "large shapes and shadows, more blur_sigma_px"),
+              f"fine texture, less blur_sigma_px, {MORE_NOISE}", "large shapes and shadows, more blur_sigma_px"),
     Statistic("corner_unevenness", "unevenness of corners", "", 0.35, 0.7,
               "plain walls or sky beside texture", "texture on plain surfaces"),
     Statistic("tracks_home", "consistent tracks", "%", 50, 75,
-              "smaller steps: more rate_hz, less speed", "larger steps: less rate_hz, more speed"),
+              "smaller steps: more rate_hz, less speed",
+              "larger steps: less rate_hz, more speed"),
     Statistic("track_life", "track length, of 13", "pictures", 3, 5,
-              "smaller steps: more rate_hz, less speed", "larger steps: less rate_hz, more speed, movers"),
+              "smaller steps: more rate_hz, less speed",
+              "larger steps: less rate_hz, more speed, movers"),
     Statistic("grey_sd", "standard deviation of grey", "DN", 50, 75,
               "sun and shadow, darker and brighter materials", "softer light, less exposure_gain"),
     Statistic("burnt", "pixels at 254 or more", "%", 4, 10, "more exposure_gain, sky or windows", "less exposure_gain"),
 )  # fmt: skip
+
+
+def side_effects(advice: Iterable[str]) -> list[str]:
+    """What else each setting in some advice moves, a sentence for each setting."""
+    text = " ".join(advice)
+    return [f"{setting}: {effect}" for setting, effect in SIDE_EFFECTS.items() if setting in text]
+
+
 FIGURES_WITHOUT_RANGE = ("grey_mean", "noise_dn", "edge_px", "corners", "flow_px")
 OFFSET_BAND_PX = (0.0, 0.9)
 

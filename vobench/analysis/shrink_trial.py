@@ -3,8 +3,9 @@
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
+from vobench.analysis.explain import segment_loss
 from vobench.analysis.nuisance import nuisances_of
 from vobench.analysis.shrink import MIN_FRAMES, Failure, Shrunk, shrink
 from vobench.analysis.trial_data import TrialPaths, read_paths
@@ -12,7 +13,7 @@ from vobench.errors import InputError
 from vobench.runner.data_frame import data_frame
 from vobench.runner.estimate import FINISHED, EstimatorOutcome
 from vobench.runner.finished_trial import FinishedTrial, read_finished_trial, run_variants
-from vobench.runner.folder import TrialScore
+from vobench.runner.folder import SURVIVED, RunFolder, TrialScore
 from vobench.runner.frames import read_frames
 from vobench.runner.motion import body_motion
 from vobench.runner.plan_runner import PlanRunner
@@ -26,6 +27,8 @@ from vobench.trajectory.trajectory import Trajectory
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
+MIN_SHRUNK_LOSS = 0.02  # the least error, relative to the path, of a trial that ended well and is shrunk
+SHARE_OF_ERROR = 0.5  # of the whole trial, that a part must have
 # The statuses, in the table of frames, of frames without a pose.
 WITHOUT_POSE = ("", "lost")
 
@@ -34,10 +37,11 @@ WITHOUT_POSE = ("", "lost")
 class ShrunkTrial:
     """A failed trial, and the smallest case found on which its estimator fails in the same way.
 
-    `suite` is the suite file of that case.
+    `summary` is how the trial failed, in one line. `suite` is the suite file of the smaller case.
     """
 
     score: TrialScore
+    summary: str
     found: Shrunk
     suite: Path
 
@@ -46,11 +50,6 @@ class ShrunkTrial:
         """The number of frames of the whole case."""
         first, end = self.found.whole
         return end - first
-
-    @property
-    def summary(self) -> str:
-        """How the trial failed, in one line."""
-        return _summary(self.score)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, as `vobench shrink --json` prints them."""
@@ -87,23 +86,92 @@ def shrink_trial(
         progress: shows a note if the estimator has changed since the run.
 
     Raises:
-        InputError: there is no such trial, it is of a recording, or it does not fail.
+        InputError: there is no such trial, it is of a recording, or it neither fails nor has a large error.
         UnknownNameError: the run has no such case or estimator.
     """
     finished = read_finished_trial(trial, estimator=estimator, progress=progress)
+    failure = failure_of(finished)
+    shrunk = _search(finished, failure, run_plan, trials)
     score = finished.score
-    if not _fails(score):
-        raise InputError(f"{score.estimator} on {score.case} is {score.status}: nothing fails")
-
-    shrunk = _search(finished, run_plan, trials)
     suite = write_case(
         shrunk.case,
         [finished.estimator_entry],
         folder or Path("shrunk") / f"{score.case}_{score.estimator}",
         name=f"{score.case}_shrunk".replace("-", "_"),
-        summary=_summary(score),
+        summary=failure.summary,
     )
-    return ShrunkTrial(score, shrunk, suite)
+    return ShrunkTrial(score, failure.summary, shrunk, suite)
+
+
+class TrialFailure(Protocol):
+    """In which way a trial failed, and whether another trial or a part of this one fails in the same way."""
+
+    @property
+    def summary(self) -> str:
+        """How the trial failed, in one line."""
+
+    def is_in(self, folder: RunFolder, score: TrialScore) -> bool:
+        """Whether another trial of the estimator fails in the same way."""
+
+    def is_in_part(self, trial: FinishedTrial, part: TrialPaths) -> bool:
+        """Whether a part of the trial, judged by itself, fails in the same way."""
+
+
+@dataclass(frozen=True, slots=True)
+class StatusFailure:
+    """A trial that did not end well: its status and reason must be the same, apart from numbers."""
+
+    kind: Failure
+    summary: str
+
+    def is_in(self, folder: RunFolder, score: TrialScore) -> bool:
+        """Whether another trial has the same status and reason."""
+        del folder
+        return Failure.of(score.status, score.reason) == self.kind
+
+    def is_in_part(self, trial: FinishedTrial, part: TrialPaths) -> bool:
+        """Whether the poses of a part would be scored with the same status and reason."""
+        scored = score_estimate(part.est, part.gt, trial.score.claims)
+        status, reason = status_of(EstimatorOutcome(kind=FINISHED, reason=""), scored, part.gt)
+        return Failure.of(status, reason) == self.kind
+
+
+@dataclass(frozen=True, slots=True)
+class AccuracyFailure:
+    """A trial that ended well, but with a large error: the mean error of segments must be half as large or more."""
+
+    loss: float
+    summary: str
+
+    def is_in(self, folder: RunFolder, score: TrialScore) -> bool:
+        """Whether another trial has at least half of the error; one without an estimate does not count."""
+        if score.status not in SURVIVED:
+            return False
+        return self._is_large(read_paths(folder, score))
+
+    def is_in_part(self, trial: FinishedTrial, part: TrialPaths) -> bool:
+        """Whether a part has at least half of the error."""
+        del trial
+        return self._is_large(part)
+
+    def _is_large(self, paths: TrialPaths) -> bool:
+        loss = segment_loss(paths.gt, paths.est, scale=paths.scale).mean()
+        return bool(loss >= SHARE_OF_ERROR * self.loss)
+
+
+def failure_of(trial: FinishedTrial) -> TrialFailure:
+    """In which way a trial failed. Raises InputError if its error is small."""
+    score = trial.score
+    if _fails(score):
+        return StatusFailure(Failure.of(score.status, score.reason), _summary(score))
+    paths = read_paths(trial.folder, score)
+    loss = float(segment_loss(paths.gt, paths.est, scale=paths.scale).mean())
+    if loss < MIN_SHRUNK_LOSS:
+        raise InputError(
+            f"{score.estimator} on {score.case} is {score.status}, with an error of {loss:.2%} of the path: nothing "
+            f"fails (an error of {MIN_SHRUNK_LOSS:.0%} or more would)"
+        )
+    return AccuracyFailure(loss, f"{score.estimator}: {score.status}, but with an error of {loss:.1%} of the path")
 
 
 def _summary(score: TrialScore) -> str:
@@ -117,27 +185,27 @@ def _fails(score: TrialScore) -> bool:
     return score.status != "ok"
 
 
-def _search(trial: FinishedTrial, run_plan: PlanRunner, trials: int) -> Shrunk:
+def _search(trial: FinishedTrial, failure: TrialFailure, run_plan: PlanRunner, trials: int) -> Shrunk:
     """The smallest case on which the estimator fails as it did in the trial."""
-    wanted = Failure.of(trial.score.status, trial.score.reason)
     suite_name = f"shrink_{trial.score.case.replace('-', '_')}_{trial.score.estimator}"
 
     def fails_alike(case: Case) -> bool:
         folder = run_variants(trial, {trial.score.case: case}, name=suite_name, run_plan=run_plan)
         score, *_ = folder.scores()
-        return Failure.of(score.status, score.reason) == wanted
+        return failure.is_in(folder, score)
 
     first = trial.case.frames[0] if trial.case.frames else 0
     stamps_ns = body_motion(trial.case).t_ns.tolist()
     whole = (first, first + len(stamps_ns))
-    is_likely = _likely_windows(trial, dict(enumerate(stamps_ns, first)), wanted)
-    return shrink(trial.case, whole, is_likely, nuisances_of(trial.case), fails_alike, trials=trials)
+    is_likely = _likely_windows(trial, dict(enumerate(stamps_ns, first)), failure)
+    nuisances = [nuisance for nuisance in nuisances_of(trial.case) if not nuisance.is_circumstance]
+    return shrink(trial.case, whole, is_likely, nuisances, fails_alike, trials=trials)
 
 
 def _likely_windows(
     trial: FinishedTrial,
     stamps_ns: dict[int, int],
-    wanted: Failure,
+    failure: TrialFailure,
 ) -> Callable[[Window], bool]:
     """Return a test of whether the estimator is likely to fail in the same way on a window of frames.
 
@@ -151,9 +219,7 @@ def _likely_windows(
         part = _part(paths, first_ns=stamps_ns[window[0]], last_ns=stamps_ns[window[1] - 1])
         if len(part.gt) < MIN_FRAMES:
             return False
-        scored = score_estimate(part.est, part.gt, trial.score.claims)
-        status, reason = status_of(EstimatorOutcome(kind=FINISHED, reason=""), scored, part.gt)
-        return Failure.of(status, reason) == wanted
+        return failure.is_in_part(trial, part)
 
     whole = (min(stamps_ns), max(stamps_ns) + 1)
     if fails_alike_in(whole):

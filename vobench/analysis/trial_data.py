@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.analysis.causes import ErrorSeries
-from vobench.analysis.conditions import conditions
+from vobench.analysis.conditions import FEW_TRACKS, conditions
 from vobench.analysis.explain import Outcome, loss_between, segment_loss
 from vobench.errors import InputError
 from vobench.geometry.se3 import Array
@@ -48,7 +48,24 @@ def read_error_series(folder: RunFolder, score: TrialScore, frame_conditions: Ma
     every_frame = np.arange(len(paths.gt))
     loss = loss_between(paths.gt, paths.est, every_frame, scale=paths.scale)
     loss = np.append(0.0, loss)  # the first frame has no predecessor
-    return ErrorSeries(score.case, score.repeat, frame_conditions, loss)
+    return ErrorSeries(
+        score.case,
+        score.repeat,
+        frame_conditions,
+        loss,
+        place=score.variant.get("scene", ""),
+        drive=score.variant.get("trajectory", ""),
+    )
+
+
+def read_symptoms(folder: RunFolder, score: TrialScore) -> dict[str, Array]:
+    """Read what an estimator reports of the frames (N,) of a trial, by name; empty if it does not report it."""
+    rows = read_frames(folder.estimate(score.case, score.estimator, score.repeat))
+    tracks = [row.tracks for row in rows]
+    if all(count is None for count in tracks):
+        return {}
+    counts = np.array([count or 0 for count in tracks])
+    return {FEW_TRACKS: 1 / (1.0 + counts)}
 
 
 def read_conditions(folder: RunFolder, case: Case) -> dict[str, Array]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vobench.analysis.causes import Attribution, Cause
+from vobench.analysis.causes import MIN_EXPLAINED, Attribution, Cause
 from vobench.analysis.run_causes import WORST_SEGMENTS, EstimatorCauses, find_causes
 from vobench.cli import terminal
 from vobench.cli.option import Json, RunPath
@@ -42,9 +42,13 @@ def _print_causes(causes: EstimatorCauses, *, worst: int) -> None:
     console = terminal.console()
     attribution = causes.attribution
     if attribution is None:
-        console.print(f"{causes.estimator}: too few frames, or too similar ones, to learn causes from")
+        console.print(f"{causes.estimator}: no answer. {causes.reason}", soft_wrap=True)
         return
     _print_attribution(causes.estimator, attribution, console)
+    for symptom in causes.symptoms:
+        console.print(f"symptom, besides these: {' + '.join(symptom.conditions)} ×{symptom.factor:.2g}")
+    if causes.has_one_drive:
+        console.print("all cases share one drive: what recurs on it is named only if no other time on it fits as well")
     console.print(terminal.table("trials", TRIAL_HEADINGS, _trial_rows(causes, attribution)))
     console.print(terminal.table("worst segments", SEGMENT_HEADINGS, _segment_rows(attribution, worst)))
 
@@ -55,6 +59,14 @@ def _print_attribution(estimator: str, attribution: Attribution, console: "Conso
     rows = [_cause_row(cause) for cause in attribution.causes]
     console.print(terminal.table(title, CAUSE_HEADINGS, rows))
     console.print(f"together they explain {attribution.explained:.0%} of the variance of the error's logarithm")
+    if attribution.is_mostly_unexplained:
+        console.print(
+            f"Most of the error has a cause that is not in this list (they would explain {MIN_EXPLAINED:.0%} or more).",
+            soft_wrap=True,
+        )
+    else:
+        named = ", ".join(" + ".join(cause.conditions) for cause in attribution.named)
+        console.print(f"Significant: {named or 'none of these'}.", soft_wrap=True)
     if any(len(cause.conditions) > 1 for cause in attribution.causes):
         console.print("conditions joined by + vary together in this run, so a regression cannot separate them")
     if attribution.constant:
@@ -64,7 +76,8 @@ def _print_attribution(estimator: str, attribution: Attribution, console: "Conso
 def _cause_row(cause: Cause) -> list[str]:
     conditions = " + ".join(cause.conditions)
     interval = f"{cause.low:.2f} to {cause.high:.2f}"
-    return [conditions, f"{cause.factor:.2f}", interval, "" if cause.is_sure else "not significant"]
+    verdict = "significant" if cause.is_sure else "not significant"
+    return [conditions, f"{cause.factor:.2f}", interval, verdict]
 
 
 def _trial_rows(causes: EstimatorCauses, attribution: Attribution) -> list[list[str]]:

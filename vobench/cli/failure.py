@@ -25,7 +25,10 @@ def explain_command(
     trial: TrialPath,
     *,
     repeats: Annotated[
-        int, typer.Option("--repeats", "-n", min=1, max=20, help="The number of seeds; short cases get more.")
+        int,
+        typer.Option(
+            "--repeats", "-n", min=1, max=20, help="The seeds of the first comparison; a random estimator gets more."
+        ),
     ] = 3,
     rerun: RerunOptions,
     json: Json = False,
@@ -52,18 +55,17 @@ def _print_explanation(result: TrialExplanation) -> None:
     if explanation.alone:
         by_loss = sorted(explanation.alone.items(), key=lambda item: -item[1])
         losses = ", ".join(f"{name} {loss:.1%}" for name, loss in by_loss)
-        console.print(f"No single removal helps. With only one difficulty left, the error is: {losses}.")
+        console.print(f"With only one nuisance left, the error is: {losses}.", soft_wrap=True)
     if not explanation.repeats_differ:
         console.print("All repeats are identical, because nothing is random: the intervals are over segments only.")
-    if result.named:
-        console.print(f"Cause of the failure: {' and '.join(result.named)}.")
-    else:
-        console.print("None of these explains the failure: the cause is the estimator, its path or the scene.")
+    for sentence in result.sentences:
+        console.print(sentence, soft_wrap=True)
 
 
 def _change_rows(result: TrialExplanation) -> list[list[str]]:
-    everything = result.explanation.everything.removed
-    return [_change_row(row, everything) for row in result.rows()]
+    everything = result.explanation.everything
+    removed = everything.removed if everything is not None else ()
+    return [_change_row(row, removed) for row in result.rows()]
 
 
 def _change_row(row: dict[str, Any], everything: tuple[str, ...]) -> list[str]:

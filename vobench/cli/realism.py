@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from vobench.analysis.realism import OFFSET_BAND_PX, Realism, residual
+from vobench.analysis.realism import OFFSET_BAND_PX, Realism, residual, side_effects
 from vobench.analysis.realism_report import RealismReport, measure_realism
 from vobench.cli import terminal
 from vobench.cli.option import Json, with_option_groups
@@ -58,6 +58,8 @@ def _print(report: RealismReport) -> None:
     headings = ["statistic", "value", "unit", reference, "is", "changed by"]
     rows = [_row(row) for row in report.rows()]
     console.print(terminal.table(title, headings, rows))
+    for sentence in side_effects(row["knob"] for row in report.rows()):
+        console.print(sentence, soft_wrap=True)
     for line in _other_measurements(realism):
         console.print(line)
     for sentence in report.sentences():

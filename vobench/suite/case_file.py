@@ -1,7 +1,10 @@
-"""Writes a single case as a suite, in a folder that can be copied and given to `vobench run`."""
+"""Writes a single case as a suite, in a folder that can be copied and given to `vobench run`.
+
+Only what differs from the defaults is written, so that a reader sees at once what is special about the case.
+"""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import MISSING, Field, fields, is_dataclass, replace
 from pathlib import Path
 from shutil import copyfile
 from typing import Any
@@ -19,6 +22,7 @@ SUITE_FILE = "suite.yaml"
 POSES_FILE = "poses.tum"
 UNNAMED = "it"  # the name of a variant for which the case has no name
 REPLAY_SOURCE_KEYS = ("file", "times", "recorded_hz", "axes")  # the keys that say how a replayed trajectory is read
+KIND_KEY = "kind"  # says which settings follow, so it is written in any case
 LINE_WIDTH = 120
 
 
@@ -39,15 +43,17 @@ def write_case(
         "seed": case.seed,
         "scenes": [scene],
         "lightings": {variant["lighting"]: without_nothing(plain(case)["lighting"])},
-        "rigs": {variant["rig"]: without_nothing(plain(case.rig))},
+        "rigs": {variant["rig"]: special_settings(case.rig)},
         "trajectories": {variant["trajectory"]: _write_trajectory_file(case, folder)},
-        "cameras": {variant["camera"]: without_nothing(plain(case.camera))},
-        "rendering": without_nothing(plain(case.rendering)),
-        "truth": list(case.truth),
-        "truth_noise": plain(case.truth_noise),
+        "cameras": {variant["camera"]: special_settings(case.camera)},
     }
-    if case.frames:
-        suite["frames"] = list(case.frames)
+    optional = {
+        "rendering": special_settings(case.rendering),
+        "truth": list(case.truth),
+        "truth_noise": special_settings(case.truth_noise),
+        "frames": list(case.frames or ()),
+    }
+    suite |= {key: value for key, value in optional.items() if value}
     suite["estimators"] = [_estimator(estimator_entry) for estimator_entry in estimator_entries]
     _write_yaml(folder / SUITE_FILE, suite)
     return folder / SUITE_FILE
@@ -55,7 +61,7 @@ def write_case(
 
 def _write_scene_files(case: Case, folder: Path) -> Any:
     """Copy the files of the case's scene to a folder, and return the content of the scene file with their new paths."""
-    scene = without_nothing(plain(case.scene))
+    scene = special_settings(case.scene)
     parts = (*scene.get("meshes", ()), *scene.get("movers", ()), scene)
     for part in parts:
         for key in ("file", "maker", "generator"):
@@ -75,7 +81,37 @@ def _write_trajectory_file(case: Case, folder: Path) -> Any:
     trajectory = {key: value for key, value in plain(case)["trajectory"].items() if hasattr(spec, key)}
     if isinstance(spec, Replay):
         trajectory |= {key: getattr(spec, key) for key in REPLAY_SOURCE_KEYS}
-    return without_nothing(trajectory)
+    return _special(spec, without_nothing(trajectory))
+
+
+def special_settings(settings: Any) -> Any:
+    """The settings that differ from the defaults, as plain values that read as the same settings again."""
+    return _special(settings, without_nothing(plain(settings)))
+
+
+def _special(settings: Any, tree: Any) -> Any:
+    """The part of a tree of plain values that differs from the defaults of the settings that it stands for."""
+    if is_dataclass(settings) and isinstance(tree, dict):
+        known = {field.name: field for field in fields(settings)}
+        special = {}
+        for key, value in tree.items():
+            current = getattr(settings, key, None)
+            if key in known and key != KIND_KEY and current == _default(known[key]):
+                continue
+            special[key] = _special(current, value)
+        return special
+    if isinstance(settings, dict) and isinstance(tree, dict):
+        return {key: _special(settings.get(key), value) for key, value in tree.items()}
+    if isinstance(settings, tuple) and isinstance(tree, list):
+        return [_special(item, value) for item, value in zip(settings, tree, strict=True)]
+    return tree
+
+
+def _default(field: "Field[Any]") -> Any:
+    """The default of a field; MISSING if it has none."""
+    if field.default_factory is not MISSING:
+        return field.default_factory()
+    return field.default
 
 
 def _estimator(estimator_entry: EstimatorEntry) -> Any:
@@ -85,12 +121,13 @@ def _estimator(estimator_entry: EstimatorEntry) -> Any:
     for key, value in plain(estimator_entry.limits).items():
         if value != getattr(manifest.limits, key):
             limits[key] = value
-    entry = {
-        "name": manifest.name,
-        "label": estimator_entry.label,
-        "params": estimator_entry.params,
-        "limits": limits,
-    }
+    entry: dict[str, Any] = {"name": manifest.name}
+    if estimator_entry.label != manifest.name:
+        entry["label"] = estimator_entry.label
+    if estimator_entry.params != manifest.params:
+        entry["params"] = estimator_entry.params
+    if limits:
+        entry["limits"] = limits
     return without_nothing(entry)
 
 
