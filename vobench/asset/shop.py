@@ -45,7 +45,7 @@ def interior(rng: Rng, kind: str, *, width_m: float, sill_m: float, depth_m: flo
     floor = (
         wood("oak")
         if rng.random() < 0.5
-        else coated("#cfcac0", picture.masonry("tile", 0, 1024, 1.2, rows=3, columns=3, bond=0.0), 0.25)
+        else coated("#cfcac0", picture.masonry("tile", 0, 512, 1.2, rows=3, columns=3, bond=0.0), 0.25)
     )
     paint = matt(one_of(rng, "#e9e6df", "#efe9dc", *PAINTS))
     walls = [
