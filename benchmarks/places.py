@@ -15,13 +15,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vobench.asset import home, place_check, site_check, street, workplace
+from vobench.asset import home, place_check, site_check, street, warehouse, workplace
 from vobench.asset.daylight import LIGHTINGS
 from vobench.asset.interior import Interior
 from vobench.asset.site import Site
 from vobench.geometry.triangle import areas_m2
 
-MAKERS = {"flat": home.furnished_flat, "office": workplace.furnished_office, "street": street.generated_street}
+MAKERS = {
+    "flat": home.furnished_flat,
+    "office": workplace.furnished_office,
+    "street": street.generated_street,
+    "warehouse": warehouse.generated_warehouse,
+}
 PLACE_M = 1e-3  # faces are the same if their corners are as near as this
 
 

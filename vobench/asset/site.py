@@ -29,6 +29,7 @@ class Built:
 class SitePiece:
     """Something that stands on the ground, or on the piece named by `support`; parts in the frame of the place.
 
+    base_m: the height of the deck of a rack on which it stands instead.
     sunk_m: how far it may reach into the ground, such as the trunk of a tree on a slope.
     """
 
@@ -37,6 +38,7 @@ class SitePiece:
     spacing_m: float
     support: str = ""
     sunk_m: float = 0.01
+    base_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +113,8 @@ class Site:
     """A place outdoors or in a large hall.
 
     roads: the areas in which a body has to get from the first to the last of the `stations_m` (N, 2), with its middle
-    `body_radius_m` away from everything. walls: footprints (4, 2) that nothing may enter.
+    `body_radius_m` away from everything. walls: footprints (4, 2) that nothing may enter. blocked: footprints (4, 2) of
+    racks, which pieces may enter and bodies may not.
     """
 
     built: tuple[Built, ...]
@@ -122,6 +125,7 @@ class Site:
     stations_m: Array
     body_radius_m: float
     walls: tuple[Array, ...] = ()
+    blocked: tuple[Array, ...] = ()
 
     @property
     def area_m2(self) -> float:

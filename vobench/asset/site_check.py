@@ -13,6 +13,7 @@ from vobench.scene.light import AreaLight, Sky, Sun
 TOLERANCE_M = 0.02  # between a piece and the ground
 OVERLAP_M = 0.03  # that footprints may share
 CELL_M = 0.15  # of the map of the roads
+LOW_M = 0.5  # what stands higher is in a rack
 FACES = 340_000  # at most
 
 
@@ -59,7 +60,7 @@ def _loose(site: Site, footprints: Mapping[str, Footprint]) -> Iterator[str]:
                 yield f"{piece.name} is not on {piece.support} (gap {gap_m:.2f} m)"
             continue
         middle = standing.corners_m.mean(axis=0)
-        ground_m = float(site.ground.heights_m(middle[None])[0])
+        ground_m = float(site.ground.heights_m(middle[None])[0]) if piece.base_m is None else piece.base_m
         above_m = standing.low_m - ground_m
         if not -piece.sunk_m - TOLERANCE_M <= above_m <= TOLERANCE_M:
             yield f"{piece.name} stands {above_m:.3f} m above the ground"
@@ -76,10 +77,11 @@ def _unreached(site: Site, footprints: Sequence[Footprint]) -> Iterator[str]:
     is_free = np.zeros(len(centres_m), bool)
     for area in site.roads:
         is_free |= area.contains(centres_m)
-    for standing in footprints:
-        is_near = ((centres_m > standing.corners_m.min(0)) & (centres_m < standing.corners_m.max(0))).all(axis=1)
+    on_ground = [standing.corners_m for standing in footprints if standing.low_m < LOW_M]
+    for corners in (*on_ground, *site.blocked, *site.walls):
+        is_near = ((centres_m > corners.min(0)) & (centres_m < corners.max(0))).all(axis=1)
         near = np.flatnonzero(is_near & is_free)
-        is_free[near[_is_inside(centres_m[near], standing.corners_m)]] = False
+        is_free[near[_is_inside(centres_m[near], corners)]] = False
     shape = (len(y), len(x))
     distance_m = scipy.ndimage.distance_transform_edt(is_free.reshape(shape)) * CELL_M
     labels, _ = scipy.ndimage.label(distance_m > site.body_radius_m)
