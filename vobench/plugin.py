@@ -15,8 +15,8 @@ Makers       Thing make_mesh joined moved copies flipped two_sided textured: mes
              Part Piece put stood things mm bars bulb kitchen: furniture
              Opening shell FINISHES OUTWARD: rooms
              AreaLight PointLight SpotLight Sun Sky Steady Flicker Dimmer Switched: lights
-             Surroundings GeneratedPlace home workplace: the panorama of a sky, what a generator returns,
-             furnished flats and offices
+             Surroundings GeneratedPlace home workplace street warehouse: the panorama of a sky, what a generator
+             returns, furnished flats and offices, streets, warehouses
 Layouts      Layout Writing ReadOptions Topics: the definition of a layout, and the options of its reader
              Recording RecordedFrame RecordedPicture PictureStream assemble picture_files numbered truth_file unread
              chain_rig: reading
@@ -36,7 +36,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vobench.asset import home, kitchen, picture, workplace
+    from vobench.asset import home, kitchen, picture, street, warehouse, workplace
     from vobench.asset.fitting import bars
     from vobench.asset.furniture import (
         BLACK,
@@ -177,6 +177,8 @@ HOMES = {
     "picture": "vobench.asset.picture",
     "home": "vobench.asset.home",
     "kitchen": "vobench.asset.kitchen",
+    "street": "vobench.asset.street",
+    "warehouse": "vobench.asset.warehouse",
     "workplace": "vobench.asset.workplace",
     "FINISHES": "vobench.asset.room",
     "OUTWARD": "vobench.asset.room",
@@ -439,6 +441,7 @@ __all__ = [
     "spline",
     "stereo_pair",
     "stood",
+    "street",
     "textured",
     "things",
     "truth_file",
@@ -447,6 +450,7 @@ __all__ = [
     "two_sided",
     "unit",
     "unread",
+    "warehouse",
     "wood",
     "workplace",
 ]

@@ -16,6 +16,7 @@ SEEDS = 1 << 16  # of panoramas
 # Linear RGB of black bodies at some temperatures.
 BLACK_BODIES_K = (2700.0, 3000.0, 4000.0, 5000.0, 6500.0)
 BLACK_BODIES_RGB = ((1.0, 0.43, 0.13), (1.0, 0.48, 0.18), (1.0, 0.65, 0.39), (1.0, 0.78, 0.62), (1.0, 0.93, 1.0))
+NEAR_M = (18.0, 45.0)  # from a window to what is across the street
 ADAPTED = 0.35  # the share of a lamp's tint that remains after the eye, or white balance, adapted to it
 
 
@@ -41,11 +42,19 @@ def lamp_colour(temperature_k: float) -> Rgb:
     return unit_luminance((red, green, blue))
 
 
-def daylight(rng: Rng, lighting: str, *, towards_deg: float, height_m: float, kinds: tuple[str, ...]) -> Daylight:
+def daylight(
+    rng: Rng,
+    lighting: str,
+    *,
+    towards_deg: float,
+    height_m: float,
+    kinds: tuple[str, ...],
+    distance_m: tuple[float, float] = NEAR_M,
+) -> Daylight:
     """Sun and sky of a lighting, one of LIGHTINGS, with surroundings of one of `kinds`.
 
     towards_deg: the azimuth of what a sun shines at, such as the largest window; it stands within 60° of that.
-    height_m: how high z = 0 is above the ground.
+    height_m: how high z = 0 is above the ground. distance_m: the range of the distance to the first things around.
 
     Raises:
         UnknownNameError: there is no such lighting.
@@ -53,7 +62,7 @@ def daylight(rng: Rng, lighting: str, *, towards_deg: float, height_m: float, ki
     require_known("lighting", lighting, LIGHTINGS)
     kind = str(rng.choice(kinds))
     seed = int(rng.integers(SEEDS))
-    distance_m = float(rng.uniform(18, 45))
+    first_m = float(rng.uniform(*distance_m))
     azimuth_deg = towards_deg + float(rng.uniform(-60, 60))
     elevation_deg = float(rng.uniform(18, 52))
     if lighting == "evening":
@@ -80,7 +89,7 @@ def daylight(rng: Rng, lighting: str, *, towards_deg: float, height_m: float, ki
         kind=kind,
         seed=seed,
         height_m=height_m,
-        distance_m=distance_m,
+        distance_m=first_m,
         sun_lx=sun_lx if has_sun else 0.0,
         sun_colour=sun_colour,
     )

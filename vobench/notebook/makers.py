@@ -4,7 +4,7 @@ from pathlib import Path
 
 from vobench import trust
 from vobench.errors import InputError
-from vobench.suite.maker import sources
+from vobench.suite.scene_code import sources
 
 
 def trust_maker(maker: Path | str) -> None:

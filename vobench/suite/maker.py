@@ -9,7 +9,7 @@ included in vobench are trusted, and run in this process.
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -25,6 +25,7 @@ from vobench.scene.generated_place import GeneratedPlace
 from vobench.suite.catalog import builtin_root
 from vobench.suite.maker_message import decode
 from vobench.suite.maker_worker import ERROR_FILE, GENERATE, MAKE, SCENE_FILE, call
+from vobench.suite.scene_code import sources
 
 LIMITS = Limits(trial_s=600.0, threads=os.cpu_count() or 1)
 WORKER = (sys.executable, "-P", "-m", "vobench.suite.maker_worker")
@@ -68,14 +69,6 @@ def _run_trusted(file: Path, function: str, arguments: Sequence[Any]) -> Generat
 def _is_contained() -> bool:
     """Whether the sandbox on this machine hides the user's files."""
     return isolation.FILES not in sandbox_here().sees
-
-
-def sources(maker: Path) -> Iterator[bytes]:
-    """What is hashed of a maker: the names and contents of its file and of all Python files in its folder and below."""
-    others = [path for path in maker.parent.rglob("*.py") if path != maker and path.is_file()]
-    for path in [maker, *sorted(others)]:
-        yield str(path.relative_to(maker.parent)).encode()
-        yield path.read_bytes()
 
 
 def _run_sandboxed(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:

@@ -13,6 +13,7 @@ from vobench.errors import SuiteError
 from vobench.suite import catalog, yaml_file
 from vobench.suite.bare_model import bare_model_scene
 from vobench.suite.scene_check import check_scene
+from vobench.suite.scene_code import code_identity
 from vobench.suite.scene_entry import DRAWN, described_scene, generated_scene
 from vobench.suite.scene_spec import ModelSpec, MoverSpec, SceneFile
 from vobench.suite.yaml_source import Mistakes, YamlFile
@@ -86,6 +87,8 @@ def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> S
 def scene_content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
     """The scene as plain JSON values. Files are identified by their name and content, not by their path.
 
+    Makers and generators are identified by all Python files of their folders.
+
     A scene that is described without a generator does not depend on it.
     """
     scene: dict[str, Any] = yaml_file.plain(spec, exclude=exclude)
@@ -93,12 +96,12 @@ def scene_content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
         scene.pop("generator", None)
         scene.pop("generated", None)
     elif spec.generator:
-        scene["generator"] = _file_identity(Path(spec.generator))
+        scene["generator"] = code_identity(Path(spec.generator))
     for part in (*scene.get("meshes", ()), *scene.get("movers", ())):
         if part.get("file"):
             part["file"] = _file_identity(Path(part["file"]))
     if scene.get("maker"):
-        scene["maker"] = _file_identity(Path(scene["maker"]))
+        scene["maker"] = code_identity(Path(scene["maker"]))
     return scene
 
 
