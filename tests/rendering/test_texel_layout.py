@@ -1,10 +1,10 @@
-"""The layout of points on the map: neighbours are mutual, smoothing keeps even light, interpolation linear light."""
+"""The layout of points on the map: neighbours are mutual, smoothing keeps even light, grids hold rims."""
 
 import numpy as np
 import pytest
 
 from vobench.rendering.texel import Texels, texels
-from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.texel_layout import STRIDES, TexelLayout
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.scene.material import Material
@@ -23,13 +23,24 @@ def board(wide: int, high: int) -> tuple[Texels, TexelLayout]:
     return texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0)
 
 
-@pytest.mark.parametrize(("wide", "high"), [(5, 5), (6, 5), (5, 6), (6, 6), (2, 4), (2, 3)])
-def test_light_known_at_every_other_sample_is_whole_up_to_the_edges(wide: int, high: int) -> None:
-    """What rises evenly is told exactly by some of the samples, none of them beyond the outermost known ones."""
+@pytest.mark.parametrize("stride", STRIDES)
+@pytest.mark.parametrize(("wide", "high"), [(9, 9), (10, 7), (2, 4)])
+def test_a_grid_has_every_so_many_points_and_the_last_of_each_row_and_column(wide: int, high: int, stride: int) -> None:
     points, layout = board(wide, high)
-    ramp = points.points_m @ [1.0, 2.0, 0.0]
-    assert layout.is_sparse.sum() < 0.75 * len(points) or min(wide, high) < 3
-    np.testing.assert_allclose(layout.interpolated(np.where(layout.is_sparse, ramp, 1e9)), ramp, atol=2e-3)
+    rows = np.arange(len(points))
+    on_grid = np.isin(rows, layout.on_grid(rows, stride))
+    row, column = np.divmod(points.index, layout.width)
+    in_column = (column % stride == 0) | (column == column.min()) | (column == column.max())
+    in_row = (row % stride == 0) | (row == row.min()) | (row == row.max())
+    np.testing.assert_array_equal(on_grid, in_column & in_row)
+
+
+def test_the_finest_grid_has_all_points_and_each_grid_those_of_the_coarser_one() -> None:
+    points, layout = board(12, 11)
+    rows = np.arange(len(points))
+    np.testing.assert_array_equal(layout.on_grid(rows, 1), rows)
+    coarse, fine = (layout.on_grid(rows, stride) for stride in STRIDES)
+    assert set(coarse.tolist()) < set(fine.tolist()) < set(rows.tolist())
 
 
 def test_the_neighbour_of_a_neighbour_on_the_other_side_is_the_point_itself() -> None:
@@ -69,10 +80,3 @@ def test_texels_take_their_value_from_a_point_or_stay_dark() -> None:
     np.testing.assert_array_equal(light.ravel()[points.index], values)
     assert (light.ravel()[layout.source == len(points)] == 0).all()
     assert set(np.unique(light)) <= {0.0, *values.tolist()}
-
-
-def test_weights_of_points_add_up_to_one() -> None:
-    for wide, high in ((5, 5), (8, 3), (2, 9)):
-        points, layout = board(wide, high)
-        np.testing.assert_allclose(layout.weights.sum(1), np.ones(len(points)), rtol=1e-6)
-        assert layout.is_sparse.any()

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.emitter import Aim, Emitter, Occluder, emitters
 from vobench.rendering.geometry import RAY_OFFSET_M, BoundingSphere, PlanarPatch, RayCaster, bounding_sphere
+from vobench.rendering.level_kernels import UNKNOWN
 from vobench.rendering.shadow_kernels import (
     add_arrived,
     ahead_of,
@@ -17,7 +18,8 @@ from vobench.rendering.shadow_kernels import (
     spread_over_texels,
 )
 from vobench.rendering.texel import Texels
-from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.texel_field import TexelField
+from vobench.rendering.texel_layout import STRIDES, TexelLayout
 from vobench.rendering.thread_pool import chunked
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Light, Sky
@@ -37,6 +39,11 @@ class MirrorImage(Emitter):
     def open_side(self) -> int:
         """As many as of the emitter itself."""
         return self.emitter.open_side
+
+    @property
+    def is_hard(self) -> bool:
+        """As hard as the emitter itself."""
+        return self.emitter.is_hard
 
     def width_rad(self, points_m: Floats) -> Floats:
         """As wide as the image is seen."""
@@ -140,16 +147,23 @@ def mirror_images(
 NARROW_RAD = 0.15
 WIDE_RAD = 0.6
 RIM = 2  # texels around a place of half shadow
-PARTIAL = 0.2  # share of the points around that see an emitter in part, from which a shadow takes more rays
 LEAST_LX = 1e-30  # by which nothing is divided that is darker
+STEEP = 0.15  # difference of the visible share between neighbours from which it is computed on a finer grid
+UNEVEN = 0.1  # relative difference of unshaded light between neighbours from which it is computed on a finer grid
+GRAINY = 0.3  # relative difference of sampled light between neighbours from which it is sampled on a finer grid
+FINER_STRIDES = (*STRIDES[1:], 1)
+BENT = 1e-4  # difference of a normal from that of its flat face from which light is computed at each texel
 
 
 @dataclass(frozen=True, slots=True)
 class Rays:
-    """side x side rays to an emitter; where `spread`, they start all over a texel's area instead of its middle."""
+    """side x side rays to an emitter.
+
+    They start at a texel's middle if `spread` is 0, else all over a square of so many texels along a side around it.
+    """
 
     side: int
-    spread: bool = False
+    spread: int = 0
 
 
 def direct_light(
@@ -164,20 +178,21 @@ def direct_light(
 ) -> Floats:
     """Illuminance (P,) in lux that one emitter gives at level 1 to those among the points; of coats what enters.
 
-    Few rays tell whether the emitter is seen, of soft shadows at every other point along rows and columns. Where it
-    is neither seen nor hidden all around, within RIM texels or in the same of the cells (P,), rays from all over each
-    texel follow. Elsewhere its light needs no rays, and the sky in a pane is smoothed instead.
+    The visible share of an emitter with soft shadows is computed at every fourth point along rows and columns, and at
+    every second and at every point only where it differs between neighbours; so is the light that would arrive if
+    nothing were in the way. The sky in a pane, whose light is sampled, is smoothed. Of hard shadows one ray at each
+    point tells the outlines, within RIM texels of which, or in the same of the cells (P,), rays from all over each
+    texel follow.
     """
     lit = reached(emitter, points, np.flatnonzero(among))
     if not len(lit):
         return np.zeros(len(points), np.float32)
     receivers = Receivers(points, layout, cells, visibility, lit)
-    sides = first_rays(emitter, points.points_m[lit], side)
     if emitter.sky == "pane":
-        return receivers.pane_light(emitter, sides)
-    if not (sides > 1).any():
+        return receivers.pane_light(emitter, side)
+    if emitter.is_hard:
         return receivers.hard_light(emitter, side)
-    return receivers.soft_light(emitter, sides, side)
+    return receivers.soft_light(emitter, side)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,14 +205,22 @@ class Receivers:
     visibility: Visibility
     lit: Rows
 
-    def pane_light(self, emitter: Emitter, sides: NDArray[np.int64]) -> Floats:
-        """The sky's light (P,) in a pane, by side x side (N,) rays from every other point along rows and columns."""
-        light = np.zeros(len(self.points), np.float32)
-        is_sparse = self.layout.is_sparse[self.lit]
-        for side in np.unique(sides):
-            asked = self.lit[(sides == side) & is_sparse]
-            light[asked] = arriving(emitter, self.points, asked, self.visibility, Rays(int(side)))[0]
-        return self.layout.blurred(self.layout.interpolated(light))
+    def pane_light(self, emitter: Emitter, side: int) -> Floats:
+        """The sky's light (P,) in a pane, sampled on ever finer grids."""
+        light = TexelField.unknown(self.layout, len(self.points))
+        coarsest, finer = STRIDES
+        rows = self.layout.on_grid(self.lit, coarsest)
+        light.set(rows, self._sampled(emitter, rows, side, coarsest))
+        low_lx, high_lx = light.extremes(rows, steps=coarsest)
+        is_even = high_lx - low_lx <= GRAINY * high_lx
+        light.smooth(rows[is_even], steps=coarsest)
+
+        rows = self.layout.on_grid(self.lit, finer)
+        asked = light.refine(rows, stride=finer, tolerance=GRAINY, is_relative=True)
+        light.set(asked, self._sampled(emitter, asked, side, finer))
+        asked = light.refine(self.lit, stride=1, tolerance=np.inf)
+        light.set(asked, self._sampled(emitter, asked, side, 1))
+        return self.layout.blurred(light.values)
 
     def hard_light(self, emitter: Emitter, side: int) -> Floats:
         """Light (P,) of an emitter that is so narrow that one ray tells, but for the edges of shadows."""
@@ -208,57 +231,110 @@ class Receivers:
         near_edge = self._half_shadow(clear, self.cells, self.lit, rim=RIM)
 
         pattern = self._pattern(stride=1)
-        few = Rays(max(side // 2, 1), spread=True)
+        few = Rays(max(side // 2, 1), spread=1)
         arrived = arriving(emitter, points, near_edge, self.visibility, few, pattern)
         light[near_edge], clear[near_edge], _ = arrived
         each_alone = np.arange(len(points), dtype=np.int32)
         at_edge = self._half_shadow(clear, each_alone, near_edge, rim=1)
-        many = Rays(3 * side // 2, spread=True)
+        many = Rays(3 * side // 2, spread=1)
         light[at_edge] = arriving(emitter, points, at_edge, self.visibility, many, pattern)[0]
         return light
 
-    def soft_light(self, emitter: Emitter, sides: NDArray[np.int64], side: int) -> Floats:
+    def soft_light(self, emitter: Emitter, side: int) -> Floats:
         """Light (P,) of a wide emitter: what would arrive with nothing in the way, times the share that rays find."""
-        points = self.points
-        layout = self.layout
-        share = np.zeros(len(points), np.float32)
-        clear = np.full(len(points), np.nan, np.float32)
-        coarse = self._pattern(stride=2)
-        for first_side in np.unique(sides):
-            asked = self.lit[(sides == first_side) & layout.is_sparse[self.lit]]
-            rays = Rays(int(first_side))
-            total, clear[asked], unshaded = arriving(emitter, points, asked, self.visibility, rays, coarse)
-            share[asked] = total / np.maximum(unshaded, LEAST_LX)
-        share = layout.interpolated(share)
-
-        half = self._half_shadow(clear, self.cells, self.lit, rim=RIM)
-        rays = Rays(max(side // 2, 1), spread=True)
-        total, clear[half], unshaded = arriving(emitter, points, half, self.visibility, rays, self._pattern(stride=1))
-        share[half] = total / np.maximum(unshaded, LEAST_LX)
-
-        # More rays where shadows are wide.
-        is_partial = (clear > 0) & (clear < 1)
-        density = layout.blurred_among(is_partial, half, unshaded > 0)
-        wide = half[density > PARTIAL]
-        more = Rays(max(3 * side // 4, 1), spread=True)
-        halfway = self._pattern(stride=1, turn=0.5)
-        total, more_clear, more_unshaded = arriving(emitter, points, wide, self.visibility, more, halfway)
-        weight = np.float32(more.side**2 / (rays.side**2 + more.side**2))
-        share[wide] += weight * (total / np.maximum(more_unshaded, LEAST_LX) - share[wide])
-        clear[wide] += weight * (more_clear - clear[wide])
-
-        is_partial = (clear[half] > 0) & (clear[half] < 1)
-        smooth = layout.blurred_among(share, half, unshaded > 0)
-        share[half[is_partial]] = smooth[is_partial]
-
-        light = np.zeros(len(points), np.float32)
+        share = self._visible_share(emitter, side)
         shone = self.lit[share[self.lit] > 0]
-        open_lx, is_grainy = open_light(emitter, points, shone, side)
+        open_lx, is_grainy = self._open_light(emitter, shone, side)
+        light = np.zeros(len(self.points), np.float32)
         light[shone] = share[shone] * open_lx
         grainy = shone[is_grainy]
         if emitter.open_side > 1 and len(grainy):
-            light[grainy] = layout.blurred(light)[grainy]
+            light[grainy] = self.layout.blurred(light)[grainy]
         return light
+
+    def _visible_share(self, emitter: Emitter, side: int) -> Floats:
+        """The share (P,) of an emitter's light that nothing hides."""
+        share = TexelField.unknown(self.layout, len(self.points))
+        coarsest = STRIDES[0]
+        rows = self.layout.on_grid(self.lit, coarsest)
+        first_share, clear = self._shares(
+            emitter, rows, first_rays(emitter, self.points.points_m[rows], side), coarsest
+        )
+        share.set(rows, clear)
+        low, high = share.extremes(rows, steps=coarsest)
+        share.set(rows, first_share)
+        mixed = rows[(low < 1) & (high > 0)]
+        share.set(mixed, self._shares(emitter, mixed, Rays(side, spread=2), coarsest)[0])
+        low, high = share.extremes(mixed, steps=coarsest)
+        share.smooth(mixed[high - low < STEEP], steps=coarsest)
+
+        finer_side = max(3 * side // 4, 1)
+        for stride in FINER_STRIDES:
+            rows = self.layout.on_grid(self.lit, stride)
+            steep = share.refine(rows, stride=stride, tolerance=STEEP)
+            steep_share, clear = self._shares(emitter, steep, Rays(finer_side, spread=stride), stride)
+            share.set(steep, steep_share)
+            low, high = share.extremes(steep, steps=stride)
+            is_partial = (clear > 0) & (clear < 1)
+            is_gentle = (high - low < STEEP) | (stride == 1)
+            share.smooth(steep[is_partial & is_gentle], steps=stride)
+        return share.values
+
+    def _shares(
+        self,
+        emitter: Emitter,
+        rows: Rows,
+        rays: "Rays | NDArray[np.int64]",
+        stride: int,
+    ) -> tuple[Floats, Floats]:
+        """The visible share (N,) of an emitter's light at points, and the share of the rays that met nothing opaque.
+
+        `rays` are the same for all, or rays from the middle of each point by their number along a side (N,).
+        """
+        pattern = self._pattern(stride=stride)
+        share = np.zeros(len(rows), np.float32)
+        clear = np.zeros(len(rows), np.float32)
+        parts = [(rays, np.arange(len(rows)))] if isinstance(rays, Rays) else []
+        if not isinstance(rays, Rays):
+            parts = [(Rays(int(ray_side)), np.flatnonzero(rays == ray_side)) for ray_side in np.unique(rays)]
+        for part_rays, part in parts:
+            total, part_clear, unshaded = arriving(
+                emitter, self.points, rows[part], self.visibility, part_rays, pattern
+            )
+            share[part] = total / np.maximum(unshaded, LEAST_LX)
+            clear[part] = np.nan_to_num(part_clear)
+        return share, clear
+
+    def _sampled(self, emitter: Emitter, rows: Rows, side: int, stride: int) -> Floats:
+        """The light (N,) that rays to an emitter bring to points."""
+        sides = first_rays(emitter, self.points.points_m[rows], side)
+        light = np.zeros(len(rows), np.float32)
+        for ray_side in np.unique(sides):
+            part = np.flatnonzero(sides == ray_side)
+            rays = Rays(int(ray_side), spread=min(stride, 2))
+            light[part] = arriving(
+                emitter, self.points, rows[part], self.visibility, rays, self._pattern(stride=stride)
+            )[0]
+        return light
+
+    def _open_light(self, emitter: Emitter, rows: Rows, side: int) -> tuple[Floats, Mask]:
+        """The illuminance (N,) at points if nothing hid the emitter; and where it is sampled, hence grainy (N,)."""
+        points = self.points
+        light = TexelField.unknown(self.layout, len(points))
+        is_grainy = np.zeros(len(points), bool)
+        is_bent = np.zeros(len(points), bool)
+        is_bent[rows] = chunked(lambda part: _are_bent(points, rows[part]), len(rows))
+        grid = self.layout.on_grid(rows, STRIDES[0])
+        exact_lx, is_grainy[grid] = open_light(emitter, points, grid, side)
+        light.set(grid, exact_lx)
+        for stride in FINER_STRIDES:
+            grid = self.layout.on_grid(rows, stride)
+            bent = grid[is_bent[grid]]
+            light.state[bent] = UNKNOWN
+            asked = light.refine(grid, stride=stride, tolerance=UNEVEN, is_relative=True)
+            exact_lx, is_grainy[asked] = open_light(emitter, points, asked, side)
+            light.set(asked, exact_lx)
+        return light.values[rows], is_grainy[rows]
 
     def _pattern(self, *, stride: int, turn: float = 0) -> "EvenPattern":
         return EvenPattern(self.layout.width, stride, self.points.dither[:1] + np.float32(turn))
@@ -277,6 +353,11 @@ class Receivers:
         is_mixed = seen_in_cell & hidden_in_cell
         is_near = self.layout.dilated(is_seen, steps=rim) & self.layout.dilated(is_hidden, steps=rim)
         return among[(is_near | is_mixed[cells])[among]]
+
+
+def _are_bent(points: Texels, rows: Rows) -> Mask:
+    """Which of the points at rows (N,) have a normal that is not that of their flat face."""
+    return np.asarray(np.abs(points.normals[rows] - points.planes[rows]).max(1) > BENT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -391,7 +472,8 @@ def _arriving(
         lit = slice(lit_count)
         if rays.spread:
             steps_m = (texels.step_u_m, texels.step_v_m)
-            spread_over_texels(texels.dither, *steps_m, cell, rows[lit], origins_m[lit], segments_m[lit])
+            place = (texels.dither, *steps_m, cell, rays.spread)
+            spread_over_texels(*place, rows[lit], origins_m[lit], segments_m[lit])
         share = emitter.passing(occluder, origins_m[lit], segments_m[lit])
         add_arrived(rows[lit], share.astype(np.float32), light, total, unshaded, passed_count, ray_count)
     with np.errstate(invalid="ignore"):
