@@ -138,7 +138,7 @@ def test_a_soft_shadow_is_that_of_many_rays_and_takes_a_fraction_of_them(monkeyp
     points, layout, visibility = open_floor(block, spacing_m=0.025)
     (emitter,) = emitters(PANEL, visibility)
     rows = np.arange(len(points))
-    exact_lx = arriving(emitter, points, rows, visibility, Rays(16, spread=1))[0]
+    exact_lx = arriving(emitter, points, rows, visibility, Rays(16, spread=True))[0]
     sent = []
     passing = visibility.passing
 

@@ -7,6 +7,7 @@ from vobench.rendering.level_kernels import (
     UNKNOWN,
     fill_between,
     find_extremes,
+    mark_bends,
     nearest_known,
     next_to_marked,
     smooth_along,
@@ -73,3 +74,11 @@ def test_means_give_half_the_weight_to_the_point_itself() -> None:
     result = np.empty(4, np.float32)
     smooth_along(ROWS, BEFORE, AFTER, 1, np.full(4, KNOWN, np.uint8), np.array([0, 4, 0, 8], np.float32), result)
     assert result.tolist() == [1, 2, 3, 6]
+
+
+def test_a_point_off_the_line_between_its_neighbours_is_marked_and_one_on_it_is_not() -> None:
+    known = np.full(4, KNOWN, np.uint8)
+    for peak, is_marked in ((2.0, False), (2.2, True)):
+        result = np.zeros(4, bool)
+        mark_bends(ROWS, BEFORE, AFTER, 1, 0.05, known, np.array([1, peak, 3, 4], np.float32), result)
+        assert result.tolist() == [False, is_marked, False, False]

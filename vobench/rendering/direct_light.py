@@ -148,8 +148,12 @@ NARROW_RAD = 0.15
 WIDE_RAD = 0.6
 RIM = 2  # texels around a place of half shadow
 LEAST_LX = 1e-30  # by which nothing is divided that is darker
-STEEP = 0.15  # difference of the visible share between neighbours from which it is computed on a finer grid
+# Differences of the visible share between neighbours from which it is computed at every second and at every texel. What
+# is interpolated beside the rim of a half shadow errs by less than half of them.
+STEEP = (0.08, 0.15)
+GENTLE = 0.2  # difference of the visible share between neighbours on a coarse grid up to which it is smoothed
 UNEVEN = 0.1  # relative difference of unshaded light between neighbours from which it is computed on a finer grid
+BEND = 0.004  # the same of the mean of its neighbours, four times the error of what is interpolated
 GRAINY = 0.3  # relative difference of sampled light between neighbours from which it is sampled on a finer grid
 FINER_STRIDES = (*STRIDES[1:], 1)
 BENT = 1e-4  # difference of a normal from that of its flat face from which light is computed at each texel
@@ -157,13 +161,10 @@ BENT = 1e-4  # difference of a normal from that of its flat face from which ligh
 
 @dataclass(frozen=True, slots=True)
 class Rays:
-    """side x side rays to an emitter.
-
-    They start at a texel's middle if `spread` is 0, else all over a square of so many texels along a side around it.
-    """
+    """side x side rays to an emitter; where `spread`, they start all over a texel's area instead of its middle."""
 
     side: int
-    spread: int = 0
+    spread: bool = False
 
 
 def direct_light(
@@ -231,12 +232,12 @@ class Receivers:
         near_edge = self._half_shadow(clear, self.cells, self.lit, rim=RIM)
 
         pattern = self._pattern(stride=1)
-        few = Rays(max(side // 2, 1), spread=1)
+        few = Rays(max(side // 2, 1), spread=True)
         arrived = arriving(emitter, points, near_edge, self.visibility, few, pattern)
         light[near_edge], clear[near_edge], _ = arrived
         each_alone = np.arange(len(points), dtype=np.int32)
         at_edge = self._half_shadow(clear, each_alone, near_edge, rim=1)
-        many = Rays(3 * side // 2, spread=1)
+        many = Rays(3 * side // 2, spread=True)
         light[at_edge] = arriving(emitter, points, at_edge, self.visibility, many, pattern)[0]
         return light
 
@@ -264,21 +265,26 @@ class Receivers:
         low, high = share.extremes(rows, steps=coarsest)
         share.set(rows, first_share)
         mixed = rows[(low < 1) & (high > 0)]
-        share.set(mixed, self._shares(emitter, mixed, Rays(side, spread=2), coarsest)[0])
-        low, high = share.extremes(mixed, steps=coarsest)
-        share.smooth(mixed[high - low < STEEP], steps=coarsest)
+        self._take_shares(share, emitter, mixed, Rays(side, spread=True), coarsest)
 
-        finer_side = max(3 * side // 4, 1)
-        for stride in FINER_STRIDES:
+        finer_rays = max(3 * side // 4, 1)
+        for stride, tolerance in zip(FINER_STRIDES, STEEP, strict=True):
             rows = self.layout.on_grid(self.lit, stride)
-            steep = share.refine(rows, stride=stride, tolerance=STEEP)
-            steep_share, clear = self._shares(emitter, steep, Rays(finer_side, spread=stride), stride)
-            share.set(steep, steep_share)
-            low, high = share.extremes(steep, steps=stride)
-            is_partial = (clear > 0) & (clear < 1)
-            is_gentle = (high - low < STEEP) | (stride == 1)
-            share.smooth(steep[is_partial & is_gentle], steps=stride)
+            steep = share.refine(rows, stride=stride, tolerance=tolerance)
+            self._take_shares(share, emitter, steep, Rays(finer_rays, spread=True), stride)
         return share.values
+
+    def _take_shares(self, share: TexelField, emitter: Emitter, rows: Rows, rays: Rays, stride: int) -> None:
+        """Set the visible share of an emitter's light at the rows (N,), smoothed where it is in part hidden.
+
+        On the coarse grids it is smoothed only where it changes slowly.
+        """
+        values, clear = self._shares(emitter, rows, rays, stride)
+        share.set(rows, values)
+        low, high = share.extremes(rows, steps=stride)
+        is_partial = (clear > 0) & (clear < 1)
+        is_gentle = (high - low < GENTLE) | (stride == 1)
+        share.smooth(rows[is_partial & is_gentle], steps=stride)
 
     def _shares(
         self,
@@ -311,7 +317,7 @@ class Receivers:
         light = np.zeros(len(rows), np.float32)
         for ray_side in np.unique(sides):
             part = np.flatnonzero(sides == ray_side)
-            rays = Rays(int(ray_side), spread=min(stride, 2))
+            rays = Rays(int(ray_side), spread=True)
             light[part] = arriving(
                 emitter, self.points, rows[part], self.visibility, rays, self._pattern(stride=stride)
             )[0]
@@ -328,10 +334,11 @@ class Receivers:
         exact_lx, is_grainy[grid] = open_light(emitter, points, grid, side)
         light.set(grid, exact_lx)
         for stride in FINER_STRIDES:
+            exact = grid[~is_grainy[grid]]
+            is_bend = light.bends(exact, steps=2 * stride, tolerance=BEND)
             grid = self.layout.on_grid(rows, stride)
-            bent = grid[is_bent[grid]]
-            light.state[bent] = UNKNOWN
-            asked = light.refine(grid, stride=stride, tolerance=UNEVEN, is_relative=True)
+            light.state[grid[is_bent[grid]]] = UNKNOWN
+            asked = light.refine(grid, stride=stride, tolerance=UNEVEN, is_relative=True, marked=is_bend)
             exact_lx, is_grainy[asked] = open_light(emitter, points, asked, side)
             light.set(asked, exact_lx)
         return light.values[rows], is_grainy[rows]
@@ -472,8 +479,7 @@ def _arriving(
         lit = slice(lit_count)
         if rays.spread:
             steps_m = (texels.step_u_m, texels.step_v_m)
-            place = (texels.dither, *steps_m, cell, rays.spread)
-            spread_over_texels(*place, rows[lit], origins_m[lit], segments_m[lit])
+            spread_over_texels(texels.dither, *steps_m, cell, rows[lit], origins_m[lit], segments_m[lit])
         share = emitter.passing(occluder, origins_m[lit], segments_m[lit])
         add_arrived(rows[lit], share.astype(np.float32), light, total, unshaded, passed_count, ray_count)
     with np.errstate(invalid="ignore"):

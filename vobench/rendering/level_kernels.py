@@ -69,6 +69,30 @@ def fill_between(
 
 
 @compiled
+def mark_bends(
+    rows: Rows,
+    before: Indices,
+    after: Indices,
+    steps: int,
+    tolerance: float,
+    state: States,
+    values: Floats,
+    is_marked: Mask,
+) -> None:
+    """Mark the points at rows (N,) whose value differs from the mean of the known ones before and after them.
+
+    It differs by more than the tolerance, relative to the value.
+    """
+    for place in range(len(rows)):
+        point = rows[place]
+        first, _ = nearest_known(point, before, steps, state)
+        second, _ = nearest_known(point, after, steps, state)
+        if first >= 0 and second >= 0:
+            mean = (values[first] + values[second]) / 2
+            is_marked[point] = is_marked[point] or abs(values[point] - mean) > tolerance * values[point]
+
+
+@compiled
 def next_to_marked(rows: Rows, neighbours: Indices, is_marked: Mask, result: Mask) -> None:
     """Write which of the points at rows (N,) are marked or have a marked neighbour (4, P)."""
     for place in range(len(rows)):

@@ -251,7 +251,7 @@ def end_rays(
 def goes_on(weight: float, dither: Floats, ray: int) -> bool:
     """Whether a ray of less weight than ROULETTE is the one that stands for those like it."""
     number = dither[0] + dither[1] + np.float32(ray % ROULETTE_CYCLE) * ROULETTE_STEP
-    return number - math.floor(number) < weight / ROULETTE
+    return bool(number - math.floor(number) < weight / ROULETTE)
 
 
 @compiled

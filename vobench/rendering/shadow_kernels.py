@@ -83,21 +83,17 @@ def spread_over_texels(
     step_u_m: Floats,
     step_v_m: Floats,
     cell: int,
-    width: int,
     rows: Indices,
     origins_m: Floats,
     segments_m: Floats,
 ) -> None:
-    """Move the origins of rays (N, 3) from the middles of texels, at rows (N,), to somewhere around.
-
-    They end in a square of `width` texels along a side.
-    """
+    """Move the origins of rays (N, 3) from the middles of texels, at rows (N,), to somewhere on their areas."""
     for ray in range(len(rows)):
         point = rows[ray]
         place_u = dither[point, 1] + np.float32(cell) * FOOTPRINT_U
         place_v = dither[point, 0] + np.float32(cell) * FOOTPRINT_V
-        along_u = (place_u - np.float32(math.floor(place_u)) - HALF) * np.float32(width)
-        along_v = (place_v - np.float32(math.floor(place_v)) - HALF) * np.float32(width)
+        along_u = place_u - np.float32(math.floor(place_u)) - HALF
+        along_v = place_v - np.float32(math.floor(place_v)) - HALF
         for axis in range(3):
             aside_m = along_u * step_u_m[point, axis] + along_v * step_v_m[point, axis]
             origins_m[ray, axis] += aside_m
