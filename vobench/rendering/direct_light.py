@@ -146,6 +146,7 @@ def mirror_images(
 # emitters that are seen narrower or wider need fewer or more rays
 NARROW_RAD = 0.15
 WIDE_RAD = 0.6
+BESIDE_RAD = 1.5
 RIM = 2  # texels around a place of half shadow
 LEAST_LX = 1e-30  # by which nothing is divided that is darker
 # Differences of the visible share between neighbours from which it is computed at every second and at every texel. What
@@ -154,7 +155,7 @@ STEEP = (0.08, 0.15)
 GENTLE = 0.2  # difference of the visible share between neighbours on a coarse grid up to which it is smoothed
 UNEVEN = 0.1  # relative difference of unshaded light between neighbours from which it is computed on a finer grid
 BEND = 0.004  # the same of the mean of its neighbours, four times the error of what is interpolated
-GRAINY = 0.3  # relative difference of sampled light between neighbours from which it is sampled on a finer grid
+GRAINY = 0.2  # relative difference of sampled light between neighbours from which it is sampled on a finer grid
 FINER_STRIDES = (*STRIDES[1:], 1)
 BENT = 1e-4  # difference of a normal from that of its flat face from which light is computed at each texel
 
@@ -431,12 +432,13 @@ def first_rays(
 ) -> NDArray[np.int64]:
     """How many rays along a side points (P, 3) need to tell whether they see an emitter: one where shadows are hard."""
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
-    is_pane = emitter.sky == "pane"
-    narrow = max(side // 2, 1)
-    middle = max(3 * side // 4, 1) if is_pane else narrow
-    wide = side if is_pane else max(3 * side // 4, 1)
-    conditions = [width_rad == 0, width_rad < NARROW_RAD, width_rad < WIDE_RAD]
-    return np.select(conditions, [1, narrow, middle], wide)
+    half = max(side // 2, 1)
+    most = max(3 * side // 4, 1)
+    if emitter.sky != "pane":
+        return np.select([width_rad == 0, width_rad < WIDE_RAD], [1, half], most)
+    # The light of a sky varies, too, and frames and reveals beside a pane send much of it on into a room.
+    conditions = [width_rad < NARROW_RAD, width_rad < WIDE_RAD, width_rad < BESIDE_RAD]
+    return np.select(conditions, [half, most, side], 3 * side // 2)
 
 
 def arriving(  # noqa: PLR0917
