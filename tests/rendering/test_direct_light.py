@@ -127,7 +127,7 @@ def test_wide_emitters_take_more_rays_than_narrow_ones_and_points_take_one() -> 
         panel = ceiling_light("panel", np.array([0, 0, distance_m]), (0.5, 0.5), power_lm=1)
         (emitter,) = emitters(panel, open_floor()[2])
         sides.append(int(first_rays(emitter, points_m, 8)[0]))
-    assert sides == [6, 4, 4]
+    assert sides == [12, 4, 4]
     (bulb,) = emitters(BULB, open_floor()[2])
     assert isinstance(bulb, Emitter)
     assert first_rays(bulb, points_m, 8).tolist() == [1]

@@ -41,20 +41,20 @@ def test_no_point_of_even_values_is_computed_again() -> None:
 
 def test_points_beside_an_edge_are_computed_and_those_far_from_it_are_not() -> None:
     points, layout = board(33, 9)
-    edge_m = 1.55
+    edge_m = 0.775
     step = (points.points_m[:, 0] > edge_m).astype(float)
     field = known_on_the_coarsest_grid(points, layout, step)
     rows = np.arange(len(points))
     for stride in FINER_STRIDES:
         asked = field.refine(layout.on_grid(rows, stride), stride=stride, tolerance=0.2)
-        assert (np.abs(points.points_m[asked, 0] - edge_m) < 0.1 * 2 * stride + 0.1).all()
+        assert (np.abs(points.points_m[asked, 0] - edge_m) < 0.05 * 2 * stride + 0.05).all()
         field.set(asked, step[asked].astype(np.float32))
     np.testing.assert_array_equal(field.values, step)
 
 
 def test_a_relative_tolerance_is_that_of_the_greater_value() -> None:
     points, layout = board(9, 9)
-    column = np.rint(points.points_m[:, 0] * 10).astype(int)
+    column = np.rint(points.points_m[:, 0] * 20).astype(int)
     values = np.where(column > column.max() // 2, 1000.0, 950.0)
     rows = layout.on_grid(np.arange(len(points)), 2)
     for tolerance, is_asked in ((0.04, True), (0.06, False)):
@@ -75,10 +75,10 @@ def test_extremes_are_those_of_known_points_at_most_so_far_away_on_four_sides() 
     values = points.points_m @ [1.0, 10.0, 0.0]
     field = TexelField.unknown(layout, len(points))
     field.set(np.arange(len(points)), values.astype(np.float32))
-    centre = np.array([np.argmin(np.linalg.norm(points.points_m[:, :2] - 0.4, axis=1))])
+    centre = np.array([np.argmin(np.linalg.norm(points.points_m[:, :2] - 0.2, axis=1))])
     low, high = field.extremes(centre, steps=1)
-    assert low[0] == pytest.approx(values[centre[0]] - 1.0, rel=1e-3)
-    assert high[0] == pytest.approx(values[centre[0]] + 1.0, rel=1e-3)
+    assert low[0] == pytest.approx(values[centre[0]] - 0.5, rel=1e-3)
+    assert high[0] == pytest.approx(values[centre[0]] + 0.5, rel=1e-3)
     field.state[:] = 0
     low, high = field.extremes(centre, steps=4)
     assert low[0] == high[0] == np.float32(values[centre[0]])

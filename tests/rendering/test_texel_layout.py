@@ -15,11 +15,12 @@ MATERIALS = {"grey": Material()}
 LEFT, RIGHT, ABOVE, BELOW = range(4)
 
 
-def board(wide: int, high: int) -> tuple[Texels, TexelLayout]:
-    """Points 10 cm apart."""
-    things = [Thing("board", quad([0, 0, 0], [0.1 * (wide - 1), 0, 0], [0, 0.1 * (high - 1), 0]), "grey")]
+def board(wide: int, high: int, spacing_m: float = 0.05) -> tuple[Texels, TexelLayout]:
+    """Points in rows and columns."""
+    size_m = [spacing_m * (wide - 1), spacing_m * (high - 1)]
+    things = [Thing("board", quad([0, 0, 0], [size_m[0], 0, 0], [0, size_m[1], 0]), "grey")]
     faces, lit = triangle_table(things, [-1], [-1]), np.ones(2, bool)
-    atlas = unwrap(faces, np.full(2, 0.1), lit)
+    atlas = unwrap(faces, np.full(2, spacing_m), lit)
     return texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0)
 
 
@@ -64,7 +65,7 @@ def test_blurring_keeps_even_light_and_the_mean_and_makes_grain_finer() -> None:
 
 
 def test_a_mark_spreads_by_so_many_steps_along_rows_and_columns() -> None:
-    points, layout = board(9, 9)
+    points, layout = board(9, 9, spacing_m=0.1)
     centre = int(np.argmin(np.linalg.norm(points.points_m[:, :2] - 0.4, axis=1)))
     marked = np.arange(len(points)) == centre
     for steps in range(4):
@@ -80,3 +81,12 @@ def test_texels_take_their_value_from_a_point_or_stay_dark() -> None:
     np.testing.assert_array_equal(light.ravel()[points.index], values)
     assert (light.ravel()[layout.source == len(points)] == 0).all()
     assert set(np.unique(light)) <= {0.0, *values.tolist()}
+
+
+def test_where_points_are_far_apart_a_finer_grid_stands_for_a_coarse_one() -> None:
+    for spacing_m, strides in ((0.05, (4, 2)), (0.1, (2, 2)), (0.2, (1, 1))):
+        points, layout = board(17, 13, spacing_m)
+        row, column = np.divmod(points.index, layout.width)
+        inner = (row > row.min()) & (row < row.max()) & (column > column.min()) & (column < column.max())
+        for grid, stride in zip(layout.grids, strides, strict=True):
+            np.testing.assert_array_equal(grid[inner], ((row % stride == 0) & (column % stride == 0))[inner])

@@ -155,7 +155,6 @@ STEEP = (0.08, 0.15)
 GENTLE = 0.2  # difference of the visible share between neighbours on a coarse grid up to which it is smoothed
 UNEVEN = 0.1  # relative difference of unshaded light between neighbours from which it is computed on a finer grid
 BEND = 0.004  # the same of the mean of its neighbours, four times the error of what is interpolated
-GRAINY = 0.2  # relative difference of sampled light between neighbours from which it is sampled on a finer grid
 FINER_STRIDES = (*STRIDES[1:], 1)
 BENT = 1e-4  # difference of a normal from that of its flat face from which light is computed at each texel
 
@@ -182,9 +181,9 @@ def direct_light(
 
     The visible share of an emitter with soft shadows is computed at every fourth point along rows and columns, and at
     every second and at every point only where it differs between neighbours; so is the light that would arrive if
-    nothing were in the way. The sky in a pane, whose light is sampled, is smoothed. Of hard shadows one ray at each
-    point tells the outlines, within RIM texels of which, or in the same of the cells (P,), rays from all over each
-    texel follow.
+    nothing were in the way. The sky in a pane is sampled at every other point and smoothed. Of hard shadows one ray at
+    each point tells the outlines, within RIM texels of which, or in the same of the cells (P,), rays from all over
+    each texel follow.
     """
     lit = reached(emitter, points, np.flatnonzero(among))
     if not len(lit):
@@ -208,20 +207,12 @@ class Receivers:
     lit: Rows
 
     def pane_light(self, emitter: Emitter, side: int) -> Floats:
-        """The sky's light (P,) in a pane, sampled on ever finer grids."""
+        """The sky's light (P,) in a pane, sampled at every other point along rows and columns."""
         light = TexelField.unknown(self.layout, len(self.points))
-        coarsest, finer = STRIDES
-        rows = self.layout.on_grid(self.lit, coarsest)
-        light.set(rows, self._sampled(emitter, rows, side, coarsest))
-        low_lx, high_lx = light.extremes(rows, steps=coarsest)
-        is_even = high_lx - low_lx <= GRAINY * high_lx
-        light.smooth(rows[is_even], steps=coarsest)
-
-        rows = self.layout.on_grid(self.lit, finer)
-        asked = light.refine(rows, stride=finer, tolerance=GRAINY, is_relative=True)
-        light.set(asked, self._sampled(emitter, asked, side, finer))
-        asked = light.refine(self.lit, stride=1, tolerance=np.inf)
-        light.set(asked, self._sampled(emitter, asked, side, 1))
+        rows = self.layout.on_grid(self.lit, STRIDES[-1])
+        light.set(rows, self._sampled(emitter, rows, side))
+        rows = light.refine(self.lit, stride=1, tolerance=np.inf)
+        light.set(rows, self._sampled(emitter, rows, side))
         return self.layout.blurred(light.values)
 
     def hard_light(self, emitter: Emitter, side: int) -> Floats:
@@ -312,16 +303,13 @@ class Receivers:
             clear[part] = np.nan_to_num(part_clear)
         return share, clear
 
-    def _sampled(self, emitter: Emitter, rows: Rows, side: int, stride: int) -> Floats:
+    def _sampled(self, emitter: Emitter, rows: Rows, side: int) -> Floats:
         """The light (N,) that rays to an emitter bring to points."""
         sides = first_rays(emitter, self.points.points_m[rows], side)
         light = np.zeros(len(rows), np.float32)
         for ray_side in np.unique(sides):
             part = np.flatnonzero(sides == ray_side)
-            rays = Rays(int(ray_side), spread=True)
-            light[part] = arriving(
-                emitter, self.points, rows[part], self.visibility, rays, self._pattern(stride=stride)
-            )[0]
+            light[part] = arriving(emitter, self.points, rows[part], self.visibility, Rays(int(ray_side)))[0]
         return light
 
     def _open_light(self, emitter: Emitter, rows: Rows, side: int) -> tuple[Floats, Mask]:
@@ -381,9 +369,10 @@ class EvenPattern:
     stride: int
     shift: Floats
 
-    def dither(self, index: Rows) -> Floats:
-        """Two numbers in [0, 1) for each texel at a flat index (P, 2)."""
+    def dither(self, index: Rows, others: Floats) -> Floats:
+        """Two numbers in [0, 1) for each texel at a flat index (P, 2), the `others` (P, 2) for those between."""
         row, column = np.divmod(index, self.width)
+        is_between = (row % self.stride != 0) | (column % self.stride != 0)
         along_curve = _spread_bits(column // self.stride) | _spread_bits(row // self.stride) << np.uint32(1)
         first = np.zeros(len(index), np.uint32)
         second = np.zeros(len(index), np.uint32)
@@ -397,7 +386,7 @@ class EvenPattern:
             second_direction ^= second_direction >> 1
         numbers = np.stack([first, second], -1).astype(np.float32)
         shifted = numbers / np.float32(1 << PATTERN_BITS) + self.shift
-        return np.asarray(shifted - np.floor(shifted))
+        return np.where(is_between[:, None], others, shifted - np.floor(shifted))
 
 
 PATTERN_BITS = 12  # of a place along the curve: texels 64 apart have the same numbers
@@ -434,11 +423,13 @@ def first_rays(
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
     half = max(side // 2, 1)
     most = max(3 * side // 4, 1)
+    # Few of the rays to an open sky find a small opening. Frames beside a pane send much of its light on into a room.
+    widest = 3 * side // 2
     if emitter.sky != "pane":
-        return np.select([width_rad == 0, width_rad < WIDE_RAD], [1, half], most)
-    # The light of a sky varies, too, and frames and reveals beside a pane send much of it on into a room.
+        conditions = [width_rad == 0, width_rad < WIDE_RAD, width_rad < BESIDE_RAD]
+        return np.select(conditions, [1, half, most], widest)
     conditions = [width_rad < NARROW_RAD, width_rad < WIDE_RAD, width_rad < BESIDE_RAD]
-    return np.select(conditions, [half, most, side], 3 * side // 2)
+    return np.select(conditions, [half, most, side], widest)
 
 
 def arriving(  # noqa: PLR0917
@@ -457,7 +448,7 @@ def arriving(  # noqa: PLR0917
     def arriving_part(part: slice) -> Floats:
         texels = points.take(rows[part])
         if pattern:
-            texels = replace(texels, dither=pattern.dither(texels.index))
+            texels = replace(texels, dither=pattern.dither(texels.index, texels.dither))
         return _arriving(emitter, texels, occluder, rays)
 
     return chunked(arriving_part, len(rows)).T

@@ -90,7 +90,7 @@ def evenly_dithered(middles: Texels, step_m: Floats) -> Texels:
     row = np.where(axis == 0, cell[:, 1], cell[:, 0]) % PATTERN_SIDE
     column = np.where(axis == 2, cell[:, 1], cell[:, 2]) % PATTERN_SIDE
     pattern = EvenPattern(PATTERN_SIDE, 1, middles.dither[:1])
-    return replace(middles, dither=pattern.dither(row * PATTERN_SIDE + column))
+    return replace(middles, dither=pattern.dither(row * PATTERN_SIDE + column, middles.dither))
 
 
 def _grouped(key: Rows, points_m: Floats) -> tuple[Rows, Rows]:

@@ -14,6 +14,7 @@ from vobench.rendering.visibility import Visibility
 
 STRAIGHT = np.cos(np.deg2rad(1.5))  # between texels that lie in one plane
 BLURS = 2
+WIDEST_M = 0.22  # between points of a grid; light changes over such distances
 STRIDES = (4, 2)  # of the grids of texels at which light is computed first
 
 
@@ -119,7 +120,7 @@ def texel_layout(
     itself = np.arange(count)
     valid_beside = np.where(valid_beside < 0, itself, valid_beside).astype(np.int32)
     in_plane = _in_plane(points_m, planes, valid_beside, visibility)
-    grids = np.stack([_grid(index[is_valid], valid_beside, atlas.width, stride) for stride in STRIDES])
+    grids = _grids(index[is_valid], points_m, valid_beside, atlas.width)
     return TexelLayout(atlas.height, atlas.width, source, valid_beside, grids), in_plane
 
 
@@ -162,13 +163,26 @@ def _in_plane(
     return in_plane
 
 
-def _grid(index: Rows, beside: Indices, width: int, stride: int) -> Mask:
-    """Every stride-th point along rows and columns; at rims, where a row or a column ends, its last point, too."""
+def _grids(index: Rows, points_m: Floats, beside: Indices, width: int) -> Mask:
+    """Which points (P, 3) are on the grid of each of STRIDES (N, P): every so many along rows and columns.
+
+    At rims, where a row or a column ends, its last point is, too. Where points of a grid would be more than WIDEST_M
+    apart, the next finer one stands for it.
+    """
     at_rim = beside == np.arange(len(index), dtype=np.int32)
     row, column = np.divmod(index, width)
-    in_column = (column % stride == 0) | at_rim[:2].any(0)
-    in_row = (row % stride == 0) | at_rim[2:].any(0)
-    return np.asarray(in_column & in_row)
+    spacing_m = np.zeros(len(index), np.float32)
+    for neighbour in beside:
+        np.maximum(spacing_m, np.linalg.norm(points_m[neighbour] - points_m, axis=1), out=spacing_m)
+    grids = np.empty((len(STRIDES), len(index)), bool)
+    finer = np.ones(len(index), bool)
+    for nth, stride in reversed(list(enumerate(STRIDES))):
+        in_column = (column % stride == 0) | at_rim[:2].any(0)
+        in_row = (row % stride == 0) | at_rim[2:].any(0)
+        is_wide = stride * spacing_m > WIDEST_M
+        finer = np.where(is_wide, finer, in_column & in_row)
+        grids[nth] = finer
+    return grids
 
 
 def _nearest_valid(beside: Indices, is_valid: Mask) -> Rows:
