@@ -5,6 +5,7 @@ import pytest
 
 from tests.rendering.rectangles import rectangle
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Floats
 from vobench.rendering.direct_light import Rays, arriving, direct_light, first_rays, mirror_images, open_light, reached
 from vobench.rendering.emitter import Emitter, emitters
 from vobench.rendering.texel import Texels, texels
@@ -21,14 +22,15 @@ MATERIALS = {"a": Material(), "mirror": Material("mirror", tint=0.8)}
 X, Y, Z = np.eye(3)
 FLOOR = rectangle(0 * Z, 2 * X, 2 * Y, "a", "floor")
 BULB = PointLight("bulb", np.array([0.3, -0.2, 1.5]), 4 * np.pi * 100)
-PANEL = ceiling_light("panel", np.array([0.2, 0.1, 2.0]), (0.4, 0.3), power_lm=500)
+PANEL_M = np.array([0.2, 0.1, 2.0])
+PANEL = ceiling_light("panel", PANEL_M, (0.4, 0.3), power_lm=500)
 
 
-def open_floor(*more: Thing) -> tuple[Texels, TexelLayout, Visibility]:
+def open_floor(*more: Thing, spacing_m: float = 0.1) -> tuple[Texels, TexelLayout, Visibility]:
     things = [FLOOR, *more]
     faces = triangle_table(things, [-1] * len(things), [-1] * len(things))
     lit = faces.thing == 0
-    atlas = unwrap(faces, np.full(len(faces), 0.1), lit)
+    atlas = unwrap(faces, np.full(len(faces), spacing_m), lit)
     visibility = Visibility(faces, MATERIALS, np.arange(len(faces)))
     points, layout = texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0, visibility=visibility)
     return points, layout, visibility
@@ -125,7 +127,39 @@ def test_wide_emitters_take_more_rays_than_narrow_ones_and_points_take_one() -> 
         panel = ceiling_light("panel", np.array([0, 0, distance_m]), (0.5, 0.5), power_lm=1)
         (emitter,) = emitters(panel, open_floor()[2])
         sides.append(int(first_rays(emitter, points_m, 8)[0]))
-    assert sides == [6, 4, 4]
+    assert sides == [12, 4, 4]
     (bulb,) = emitters(BULB, open_floor()[2])
     assert isinstance(bulb, Emitter)
     assert first_rays(bulb, points_m, 8).tolist() == [1]
+
+
+def test_a_soft_shadow_is_that_of_many_rays_and_takes_a_fraction_of_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    block = rectangle(PANEL_M - 1.5 * Z, 0.6 * Y, 0.6 * X, "a", "block")
+    points, layout, visibility = open_floor(block, spacing_m=0.025)
+    (emitter,) = emitters(PANEL, visibility)
+    rows = np.arange(len(points))
+    exact_lx = arriving(emitter, points, rows, visibility, Rays(16, spread=True))[0]
+    sent = []
+    passing = visibility.passing
+
+    def counted(origins_m: Floats, segments_m: Floats) -> Floats:
+        sent.append(len(origins_m))
+        return passing(origins_m, segments_m)
+
+    monkeypatch.setattr(visibility, "passing", counted)
+    cells = np.arange(len(points), dtype=np.int32)
+    light_lx = direct_light(emitter, points, layout, cells, visibility, side=4, among=np.ones(len(points), bool))
+    assert sum(sent) < 4 * len(points)
+    error = (light_lx - exact_lx) / exact_lx.max()
+    assert np.sqrt((error**2).mean()) < 0.03
+    assert abs(error.mean()) < 2e-3
+    assert np.abs(error).max() < 0.25
+
+
+def test_the_open_light_of_a_panel_is_exact_where_it_is_interpolated() -> None:
+    points, layout, visibility = open_floor(spacing_m=0.025)
+    (emitter,) = emitters(PANEL, visibility)
+    cells = np.zeros(len(points), np.int32)
+    light_lx = direct_light(emitter, points, layout, cells, visibility, side=4, among=np.ones(len(points), bool))
+    exact_lx, _ = open_light(emitter, points, np.arange(len(points)), 4)
+    np.testing.assert_allclose(light_lx, exact_lx, rtol=3e-3)

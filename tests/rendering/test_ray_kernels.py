@@ -5,7 +5,15 @@ import pytest
 
 from vobench.geometry.se3 import Array
 from vobench.rendering import ray_kernels
-from vobench.rendering.ray_kernels import FACE, cosine_rays, facet_normals, sorted_by_point
+from vobench.rendering.ray_kernels import (
+    FACE,
+    FAINT,
+    ROULETTE,
+    chosen_rays,
+    cosine_rays,
+    facet_normals,
+    sorted_by_point,
+)
 
 RNG = np.random.default_rng(0)
 
@@ -78,3 +86,25 @@ def test_selected_entries_are_sorted_by_point_and_none_is_lost() -> None:
         part = slice(starts[row], starts[row + 1])
         assert columns[part].tolist() == column[expected].tolist()
         assert shares[part].tolist() == share[expected].tolist()
+
+
+@pytest.mark.parametrize("share", [0.04, 0.3, 0.9])
+def test_few_of_the_faint_rays_stand_for_all_of_them(share: float) -> None:
+    count = 36 * 200
+    point = np.repeat(np.arange(200, dtype=np.int32), 36)
+    weight = np.full(count, share * ROULETTE, np.float32)
+    dither = RNG.random((200, 2), dtype=np.float32)
+    selected = np.empty(count, np.int64)
+    selected = selected[: chosen_rays(weight, point, dither, selected)]
+    assert len(selected) == pytest.approx(share * count, rel=0.03)
+    np.testing.assert_array_equal(weight[selected], ROULETTE)
+    of_points = np.bincount(point[selected], minlength=200)
+    assert np.abs(of_points - share * 36).max() < 4
+
+
+def test_strong_rays_all_go_on_as_they_are_and_the_faintest_end() -> None:
+    weight = np.array([0.5, FAINT / 2, ROULETTE], np.float32)
+    selected = np.empty(3, np.int64)
+    count = chosen_rays(weight, np.zeros(3, np.int32), np.zeros((1, 2), np.float32), selected)
+    assert selected[:count].tolist() == [0, 2]
+    assert weight[[0, 2]].tolist() == [0.5, ROULETTE]

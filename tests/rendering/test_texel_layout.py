@@ -1,10 +1,10 @@
-"""The layout of points on the map: neighbours are mutual, smoothing keeps even light, interpolation linear light."""
+"""The layout of points on the map: neighbours are mutual, smoothing keeps even light, grids hold rims."""
 
 import numpy as np
 import pytest
 
 from vobench.rendering.texel import Texels, texels
-from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.texel_layout import STRIDES, TexelLayout
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
 from vobench.scene.material import Material
@@ -15,21 +15,33 @@ MATERIALS = {"grey": Material()}
 LEFT, RIGHT, ABOVE, BELOW = range(4)
 
 
-def board(wide: int, high: int) -> tuple[Texels, TexelLayout]:
-    """Points 10 cm apart."""
-    things = [Thing("board", quad([0, 0, 0], [0.1 * (wide - 1), 0, 0], [0, 0.1 * (high - 1), 0]), "grey")]
+def board(wide: int, high: int, spacing_m: float = 0.05) -> tuple[Texels, TexelLayout]:
+    """Points in rows and columns."""
+    size_m = [spacing_m * (wide - 1), spacing_m * (high - 1)]
+    things = [Thing("board", quad([0, 0, 0], [size_m[0], 0, 0], [0, size_m[1], 0]), "grey")]
     faces, lit = triangle_table(things, [-1], [-1]), np.ones(2, bool)
-    atlas = unwrap(faces, np.full(2, 0.1), lit)
+    atlas = unwrap(faces, np.full(2, spacing_m), lit)
     return texels(faces, MATERIALS, atlas, owners(atlas), among=lit, seed=0)
 
 
-@pytest.mark.parametrize(("wide", "high"), [(5, 5), (6, 5), (5, 6), (6, 6), (2, 4), (2, 3)])
-def test_light_known_at_every_other_sample_is_whole_up_to_the_edges(wide: int, high: int) -> None:
-    """What rises evenly is told exactly by some of the samples, none of them beyond the outermost known ones."""
+@pytest.mark.parametrize("stride", STRIDES)
+@pytest.mark.parametrize(("wide", "high"), [(9, 9), (10, 7), (2, 4)])
+def test_a_grid_has_every_so_many_points_and_the_last_of_each_row_and_column(wide: int, high: int, stride: int) -> None:
     points, layout = board(wide, high)
-    ramp = points.points_m @ [1.0, 2.0, 0.0]
-    assert layout.is_sparse.sum() < 0.75 * len(points) or min(wide, high) < 3
-    np.testing.assert_allclose(layout.interpolated(np.where(layout.is_sparse, ramp, 1e9)), ramp, atol=2e-3)
+    rows = np.arange(len(points))
+    on_grid = np.isin(rows, layout.on_grid(rows, stride))
+    row, column = np.divmod(points.index, layout.width)
+    in_column = (column % stride == 0) | (column == column.min()) | (column == column.max())
+    in_row = (row % stride == 0) | (row == row.min()) | (row == row.max())
+    np.testing.assert_array_equal(on_grid, in_column & in_row)
+
+
+def test_the_finest_grid_has_all_points_and_each_grid_those_of_the_coarser_one() -> None:
+    points, layout = board(12, 11)
+    rows = np.arange(len(points))
+    np.testing.assert_array_equal(layout.on_grid(rows, 1), rows)
+    coarse, fine = (layout.on_grid(rows, stride) for stride in STRIDES)
+    assert set(coarse.tolist()) < set(fine.tolist()) < set(rows.tolist())
 
 
 def test_the_neighbour_of_a_neighbour_on_the_other_side_is_the_point_itself() -> None:
@@ -53,7 +65,7 @@ def test_blurring_keeps_even_light_and_the_mean_and_makes_grain_finer() -> None:
 
 
 def test_a_mark_spreads_by_so_many_steps_along_rows_and_columns() -> None:
-    points, layout = board(9, 9)
+    points, layout = board(9, 9, spacing_m=0.1)
     centre = int(np.argmin(np.linalg.norm(points.points_m[:, :2] - 0.4, axis=1)))
     marked = np.arange(len(points)) == centre
     for steps in range(4):
@@ -71,8 +83,10 @@ def test_texels_take_their_value_from_a_point_or_stay_dark() -> None:
     assert set(np.unique(light)) <= {0.0, *values.tolist()}
 
 
-def test_weights_of_points_add_up_to_one() -> None:
-    for wide, high in ((5, 5), (8, 3), (2, 9)):
-        points, layout = board(wide, high)
-        np.testing.assert_allclose(layout.weights.sum(1), np.ones(len(points)), rtol=1e-6)
-        assert layout.is_sparse.any()
+def test_where_points_are_far_apart_a_finer_grid_stands_for_a_coarse_one() -> None:
+    for spacing_m, strides in ((0.05, (4, 2)), (0.1, (2, 2)), (0.2, (1, 1))):
+        points, layout = board(17, 13, spacing_m)
+        row, column = np.divmod(points.index, layout.width)
+        inner = (row > row.min()) & (row < row.max()) & (column > column.min()) & (column < column.max())
+        for grid, stride in zip(layout.grids, strides, strict=True):
+            np.testing.assert_array_equal(grid[inner], ((row % stride == 0) & (column % stride == 0))[inner])

@@ -618,16 +618,14 @@ TREE_PX = 128
 TREE_KINDS = 6
 
 
-@dataclass(frozen=True, slots=True)
-class _FarTree:
-    """The look of a tree: opacity (N, N), normals (N, N, 3) to the right, up and towards the viewer, and its shade."""
-
-    opacity: Floats
-    normals: Floats
-    shade: Floats
+FarTree = list[Floats]  # what a tree looks like (N, N, 5), at levels of half the size each, all with a rim of zeros
+# channels of a tree's look
+OPACITY = 0
+NORMAL = slice(1, 4)  # to the right, up and towards the viewer
+SHADE = 4
 
 
-def _tree(rng: Rng) -> _FarTree:
+def _tree(rng: Rng) -> FarTree:
     """A crown of balls of leaves above a trunk, row 0 at the top."""
     places = (np.arange(TREE_PX, dtype=np.float32) + 0.5) / TREE_PX
     x, y = np.meshgrid(2 * places - 1, 1 - places)
@@ -662,7 +660,7 @@ def _tree(rng: Rng) -> _FarTree:
     depth = np.clip((nearest + 0.3) / 0.6, 0, 1)
     shade = (0.45 + 0.55 * depth) * np.exp(0.25 * leaves)
     shade[trunk & (nearest < -8)] = 1.0
-    return _FarTree(opacity, normals.astype(np.float32), shade.astype(np.float32))
+    return _levels(np.concatenate([opacity[..., None], normals, shade[..., None]], -1).astype(np.float32))
 
 
 class _Trees:
@@ -690,10 +688,10 @@ class _Trees:
         turn = 2 * np.pi * ((columns + 0.5) / COLUMNS - 0.5) - azimuth
         column_share = 0.5 - turn / (2 * half_width)  # azimuth grows to the left
         size = max(len(columns), 1)
-        opacity = _resampled(kind.opacity, row_share, column_share, size)
-        opacity *= (canvas.tangent[rows, None] > ground) | (sunk == 0)
-        normals = _resampled(kind.normals, row_share, column_share, size)
-        shade = _resampled(kind.shade, row_share, column_share, size)
+        look = _resampled(kind, row_share, column_share, size)
+        opacity = look[..., OPACITY] * ((canvas.tangent[rows, None] > ground) | (sunk == 0))
+        normals = look[..., NORMAL]
+        shade = look[..., SHADE]
 
         sun = canvas.daylight.sun_direction
         right = np.array([np.sin(azimuth), -np.cos(azimuth), 0.0])
@@ -705,21 +703,29 @@ class _Trees:
         canvas.paint(rows, columns, colour, opacity, distance_m=distance_m)
 
 
-def _resampled(values: Floats, row_share: Floats, column_share: Floats, size_px: int) -> Floats:
-    """Values (N, N, ...) at shares (r,), (c,) of its sides, from a level of about size_px pixels; 0 outside."""
-    level = values
-    while len(level) >= 2 * max(size_px, 4):
-        level = (level[::2] + level[1::2]) / 2
-        level = (level[:, ::2] + level[:, 1::2]) / 2
-    size = len(level)
-    padded = np.pad(level, [(1, 1), (1, 1), *[(0, 0)] * (level.ndim - 2)])
+LEAST_PX = 4  # of a level's side
+
+
+def _levels(values: Floats) -> list[Floats]:
+    """Values (N, N, C), then the means of squares of 2 x 2 of them and so on, all with a rim of zeros."""
+    levels = [values]
+    while len(levels[-1]) >= 2 * LEAST_PX:
+        rows = (levels[-1][::2] + levels[-1][1::2]) / 2
+        levels.append((rows[:, ::2] + rows[:, 1::2]) / 2)
+    return [np.pad(level, [(1, 1), (1, 1), (0, 0)]) for level in levels]
+
+
+def _resampled(levels: Sequence[Floats], row_share: Floats, column_share: Floats, size_px: int) -> Floats:
+    """Values (r, c, C) at shares (r,), (c,) of the sides, from a level of about size_px pixels; 0 outside."""
+    fitting = [level for level in levels if len(level) - 2 < 2 * max(size_px, LEAST_PX)]
+    padded = fitting[0]
+    size = len(padded) - 2
     y = np.clip(row_share * size + 0.5, 0, size + 0.999)
     x = np.clip(column_share * size + 0.5, 0, size + 0.999)
     top = y.astype(np.int32)
     left = x.astype(np.int32)
-    trailing = [1] * (level.ndim - 2)
-    down = (y - top).astype(np.float32).reshape(-1, 1, *trailing)
-    right = (x - left).astype(np.float32).reshape(1, -1, *trailing)
+    down = (y - top).astype(np.float32)[:, None, None]
+    right = (x - left).astype(np.float32)[None, :, None]
     upper = padded[top][:, left] * (1 - right) + padded[top][:, left + 1] * right
     lower = padded[top + 1][:, left] * (1 - right) + padded[top + 1][:, left + 1] * right
     return np.asarray(upper * (1 - down) + lower * down, np.float32)

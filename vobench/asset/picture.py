@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache, wraps
+from functools import cache, lru_cache, wraps
 from inspect import signature
 from itertools import product
 from typing import Any
@@ -207,18 +207,24 @@ def noise(
     low = low / repeats
     high = high / repeats
 
-    f_u = scipy.fft.rfftfreq(n) * n * stretch
-    f_v = scipy.fft.fftfreq(n)[:, None] * n
-    f = np.hypot(f_u, f_v).astype(np.float32)
-    is_in_band = (f >= low) & (f <= high)
-    gain = np.maximum(f, 1) ** -slope
-    shape = np.where(is_in_band, gain, 0).astype(np.float32)
-
     white = rng.standard_normal((n, n), dtype=np.float32)
     spectrum = scipy.fft.rfft2(white)
-    values = scipy.fft.irfft2(spectrum * shape, s=(n, n))
-    unit_variance = values / (values.std() or 1)
-    return np.tile(unit_variance, (repeats, repeats)).astype(np.float32)
+    spectrum *= _band(n, low, high, slope, stretch)
+    values = scipy.fft.irfft2(spectrum, s=(n, n), overwrite_x=True)
+    values /= values.std() or 1
+    return np.tile(values, (repeats, repeats)) if repeats > 1 else np.asarray(values)
+
+
+@lru_cache(maxsize=8)  # textures of one kind have the same bands
+def _band(n: int, low: float, high: float, slope: float, stretch: float) -> Map:
+    """The gain (n, n // 2 + 1) of each frequency of a spectrum, zero outside of a band."""
+    f_u = (np.arange(n // 2 + 1) * stretch).astype(np.float32)
+    f_v = (scipy.fft.fftfreq(n)[:, None] * n).astype(np.float32)
+    f = np.hypot(f_u, f_v)
+    is_in_band = (f >= low) & (f <= high)
+    gain = np.zeros(f.shape, np.float32)
+    gain[is_in_band] = np.maximum(f[is_in_band], 1) ** -np.float32(slope)
+    return gain
 
 
 def _polygons(
@@ -323,27 +329,30 @@ def _boards(tones: str, seed: int, px: int, tile_m: float, *, rows: int, joint_m
 
     # Each plank is cut at a random distance from the centre of its trunk. Late wood is the dark part of a ring.
     row_share = (np.arange(px) / px * rows) % 1
-    v = row_share[:, None] * tile_m / rows
-    heart = rng.uniform(-0.05, 0.15, planks)
+    v = (row_share[:, None] * tile_m / rows).astype(np.float32)
+    heart = rng.uniform(-0.05, 0.15, planks).astype(np.float32)
     depth = rng.uniform(0.01, 0.07, planks)
     phase = rng.uniform(0, 7, planks)
     angle_u = 2 * np.pi * np.arange(px) / px
-    wave = np.sin(angle_u + phase[cell]) * 0.02
-    bend = noise(rng, px, 1, 12, slope=1.6, stretch=3) * 0.004
-    across = v - heart[cell] + bend
-    radius = np.hypot(across, depth[cell] + wave)
-    ring_m = rng.uniform(0.005, 0.009, planks)
-    place_in_ring = radius / ring_m[cell] % 1
-    late_wood = (place_in_ring**3).astype(np.float32)
+    wave = np.sin(angle_u + phase[:, None]) * 0.02
+    depth_along_u = (depth[:, None] + wave).astype(np.float32)  # (planks, px)
+    bend = noise(rng, px, 1, 12, slope=1.6, stretch=3)
+    across = v - heart[cell] + np.float32(0.004) * bend
+    depth_of_pixel = depth_along_u[cell, np.arange(px)]
+    radius = np.sqrt(across * across + depth_of_pixel * depth_of_pixel)
+    rings_per_m = (1 / rng.uniform(0.005, 0.009, planks)).astype(np.float32)
+    ring = radius * rings_per_m[cell]
+    place_in_ring = ring - np.floor(ring)
+    late_wood = place_in_ring * place_in_ring * place_in_ring
 
     fibre = noise(rng, px, 30, 500, slope=0.4, stretch=30)
     pores = noise(rng, px, 60, 500, slope=0.0, stretch=12) > 1.9
-    plank_tone = rng.normal(0, variety, planks)
-    tone = 0.62 - 0.3 * late_wood + 0.09 * fibre - 0.22 * pores + plank_tone[cell]
+    plank_tone = rng.normal(0, variety, planks).astype(np.float32)
+    tone = 0.62 - 0.3 * late_wood + 0.09 * fibre - np.float32(0.22) * pores + plank_tone[cell]
 
     stains = noise(rng, px, 1, 20)
     scratches = _scratches(rng, px, px // 4)
-    wear = 1 + 0.03 * stains + 0.12 * scratches
+    wear = 1 + np.float32(0.03) * stains + np.float32(0.12) * scratches
     hue = 1 + rng.normal(0, 0.15 * variety, (planks, 3)).astype(np.float32)
     joint_shade = np.float32(1)
     if joint_m:

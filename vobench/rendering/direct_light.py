@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.emitter import Aim, Emitter, Occluder, emitters
 from vobench.rendering.geometry import RAY_OFFSET_M, BoundingSphere, PlanarPatch, RayCaster, bounding_sphere
+from vobench.rendering.level_kernels import UNKNOWN
 from vobench.rendering.shadow_kernels import (
     add_arrived,
     ahead_of,
@@ -17,7 +18,8 @@ from vobench.rendering.shadow_kernels import (
     spread_over_texels,
 )
 from vobench.rendering.texel import Texels
-from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.texel_field import TexelField
+from vobench.rendering.texel_layout import STRIDES, TexelLayout
 from vobench.rendering.thread_pool import chunked
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Light, Sky
@@ -37,6 +39,11 @@ class MirrorImage(Emitter):
     def open_side(self) -> int:
         """As many as of the emitter itself."""
         return self.emitter.open_side
+
+    @property
+    def is_hard(self) -> bool:
+        """As hard as the emitter itself."""
+        return self.emitter.is_hard
 
     def width_rad(self, points_m: Floats) -> Floats:
         """As wide as the image is seen."""
@@ -139,9 +146,17 @@ def mirror_images(
 # emitters that are seen narrower or wider need fewer or more rays
 NARROW_RAD = 0.15
 WIDE_RAD = 0.6
+BESIDE_RAD = 1.5
 RIM = 2  # texels around a place of half shadow
-PARTIAL = 0.2  # share of the points around that see an emitter in part, from which a shadow takes more rays
 LEAST_LX = 1e-30  # by which nothing is divided that is darker
+# Differences of the visible share between neighbours from which it is computed at every second and at every texel. What
+# is interpolated beside the rim of a half shadow errs by less than half of them.
+STEEP = (0.08, 0.15)
+GENTLE = 0.2  # difference of the visible share between neighbours on a coarse grid up to which it is smoothed
+UNEVEN = 0.1  # relative difference of unshaded light between neighbours from which it is computed on a finer grid
+BEND = 0.004  # the same of the mean of its neighbours, four times the error of what is interpolated
+FINER_STRIDES = (*STRIDES[1:], 1)
+BENT = 1e-4  # difference of a normal from that of its flat face from which light is computed at each texel
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,20 +179,21 @@ def direct_light(
 ) -> Floats:
     """Illuminance (P,) in lux that one emitter gives at level 1 to those among the points; of coats what enters.
 
-    Few rays tell whether the emitter is seen, of soft shadows at every other point along rows and columns. Where it
-    is neither seen nor hidden all around, within RIM texels or in the same of the cells (P,), rays from all over each
-    texel follow. Elsewhere its light needs no rays, and the sky in a pane is smoothed instead.
+    The visible share of an emitter with soft shadows is computed at every fourth point along rows and columns, and at
+    every second and at every point only where it differs between neighbours; so is the light that would arrive if
+    nothing were in the way. The sky in a pane is sampled at every other point and smoothed. Of hard shadows one ray at
+    each point tells the outlines, within RIM texels of which, or in the same of the cells (P,), rays from all over
+    each texel follow.
     """
     lit = reached(emitter, points, np.flatnonzero(among))
     if not len(lit):
         return np.zeros(len(points), np.float32)
     receivers = Receivers(points, layout, cells, visibility, lit)
-    sides = first_rays(emitter, points.points_m[lit], side)
     if emitter.sky == "pane":
-        return receivers.pane_light(emitter, sides)
-    if not (sides > 1).any():
+        return receivers.pane_light(emitter, side)
+    if emitter.is_hard:
         return receivers.hard_light(emitter, side)
-    return receivers.soft_light(emitter, sides, side)
+    return receivers.soft_light(emitter, side)
 
 
 @dataclass(frozen=True, slots=True)
@@ -190,14 +206,14 @@ class Receivers:
     visibility: Visibility
     lit: Rows
 
-    def pane_light(self, emitter: Emitter, sides: NDArray[np.int64]) -> Floats:
-        """The sky's light (P,) in a pane, by side x side (N,) rays from every other point along rows and columns."""
-        light = np.zeros(len(self.points), np.float32)
-        is_sparse = self.layout.is_sparse[self.lit]
-        for side in np.unique(sides):
-            asked = self.lit[(sides == side) & is_sparse]
-            light[asked] = arriving(emitter, self.points, asked, self.visibility, Rays(int(side)))[0]
-        return self.layout.blurred(self.layout.interpolated(light))
+    def pane_light(self, emitter: Emitter, side: int) -> Floats:
+        """The sky's light (P,) in a pane, sampled at every other point along rows and columns."""
+        light = TexelField.unknown(self.layout, len(self.points))
+        rows = self.layout.on_grid(self.lit, STRIDES[-1])
+        light.set(rows, self._sampled(emitter, rows, side))
+        rows = light.refine(self.lit, stride=1, tolerance=np.inf)
+        light.set(rows, self._sampled(emitter, rows, side))
+        return self.layout.blurred(light.values)
 
     def hard_light(self, emitter: Emitter, side: int) -> Floats:
         """Light (P,) of an emitter that is so narrow that one ray tells, but for the edges of shadows."""
@@ -217,48 +233,104 @@ class Receivers:
         light[at_edge] = arriving(emitter, points, at_edge, self.visibility, many, pattern)[0]
         return light
 
-    def soft_light(self, emitter: Emitter, sides: NDArray[np.int64], side: int) -> Floats:
+    def soft_light(self, emitter: Emitter, side: int) -> Floats:
         """Light (P,) of a wide emitter: what would arrive with nothing in the way, times the share that rays find."""
-        points = self.points
-        layout = self.layout
-        share = np.zeros(len(points), np.float32)
-        clear = np.full(len(points), np.nan, np.float32)
-        coarse = self._pattern(stride=2)
-        for first_side in np.unique(sides):
-            asked = self.lit[(sides == first_side) & layout.is_sparse[self.lit]]
-            rays = Rays(int(first_side))
-            total, clear[asked], unshaded = arriving(emitter, points, asked, self.visibility, rays, coarse)
-            share[asked] = total / np.maximum(unshaded, LEAST_LX)
-        share = layout.interpolated(share)
-
-        half = self._half_shadow(clear, self.cells, self.lit, rim=RIM)
-        rays = Rays(max(side // 2, 1), spread=True)
-        total, clear[half], unshaded = arriving(emitter, points, half, self.visibility, rays, self._pattern(stride=1))
-        share[half] = total / np.maximum(unshaded, LEAST_LX)
-
-        # More rays where shadows are wide.
-        is_partial = (clear > 0) & (clear < 1)
-        density = layout.blurred_among(is_partial, half, unshaded > 0)
-        wide = half[density > PARTIAL]
-        more = Rays(max(3 * side // 4, 1), spread=True)
-        halfway = self._pattern(stride=1, turn=0.5)
-        total, more_clear, more_unshaded = arriving(emitter, points, wide, self.visibility, more, halfway)
-        weight = np.float32(more.side**2 / (rays.side**2 + more.side**2))
-        share[wide] += weight * (total / np.maximum(more_unshaded, LEAST_LX) - share[wide])
-        clear[wide] += weight * (more_clear - clear[wide])
-
-        is_partial = (clear[half] > 0) & (clear[half] < 1)
-        smooth = layout.blurred_among(share, half, unshaded > 0)
-        share[half[is_partial]] = smooth[is_partial]
-
-        light = np.zeros(len(points), np.float32)
+        share = self._visible_share(emitter, side)
         shone = self.lit[share[self.lit] > 0]
-        open_lx, is_grainy = open_light(emitter, points, shone, side)
+        open_lx, is_grainy = self._open_light(emitter, shone, side)
+        light = np.zeros(len(self.points), np.float32)
         light[shone] = share[shone] * open_lx
         grainy = shone[is_grainy]
         if emitter.open_side > 1 and len(grainy):
-            light[grainy] = layout.blurred(light)[grainy]
+            light[grainy] = self.layout.blurred(light)[grainy]
         return light
+
+    def _visible_share(self, emitter: Emitter, side: int) -> Floats:
+        """The share (P,) of an emitter's light that nothing hides."""
+        share = TexelField.unknown(self.layout, len(self.points))
+        coarsest = STRIDES[0]
+        rows = self.layout.on_grid(self.lit, coarsest)
+        first_share, clear = self._shares(
+            emitter, rows, first_rays(emitter, self.points.points_m[rows], side), coarsest
+        )
+        share.set(rows, clear)
+        low, high = share.extremes(rows, steps=coarsest)
+        share.set(rows, first_share)
+        mixed = rows[(low < 1) & (high > 0)]
+        self._take_shares(share, emitter, mixed, Rays(side, spread=True), coarsest)
+
+        finer_rays = max(3 * side // 4, 1)
+        for stride, tolerance in zip(FINER_STRIDES, STEEP, strict=True):
+            rows = self.layout.on_grid(self.lit, stride)
+            steep = share.refine(rows, stride=stride, tolerance=tolerance)
+            self._take_shares(share, emitter, steep, Rays(finer_rays, spread=True), stride)
+        return share.values
+
+    def _take_shares(self, share: TexelField, emitter: Emitter, rows: Rows, rays: Rays, stride: int) -> None:
+        """Set the visible share of an emitter's light at the rows (N,), smoothed where it is in part hidden.
+
+        On the coarse grids it is smoothed only where it changes slowly.
+        """
+        values, clear = self._shares(emitter, rows, rays, stride)
+        share.set(rows, values)
+        low, high = share.extremes(rows, steps=stride)
+        is_partial = (clear > 0) & (clear < 1)
+        is_gentle = (high - low < GENTLE) | (stride == 1)
+        share.smooth(rows[is_partial & is_gentle], steps=stride)
+
+    def _shares(
+        self,
+        emitter: Emitter,
+        rows: Rows,
+        rays: "Rays | NDArray[np.int64]",
+        stride: int,
+    ) -> tuple[Floats, Floats]:
+        """The visible share (N,) of an emitter's light at points, and the share of the rays that met nothing opaque.
+
+        `rays` are the same for all, or rays from the middle of each point by their number along a side (N,).
+        """
+        pattern = self._pattern(stride=stride)
+        share = np.zeros(len(rows), np.float32)
+        clear = np.zeros(len(rows), np.float32)
+        parts = [(rays, np.arange(len(rows)))] if isinstance(rays, Rays) else []
+        if not isinstance(rays, Rays):
+            parts = [(Rays(int(ray_side)), np.flatnonzero(rays == ray_side)) for ray_side in np.unique(rays)]
+        for part_rays, part in parts:
+            total, part_clear, unshaded = arriving(
+                emitter, self.points, rows[part], self.visibility, part_rays, pattern
+            )
+            share[part] = total / np.maximum(unshaded, LEAST_LX)
+            clear[part] = np.nan_to_num(part_clear)
+        return share, clear
+
+    def _sampled(self, emitter: Emitter, rows: Rows, side: int) -> Floats:
+        """The light (N,) that rays to an emitter bring to points."""
+        sides = first_rays(emitter, self.points.points_m[rows], side)
+        light = np.zeros(len(rows), np.float32)
+        for ray_side in np.unique(sides):
+            part = np.flatnonzero(sides == ray_side)
+            light[part] = arriving(emitter, self.points, rows[part], self.visibility, Rays(int(ray_side)))[0]
+        return light
+
+    def _open_light(self, emitter: Emitter, rows: Rows, side: int) -> tuple[Floats, Mask]:
+        """The illuminance (N,) at points if nothing hid the emitter; and where it is sampled, hence grainy (N,)."""
+        points = self.points
+        light = TexelField.unknown(self.layout, len(points))
+        is_grainy = np.zeros(len(points), bool)
+        is_bent = np.zeros(len(points), bool)
+        is_bent[rows] = chunked(lambda part: _are_bent(points, rows[part]), len(rows))
+        grid = self.layout.on_grid(rows, STRIDES[0])
+        exact_lx, is_grainy[grid] = open_light(emitter, points, grid, side)
+        light.set(grid, exact_lx)
+        for stride in FINER_STRIDES:
+            exact = grid[~is_grainy[grid]]
+            is_bend = light.bends(exact, steps=2 * stride, tolerance=BEND)
+            grid = self.layout.on_grid(rows, stride)
+            light.state[grid[is_bent[grid]]] = UNKNOWN
+            asked = light.refine(grid, stride=stride, tolerance=UNEVEN, is_relative=True, marked=is_bend)
+            exact_lx, is_grainy[asked] = open_light(emitter, points, asked, side)
+            light.set(asked, exact_lx)
+        return light.values[rows], is_grainy[rows]
 
     def _pattern(self, *, stride: int, turn: float = 0) -> "EvenPattern":
         return EvenPattern(self.layout.width, stride, self.points.dither[:1] + np.float32(turn))
@@ -279,6 +351,11 @@ class Receivers:
         return among[(is_near | is_mixed[cells])[among]]
 
 
+def _are_bent(points: Texels, rows: Rows) -> Mask:
+    """Which of the points at rows (N,) have a normal that is not that of their flat face."""
+    return np.asarray(np.abs(points.normals[rows] - points.planes[rows]).max(1) > BENT)
+
+
 @dataclass(frozen=True, slots=True)
 class EvenPattern:
     """Numbers by which the rays of texels beside one another fit together, as if they were those of one larger texel.
@@ -292,9 +369,10 @@ class EvenPattern:
     stride: int
     shift: Floats
 
-    def dither(self, index: Rows) -> Floats:
-        """Two numbers in [0, 1) for each texel at a flat index (P, 2)."""
+    def dither(self, index: Rows, others: Floats) -> Floats:
+        """Two numbers in [0, 1) for each texel at a flat index (P, 2), the `others` (P, 2) for those between."""
         row, column = np.divmod(index, self.width)
+        is_between = (row % self.stride != 0) | (column % self.stride != 0)
         along_curve = _spread_bits(column // self.stride) | _spread_bits(row // self.stride) << np.uint32(1)
         first = np.zeros(len(index), np.uint32)
         second = np.zeros(len(index), np.uint32)
@@ -308,7 +386,7 @@ class EvenPattern:
             second_direction ^= second_direction >> 1
         numbers = np.stack([first, second], -1).astype(np.float32)
         shifted = numbers / np.float32(1 << PATTERN_BITS) + self.shift
-        return np.asarray(shifted - np.floor(shifted))
+        return np.where(is_between[:, None], others, shifted - np.floor(shifted))
 
 
 PATTERN_BITS = 12  # of a place along the curve: texels 64 apart have the same numbers
@@ -343,12 +421,15 @@ def first_rays(
 ) -> NDArray[np.int64]:
     """How many rays along a side points (P, 3) need to tell whether they see an emitter: one where shadows are hard."""
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
-    is_pane = emitter.sky == "pane"
-    narrow = max(side // 2, 1)
-    middle = max(3 * side // 4, 1) if is_pane else narrow
-    wide = side if is_pane else max(3 * side // 4, 1)
-    conditions = [width_rad == 0, width_rad < NARROW_RAD, width_rad < WIDE_RAD]
-    return np.select(conditions, [1, narrow, middle], wide)
+    half = max(side // 2, 1)
+    most = max(3 * side // 4, 1)
+    # Few of the rays to an open sky find a small opening. Frames beside a pane send much of its light on into a room.
+    widest = 3 * side // 2
+    if emitter.sky != "pane":
+        conditions = [width_rad == 0, width_rad < WIDE_RAD, width_rad < BESIDE_RAD]
+        return np.select(conditions, [1, half, most], widest)
+    conditions = [width_rad < NARROW_RAD, width_rad < WIDE_RAD, width_rad < BESIDE_RAD]
+    return np.select(conditions, [half, most, side], widest)
 
 
 def arriving(  # noqa: PLR0917
@@ -367,7 +448,7 @@ def arriving(  # noqa: PLR0917
     def arriving_part(part: slice) -> Floats:
         texels = points.take(rows[part])
         if pattern:
-            texels = replace(texels, dither=pattern.dither(texels.index))
+            texels = replace(texels, dither=pattern.dither(texels.index, texels.dither))
         return _arriving(emitter, texels, occluder, rays)
 
     return chunked(arriving_part, len(rows)).T

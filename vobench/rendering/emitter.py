@@ -61,6 +61,11 @@ class Emitter(ABC):
         """How many places along a side are needed at least where its light without shadows is sampled."""
         return 1
 
+    @property
+    def is_hard(self) -> bool:
+        """Whether it is so narrow that one ray tells whether a point sees it."""
+        return False
+
     @abstractmethod
     def towards(self, texels: Texels) -> Aim:
         """For two random numbers (P,) each: vectors (P, 3) to places on it, and illuminance (P,) square to them."""
@@ -246,6 +251,11 @@ class Bulb(Emitter):
     light: PointLight | SpotLight
     ball: BoundingSphere
 
+    @property
+    def is_hard(self) -> bool:
+        """True."""
+        return True
+
     def towards(self, texels: Texels) -> Aim:
         """Its place."""
         vectors_m = (self.light.position_m - texels.points_m).astype(np.float32)
@@ -274,6 +284,11 @@ class SunDisc(Emitter):
     light: Sun
     direction: Array
     ball: BoundingSphere
+
+    @property
+    def is_hard(self) -> bool:
+        """True."""
+        return True
 
     def towards(self, texels: Texels) -> Aim:
         """Places spread evenly over its disc."""

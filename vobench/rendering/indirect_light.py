@@ -14,7 +14,7 @@ from vobench.rendering.blend_kernels import TURNED, count_weights, write_weights
 from vobench.rendering.direct_light import EvenPattern
 from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, face_materials, take
-from vobench.rendering.ray_kernels import FACE, FAINT, Faces, cosine_rays, end_rays, sorted_by_point
+from vobench.rendering.ray_kernels import FACE, Faces, chosen_rays, cosine_rays, end_rays, sorted_by_point
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.thread_pool import chunked, in_chunks
@@ -90,7 +90,7 @@ def evenly_dithered(middles: Texels, step_m: Floats) -> Texels:
     row = np.where(axis == 0, cell[:, 1], cell[:, 0]) % PATTERN_SIDE
     column = np.where(axis == 2, cell[:, 1], cell[:, 2]) % PATTERN_SIDE
     pattern = EvenPattern(PATTERN_SIDE, 1, middles.dither[:1])
-    return replace(middles, dither=pattern.dither(row * PATTERN_SIDE + column))
+    return replace(middles, dither=pattern.dither(row * PATTERN_SIDE + column, middles.dither))
 
 
 def _grouped(key: Rows, points_m: Floats) -> tuple[Rows, Rows]:
@@ -515,7 +515,7 @@ class Gatherer:
     ) -> tuple[_Found, _RayBatch, _RayBatch]:
         """Follow rays to the next face that is no pane: what they find, the rays that go on, those that met nothing."""
         hits = self.visibility.opaque.one_sided_hits(batch.origins_m, batch.directions)
-        from_panes = self._reflected_by_panes(batch, hits)
+        from_panes = self._reflected_by_panes(batch, hits, dither)
         count = len(batch.weight)
         found = _Found(
             point=np.empty(count, np.int32),
@@ -577,7 +577,7 @@ class Gatherer:
             ray_lx = np.pi * luminance_cd_m2 * gone.weight
             sky[nth] += np.bincount(gone.point, ray_lx, minlength=sky.shape[1])
 
-    def _reflected_by_panes(self, batch: _RayBatch, hits: Hits) -> _RayBatch:
+    def _reflected_by_panes(self, batch: _RayBatch, hits: Hits, dither: Floats) -> _RayBatch:
         """The rays that go back from the first pane before a hit; those that pass lose what panes do not let through.
 
         A lamp that a reflected ray meets is no direct light.
@@ -590,16 +590,19 @@ class Gatherer:
         )
         normals = self.visibility.normals[panes.face]
         along_normal = np.einsum("ij,ij->i", reflected.directions, normals)
-        to_pane_m = (panes.distance - RAY_OFFSET_M)[:, None] * reflected.directions
         weight = reflected.weight * self.visibility.pane_mirrors(panes.face, along_normal)
-        reflected = _RayBatch(
+        selected = np.empty(len(weight), np.int64)
+        selected = selected[: chosen_rays(weight, reflected.point, dither, selected)]
+        reflected = reflected.take(selected)
+        to_pane_m = (panes.distance[selected] - RAY_OFFSET_M)[:, None] * reflected.directions
+        outward = 2 * along_normal[selected, None] * normals[selected]
+        return _RayBatch(
             reflected.point,
             reflected.origins_m + to_pane_m,
-            reflected.directions - 2 * along_normal[:, None] * normals,
-            weight,
-            np.zeros(len(weight), bool),
+            reflected.directions - outward,
+            weight[selected],
+            np.zeros(len(selected), bool),
         )
-        return reflected.take(weight > FAINT)
 
 
 def turned(points: Texels, turn: int) -> Texels:

@@ -17,6 +17,10 @@ FULL_TURN = np.float32(2 * np.pi)
 ONE = np.float32(1)
 UPRIGHT = np.float32(0.9)  # vertical part of a normal from which on it is no good partner of the vertical axis
 FAINT = np.float32(1e-3)  # what a mirror returns of a ray is dropped below this
+# A mirrored ray with less weight than this goes on with a chance of its share of it, and then with this weight.
+ROULETTE = np.float32(0.1)
+ROULETTE_CYCLE = 1 << 12  # rays after which these numbers repeat: float32 resolves them
+ROULETTE_STEP = np.float32(0.6180339887)  # of the numbers that decide it: the golden ratio's, which fill [0, 1) evenly
 NEAR_M = np.float32(1.0)  # light from nearer changes between a surfel and its neighbours
 LIFT_M = np.float32(1e-4)  # by which a mirrored ray starts off its face
 
@@ -214,6 +218,10 @@ def end_rays(
         mirrored = weight[ray] * (row.tint * coat + (ONE - coat) * row.metal)
         if mirrored <= FAINT:
             continue
+        if mirrored < ROULETTE:
+            if not goes_on(mirrored, dither[point[ray]], ray):
+                continue
+            mirrored = ROULETTE
         facet_x = float(normal[0])
         facet_y = float(normal[1])
         facet_z = float(normal[2])
@@ -237,6 +245,13 @@ def end_rays(
         onward_direct[onward] = row.shows_lamps and is_first
         onward += 1
     return found, onward, left
+
+
+@compiled
+def goes_on(weight: float, dither: Floats, ray: int) -> bool:
+    """Whether a ray of less weight than ROULETTE is the one that stands for those like it."""
+    number = dither[0] + dither[1] + np.float32(ray % ROULETTE_CYCLE) * ROULETTE_STEP
+    return bool(number - math.floor(number) < weight / ROULETTE)
 
 
 @compiled
@@ -266,6 +281,25 @@ def facet_normals(normals: Floats, roughness: Floats, dither: Floats) -> None:
             normals[ray, 0] = x
             normals[ray, 1] = y
             normals[ray, 2] = z
+
+
+@compiled
+def chosen_rays(weight: Floats, point: Indices, dither: Floats, selected: Rows) -> int:
+    """Write the rays (R,) that go on by their weights, those of less than ROULETTE as in `end_rays`. How many.
+
+    The weights of these are raised.
+    """
+    count = 0
+    for ray in range(len(weight)):
+        if weight[ray] <= FAINT:
+            continue
+        if weight[ray] < ROULETTE:
+            if not goes_on(weight[ray], dither[point[ray]], ray):
+                continue
+            weight[ray] = ROULETTE
+        selected[count] = ray
+        count += 1
+    return count
 
 
 @compiled

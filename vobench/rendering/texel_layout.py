@@ -1,10 +1,8 @@
 """The layout of texels on the light map: their neighbours, what fills the rest of the map, interpolation, smoothing."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
@@ -14,11 +12,10 @@ from vobench.rendering.texel_owner import Owners
 from vobench.rendering.thread_pool import chunked
 from vobench.rendering.visibility import Visibility
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
 STRAIGHT = np.cos(np.deg2rad(1.5))  # between texels that lie in one plane
 BLURS = 2
+WIDEST_M = 0.22  # between points of a grid; light changes over such distances
+STRIDES = (4, 2)  # of the grids of texels at which light is computed first
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,16 +25,18 @@ class TexelLayout:
     source (H·W,) is the point that each texel takes its value from, P for none: texels beside a face are read by
     interpolation, and those inside things have the light of the nearest of their chart, so that no darkness reaches
     out. neighbours (4, P) are the points left, right, above and below in the same chart, the point itself for none.
-    is_sparse (P,): every other point along rows and columns, and those that have none of these beside them; weights
-    (P, P) interpolate all points' values between those of the sparse ones.
+    grids (N, P): which points are on the grid of each of STRIDES; the last points of rows and columns of a chart are.
     """
 
     height: int
     width: int
     source: Indices
     neighbours: Indices
-    is_sparse: Mask
-    weights: "csr_array"
+    grids: Mask
+
+    def on_grid(self, rows: Rows, stride: int) -> Rows:
+        """Those of the points at rows (N,) that are on the grid of a stride, which is 1 or one of STRIDES."""
+        return rows if stride == 1 else rows[self.grids[STRIDES.index(stride), rows]]
 
     def filled(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
         """Values (P, ...) as a map (H, W, ...)."""
@@ -52,10 +51,6 @@ class TexelLayout:
             dilate(marked, self.neighbours, result)
             marked = result
         return marked
-
-    def interpolated(self, values: Floats) -> Floats:
-        """Values (P,) known at the sparse points, at all of them."""
-        return np.asarray(self.weights @ values)
 
     def blurred(self, values: Floats) -> Floats:
         """Values (P,) smoothed by about one texel, each chart by itself."""
@@ -125,9 +120,8 @@ def texel_layout(
     itself = np.arange(count)
     valid_beside = np.where(valid_beside < 0, itself, valid_beside).astype(np.int32)
     in_plane = _in_plane(points_m, planes, valid_beside, visibility)
-    is_sparse = _is_sparse(index[is_valid], valid_beside, atlas.width)
-    weights = _interpolation(is_sparse, valid_beside)
-    return TexelLayout(atlas.height, atlas.width, source, valid_beside, is_sparse, weights), in_plane
+    grids = _grids(index[is_valid], points_m, valid_beside, atlas.width)
+    return TexelLayout(atlas.height, atlas.width, source, valid_beside, grids), in_plane
 
 
 def _read_points(index: Rows, atlas: Atlas, owner: Owners) -> Rows:
@@ -169,44 +163,26 @@ def _in_plane(
     return in_plane
 
 
-def _interpolation(is_sparse: Mask, beside: Indices) -> "csr_array":
-    """Weights (P, P) that make all points' values of the sparse ones': along rows first, then along columns."""
-    is_known = is_sparse
-    result = scipy.sparse.diags_array(is_sparse.astype(np.float32), format="csr")
-    for sides in (beside[:2], beside[2:]):
-        known_beside = is_known[sides[0]].astype(np.float32) + is_known[sides[1]]
-        known = np.flatnonzero(is_known).astype(np.int32)
-        becomes_known = ~is_known & (known_beside > 0)
-        new = np.flatnonzero(becomes_known).astype(np.int32)
-        rows = [known]
-        columns = [known]
-        for side in sides:
-            taking = new[is_known[side[new]]]
-            rows.append(taking)
-            columns.append(side[taking])
-        row = np.concatenate(rows)
-        column = np.concatenate(columns)
-        mean_share = 1 / np.maximum(known_beside[row], 1)
-        shares = np.where(is_known[row], np.float32(1), mean_share)
-        shape = (len(is_known), len(is_known))
-        step = scipy.sparse.csr_array((shares.astype(np.float32), (row, column)), shape)
-        result = step @ result
-        is_known = is_known | (known_beside > 0)
-    return result
+def _grids(index: Rows, points_m: Floats, beside: Indices, width: int) -> Mask:
+    """Which points (P, 3) are on the grid of each of STRIDES (N, P): every so many along rows and columns.
 
-
-def _is_sparse(index: Rows, beside: Indices, width: int) -> Mask:
-    """Every other point along rows and columns, and points at rims that would have one neighbour's value alone."""
-    at_rim = beside == np.arange(len(index))
-    in_even_column = index % width % 2 == 0
-    in_even_row = index // width % 2 == 0
-    in_column = in_even_column | at_rim[:2].any(0)
-    in_row = in_even_row | at_rim[2:].any(0)
-    is_sparse = in_column & in_row
-    is_known = is_sparse
-    for first, second in (beside[:2], beside[2:]):
-        is_known = is_known | is_known[first] | is_known[second]
-    return np.asarray(is_sparse | ~is_known)
+    At rims, where a row or a column ends, its last point is, too. Where points of a grid would be more than WIDEST_M
+    apart, the next finer one stands for it.
+    """
+    at_rim = beside == np.arange(len(index), dtype=np.int32)
+    row, column = np.divmod(index, width)
+    spacing_m = np.zeros(len(index), np.float32)
+    for neighbour in beside:
+        np.maximum(spacing_m, np.linalg.norm(points_m[neighbour] - points_m, axis=1), out=spacing_m)
+    grids = np.empty((len(STRIDES), len(index)), bool)
+    finer = np.ones(len(index), bool)
+    for nth, stride in reversed(list(enumerate(STRIDES))):
+        in_column = (column % stride == 0) | at_rim[:2].any(0)
+        in_row = (row % stride == 0) | at_rim[2:].any(0)
+        is_wide = stride * spacing_m > WIDEST_M
+        finer = np.where(is_wide, finer, in_column & in_row)
+        grids[nth] = finer
+    return grids
 
 
 def _nearest_valid(beside: Indices, is_valid: Mask) -> Rows:
