@@ -35,6 +35,7 @@ def test_the_lighting_changes_lights_alone() -> None:
     assert day.plan == night.plan
 
 
+@pytest.mark.slow
 def test_lamps_shine_at_night_and_mostly_not_by_day() -> None:
     shining = {}
     for lighting in ("day", "night"):
@@ -56,6 +57,7 @@ def test_a_flat_has_one_sky_with_a_panorama() -> None:
     assert sky.panorama is not None
 
 
+@pytest.mark.slow
 def test_plans_and_colours_differ_between_seeds() -> None:
     floors = set()
     for seed in SEEDS:

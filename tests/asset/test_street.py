@@ -16,6 +16,7 @@ def streets() -> dict[int, Site]:
     return {seed: street.generated_street(seed, LIGHTINGS[seed % 4]) for seed in SEEDS}
 
 
+@pytest.mark.slow
 def test_nothing_is_wrong_with_streets(streets: dict[int, Site]) -> None:
     assert [complaint for site in streets.values() for complaint in site_check.complaints(site)] == []
 

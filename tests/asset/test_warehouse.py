@@ -16,6 +16,7 @@ def halls() -> dict[int, Site]:
     return {seed: warehouse.generated_warehouse(seed, LIGHTINGS[seed % 4]) for seed in SEEDS}
 
 
+@pytest.mark.slow
 def test_nothing_is_wrong_with_warehouses(halls: dict[int, Site]) -> None:
     assert [complaint for site in halls.values() for complaint in site_check.complaints(site)] == []
 

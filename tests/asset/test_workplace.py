@@ -15,6 +15,7 @@ def test_nothing_is_wrong_with_an_office(seed: int) -> None:
     assert place_check.complaints(interior) == []
 
 
+@pytest.mark.slow
 def test_an_office_has_as_many_chairs_as_desks_at_least() -> None:
     for seed in SEEDS:
         names = [piece.name for piece in workplace.furnished_office(seed, "day").pieces]
@@ -31,6 +32,7 @@ def test_a_seed_gives_the_same_bytes_each_time() -> None:
         assert one.mesh.vertices.tobytes() == other.mesh.vertices.tobytes()
 
 
+@pytest.mark.slow
 def test_an_office_is_lit_at_night() -> None:
     for seed in SEEDS:
         lights = workplace.furnished_office(seed, "night").lights

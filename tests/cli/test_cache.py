@@ -75,6 +75,7 @@ with pytest.MonkeyPatch.context() as patch:
 """
 
 
+@pytest.mark.slow
 def test_two_runs_at_once_on_one_empty_cache_make_nothing_twice(here):
     search = os.pathsep.join([str(Path(__file__).parent), os.environ.get("PYTHONPATH", "")])
     command, environment = [sys.executable, "-c", TWICE, "run", "tiny"], os.environ | {"PYTHONPATH": search}

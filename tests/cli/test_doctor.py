@@ -20,6 +20,7 @@ def path_tracing(said) -> dict:
     return next(c for c in said.json["checks"] if c["check"] == "path tracing (Mitsuba)")
 
 
+@pytest.mark.slow
 def test_a_machine_that_cannot_trace_paths_is_well_and_told_how_it_could(vobench, without_mitsuba):
     said = vobench("doctor", "--json")
     row = path_tracing(said)
@@ -31,12 +32,14 @@ def test_a_machine_that_cannot_trace_paths_is_well_and_told_how_it_could(vobench
     assert "MISSING" not in table.out
 
 
+@pytest.mark.slow
 def test_where_paths_can_be_traced_doctor_names_the_library(vobench, monkeypatch):
     monkeypatch.setattr(doctor.mitsuba, "working_library", lambda: "/opt/libLLVM.so.99")
     row = path_tracing(vobench("doctor", "--json"))
     assert (row["well"], row["result"]) == (True, "works with /opt/libLLVM.so.99")
 
 
+@pytest.mark.slow
 def test_no_file_of_the_working_folder_is_imported_where_drawing_is_tried(vobench, without_mitsuba, here):
     (here / "ctypes.py").write_text("raise SystemExit('imported from the working folder')\n")
     (drawing,) = rows(vobench("doctor", "--json"), "drawing without a display (EGL)")

@@ -44,6 +44,7 @@ def drawn(here):
     return here / "runs" / "drawn"
 
 
+@pytest.mark.slow
 def test_a_run_until_decided_ends_with_all_units_in_one_run_and_what_it_cost(vobench, drawn):
     said = vobench("run", "drawn", "--until", "decided", "--ratio", "2", "--budget", "20min")
     assert said.code == 0, said.err

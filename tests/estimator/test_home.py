@@ -186,6 +186,7 @@ def test_three_thousand_nested_folders_are_removed(folder):
     assert list(place.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_three_thousand_nested_folders_are_more_than_any_limit(folder):
     place, descriptor = folder
     deepen(place, 3000)

@@ -43,6 +43,7 @@ def test_the_quantiles_are_those_of_the_law():
     assert pytest.approx([chi2.median(6), chi2.ppf(0.9, 6)], rel=1e-6) == [MEDIAN, NINETY_PERCENT]
 
 
+@pytest.mark.slow
 def test_an_honest_covariance_is_within_its_band_over_20_repeats_and_a_tenth_of_it_is_named(bench, first):
     honest, bold, shy = ("honest", 0.005, 0.002, 1.0), ("bold", 0.005, 0.002, 0.1), ("shy", 0.005, 0.002, 10.0)
     run = bench.run((ESTIMATORS, noisy(honest, bold, shy)), ("seed: 1\n", "seed: 1\nrepeats: 20\n"))

@@ -59,6 +59,7 @@ def test_who_is_in_time_loses_nothing(bench, first):
     assert "deadline" not in (run.path / "leaderboard.md").read_text()
 
 
+@pytest.mark.slow
 def test_the_readings_of_lost_frames_come_with_the_next(bench, slow):
     folder = bench.run(BOTH, RATE_30, cache="slow").estimate("full", "wheel_odometry.real_time", 0)
     assert np.isfinite([row.position_error_m for row in read_frames(folder) if row.status != DROPPED]).all()

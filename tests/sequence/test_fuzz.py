@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 import zstandard
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
@@ -46,6 +47,7 @@ class TooSlowError(BaseException):
     """Not an Exception, which readers turn into an error of their own."""
 
 
+@pytest.mark.slow
 def test_a_thousand_damaged_recordings_are_read_or_refused_in_one_line(tmp_path):
     done = subprocess.run([sys.executable, __file__, tmp_path], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr[-3000:]

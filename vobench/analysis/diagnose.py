@@ -110,7 +110,8 @@ def diagnose(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Finding, ..
         mismatch = find_mismatch(T_gt, T_est, gt_order=gt.order, est_order=est.order)
         if mismatch is not None:
             findings.append(_mismatch_finding(mismatch, gt, est))
-            T_gt, T_est = mismatch.correction.T_gt, mismatch.correction.T_est
+            T_gt = mismatch.correction.T_gt
+            T_est = mismatch.correction.T_est
         if has_clocks and mismatch is not None and mismatch.kind == "inverse_poses":
             findings = [finding for finding in findings if finding.fault != "time_offset"]
             T_gt, T_est = _on_one_clock_when_inverted(mismatch, gt, unshifted, findings)
