@@ -90,9 +90,28 @@ def test_a_run_is_hidden_as_a_whole(folder):
     assert found(folder) == ["old/results/tiny/20260101T000000_ab"]
 
 
-def test_of_an_estimator_whose_folder_is_a_run_or_a_cache_what_tells_the_truth_is_hidden(folder):
-    put(folder, "suite.json", "cases/room/case.json", "leaderboard.html")
-    assert found(folder) == ["cases", "leaderboard.html"]
+def test_of_an_opened_folder_that_is_a_run_what_tells_the_truth_is_hidden(folder, tmp_path, monkeypatch):
+    put(tmp_path, "opened/suite.json", "opened/cases/room/case.json", "opened/leaderboard.html")
+    monkeypatch.setenv(READ_VARIABLE, str(tmp_path / "opened"))
+    hidden = {path.name for path in visible_truth(folder, [])}
+    assert hidden == {"cases", "leaderboard.html"}
+
+
+@pytest.mark.parametrize("names", [("suite.json", "cases/room/case.json"), ("sequences/ab/case.json", "state/locks/a")])
+@pytest.mark.parametrize("below", ["", "deeper/still"])
+def test_an_estimator_whose_folder_lies_in_a_run_or_a_cache_is_refused(folder, names, below):
+    put(folder, *names)
+    (folder / below).mkdir(parents=True, exist_ok=True)
+    with pytest.raises(EstimatorFailure, match=f"refused: its folder lies in a (run|cache), .*: {folder}$"):
+        visible_truth(folder / below, [])
+
+
+def test_an_estimator_whose_folder_is_also_that_of_runs_is_refused_by_any_of_its_names(folder, tmp_path):
+    (tmp_path / "link").symlink_to(folder)
+    for name in (folder, tmp_path / "link"):
+        with pytest.raises(EstimatorFailure, match="refused: its folder is also that of runs, the cache or a record"):
+            visible_truth(name, [folder])
+    assert visible_truth(folder, [tmp_path]) == []
 
 
 def test_another_cache_is_hidden_as_a_whole(folder):

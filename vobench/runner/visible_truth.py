@@ -35,15 +35,35 @@ def visible_truth(estimator_folder: Path, known: Collection[Path]) -> list[Path]
     """The files and folders with ground truth below the folders that an estimator may read.
 
     `known` are the real paths of files and folders that are hidden in any case, and therefore not searched.
-    Raises EstimatorFailure if a folder holds more than MOST_ENTRIES files and folders.
+    Raises EstimatorFailure if the estimator's folder itself is to be hidden, or if a folder holds more than
+    MOST_ENTRIES files and folders.
     """
     if is_switched_off():
         return []
+    _require_apart(estimator_folder.resolve(), known)
     skipped = {str(path) for path in known}
     found = list[Path]()
     for folder in _searched_folders(estimator_folder):
         found += _search(folder, skipped)
     return found
+
+
+def _require_apart(estimator_folder: Path, known: Collection[Path]) -> None:
+    """Raise EstimatorFailure if the folder of an estimator, which it may read, cannot be told from what is hidden.
+
+    It is itself one of the `known` hidden paths, or it lies in a run or a cache.
+    """
+    if estimator_folder in known:
+        raise EstimatorFailure(
+            "refused",
+            "its folder is also that of runs, the cache or a recording, which contain ground truth; "
+            f"choose another one for them: {estimator_folder}",
+        )
+    for folder in (estimator_folder, *estimator_folder.parents):
+        names = {entry.name for entry in _entries(str(folder))}
+        if names >= OF_RUN or names >= OF_STORE:
+            place = "a run" if names >= OF_RUN else "a cache"
+            raise EstimatorFailure("refused", f"its folder lies in {place}, which contains ground truth: {folder}")
 
 
 def _searched_folders(estimator_folder: Path) -> list[str]:
