@@ -160,7 +160,7 @@ def _end(ring_m: Array, side: float) -> MeshArrays:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Patch:
+class _BulgedSurface:
     """A slightly bulged surface between four corners (2, 2, 3): along u, then along v."""
 
     corners_m: Array
@@ -214,7 +214,7 @@ def _cabin(car: CarShape, paint: Material) -> list[Part]:
         )
         is_glass = np.zeros((3, 3), bool)
         is_glass[1, 1] = has_glass
-        frames, panes = _patch(corners, 0.05, (direction, 0, 0.3)).divided(
+        frames, panes = _bulged_surface(corners, 0.05, (direction, 0, 0.3)).divided(
             (0, 0.06, 0.94, 1), (0, 0.09, 0.93, 1), is_glass
         )
         paint_meshes.append(_facing(frames, (direction, 0, 0.3)))
@@ -228,7 +228,7 @@ def _cabin(car: CarShape, paint: Material) -> list[Part]:
                 [[foot_front_m, side * base_y, base_z], [roof_front_m, side * roof_y, roof_z]],
             ]
         )
-        patch = _patch(corners, 0.02, (0, side, 0))
+        patch = _bulged_surface(corners, 0.02, (0, side, 0))
         cuts_u = (0.0, 0.13, 0.53, 0.57, 0.93, 1.0)
         is_glass = np.zeros((5, 3), bool)
         is_glass[[1, 3], 1] = [car.has_rear_glass, True]
@@ -242,16 +242,16 @@ def _cabin(car: CarShape, paint: Material) -> list[Part]:
             [[roof_front_m, -roof_y, roof_z], [roof_front_m, roof_y, roof_z]],
         ]
     )
-    roof = _patch(roof_corners, 0.05, (0, 0, 1)).part((0, 1), (0, 1))
+    roof = _bulged_surface(roof_corners, 0.05, (0, 0, 1)).part((0, 1), (0, 1))
     paint_meshes.append(_facing(roof, (0, 0, 1)))
     return [Part(joined_arrays(paint_meshes), paint), Part(joined_arrays(glass_meshes), GLASS)]
 
 
-def _patch(corners_m: Array, bulge_m: float, outward: Sequence[float]) -> _Patch:
+def _bulged_surface(corners_m: Array, bulge_m: float, outward: Sequence[float]) -> _BulgedSurface:
     """A patch that bulges outwards."""
     normal = cross(corners_m[1, 0] - corners_m[0, 0], corners_m[0, 1] - corners_m[0, 0])
     sign = 1.0 if normal @ np.asarray(outward, float) > 0 else -1.0
-    return _Patch(corners_m, sign * bulge_m)
+    return _BulgedSurface(corners_m, sign * bulge_m)
 
 
 # --- What is fixed to the body ---

@@ -49,6 +49,16 @@ def _print_changes(changes: Sequence[ScoreChange], environment_differences: Sequ
     cells = [change for change in changes if change.case]
     changed_cells = [cell for cell in cells if cell.verdict != SAME]
 
+    _print_tables(totals, changed_cells)
+    same_count = len(cells) - len(changed_cells)
+    console.print(f"{same_count} of {len(cells)} cells are the same to the last digit")
+    if environment_differences:
+        console.print(f"The runs differ in settings that can change scores: {'; '.join(environment_differences)}")
+
+
+def _print_tables(totals: Sequence[ScoreChange], changed_cells: Sequence[ScoreChange]) -> None:
+    """Print a table of the scores over all cases and one of the changed cells, with an explanation of their ratios."""
+    console = terminal.console()
     if totals:
         total_rows = [_row(total) for total in totals]
         console.print(terminal.table("lost-aware score over all cases", HEADINGS, total_rows))
@@ -57,10 +67,6 @@ def _print_changes(changes: Sequence[ScoreChange], environment_differences: Sequ
         console.print(terminal.table("ATE (% of path length)", ["case", *HEADINGS], cell_rows))
     if totals or changed_cells:
         console.print(RATIO_EXPLANATION)
-    same_count = len(cells) - len(changed_cells)
-    console.print(f"{same_count} of {len(cells)} cells are the same to the last digit")
-    if environment_differences:
-        console.print(f"The runs differ in settings that can change scores: {'; '.join(environment_differences)}")
 
 
 def _row(change: ScoreChange) -> list[str]:
