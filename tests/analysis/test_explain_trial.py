@@ -1,6 +1,7 @@
 """A trial that fails for noise is run again, and noise is named."""
 
 import re
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -78,7 +79,8 @@ def test_the_number_of_trials_is_announced_before_each_stage(noisy_run: NoisyRun
     found = explain_trial(
         noisy_run.trial("blind"), run_plan=noisy_run.run_plan, estimator=noisy_run.estimator, progress=progress
     )
-    assert re.fullmatch(r"trials 1 to \d+ of at most \d+: each of \d+ nuisances removed, with 3 seeds", said[0])
+    announced = r"trials 1 to \d+ of at most \d+: each of \d+ nuisances removed, with 3 seeds; the estimator takes .* s"
+    assert re.match(announced, said[0])
     assert said[-1].startswith("trials ")
     assert f"to {found.explanation.trials} of at most" in said[-1]
 
@@ -87,7 +89,7 @@ def test_the_time_of_a_stage_follows_from_the_trials_before(monkeypatch) -> None
     said = []
     clock = iter([0.0, 60.0, 60.0, 80.0])
     monkeypatch.setattr(explain_trial_module, "time", SimpleNamespace(monotonic=lambda: next(clock)))
-    forecast = _Forecast(SimpleNamespace(say=said.append), effort(3, is_deterministic=True), 10)
+    forecast = _Forecast(SimpleNamespace(say=said.append), effort(3, is_deterministic=True), 10, 1.5)
     with forecast.stage(30):
         pass
     with forecast.stage(12):
@@ -139,6 +141,13 @@ def test_each_variant_has_its_verdict_and_everything_comes_last() -> None:
     assert rows[0]["instead"] == "a short exposure and a sharp lens"
     assert rows[5]["instead"] == ""
     assert (rows[0]["mended"], rows[0]["survived"], rows[0]["repeats"]) == (0.8, 2, 6)
+
+
+def test_what_seems_to_help_but_was_not_confirmed_is_neither_named_nor_a_difference() -> None:
+    seeming = replace(change("flare", mended=0.4), is_confirmed=False)
+    found = explained(singles=(BLUR, seeming))
+    assert [row["verdict"] for row in found.rows()][:2] == ["fixes it", "unconfirmed"]
+    assert found.explanation.contributing == ()
 
 
 def test_a_single_nuisance_is_listed_once() -> None:

@@ -22,6 +22,7 @@ from vobench.analysis.trial_data import read_conditions, read_outcome
 from vobench.errors import InputError
 from vobench.runner.data_frame import data_frame
 from vobench.runner.finished_trial import FinishedTrial, read_finished_trial, run_variants
+from vobench.runner.frames import read_frames
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.store import SILENT, Progress
 from vobench.suite.case import Case
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
 
+MS_PER_S = 1e3
 SECONDS_TO_SAY = 5.0  # a stage that took less needs no forecast
 
 
@@ -62,7 +64,10 @@ class TrialExplanation:
         return tuple(sentences)
 
     def verdict(self, change: Change) -> str:
-        """The effect of a change: "fixes it", "helps", "harms", "no difference", "ruled out" or "undecided"."""
+        """The effect of a change: "fixes it", "helps", "harms", "no difference", "unconfirmed" or "undecided".
+
+        What seems to differ by the seeds of the screening, but was not run with others, is "unconfirmed".
+        """
         if change.is_sure and change.mended >= MATERIAL:
             is_named = set(change.removed) == set(self.named) or change.removed in self.explanation.alternatives
             fixes = is_named or is_sufficient(change, self.explanation.everything)
@@ -71,7 +76,8 @@ class TrialExplanation:
             return "harms"
         if change.is_sure or change.is_ruled_out:
             return "no difference"
-        return "undecided"
+        seems_to_differ = change.low > 0 or change.high < 0
+        return "unconfirmed" if seems_to_differ and not change.is_confirmed else "undecided"
 
     def rows(self) -> list[dict[str, Any]]:
         """One row per variant of the case: single nuisances removed, then pairs, then all of them.
@@ -183,7 +189,7 @@ def explain_trial(
     nuisances = _present_nuisances(finished)
     suite_name = f"explain_{finished.score.case.replace('-', '_')}_{finished.score.estimator}"
     seeds = effort(repeats, is_deterministic=finished.estimator_entry.manifest.deterministic)
-    forecast = _Forecast(progress, seeds, len(nuisances))
+    forecast = _Forecast(progress, seeds, len(nuisances), _estimator_seconds(finished))
 
     def measure(cases: Mapping[str, Case]) -> dict[str, list[Outcome]]:
         with forecast.stage(len(cases)):
@@ -201,6 +207,7 @@ class _Forecast:
     progress: Progress
     seeds: Effort
     nuisances: int
+    estimator_seconds: float
     done: int = 0
     seconds: float = 0.0
 
@@ -218,12 +225,18 @@ class _Forecast:
         if self.done == 0:
             return (
                 f"trials 1 to {trials} of at most {most}: each of {self.nuisances} nuisances removed, "
-                f"with {self.seeds.screening} seeds"
+                f"with {self.seeds.screening} seeds; the estimator takes {self.estimator_seconds:.1f} s for each, "
+                "besides the images"
             )
         numbers = f"trials {self.done + 1} to {self.done + trials} of at most {most}"
         if self.seconds < SECONDS_TO_SAY:
             return numbers
         return f"{numbers}, about {trials * self.seconds / self.done:.0f} s"
+
+
+def _estimator_seconds(trial: FinishedTrial) -> float:
+    """How long the estimator took for the frames of a trial."""
+    return sum(row.wall_ms or 0.0 for row in read_frames(trial.path)) / MS_PER_S
 
 
 def _present_nuisances(trial: FinishedTrial) -> tuple[Nuisance, ...]:
