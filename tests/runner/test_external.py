@@ -156,9 +156,9 @@ def test_a_perfect_program_is_perfect_whatever_frame_it_gives_the_poses_of(tmp_p
             writer.write_truth(t, T, np.zeros(6))
     shown = rectified(rig).rig if form == "kitti" else rig
     T_body_frame = {"left_camera": shown.T_body_left, "imu": T_BODY_IMU, "body": np.eye(4)}[pose_of]
-    command = "[cp, ./answer.txt, '{out}']"
+    command = "[cp, ./answers, '{out}']"
     folder = manifest(tmp_path / "perfect", command=command, dataset=form, pose_of=pose_of, needs="[stereo, imu]")
-    (folder / "answer.txt").write_text(format_tum(Trajectory(t_ns, T_world_body @ T_body_frame)))
+    (folder / "answers").write_text(format_tum(Trajectory(t_ns, T_world_body @ T_body_frame)))
     case = RecordedCase(name="case", variant={}, source=Source(path="."))
     (tmp_path / "estimate").mkdir()
     estimator_entry = EstimatorEntry("perfect", folder, read_manifest(folder), {})
