@@ -66,7 +66,7 @@ def units(spread: Spread, variants: Mapping[str, Collection[str]]) -> list[Unit]
 
     Raises SuiteError for more units than there are, and for pairs of unknown scenes or trajectories.
     """
-    by_axis = {axis: list(variants[axis]) for axis in UNIT_AXES if axis in spread.over}
+    by_axis: dict[str, list[str]] = {axis: list(variants[axis]) for axis in UNIT_AXES if axis in spread.over}
     combinations = _diagonals(by_axis, _paired(spread.pairs or {}, by_axis))
     if spread.units > len(combinations) and spread.pairs:
         raise SuiteError(
