@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vobench.asset.facade import House, house
+from vobench.asset.facade import FOUNDATION_M, House, house
 from vobench.asset.fitting import PANE
 from vobench.asset.street_plan import KERB_M, Lot, PlanFrame
 from vobench.geometry.se3 import Array
@@ -25,7 +25,8 @@ def test_a_house_keeps_to_its_lot_and_stands_on_the_pavement(seed: int, has_shop
     assert low_m[0] > -LOT.depth_m - 0.05
     assert high_m[0] < AWNING_M
     assert max(-low_m[1], high_m[1]) < LOT.width_m / 2 + 0.1
-    assert KERB_M - 0.02 < low_m[2] < KERB_M + 0.01
+    assert low_m[2] == pytest.approx(KERB_M - FOUNDATION_M)
+    assert low_m[2] < 0
     assert made.windows
 
 

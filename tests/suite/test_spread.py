@@ -4,7 +4,7 @@ from collections import Counter
 
 import pytest
 
-from vobench.errors import SuiteError
+from vobench.errors import SettingError, SuiteError
 from vobench.suite.scene_entry import drawn_lighting
 from vobench.suite.scene_spec import LIGHTINGS
 from vobench.suite.spread import Dealer, Spread, changes_for_units, units
@@ -91,3 +91,61 @@ def test_more_units_take_more_seeds_of_places_or_drives(suite, count, changes) -
 def test_units_of_a_suite_without_a_design_are_refused() -> None:
     with pytest.raises(SuiteError, match="this suite has none"):
         changes_for_units({}, 24)
+
+
+PAIRED = {
+    "scene": ["flat.1", "flat.2", "street.1", "street.2", "street.3", "park"],
+    "trajectory": ["tour.1", "tour.2", "walk", "car.1", "car.2"],
+}
+
+
+def test_paired_scenes_have_their_trajectories_alone_and_the_others_have_all() -> None:
+    pairs = {"flat": ("tour", "walk"), "street": ("car",)}
+    made = units(Spread(units=2 * 3 + 3 * 2 + 5, pairs=pairs), PAIRED)
+    drives: dict[str, set[str]] = {}
+    for unit in made:
+        drives.setdefault(unit.by_axis["scene"], set()).add(unit.by_axis["trajectory"])
+    assert len({unit.name for unit in made}) == len(made)
+    for scene in ("flat.1", "flat.2"):
+        assert drives[scene] == {"tour.1", "tour.2", "walk"}
+    for scene in ("street.1", "street.2", "street.3"):
+        assert drives[scene] == {"car.1", "car.2"}
+    assert drives["park"] == set(PAIRED["trajectory"])
+
+
+def test_the_first_paired_units_are_in_different_places_with_different_drives() -> None:
+    pairs = {"flat": ("tour",), "street": ("car",), "park": ("walk",)}
+    made = units(Spread(units=6, pairs=pairs), PAIRED)
+    assert {unit.by_axis["scene"] for unit in made} == set(PAIRED["scene"])
+    counts = Counter(unit.by_axis["trajectory"] for unit in made)
+    assert counts == {"tour.1": 1, "tour.2": 1, "car.1": 2, "car.2": 1, "walk": 1}
+
+
+def test_pairs_that_name_all_trajectories_change_nothing() -> None:
+    everything = {"flat": ("tour", "walk", "car"), "street": ("tour", "walk", "car")}
+    assert units(Spread(units=30, pairs=everything), PAIRED) == units(Spread(units=30), PAIRED)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "message"),
+    [
+        ({"flt": ("tour",)}, "spread.pairs names the scene 'flt', which is not among flat.1, flat.2, street.1"),
+        ({"flat": ("tor",)}, "spread.pairs names the trajectory 'tor', which is not among tour.1, tour.2, walk"),
+        ({"flat": ()}, "spread.pairs.flat should name trajectories of the suite"),
+    ],
+)
+def test_pairs_of_what_is_not_in_the_suite_are_one_line_of_error(
+    pairs: dict[str, tuple[str, ...]], message: str
+) -> None:
+    with pytest.raises(SuiteError, match=message):
+        units(Spread(units=2, pairs=pairs), PAIRED)
+
+
+def test_more_units_than_pairs_allow_is_an_error() -> None:
+    with pytest.raises(SuiteError, match="20 units are more than the 19 that the pairs of spread allow"):
+        units(Spread(units=20, pairs={"flat": ("walk",), "street": ("car", "tour")}), PAIRED)
+
+
+def test_pairs_require_a_design_over_both_axes() -> None:
+    with pytest.raises(SettingError, match="pairs"):
+        Spread(units=2, over=("scene",), pairs={"flat": ("tour",)})

@@ -32,6 +32,7 @@ FASCIAS = (NAVY, TEAL, BRICK, PLUM, INK, "#2f4a36", "#e6e3da", "#8a2f2a", "#3b3f
 SHOP_STOREY_M = 3.7
 HOME_STOREY_M = 3.0
 REVEAL_M = 0.17
+FOUNDATION_M = KERB_M + 0.02  # of a house below the pavement
 PICTURES = 8  # of what is behind windows
 FASCIA_PX = 96  # height of the picture of a shop's name
 
@@ -432,6 +433,7 @@ def _body(rng: Rng, made: House, lot: Lot, style: FrontStyle, high_m: float) -> 
     if not lot.is_open[0]:
         walls.append(quad_arrays(back_right, right - back_right, up))
     made.parts.append(Part(joined_arrays(walls), style.wall))
+    made.parts.append(Part(_foundation(right, left, back_left, back_right), style.trim))
     parapet_m = 0.3 if style.roof == "flat" else 0.0
     top = _polygon([right + up, left + up, back_left + up, back_right + up])
     made.parts.append(Part(top, DARK))
@@ -441,6 +443,18 @@ def _body(rng: Rng, made: House, lot: Lot, style: FrontStyle, high_m: float) -> 
         return
     made.parts.append(stood((0.5, w, 0.14), style.trim, 0.1, 0, high_m - 0.16, bevel=0))
     _pitched_roof(rng, made, lot, style, high_m)
+
+
+def _foundation(right: Array, left: Array, back_left: Array, back_right: Array) -> MeshArrays:
+    """The front and the sides down to the road, for houses at the end of a road, where there is no pavement."""
+    up = np.array([0.0, 0.0, FOUNDATION_M])
+    down = -up
+    sides = [
+        quad_arrays(right + down, left - right, up),
+        quad_arrays(left + down, back_left - left, up),
+        quad_arrays(back_right + down, right - back_right, up),
+    ]
+    return joined_arrays(sides)
 
 
 def _polygon(corners_m: Sequence[Array]) -> MeshArrays:

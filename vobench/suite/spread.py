@@ -25,13 +25,19 @@ class Spread:
     A unit is a combination of the variants of the axes `over`: by default a drive in a place. Every scenario, at all
     its severities, runs in `each` of the units; a suite without scenarios spreads each combination of its other axes.
     All estimators run in the same units.
+
+    `pairs` names, for some of the scenes, the trajectories that belong there, such as {street: [car], flat: [walk]};
+    both as in the suite, without seeds. All trajectories belong to the other scenes.
     """
 
     over: Annotated[tuple[UnitAxis, ...], MinLen(1)] = UNIT_AXES
     units: Annotated[int, Ge(1), Le(MOST_UNITS)]
     each: Annotated[int, Ge(1), Le(MOST_UNITS)] = 3
+    pairs: dict[str, tuple[str, ...]] | None = None
 
     def __post_init__(self) -> None:
+        if self.pairs and set(self.over) != set(UNIT_AXES):
+            raise SettingError(f"are for designs over scene and trajectory (over is {list(self.over)})", "pairs")
         if len(set(self.over)) != len(self.over):
             raise SettingError(f"should name each axis once (got {list(self.over)})", "over")
 
@@ -56,9 +62,17 @@ class Unit:
 def units(spread: Spread, variants: Mapping[str, Collection[str]]) -> list[Unit]:
     """The units of a design over the variants of each axis. Each variant is in as many units as any other, or one less.
 
-    Raises SuiteError for more units than there are.
+    With `pairs`, this holds for the scenes, and for the trajectories among scenes that have the same ones.
+
+    Raises SuiteError for more units than there are, and for pairs of unknown scenes or trajectories.
     """
-    combinations = _diagonals({axis: list(variants[axis]) for axis in UNIT_AXES if axis in spread.over})
+    by_axis: dict[str, list[str]] = {axis: list(variants[axis]) for axis in UNIT_AXES if axis in spread.over}
+    combinations = _diagonals(by_axis, _paired(spread.pairs or {}, by_axis))
+    if spread.units > len(combinations) and spread.pairs:
+        raise SuiteError(
+            f"{spread.units} units are more than the {len(combinations)} that the pairs of spread allow; raise the "
+            "seeds of a scene or a trajectory, or ask for fewer"
+        )
     if spread.units > len(combinations):
         counts = " × ".join(f"{len(variants[axis])} ({axis})" for axis in UNIT_AXES if axis in spread.over)
         raise SuiteError(
@@ -68,17 +82,49 @@ def units(spread: Spread, variants: Mapping[str, Collection[str]]) -> list[Unit]
     return [Unit(combination) for combination in combinations[: spread.units]]
 
 
-def _diagonals(variants: Mapping[str, Sequence[str]]) -> list[dict[str, str]]:
-    """All combinations, along diagonals, so that variants of an axis occur about equally often in the first."""
+def _paired(pairs: Mapping[str, Collection[str]], variants: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """The variants of trajectories that belong to each variant of a scene with pairs.
+
+    Raises SuiteError for pairs of unknown scenes or trajectories.
+    """
+    allowed = dict[str, list[str]]()
+    for scene, names in pairs.items():
+        scenes = _of_entry(scene, "scene", variants)
+        drives = [drive for name in names for drive in _of_entry(name, "trajectory", variants)]
+        if not drives:
+            raise SuiteError(f"spread.pairs.{scene} should name trajectories of the suite (got none)")
+        allowed.update(dict.fromkeys(scenes, drives))
+    return allowed
+
+
+def _of_entry(name: str, axis: str, variants: Mapping[str, Sequence[str]]) -> list[str]:
+    """The variants of an entry of the suite: those with its name, or with its name before a seed."""
+    found = [variant for variant in variants[axis] if variant == name or variant.startswith(f"{name}.")]
+    if not found:
+        raise SuiteError(f"spread.pairs names the {axis} '{name}', which is not among {', '.join(variants[axis])}")
+    return found
+
+
+def _diagonals(variants: Mapping[str, Sequence[str]], allowed: Mapping[str, list[str]]) -> list[dict[str, str]]:
+    """All combinations, along diagonals, so that variants of an axis occur about equally often in the first.
+
+    `allowed` are the trajectories of some of the scenes. The other scenes have all of them.
+    """
     if len(variants) == 1:
         ((axis, names),) = variants.items()
         return [{axis: name} for name in names]
-    scenes = variants["scene"]
-    trajectories = variants["trajectory"]
+    drives_of = {scene: tuple(allowed.get(scene, variants["trajectory"])) for scene in variants["scene"]}
+    # Scenes with the same trajectories take turns among these.
+    turns = Counter[tuple[str, ...]]()
+    first = dict[str, int]()
+    for scene, drives in drives_of.items():
+        first[scene] = turns[drives]
+        turns[drives] += 1
     combinations = []
-    for shift, number in product(range(len(trajectories)), range(len(scenes))):
-        trajectory = trajectories[(number + shift) % len(trajectories)]
-        combinations.append({"scene": scenes[number], "trajectory": trajectory})
+    most = max(len(drives) for drives in drives_of.values())
+    for shift, (scene, drives) in product(range(most), drives_of.items()):
+        if shift < len(drives):
+            combinations.append({"scene": scene, "trajectory": drives[(first[scene] + shift) % len(drives)]})
     return combinations
 
 
