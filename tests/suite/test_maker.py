@@ -137,7 +137,7 @@ def test_a_file_without_make_is_named_once(tmp_path, monkeypatch, is_builtin) ->
 
 
 def test_a_scene_file_that_is_too_large_is_reported_as_such(make, monkeypatch) -> None:
-    monkeypatch.setattr(maker, "SCENE_BYTES", 10)
+    monkeypatch.setattr(maker, "MAX_SCENE_BYTES", 10)
     with pytest.raises(SuiteError, match=r"returned no scene: scene\.bin is larger than 10 bytes$"):
         make("return wall((0.5, 0.5, 0.5))")
 
