@@ -11,7 +11,7 @@ the rules were made with the other half.
 import argparse
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 from numpy.random import Generator
@@ -44,17 +44,9 @@ Kind = Literal[
     "bursts",
     "lost by chance",
 ]
-NAMEABLE: tuple[Kind, ...] = (
-    "one",
-    "one, some chance",
-    "one, lost by chance",
-    "one, a removal harms",
-    "circumstance",
-    "either of two",
-    "two together",
-)
 NAMEABLE_SHARE = 0.5  # of the error, that the causes must be
 UNNAMEABLE: tuple[Kind, ...] = ("none", "clock", "after N frames", "coin", "rare", "bursts", "lost by chance")
+NAMEABLE: tuple[Kind, ...] = tuple(kind for kind in get_args(Kind) if kind not in UNNAMEABLE)
 RANDOM: tuple[Kind, ...] = ("one, some chance", "one, lost by chance", "coin", "rare", "bursts", "lost by chance")
 
 

@@ -3,18 +3,9 @@
 import numpy as np
 import pytest
 
-from vobench.geometry import se3
+from tests.trajectory.random_poses import random_trajectory
 from vobench.trajectory.any_format import parse_any
 from vobench.trajectory.euroc import csv_rows, format_euroc
-from vobench.trajectory.trajectory import Trajectory
-
-
-def random_trajectory(n: int, seed: int) -> Trajectory:
-    rng = np.random.default_rng(seed)
-    q = rng.normal(size=(n, 4))
-    rotations = se3.from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
-    t_ns = np.cumsum(rng.integers(1, 10**10, n)).astype(np.int64)
-    return Trajectory(t_ns, se3.transform(rotations, rng.normal(scale=100, size=(n, 3))))
 
 
 def test_euroc_text_has_its_header_the_scalar_first_and_is_read_back():

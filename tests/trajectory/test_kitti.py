@@ -3,11 +3,10 @@
 import numpy as np
 import pytest
 
+from tests.trajectory.random_poses import random_trajectory
 from vobench.errors import TrajectoryError
-from vobench.geometry import se3
 from vobench.trajectory.any_format import parse_any
 from vobench.trajectory.kitti import format_kitti, format_times, parse_times
-from vobench.trajectory.trajectory import Trajectory
 
 KITTI = "1 0 0 5 0 0 -1 6 0 1 0 7\n"
 
@@ -25,14 +24,6 @@ def test_kitti_may_have_the_frames_number_first_and_frames_missing():
     np.testing.assert_array_equal(parsed.T[1], parse_any(turned, name="x").T[0])
     said = "rows that repeat the frame number of the row before were left out: 1 of 4, the first at run.txt:3"
     assert parsed.notes == (said,)
-
-
-def random_trajectory(n: int, seed: int) -> Trajectory:
-    rng = np.random.default_rng(seed)
-    q = rng.normal(size=(n, 4))
-    rotations = se3.from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
-    t_ns = np.cumsum(rng.integers(1, 10**10, n)).astype(np.int64)
-    return Trajectory(t_ns, se3.transform(rotations, rng.normal(scale=100, size=(n, 3))))
 
 
 def test_a_file_of_times_is_exact_to_the_nanosecond():

@@ -2,17 +2,8 @@
 
 import numpy as np
 
-from vobench.geometry import se3
-from vobench.trajectory.trajectory import Trajectory
+from tests.trajectory.random_poses import random_trajectory
 from vobench.trajectory.tum import format_tum, parse_tum
-
-
-def random_trajectory(n: int, seed: int) -> Trajectory:
-    rng = np.random.default_rng(seed)
-    q = rng.normal(size=(n, 4))
-    rotations = se3.from_quaternion(q / np.linalg.norm(q, axis=1, keepdims=True))
-    t_ns = np.cumsum(rng.integers(1, 10**10, n)).astype(np.int64)
-    return Trajectory(t_ns, se3.transform(rotations, rng.normal(scale=100, size=(n, 3))))
 
 
 def test_text_is_the_inverse_of_parsing():

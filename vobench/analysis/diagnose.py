@@ -115,15 +115,23 @@ def diagnose(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Finding, ..
         if has_clocks and mismatch is not None and mismatch.kind == "inverse_poses":
             findings = [finding for finding in findings if finding.fault != "time_offset"]
             T_gt, T_est = _on_one_clock_when_inverted(mismatch, gt, unshifted, findings)
-        misfit_after = misfit(T_gt, T_est).trans
-        disagreement = motion_disagreement(T_gt, T_est)
-        is_chance = misfit_after > MAX_MISFIT_WITHOUT_IT and _has_unsure_offset(findings)
-        if is_chance or _is_unrelated(misfit_after, disagreement):
+        unrelated = _find_unrelated(T_gt, T_est, misfit_before, has_unsure_offset=_has_unsure_offset(findings))
+        if unrelated is not None:
             units = (finding for finding in findings if finding.fault == "stamp_unit")
-            return (*units, _unrelated(misfit_before, misfit_after, disagreement))
+            return (*units, unrelated)
         findings += _wrong_scale(T_gt, T_est)
         findings += _swapped_inputs(gt, est)
     return tuple(findings)
+
+
+def _find_unrelated(T_gt: Array, T_est: Array, misfit_before: float, *, has_unsure_offset: bool) -> Finding | None:
+    """The finding that corrected poses (K, 4, 4) have nothing in common; None if they have."""
+    misfit_after = misfit(T_gt, T_est).trans
+    disagreement = motion_disagreement(T_gt, T_est)
+    is_chance = has_unsure_offset and misfit_after > MAX_MISFIT_WITHOUT_IT
+    if is_chance or _is_unrelated(misfit_after, disagreement):
+        return _unrelated(misfit_before, misfit_after, disagreement)
+    return None
 
 
 def _is_unrelated(misfit_after: float, disagreement: float | None) -> bool:

@@ -351,10 +351,15 @@ def _wall_cupboards(
     return parts
 
 
+def _is_clear_of(y: float, taken_y: Sequence[float]) -> bool:
+    """Whether a place along the worktop is clear of what stands there already, given by its middles in m."""
+    return all(abs(y - middle) > 0.42 for middle in taken_y)
+
+
 def _worktop_things(rng: Rng, first_m: float, last_m: float, taken_y: Sequence[float]) -> list[Part]:
     """A kettle, jars, boards, a block of knives and a bottle, where the worktop is free."""
     places = np.arange(first_m + 0.14, last_m - 0.1, 0.19)
-    free = [y for y in places.tolist() if all(abs(y - middle) > 0.42 for middle in taken_y)]
+    free = [y for y in places.tolist() if _is_clear_of(y, taken_y)]
     kinds = rng.permutation(["kettle", "jars", "bottle", "board", "knives", "jar"]).tolist()
     parts = list[Part]()
     for y, kind in zip(free, kinds, strict=False):

@@ -490,7 +490,8 @@ class Gatherer:
             for depth in range(MIRRORS):
                 if depth == 0:
                     # Light that the first face shows already goes on from it, and that alone counts.
-                    batch, shown = batch.take(~batch.is_direct), batch.take(batch.is_direct)
+                    shown = batch.take(batch.is_direct)
+                    batch = batch.take(~batch.is_direct)
                     _, from_shown, _ = self._followed(shown, photons.dither, is_first=False)
                 found, batch, _ = self._followed(batch, photons.dither, is_first=False)
                 if depth == 0:
