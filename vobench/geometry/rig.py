@@ -138,7 +138,10 @@ def looking(*, pitch_deg: float, position_m: tuple[float, float, float]) -> Arra
 
 @settings()
 class Mount:
-    """Where a body carries its cameras, and how far these look down. What is None remains as in the rig."""
+    """Where the body of a trajectory carries its cameras, and how far these look down.
+
+    What is None remains as in the rig.
+    """
 
     pitch_deg: Annotated[float, Ge(-90), Le(90)] | None = None
     forward_m: float | None = None

@@ -166,8 +166,7 @@ class Wander:
 
     `seeds` is the number of drives, with seeds from `seed` on, plus the base seed of the suite. A hand holds the body
     at about 1.45 m, and a quadrotor flies 0.7 to 1.5 m above the floor: their cameras should have height_m 0. The
-    wheels of pioneer and car roll without slip. `mount` says where the body carries the cameras; by default, the rig
-    says so.
+    wheels of pioneer and car roll without slip.
     """
 
     kind: Literal["wander"] = "wander"

@@ -17,7 +17,6 @@ from vobench.geometry.rig import (
     mounted_rig,
     resized,
 )
-from vobench.motion.wander import Wander
 from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
 from vobench.sensor.imu import IMUS, ImuSettings
 from vobench.setting import FromPreset, OneOf, Positive, ShortForm, settings
@@ -79,9 +78,8 @@ class RigSettings:
 
     def mounted_on(self, trajectory: TrajectorySpec) -> "RigSettings":
         """The rig on the body of a trajectory, which may carry its cameras elsewhere."""
-        if not isinstance(trajectory, Wander) or trajectory.mount is None:
-            return self
-        return replace(self, **trajectory.mount.replaced)
+        mount = trajectory.mount
+        return replace(self, **mount.replaced) if mount else self
 
     def build(self) -> Rig:
         """The sensors with their nominal calibration. Raises InputError if the lenses have not been read."""

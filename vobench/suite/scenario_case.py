@@ -8,7 +8,6 @@ from typing import Any
 from vobench.errors import SuiteError
 from vobench.geometry.rig import Level
 from vobench.motion.replay import Replay
-from vobench.motion.wander import Wander
 from vobench.suite import scene_file, scene_lighting
 from vobench.suite.axis import RigSettings
 from vobench.suite.case import Case
@@ -107,11 +106,13 @@ class ScenarioCases:
         for unit in chosen:
             name = unit.by_axis.get("trajectory") or next(iter(self.axes["trajectory"]))
             trajectory = self.axes["trajectory"][name]
-            mount = trajectory.mount if isinstance(trajectory, Wander) else None
-            both = varied & set(mount.replaced if mount else ())
+            mounted = trajectory.mount.replaced if trajectory.mount else {}
+            both = varied & set(mounted)
             if both:
                 keys = ", ".join(sorted(both))
-                raise SuiteError(f"its severities change {keys} of the rig, which the mount of trajectory '{name}' sets")
+                raise SuiteError(
+                    f"its severities change {keys} of the rig, which the mount of trajectory '{name}' sets"
+                )
 
     def _folder_of_rig(self, scenario: Scenario) -> Path:
         """The folder at which the paths in a rig start: that of the suite if it has a rig, or of the scenario."""
