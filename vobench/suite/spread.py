@@ -160,16 +160,16 @@ class Dealer:
         places = Counter[str]()
         kinds = Counter[str]()
         order = self._rng.permutation(len(self.units)).tolist()
+        candidates = [self.units[index] for index in order]
+
+        def rank(unit: Unit) -> tuple[int, ...]:
+            """The candidate with the lowest rank is next."""
+            runs_of_kind = runs if kinds[unit.kind] else 0
+            return self._dealt[unit.name] + runs_of_kind, kinds[unit.kind], places[unit.place], self._load(unit)
+
         for _ in range(self.each):
-            candidates = [self.units[index] for index in order if self.units[index] not in chosen]
-            unit = min(
-                candidates,
-                key=lambda unit: (
-                    self._dealt[unit.name] + runs * kinds[unit.kind],
-                    places[unit.place],
-                    self._load(unit),
-                ),
-            )
+            unit = min(candidates, key=rank)
+            candidates.remove(unit)
             chosen.append(unit)
             places[unit.place] += 1
             kinds[unit.kind] += 1
