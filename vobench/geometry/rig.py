@@ -148,9 +148,10 @@ class Mount:
     height_m: float | None = None
 
     @property
-    def replaced(self) -> dict[str, float]:
+    def replaced(self) -> dict[str, Any]:
         """The keys of a rig that are replaced, and their values."""
-        return {each.name: value for each in fields(self) if (value := getattr(self, each.name)) is not None}
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {key: value for key, value in values.items() if value is not None}
 
 
 def mounted_rig(
