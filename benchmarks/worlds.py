@@ -30,16 +30,19 @@ from vobench.suite.scene_file import read_place
 from vobench.suite.suite import read_plan
 from vobench.suite.viewpoint import Viewpoint
 
-PLACES = ("flat", "office")
+PLACES = ("flat", "office", "street", "warehouse")
 STAGES = ("build", "light", "open", "picture")
 CAMERA = Pinhole(752, 480, 458.0, 458.0, 375.5, 239.5)
 EYE_HEIGHT_M = 1.2
 YAW_DEG = 45.0
 PITCH_DEG = 8.0
 MIB = 1 << 10  # of the KiB in which Linux counts memory
+SCENARIOS = 4  # of the suite; together they have each place once
 SUITE = """name: many
-scenes: [{name: flat, seeds: HALF}, {name: office, seeds: HALF}]
-trajectories: {tour: {kind: wander, length_m: 6}}
+scenes: [{name: flat, seeds: N}, {name: office, seeds: N}, {name: street, seeds: N}, {name: warehouse, seeds: N}]
+trajectories: {tour: {kind: wander, length_m: 6}, car: {kind: wander, length_m: 30, body: car, mount: {height_m: 1.6}}}
+scenarios: {noise: [1, 3], jpeg: [1, 3], drops: [1, 3], vignetting: [1, 3]}
+spread: {units: UNITS, each: EACH, pairs: {flat: [tour], office: [tour], street: [car], warehouse: [tour]}}
 estimators: [stand_still]
 """
 
@@ -97,7 +100,9 @@ def _text(costs_s: list[float]) -> str:
 
 def _plan(places: int) -> None:
     """Read a suite of many places, count its tasks, and print what that costs."""
-    text = SUITE.replace("HALF", str(places // 2))
+    seeds = places // len(PLACES)
+    units = seeds * len(PLACES)
+    text = SUITE.replace("UNITS", str(units)).replace("EACH", str(units // SCENARIOS)).replace("N}", f"{seeds}}}")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "many.yaml"
         path.write_text(text, encoding="utf-8")

@@ -194,3 +194,26 @@ def test_more_units_in_each_than_there_are_is_a_mistake_of_spread(spread_plan, p
     text = SPREAD.replace("each: 2", "each: 9")
     with pytest.raises(SuiteError, match=r"spread: spread runs each scenario in 9 units, but there are 8"):
         plan(f"{text}scenarios: {{mist: 1}}\n")
+
+
+def test_the_body_of_a_unit_carries_the_rig_as_its_mount_says(spread_plan, monkeypatch):
+    mounted = "{walk: {kind: wander, length_m: 1, body: hand, mount: {height_m: 0, pitch_deg: 3}}, tour"
+    monkeypatch.setitem(globals(), "SPREAD", SPREAD.replace("{tour", mounted).replace("seeds: 2}}", "seeds: 1}}"))
+    cases = [case for case in spread_plan().simulated if case.scenario in NAMES]
+    by_drive = {case.variant["trajectory"]: case.rig for case in cases}
+    assert by_drive.keys() == {"walk", "tour.1"}
+    assert (by_drive["walk"].height_m, by_drive["walk"].pitch_deg) == (0, 3)
+    assert by_drive["walk"].forward_m == by_drive["tour.1"].forward_m
+    assert (by_drive["tour.1"].height_m, by_drive["tour.1"].pitch_deg) == (0.4, 90)
+
+
+def test_a_scenario_that_changes_what_a_mount_sets_is_refused(plan, tmp_path, spread_plan):
+    del spread_plan  # it writes the files
+    tilt = PLAIN.format(name="tilt").replace("{camera: {gain_db: 18}}", "{rig: {pitch_deg: 60}}")
+    (tmp_path / "suites" / "scenarios" / "tilt.yaml").write_text(tilt)
+    text = SPREAD.replace("length_m: 1", "length_m: 1, mount: {pitch_deg: 3}")
+    with pytest.raises(SuiteError, match="tilt: its severities change pitch_deg of the rig, which the mount"):
+        plan(f"{text}scenarios: {{tilt: [0, 5]}}\n")
+    free = SPREAD.replace("length_m: 1", "length_m: 1, mount: {height_m: 1}")
+    pitches = {case.rig.pitch_deg for case in plan(f"{free}scenarios: {{tilt: [0, 5]}}\n").simulated}
+    assert pitches == {90, 60}

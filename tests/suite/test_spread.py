@@ -149,3 +149,21 @@ def test_more_units_than_pairs_allow_is_an_error() -> None:
 def test_pairs_require_a_design_over_both_axes() -> None:
     with pytest.raises(SettingError, match="pairs"):
         Spread(units=2, over=("scene",), pairs={"flat": ("tour",)})
+
+
+def test_a_treatment_gets_different_kinds_of_places_where_it_can_and_units_stay_balanced() -> None:
+    scenes = ["park", "flat.1", "flat.2", "flat.3", "street.1", "street.2", "street.3"]
+    made = units(Spread(units=7), {"scene": scenes, "trajectory": ["tour"]})
+    dealer = Dealer(made, 3, seed=1)
+    load = Counter[str]()
+    for _ in range(20):
+        dealt = dealer.deal(2)
+        assert len({unit.kind for unit in dealt}) >= 2
+        load.update(unit.name for unit in dealt)
+    assert len(load) == 7
+    assert max(load.values()) - min(load.values()) <= 2
+
+
+def test_where_all_places_are_of_one_kind_it_does_not_matter() -> None:
+    of_one_kind = Dealer(units(Spread(units=12), VARIANTS), 3, seed=1).deal()
+    assert len({unit.place for unit in of_one_kind}) == 3

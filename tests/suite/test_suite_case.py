@@ -118,3 +118,19 @@ def test_geometry_is_built_only_for_lights_that_the_file_does_not_list(tmp_path,
     assert not built
     assert names(scene_lights(scene, ["candle"])) == ["lamp"]
     assert len(built) == 1
+
+
+def test_a_mount_replaces_its_keys_of_every_rig_and_no_others(plan):
+    drives = "trajectories: {low: {targets_m: [[0.5, 0]]}, high: {targets_m: [[0.5, 0]], mount: {height_m: 1.2}}}\n"
+    rigs = "rigs: {down: {pitch_deg: 90, height_m: 0.5}, ahead: {pitch_deg: 5, height_m: 0.6}}\n"
+    seen = {}
+    for case in plan(rigs + drives).simulated:
+        rig = case.build_rig()
+        assert rig.T_body_left[2, 3] == pytest.approx(case.rig.height_m)
+        seen[case.variant["rig"], case.variant["trajectory"]] = (case.rig.pitch_deg, case.rig.height_m)
+    assert seen == {
+        ("down", "low"): (90, 0.5),
+        ("down", "high"): (90, 1.2),
+        ("ahead", "low"): (5, 0.6),
+        ("ahead", "high"): (5, 1.2),
+    }

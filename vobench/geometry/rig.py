@@ -1,6 +1,6 @@
 """Stereo rigs: cameras, mounts, wheels and IMU of a body; presets, declared calibration error, rectification."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -134,6 +134,24 @@ def looking(*, pitch_deg: float, position_m: tuple[float, float, float]) -> Arra
     down = np.cross(forward, right)
     R_body_camera = np.stack([right, down, forward], -1)
     return se3.transform(R_body_camera, position_m)
+
+
+@settings()
+class Mount:
+    """Where the body of a trajectory carries its cameras, and how far these look down.
+
+    What is None remains as in the rig.
+    """
+
+    pitch_deg: Annotated[float, Ge(-90), Le(90)] | None = None
+    forward_m: float | None = None
+    height_m: float | None = None
+
+    @property
+    def replaced(self) -> dict[str, Any]:
+        """The keys of a rig that are replaced, and their values."""
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {key: value for key, value in values.items() if value is not None}
 
 
 def mounted_rig(

@@ -7,6 +7,7 @@ import numpy as np
 
 from vobench.errors import SettingError
 from vobench.geometry import se3
+from vobench.geometry.rig import Mount
 from vobench.geometry.se3 import Array
 from vobench.motion.spline import Poses, columns, pose_spline, turned
 from vobench.motion.wheeled import Rate
@@ -131,6 +132,7 @@ class Handheld:
     shake: Annotated[str, OneOf("shake", SHAKES)] = "walking"
     ease_s: NonNegative = 0.0
     rate_hz: Rate = 30.0
+    mount: Mount | None = None
 
     def motion(self, rng: np.random.Generator) -> HandheldMotion:
         """The motion with its shake drawn from `rng`. Raises MotionError."""

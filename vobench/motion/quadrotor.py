@@ -14,6 +14,7 @@ from annotated_types import Ge, Le, MaxLen, MinLen
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
+from vobench.geometry.rig import Mount
 from vobench.geometry.se3 import Array
 from vobench.motion.rail import check_apart
 from vobench.motion.spline import Jet, from_zero, of_axes
@@ -84,6 +85,7 @@ class Quadrotor:
     speed_mps: Speed = 0.5
     yaw_deg: Annotated[float, Ge(-360), Le(360)] | None = None
     rate_hz: Rate = 30.0
+    mount: Mount | None = None
 
     def motion(self) -> CurveMotion:
         """The motion. Raises MotionError for invalid points or times, and for rotors that would have to pull."""

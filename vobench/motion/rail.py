@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
+from vobench.geometry.rig import Mount
 from vobench.geometry.se3 import Array
 from vobench.motion.course import BLUNT, ArcLength, arc_length
 from vobench.motion.spline import Jet, of_axes, quintic
@@ -67,6 +68,7 @@ class Rail:
     speed_mps: Speed = 0.3
     accel_mps2: Acceleration = 0.5
     rate_hz: Rate = 30.0
+    mount: Mount | None = None
 
     def motion(self) -> CurveMotion:
         """The motion. Raises MotionError for two equal points, and for a rail that is too steep or turns back."""

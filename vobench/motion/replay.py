@@ -9,6 +9,7 @@ from annotated_types import Ge, Gt, Le
 
 from vobench.errors import InputError, MotionError, SettingError, unknown_name_sentence
 from vobench.geometry import se3
+from vobench.geometry.rig import Mount
 from vobench.geometry.se3 import Array
 from vobench.motion.spline import FEWEST, Attitude, Jet, PoseCurve, of_quaternion, through
 from vobench.motion.wheeled import Rate
@@ -52,6 +53,7 @@ class Replay:
     start_m: Triple | None = None
     start_heading_deg: float = 0.0
     rate_hz: Rate = 30.0
+    mount: Mount | None = None
 
     def __post_init__(self) -> None:
         try:

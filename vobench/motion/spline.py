@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from vobench.errors import MotionError
 from vobench.geometry import se3
+from vobench.geometry.rig import Mount
 from vobench.geometry.se3 import Array
 from vobench.motion.wheeled import Rate
 from vobench.setting import MOST_POINTS, NonNegative, Triple, settings
@@ -158,6 +159,7 @@ class PoseSpline:
     poses: Poses
     ease_s: NonNegative = 0.0
     rate_hz: Rate = 30.0
+    mount: Mount | None = None
 
     def motion(self) -> CurveMotion:
         """The motion. Raises MotionError."""

@@ -15,7 +15,7 @@ from annotated_types import Ge, Gt, Le
 from numpy.typing import NDArray
 
 from vobench.errors import MotionError
-from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
+from vobench.geometry.rig import PIONEER_WHEELS, Mount, WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS, ackermann
 from vobench.motion.course import Course, CoursePiece, course
@@ -165,8 +165,8 @@ class Wander:
     """A drive at random through the free space of its place; another seed is another drive.
 
     `seeds` is the number of drives, with seeds from `seed` on, plus the base seed of the suite. A hand holds the body
-    at about 1.45 m, and its rig should have height_m 0; a quadrotor flies 0.7 to 1.5 m above the floor. The wheels of
-    pioneer and car roll without slip.
+    at about 1.45 m, and a quadrotor flies 0.7 to 1.5 m above the floor: their cameras should have height_m 0. The
+    wheels of pioneer and car roll without slip.
     """
 
     kind: Literal["wander"] = "wander"
@@ -177,6 +177,7 @@ class Wander:
     speed_mps: Speed | None = None
     rate_hz: Rate = 30.0
     encoders: Literal["exact", "nominal"] = "nominal"
+    mount: Mount | None = None
 
     @property
     def habits(self) -> BodyHabits:

@@ -10,7 +10,7 @@ from annotated_types import Ge, Gt, Le
 from numpy.typing import NDArray
 
 from vobench.errors import SettingError
-from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
+from vobench.geometry.rig import PIONEER_WHEELS, Mount, WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS
 from vobench.motion.controller import CONTROLLERS
@@ -80,6 +80,7 @@ class Wheeled:
     delta: Annotated[str, OneOf("disturbance", DELTAS)] = "none"
     integrator: Annotated[str, OneOf("integrator", INTEGRATORS)] = "rk4"
     substeps: Annotated[int, Ge(1), Le(64)] = 4
+    mount: Mount | None = None
 
     def __post_init__(self) -> None:
         if self.mover not in self.mover_keys:

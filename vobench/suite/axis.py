@@ -20,6 +20,7 @@ from vobench.geometry.rig import (
 from vobench.sensor.image_sensor import SENSOR_PRESETS, CameraSettings
 from vobench.sensor.imu import IMUS, ImuSettings
 from vobench.setting import FromPreset, OneOf, Positive, ShortForm, settings
+from vobench.suite.trajectory import TrajectorySpec
 
 AXES = ("scene", "lighting", "rig", "trajectory", "camera")
 LENS_KEYS = ("own", "calib", "camchain")  # replace the preset
@@ -74,6 +75,11 @@ class RigSettings:
         else:
             pair = kalibr.read_pair(folder / str(self.camchain))
         return replace(self, own=custom_stereo_pair(pair), calib=None, size_px=None, camchain=None)
+
+    def mounted_on(self, trajectory: TrajectorySpec) -> "RigSettings":
+        """The rig on the body of a trajectory, which may carry its cameras elsewhere."""
+        mount = trajectory.mount
+        return replace(self, **mount.replaced) if mount else self
 
     def build(self) -> Rig:
         """The sensors with their nominal calibration. Raises InputError if the lenses have not been read."""

@@ -1,7 +1,7 @@
 """Scenarios: simulated cases in which one difficulty for odometry increases from severity 0 to severity 5."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -70,6 +70,12 @@ class Scenario:
         changed_keys = [key for key in PLACE_KEYS if self._is_changed_by_any_severity(key)]
         return not changed_keys and not self.setups[0].lighting
 
+    @property
+    def varied_rig_keys(self) -> set[str]:
+        """The keys of the rig that differ between severities."""
+        rigs = [setup.rig for setup in self.setups]
+        return {each.name for each in fields(RigSettings) if any(_differs(rig, rigs[0], each.name) for rig in rigs)}
+
     def _is_changed_by_any_severity(self, key: str) -> bool:
         """Whether a key of the setup differs from that of severity 0 at another severity."""
         base_value = getattr(self.setups[0], key)
@@ -94,6 +100,10 @@ class Scenario:
         """The name, followed by the severity if it changes this key of the setup."""
         is_unchanged = getattr(self.setups[severity], key) == getattr(self.setups[0], key)
         return name if is_unchanged else f"{name}.{severity}"
+
+
+def _differs(rig: RigSettings, base: RigSettings, key: str) -> bool:
+    return bool(getattr(rig, key) != getattr(base, key))
 
 
 def read_scenario(path: Path, replaced: Mapping[str, Any] = MappingProxyType({})) -> Scenario:

@@ -15,7 +15,7 @@ from vobench.suite.lookup import Lookup
 from vobench.suite.scenario import Scenario, Setup, read_scenario
 from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_spec import SceneFile
-from vobench.suite.spread import UNIT_AXES, Dealer, units
+from vobench.suite.spread import UNIT_AXES, Dealer, Unit, units
 from vobench.suite.suite_case import Axes, check_buildable, scene_lights, shared_settings
 from vobench.suite.suite_spec import Suite
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
@@ -81,21 +81,37 @@ class ScenarioCases:
         """The cases of a scenario in its units; severities share units, so that they differ by severity alone."""
         runs = sum(len(self._calibration_levels(severity)) for severity in severities)
         chosen = dealer.deal(runs)
+        self._require_free_mounts(scenario, chosen)
         for severity in severities:
             setup = scenario.setups[severity]
             for unit in chosen:
                 by_axis: dict[str, str] = {
                     axis: unit.by_axis.get(axis) or next(iter(self.axes[axis])) for axis in UNIT_AXES
                 }
+                trajectory = self.axes["trajectory"][by_axis["trajectory"]]
                 yield from self._cases(
                     scenario,
                     severity,
                     scene=self.axes["scene"][by_axis["scene"]],
-                    trajectory=self.axes["trajectory"][by_axis["trajectory"]],
+                    trajectory=trajectory,
                     replayed=self.replayed.get(by_axis["trajectory"]),
                     variant={**scenario.variant_names(severity, by_axis["scene"]), **by_axis},
-                    rig=setup.rig.read(self._folder_of_rig(scenario)),
+                    rig=setup.rig.read(self._folder_of_rig(scenario)).mounted_on(trajectory),
                     unit=unit.name,
+                )
+
+    def _require_free_mounts(self, scenario: Scenario, chosen: Sequence[Unit]) -> None:
+        """Raise SuiteError if a trajectory mounts the cameras where only the severities of a scenario should."""
+        varied = scenario.varied_rig_keys
+        for unit in chosen:
+            name = unit.by_axis.get("trajectory") or next(iter(self.axes["trajectory"]))
+            trajectory = self.axes["trajectory"][name]
+            mounted = trajectory.mount.replaced if trajectory.mount else {}
+            both = varied & set(mounted)
+            if both:
+                keys = ", ".join(sorted(both))
+                raise SuiteError(
+                    f"its severities change {keys} of the rig, which the mount of trajectory '{name}' sets"
                 )
 
     def _folder_of_rig(self, scenario: Scenario) -> Path:

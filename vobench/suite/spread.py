@@ -54,6 +54,11 @@ class Unit:
         return self.by_axis.get("scene", "") or self.by_axis["trajectory"]
 
     @property
+    def kind(self) -> str:
+        """What places have in common that differ by their seed: the name before the seed."""
+        return self.place.split(".")[0]
+
+    @property
     def name(self) -> str:
         """The variants in the order of the axes, as in the names of cases."""
         return "-".join(self.by_axis[axis] for axis in UNIT_AXES if axis in self.by_axis)
@@ -132,8 +137,9 @@ def _diagonals(variants: Mapping[str, Sequence[str]], allowed: Mapping[str, list
 class Dealer:
     """Deals units to treatments one after the other, such as scenarios, so that units have about equally many.
 
-    A treatment gets different units, if possible in different places. Among units that have equally many treatments,
-    those of the places and drives that have the fewest come first; the rest is drawn by the seed.
+    A treatment gets different units, if possible in different kinds of places: a kind that it already has counts as
+    one more treatment of all units there. Among units that have equally many treatments, those of the places and drives
+    that have the fewest come first; the rest is drawn by the seed.
     """
 
     units: Sequence[Unit]
@@ -152,12 +158,21 @@ class Dealer:
         """The units of the next treatment, which has a number of runs in each of them."""
         chosen = list[Unit]()
         places = Counter[str]()
+        kinds = Counter[str]()
         order = self._rng.permutation(len(self.units)).tolist()
+        candidates = [self.units[index] for index in order]
+
+        def rank(unit: Unit) -> tuple[int, ...]:
+            """The candidate with the lowest rank is next."""
+            runs_of_kind = runs if kinds[unit.kind] else 0
+            return self._dealt[unit.name] + runs_of_kind, kinds[unit.kind], places[unit.place], self._load(unit)
+
         for _ in range(self.each):
-            candidates = [self.units[index] for index in order if self.units[index] not in chosen]
-            unit = min(candidates, key=lambda unit: (self._dealt[unit.name], places[unit.place], self._load(unit)))
+            unit = min(candidates, key=rank)
+            candidates.remove(unit)
             chosen.append(unit)
             places[unit.place] += 1
+            kinds[unit.kind] += 1
             self._dealt[unit.name] += runs
             for variant in unit.by_axis.items():
                 self._dealt_by_variant[variant] += runs

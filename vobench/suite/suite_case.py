@@ -189,6 +189,7 @@ class AxisReader:
     def case(self, variant: Variant, axes: Axes, replayed: Mapping[str, str]) -> Case:
         """The case of one combination."""
         chosen = {axis: axes[axis][name] for axis, name in variant.by_axis.items()}
+        chosen["rig"] = chosen["rig"].mounted_on(chosen["trajectory"])
         return Case(
             name=variant.name,
             variant=variant.by_axis,
