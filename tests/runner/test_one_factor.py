@@ -147,7 +147,9 @@ def test_switching_one_effect_changes_its_own_channels_and_no_other(base, cache,
 
 def test_fog_changes_pictures_but_no_truth_of_pixels(cache, tmp_path):
     clear = channels(recorded(tmp_path / "clear", cache=cache, TRUTH="[depth, flow, occlusion]"))
-    foggy = channels(recorded(tmp_path / "foggy", cache=cache, TRUTH="[depth, flow, occlusion]", AIR="fog: {visibility_m: 5}\n"))
+    foggy = channels(
+        recorded(tmp_path / "foggy", cache=cache, TRUTH="[depth, flow, occlusion]", AIR="fog: {visibility_m: 5}\n")
+    )
     assert any("depth" in topic for topic in clear)
     assert {topic for topic in clear if clear[topic] != foggy[topic]} == PICTURES
 
