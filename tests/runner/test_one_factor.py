@@ -19,7 +19,7 @@ materials:
   grain: {pattern: terrazzo, albedo: 0.5, contrast: 0.6, resolution_px: 256}
 room: {size_m: [3, 3, 1.5], floor: grain, wall: grain, ceiling: grain}
 lamps: [{name: lamp, center_m: [0, 0, 1.4], size_m: [0.4, 0.4], power_lm: 600}]
-"""
+AIR"""
 SUITE = """name: one
 seed: 3
 scenes: [SCENE]
@@ -39,6 +39,7 @@ DEFAULTS = {
     "FLOOR": "",
     "CAMERA": "",
     "TRUTH": "[]",
+    "AIR": "",
 }
 LEFT, RIGHT = "sensors/cam_left/image/compressed", "sensors/cam_right/image/compressed"
 PICTURES = {LEFT, RIGHT}
@@ -86,6 +87,7 @@ FACTORS = {
     "no IMU": ({"IMU": "null"}, {READINGS, BIAS, "sensors/tf_static", "truth/tf_static"}),
     "floor elsewhere": ({"FLOOR": ", floor: [{surface: wet, center_m: [0, 1], size_m: [0.5, 0.5]}]"}, set()),
     "encoders": ({"ENCODERS": "exact"}, {"sensors/encoders"}),
+    "fog": ({"AIR": "fog: {visibility_m: 5}\n"}, PICTURES),
     "truth of pixels": ({"TRUTH": "[depth, flow, occlusion]"}, set()),
 }
 
@@ -93,9 +95,10 @@ FACTORS = {
 def recorded(folder: Path, *, cache: Path | None = None, **factors: str) -> Path:
     """The sequence of the suite with these texts in place of its defaults; made anew without a cache."""
     (folder / "scenes").mkdir(parents=True)
-    (folder / "scenes" / "cell.yaml").write_text(SCENE)
+    texts = {**DEFAULTS, **factors}
+    (folder / "scenes" / "cell.yaml").write_text(SCENE.replace("AIR", texts.pop("AIR")))
     text = SUITE.replace("SCENE", str(folder / "scenes" / "cell.yaml"))
-    for key, value in {**DEFAULTS, **factors}.items():
+    for key, value in texts.items():
         text = text.replace(key, value)
     (folder / "one.yaml").write_text(text)
     (case,) = read_plan(str(folder / "one.yaml")).cases
@@ -140,6 +143,15 @@ def test_switching_one_effect_changes_its_own_channels_and_no_other(base, cache,
     changed = {topic for topic in before if before[topic] != after.get(topic)}
     assert changed <= may_change
     assert changed >= may_change - {RECTIFIED_LEFT}
+
+
+def test_fog_changes_pictures_but_no_truth_of_pixels(cache, tmp_path):
+    clear = channels(recorded(tmp_path / "clear", cache=cache, TRUTH="[depth, flow, occlusion]"))
+    foggy = channels(
+        recorded(tmp_path / "foggy", cache=cache, TRUTH="[depth, flow, occlusion]", AIR="fog: {visibility_m: 5}\n")
+    )
+    assert any("depth" in topic for topic in clear)
+    assert {topic for topic in clear if clear[topic] != foggy[topic]} == PICTURES
 
 
 def test_slip_changes_the_way_but_no_noise_of_the_chip(base, dry):

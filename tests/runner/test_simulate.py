@@ -9,13 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from vobench.errors import InputError
 from vobench.geometry.camera import Camera
 from vobench.rendering.renderer import Radiance, View
 from vobench.runner import simulate as simulate_file
 from vobench.runner.motion import body_motion
 from vobench.runner.simulate import content, frames_of, libraries, open_renderer, simulate
 from vobench.runner.store import SilentProgress
+from vobench.scene.fog import Fog
 from vobench.scene.material import Rgb
+from vobench.scene.scene import Scene
 from vobench.sequence import reader
 from vobench.suite.case import Case
 from vobench.suite.suite import read_plan
@@ -133,6 +136,13 @@ def test_an_engine_without_what_it_draws_with_is_refused(read) -> None:
         open_renderer(scene, Rendering(engine="raster"), None)
     with pytest.raises(ValueError, match="pyrender needs white_cd_m2"):
         open_renderer(scene, Rendering(engine="pyrender"), None)
+
+
+@pytest.mark.parametrize("engine", ["path", "pyrender"])
+def test_an_engine_that_draws_no_fog_refuses_a_scene_with_fog(engine: str) -> None:
+    scene = Scene("yard", (), {}, (), fog=Fog(visibility_m=60.0))
+    with pytest.raises(InputError, match=f"yard: fog requires engine raster, but the engine is {engine}"):
+        open_renderer(scene, Rendering(engine=engine), None, white_cd_m2=50.0)
 
 
 def test_the_truth_is_the_motion_at_the_stamps_of_the_pictures(simulated) -> None:

@@ -11,6 +11,7 @@ import trimesh
 from vobench.asset import FINISHES, FURNITURE
 from vobench.asset import room as kinds
 from vobench.errors import ModelError, SuiteError
+from vobench.scene.fog import Fog
 from vobench.scene.light import AreaLight, PointLight
 from vobench.scene.material import LUMINANCE, linear
 from vobench.scene.scene import Scene
@@ -290,3 +291,16 @@ def test_a_screen_gives_the_light_of_its_picture(yard) -> None:
     assert lamp.luminance_cd_m2 == pytest.approx(shown @ LUMINANCE, rel=1e-6)
     np.testing.assert_allclose(lamp.luminance_cd_m2 * np.array(lamp.colour), shown, rtol=1e-6)
     assert shown.max() < 0.9 * max(look.emission_cd_m2)
+
+
+def test_a_scene_has_the_fog_of_its_file_which_grows_with_its_scale(tmp_path: Path) -> None:
+    (tmp_path / "yard.yaml").write_text(YAML + "fog: {visibility_m: 60, airlight: sky}\nscale: 2\n")
+    assert build(read_scene(tmp_path / "yard.yaml"), {}).fog == Fog(visibility_m=120.0, airlight="sky")
+
+
+def test_airlight_of_a_sky_without_a_sky_is_refused(tmp_path: Path) -> None:
+    lamp = "lamps: [{name: bulb, kind: point, center_m: [0, 0, 2], power_lm: 900}]\n"
+    indoors = YAML.replace("sky: {illuminance_lx: 8000}\n", lamp)
+    (tmp_path / "yard.yaml").write_text(indoors + "fog: {visibility_m: 60, airlight: sky}\n")
+    with pytest.raises(SuiteError, match="airlight 'sky' requires a sky, and the scene has none"):
+        build(read_scene(tmp_path / "yard.yaml"), {})

@@ -58,6 +58,25 @@ class Background:
                 skies.append(StandardSky(gradation, nominal.scatter, nominal.sun, nominal.colour))
         return skies
 
+    def mean_cd_m2(self, start_ns: int, end_ns: int) -> Array:
+        """The luminance (3,) of an evenly bright sky with the illuminance of all skies together, over an interval."""
+        total_cd_m2 = np.zeros(3)
+        for sky in self._skies:
+            illuminance_lx = sky.level.mean(start_ns, end_ns) * sky.illuminance_lx
+            total_cd_m2 += illuminance_lx / np.pi * np.array(sky.colour)
+        return total_cd_m2
+
+
+def even_sky(luminance_cd_m2: Array) -> StandardSky:
+    """A background with the same luminance (3,) in every direction."""
+    none = np.zeros(4)
+    return StandardSky(
+        gradation=np.array([0.0, 0.0, 1.0, 1.0]),
+        scatter=none,
+        sun=none,
+        colour=np.array([*luminance_cd_m2, 0.0]),
+    )
+
 
 def _standard_sky(sky: Sky) -> StandardSky:
     """A sky at level 1. Source: ISO 15469:2004, eqs 1 to 7; the luminance at the zenith gives the scale."""

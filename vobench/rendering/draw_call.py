@@ -115,6 +115,8 @@ class DrawCalls:
         all_defines = defines | batch_defines | _canvas_defines(canvas)
         if view.mirror:
             all_defines |= {ShaderDefine.IS_MIRRORED}
+        if view.extinction_per_m:
+            all_defines |= {ShaderDefine.HAS_FOG}
         self._program("surface", "surface", all_defines).use()
         self._batch_buffer.use(batch.index)
         textures = self._textures[batch.index]

@@ -9,7 +9,7 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
-from vobench.rendering.background import Background
+from vobench.rendering.background import Background, even_sky
 from vobench.rendering.bake import BakedScene
 from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
@@ -21,6 +21,7 @@ from vobench.rendering.render_target import RenderTarget, render_target
 from vobench.rendering.renderer import Radiance, View
 from vobench.rendering.view import NO_GLINTS, Box, PinholeView, pinhole_view
 from vobench.rendering.warp import Warp, warp
+from vobench.scene.fog import Fog
 from vobench.scene.light import STEADY, Light, Steady
 from vobench.scene.material import Rgb
 from vobench.scene.triangles import Triangles
@@ -38,6 +39,7 @@ class FrameRenderer:
         self._ambient = AmbientLight(baked)
         self._movers = baked.scene.movers
         self._lights = baked.scene.lights
+        self._fog = baked.scene.fog
         light_map = self._illumination.at(0, 0)
         self._light = ShadedLight(baked, light_map) if self._movers else LightTexture(light_map)
         drawn = geometry(baked.faces, baked.light_uv, baked.scene.materials)
@@ -171,12 +173,26 @@ class FrameRenderer:
             ambient_cd_m2=np.broadcast_to(self._ambient.cd_m2(light), 3),
             glints=shown_glints,
         )
+        if self._fog:
+            pinhole = self._in_fog(pinhole, self._fog, start_ns, end_ns)
         if isinstance(self._light, ShadedLight):
             colours, suns_ns = self._illumination.lights_at(start_ns, end_ns)
             self._light.shade(light, middle_ns, suns_ns, colours, self._draw.views(pinhole, box))
         else:
             self._light.update(light)
         return pinhole
+
+    def _in_fog(self, view: PinholeView, fog: Fog, start_ns: int, end_ns: int) -> PinholeView:
+        """A view in fog, which hides the sky."""
+        airlight_cd_m2 = view.ambient_cd_m2
+        if fog.airlight == "sky":
+            airlight_cd_m2 = self._background.mean_cd_m2(start_ns, end_ns)
+        return replace(
+            view,
+            skies=[even_sky(airlight_cd_m2)],
+            extinction_per_m=fog.extinction_per_m,
+            airlight_cd_m2=airlight_cd_m2,
+        )
 
 
 def _steady(light: Light) -> Light:

@@ -11,6 +11,7 @@ class ShaderDefine(StrEnum):
 
     # The view.
     IS_MIRRORED = "IS_MIRRORED"  # the view is the image in a mirror
+    HAS_FOG = "HAS_FOG"
 
     # The batch.
     IS_PLANAR = "IS_PLANAR"  # its faces lie in one plane, in which the scene is mirrored

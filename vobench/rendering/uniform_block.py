@@ -101,6 +101,8 @@ PASS = UniformBlock(
         Field("vec3", "ambient", "what is mirrored where no mirror is followed"),
         Field("vec3", "weights", "of the channels in a picture that has one"),
         Field("float", "inverse_weight_sum", "1 / the sum of the weights"),
+        Field("vec3", "airlight", "luminance of endless fog"),
+        Field("float", "extinction", "of fog, per metre"),
         Field("vec3", "probe_centre", "where the probe was drawn from"),
         Field("vec3", "probe_low", "lower bounds of the room that it shows"),
         Field("vec3", "probe_high", "upper bounds of that room"),

@@ -34,6 +34,8 @@ def set_view(
     uniforms["ambient"] = view.ambient_cd_m2
     uniforms["weights"] = weights
     uniforms["inverse_weight_sum"] = 1 / sum(weights)
+    uniforms["airlight"] = view.airlight_cd_m2
+    uniforms["extinction"] = view.extinction_per_m
 
 
 def set_probe(uniforms: Block, view: PinholeView, probe: Probe) -> None:

@@ -109,6 +109,7 @@ class PinholeView:
     there were no mirrors.
     eye_m (3,) is behind the last mirror, if any.
     images (4, 4) takes what the last mirror shows to where the camera sees it. glints (G, 3, 4) as in `probe`.
+    extinction_per_m and airlight_cd_m2 (3,) are those of fog; 0 where the air is clear.
     """
 
     camera: Pinhole
@@ -122,6 +123,8 @@ class PinholeView:
     images: Array
     glints: Array = field(default_factory=lambda: NO_GLINTS)
     mirrors: tuple[Plane, ...] = ()
+    extinction_per_m: float = 0.0
+    airlight_cd_m2: Array = field(default_factory=lambda: np.zeros(3))
 
     def through(self, mirror: Plane) -> "PinholeView":
         """The view into a mirror."""

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from vobench.errors import InputError
 from vobench.geometry.rig import SIDES
 from vobench.runner.key import canonical, versions
 from vobench.runner.motion import BodyMotion, body_motion, generator, require_possible
@@ -77,8 +78,11 @@ def open_renderer(
     `light` is the folder with the light of the scene, for the engine raster. `white_cd_m2` is the luminance of white,
     for the engine pyrender, which renders 8 bits.
 
-    Raises MissingDependencyError if this machine cannot render.
+    Raises MissingDependencyError if this machine cannot render, and InputError if the engine does not draw the scene's
+    fog.
     """
+    if scene.fog and rendering.engine != "raster":
+        raise InputError(f"{scene.name}: fog requires engine raster, but the engine is {rendering.engine}")
     if rendering.engine == "path":
         from vobench.rendering.path import SAMPLES, PathRenderer
 

@@ -50,6 +50,7 @@ UNLIT: dict[str, Any] = {
     "lamps": {"__all__": {"level"}},
     "sun": {"level"},
     "sky": {"level"},
+    "fog": True,
 }
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.scene.fog import Fog
 from vobench.scene.light import AreaLight, Light, PointLight, SpotLight
 from vobench.scene.material import Material
 from vobench.scene.mesh import moved, quad
@@ -118,13 +119,14 @@ class Mover:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Stationary things, their materials by name, the lights that shine on them, and movers."""
+    """Stationary things, their materials by name, the lights that shine on them, movers, and fog in the air."""
 
     name: str
     things: tuple[Thing, ...]
     materials: dict[str, Material]
     lights: tuple[Light, ...]
     movers: tuple[Mover, ...] = ()
+    fog: Fog | None = None
 
     @property
     def panels(self) -> tuple[AreaLight, ...]:
@@ -180,6 +182,7 @@ def sized(scene: Scene, by: float) -> Scene:
         things=tuple(_sized_thing(thing, by) for thing in scene.things),
         lights=tuple(_sized_light(light, by) for light in scene.lights),
         movers=tuple(movers),
+        fog=scene.fog and replace(scene.fog, visibility_m=scene.fog.visibility_m * by),
     )
 
 

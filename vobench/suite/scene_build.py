@@ -85,7 +85,10 @@ def _scene(spec: SceneFile) -> Scene:
         dict(whole.materials),
         (*whole.lights, *_area_lights(luminous_things, whole.materials)),
         whole.movers,
+        spec.fog,
     )
+    if scene.fog and scene.fog.airlight == "sky" and not any(isinstance(light, Sky) for light in scene.lights):
+        raise SuiteError(f"{scene.name}: fog with airlight 'sky' requires a sky, and the scene has none; use 'light'")
     return scene if spec.scale == 1 else scripted.sized(scene, spec.scale)
 
 

@@ -11,6 +11,7 @@ from vobench.asset import FURNITURE, PANORAMAS, ROLES
 from vobench.asset.texture import Procedural
 from vobench.errors import SettingError
 from vobench.geometry.se3 import Array
+from vobench.scene.fog import Fog
 from vobench.scene.light import (
     SKIES,
     AreaLight,
@@ -476,6 +477,7 @@ class SceneFile:
     lamps: tuple[LampSpec, ...] = ()
     sun: SunSpec | None = None
     sky: SkySpec | None = None
+    fog: Fog | None = None
     movers: tuple[MoverSpec, ...] = ()
 
     def __post_init__(self) -> None:

@@ -44,6 +44,7 @@ const float PI = 3.14159265358979;
 const float NARROWEST_RIM = 0.01;  // in opacity
 const float LEAST_COVERED = 0.02;  // less of a sample is not drawn
 const float SOLID = 0.98;  // more of a sample hides what is behind
+const float LEAST_CLEAR = 1e-6;  // share of light that passes the fog
 
 // Share of unpolarised light that a boundary from air to eta reflects (Born and Wolf, section 1.5), by one division.
 float fresnel(float c, float eta, float inverse_square)
@@ -93,6 +94,9 @@ void main()
     // Not clipped by OpenGL, which would move the ends of edges that must stay the same from mirror to mirror.
     if (before_mirror < 0.0) discard;
 #endif
+#ifdef HAS_FOG
+    float clear = exp(-view.extinction * length(to_eye));  // share of light that passes the fog (Koschmieder, 1924)
+#endif
     Shade colour = SHADE(batch.colour);
 #ifdef HAS_TEXTURE
     vec4 texel = texture(body_texture, at_texture, view.lod_bias[layer]);
@@ -131,6 +135,10 @@ void main()
     vec3 seen = texelFetch(reflection, ivec3(ivec2(gl_FragCoord.xy), layer), 0).rgb;
 #ifdef IS_MONO
     seen = vec3(view.inverse_weight_sum * seen.r);  // which has been weighted
+#endif
+#ifdef HAS_FOG
+    // It was drawn with the fog of the whole path. The part between the mirror and the eye is added at the end.
+    seen = (seen - (1.0 - clear) * view.airlight) / max(clear, LEAST_CLEAR);
 #endif
 #else
     vec3 seen = view.ambient;
@@ -183,6 +191,15 @@ void main()
     radiance = LIGHT(glow * around);
 #else
     radiance += LIGHT(glow);
+#endif
+#endif
+#ifdef HAS_FOG
+    Light air = (1.0 - clear) * LIGHT(view.airlight);
+#ifdef IS_PANE
+    // What is seen through the pane has the fog of its whole path already.
+    radiance = clear * radiance + (1.0 - through) * air;
+#else
+    radiance = clear * radiance + air;
 #endif
 #endif
 #ifdef IS_MONO
