@@ -209,9 +209,3 @@ def test_the_manifests_of_known_systems_in_the_docs_are_valid(tmp_path, name):
 
 def test_there_are_those_that_people_ask_for():
     assert set(WORKED) == {"orb_slam3", "openvins", "basalt", "stella_vslam", "libviso2", "dpvo", "cuvslam"}
-
-
-def test_the_example_with_both_pictures_is_the_scaffolds():
-    scaffold = ESTIMATORS.parent / "vobench" / "cli" / "scaffold" / "class" / "estimator.txt"
-    shown = next(block for block in blocks("text") if "frame.right" in block)
-    assert shown.rstrip() in scaffold.read_text(encoding="utf-8")
