@@ -62,9 +62,10 @@ class Run:
     @cached_property
     def trials(self) -> "pd.DataFrame":
         """One row per trial: case, estimator, repeat, the choices that make the case, its seeds, status and metrics."""
+        from vobench.report.case_facts import case_facts
         from vobench.report.run_tables import trial_frame
 
-        facts = {cell.case: cell.facts for cell in self._board.cells}
+        facts = {case: case_facts(self._folder, case) for case in self.cases}
         return trial_frame(self._scores, facts)
 
     @cached_property

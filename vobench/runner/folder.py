@@ -174,6 +174,7 @@ def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> fl
 
 ONLY_THEIR_OWN = "Estimators saw only their own files."
 ORACLE = "oracle"  # the claim of estimators that are part of vobench and use the ground truth
+NOT_DETERMINISTIC = "not deterministic"  # the claim of estimators whose answers to one sequence may differ
 
 
 def visible_to(trials: Iterable[TrialScore]) -> str:
