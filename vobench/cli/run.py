@@ -29,7 +29,6 @@ from vobench.suite.plan import Plan
 from vobench.suite.spread import changes_for_units
 from vobench.suite.suite import read_plan
 from vobench.suite.suite_spec import Suite
-from vobench.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from vobench.report.leaderboard import Board
@@ -283,30 +282,16 @@ def _run_until_decided(
     budget_s: float,
 ) -> "UntilDecided":
     """Run draws of a suite with progress on the terminal until each pair of estimators is decided or alike."""
-    from vobench.report import page
-    from vobench.report.until_decided import record, run_until_decided
-
-    def write_reports(folder: "RunFolder", scores: "list[TrialScore]") -> None:
-        record(folder, ratio=ratio)
-        page.write_reports(folder, scores)
+    from vobench.report.until_decided_run import run_draws
 
     def say(sentence: str) -> None:
         if not progress.quiet:
             terminal.warn(sentence)
 
-    with temporary_folder() as looks:
-        return run_until_decided(
-            draw,
-            look=lambda plan: _run(plan, looks, execution, progress, finish=_no_reports),
-            finish=lambda plan: _run(plan, out, execution, progress, finish=write_reports),
-            ratio=ratio,
-            budget_s=budget_s,
-            tell=say,
-        )
+    def run(plan: Plan, parent: Path, finish: "Finish") -> "RunFolder":
+        return _run(plan, parent, execution, progress, finish=finish)
 
-
-def _no_reports(folder: "RunFolder", scores: "list[TrialScore]") -> None:
-    del folder, scores
+    return run_draws(draw, run, out=out, ratio=ratio, budget_s=budget_s, tell=say)
 
 
 def _run(
