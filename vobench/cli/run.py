@@ -345,10 +345,11 @@ def _print_remarks(folder: "RunFolder", scores: "Sequence[TrialScore]", *, share
     if with_sequence(scores):
         trial = pick(scores, case=None, estimator=None)
         name = f"{folder.path}/{trial.case}/{trial.estimator}"
-        see = f"see it (`{command} view {name}`)"
-        # A recording cannot be simulated again.
-        ask = f", ask why (`{command} explain {name}`)" if "scene" in trial.variant else ""
-        console.print(f"{story(trial, case_facts(folder, trial.case))}: {see}{ask}")
+        lines = [f"{story(trial, case_facts(folder, trial.case))}:", f"  see it (`{command} view {name}`)"]
+        if "scene" in trial.variant:  # a recording cannot be simulated again
+            lines[-1] += ","
+            lines.append(f"  ask why (`{command} explain {name}`)")
+        console.print("\n".join(lines), soft_wrap=True)  # a command can be copied however wide the terminal is
 
 
 def _split_assignments(assignments: Sequence[str]) -> dict[str, str]:

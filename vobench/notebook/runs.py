@@ -178,7 +178,7 @@ class Run:
         parts = [_html_table(["case", *self.estimators], _matrix_rows(board), title)]
         for scope, (headings, *rows) in board_table.totals(board):
             parts.append(_html_table(headings, rows, f"totals over {scope}"))
-        sentences = [*board_table.remarks(board), *board_table.cell_notes(board), str(self.path)]
+        sentences = [*board_table.board_notes(board), str(self.path)]
         parts += [f"<small>{html.escape(sentence)}</small><br>" for sentence in sentences]
         return "\n".join(parts)
 

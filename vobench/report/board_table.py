@@ -29,6 +29,13 @@ LEGEND = (
 )
 
 
+# The same for a terminal.
+SHORT_LEGEND = (
+    "* best of its case; ~ not decided against it. × best: error relative to the first, where both survive. "
+    "◆ nothing better is cheaper. leaderboard.html explains the rest."
+)
+
+
 @dataclass(frozen=True, slots=True)
 class ShownCell:
     """The text of a cell.
@@ -210,15 +217,20 @@ def _total_row(total: Total, headings: Sequence[str]) -> list[str]:
     return [COLUMNS[heading](total) for heading in headings]
 
 
+def board_notes(board: Board) -> list[str]:
+    """All sentences below the tables of a board, the most important first."""
+    unbroken = [curve.sentence for curve in board.curves if curve.breaks_at is None]
+    return [*remarks(board), *cell_notes(board), *unbroken]
+
+
 def remarks(board: Board) -> list[str]:
     """Sentences on the totals: what they cover, who breaks down where, and how undecided orders could be decided."""
     breaking = [curve.sentence for curve in board.curves if curve.breaks_at is not None]
-    others = [curve.sentence for curve in board.curves if curve.breaks_at is None]
     undecided = []
     for above, total in zip(board.totals, board.totals[1:], strict=False):
         if total.decided_above is False and total.smallest_ratio is not None:
             undecided.append(_undecided(above, total))
-    return [*board.remarks, *breaking, *undecided, *others]
+    return [*board.remarks, *breaking, *undecided]
 
 
 def _undecided(above: Total, total: Total) -> str:

@@ -8,6 +8,7 @@ from statistics import fmean
 from typing import Any
 
 from vobench import stop
+from vobench.errors import printable
 from vobench.report import board_table, leaderboard
 from vobench.report.board_formats import FORMATS
 from vobench.report.board_metric import METRICS
@@ -168,7 +169,7 @@ def board_page(folder: RunFolder, scores: list[TrialScore], board: Board, beside
         named=board_table.named,
         claims={cell.estimator: cell.claims for cell in board.cells},
         totals=board_table.totals(board),
-        remarks=board_table.remarks(board),
+        remarks=[printable(note) for note in board_table.board_notes(board)],
         legend=board_table.LEGEND,
         data=_script_json(data),
     )
