@@ -11,12 +11,12 @@ from vobench.trajectory.increasing_column import increasing_rows
 from vobench.trajectory.kitti import KITTI_COLUMNS, NUMBERED_COLUMNS, frame_numbers, matrix_poses
 from vobench.trajectory.quaternion_columns import QuaternionOrder, rotations
 from vobench.trajectory.stamp_text import StampUnit, unchecked_stamps_ns
+from vobench.trajectory.tartanair import TARTANAIR_COLUMNS
 from vobench.trajectory.text_table import TextTable, content_lines, read_table
 from vobench.trajectory.trajectory import Stamps
 from vobench.trajectory.tum import TUM_COLUMNS
 
 LFS_POINTER = "version https://git-lfs.github.com/spec/"
-TARTANAIR_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 FORMATS_WITHOUT_COMMAS = (TUM_COLUMNS, KITTI_COLUMNS, NUMBERED_COLUMNS, TARTANAIR_COLUMNS)
 COLUMNS_BY_COUNT = {len(columns): columns for columns in FORMATS_WITHOUT_COMMAS}
 KNOWN_FORMATS = (
