@@ -1,6 +1,6 @@
 """Shrinks the worst trials of a run that ended well, and runs each saved suite again in another folder.
 
-    python benchmarks/shrink.py runs/regression/latest --count 10
+    vobench run benchmarks/shrink.yaml && python benchmarks/shrink.py runs/shrink/latest --count 20
 
 For each trial it prints the share of frames that is left, and whether the suite fails in the same way there.
 """
