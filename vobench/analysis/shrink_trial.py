@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from vobench.analysis.explain import segment_loss
 from vobench.analysis.nuisance import nuisances_of
+from vobench.analysis.segment_loss import segment_loss
 from vobench.analysis.shrink import MIN_FRAMES, Failure, Shrunk, shrink
 from vobench.analysis.trial_data import TrialPaths, read_paths
 from vobench.errors import InputError
