@@ -13,7 +13,7 @@ from vobench.dataset.export import export as export_sequence
 from vobench.errors import counted
 from vobench.runner.import_recording import import_dataset
 
-COMMAND_CLASS = FormCommand  # both commands are of this class, which lists the known forms in its help
+COMMAND_CLASS = FormCommand  # `CommandGroup` reads it: both commands list the known forms in their help
 
 
 @with_option_groups
