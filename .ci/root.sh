@@ -32,9 +32,10 @@ mirror() {
   echo "${uris:-http://deb.debian.org/debian}" | head -n 1 | tr -d ' '
 }
 
-# make_root SUITE ROOT: a bare Debian of that suite; on failure says why and returns 1.
+# make_root SUITE ROOT: a bare Debian of that suite; on failure says why and returns 1. Roots of one name share
+# apt's archives, so two of one name must not be made at once.
 make_root() {
-  local suite=$1 root=$2 archives="$DOWNLOADS/apt-$1" script=/usr/share/debootstrap/scripts
+  local suite=$1 root=$2 archives="$DOWNLOADS/apt-${2##*/}" script=/usr/share/debootstrap/scripts
   mkdir -p "$archives"
   # A debootstrap that is older than the suite knows it by the script that all suites share.
   [ -e "$script/$suite" ] || script=$script/sid

@@ -1,4 +1,4 @@
-"""Keeps the tables of keys in these pages as the settings are: unit, values and default are read off the fields.
+"""Keeps the tables of keys in these pages as the settings are: values, unit and default are read off the fields.
 
 A table below `<!-- keys of CLASS -->` has a row for each key of that class of settings; only what a key says is written
 by hand. `python docs/keys.py` rewrites the pages beside it.
@@ -15,8 +15,8 @@ from vobench.suite.yaml_file import json_schema
 
 TABLE = re.compile(r"<!-- keys of (\w+) -->\n\n((?:\|.*\n)+)")
 ZEROS = re.compile(r"\.0(?![0-9])")
-HEAD = "| key | unit | takes | default | says |\n|---|---|---|---|---|\n"
-BOUNDS = {"exclusiveMinimum": "more than", "minimum": "from", "exclusiveMaximum": "less than", "maximum": "up to"}
+HEAD = "| key | takes | default | says |\n|---|---|---|---|\n"
+BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 
 
 def sections() -> dict[str, dict[str, Any]]:
@@ -74,7 +74,11 @@ def _row(key: str, section: dict[str, Any], said: str) -> str:
     default = _value(part["default"]) if "default" in part else "as said"
     if key in section.get("required", ()):
         default = ""
-    cells = (f"`{key}`", unit_of(key), takes(part), default, said)
+    unit = unit_of(key)
+    values = takes(part)
+    if unit:
+        values += f", {unit}" if values == "number" else f" {unit}"
+    cells = (f"`{key}`", values, default, said)
     return f"|{'|'.join(f' {cell} ' if cell else ' ' for cell in cells)}|\n"
 
 
@@ -85,12 +89,23 @@ def takes(part: dict[str, Any]) -> str:
     if "enum" in part or "const" in part:
         return ", ".join(f"`{value}`" for value in part.get("enum", [part.get("const")]))
     if part.get("type") in {"number", "integer"}:
-        bounds = [f"{words} {part[name]:g}" for name, words in BOUNDS.items() if name in part]
-        return " ".join(["whole number" if part["type"] == "integer" else "number", *bounds])
+        return _number(part)
     if items := part.get("prefixItems"):
-        return f"[{' × '.join([str(len(items)), *{takes(item): None for item in items}])}]"
+        kinds = list(dict.fromkeys(takes(item) for item in items))
+        return f"[{len(items)} × {kinds[0]}]" if len(kinds) == 1 else f"[{', '.join(kinds)}]"
     words = {"string": "text", "boolean": "`true`, `false`", "array": "list", "object": "keys"}
     return words.get(str(part.get("type")), "any value" if not part else "keys")
+
+
+def _number(part: dict[str, Any]) -> str:
+    """The range of a number: `0 to 4`, `> 0`, `integer ≥ 1`."""
+    if "minimum" in part and "maximum" in part:
+        range_of_values = f"{part['minimum']:g} to {part['maximum']:g}"
+    else:
+        range_of_values = ", ".join(f"{sign} {part[name]:g}" for name, sign in BOUNDS.items() if name in part)
+    if part["type"] == "integer":
+        return f"integer {range_of_values}".rstrip()
+    return range_of_values or "number"
 
 
 def _value(default: Any) -> str:

@@ -50,6 +50,7 @@ UNITS = {
     "hz": "Hz",
     "mib": "MiB",
     "db": "dB",
+    "ev": "EV",
     "e": "electrons",
     "dn": "grey values",
     "e_per_s": "electrons/s",

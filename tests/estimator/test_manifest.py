@@ -191,21 +191,16 @@ def test_the_example_of_the_docs_works(tmp_path):
     assert estimator.process(Frame(2, 0)).T_odom_frame[:3, 3].tolist() == [0.02, 0.002, 0.0]
 
 
-def blocks(language):
-    page = (ESTIMATORS.parent / "docs" / "estimators.md").read_text(encoding="utf-8")
-    return [block.split("```")[0] for block in page.split(f"```{language}\n")[1:]]
+MANIFESTS = {path.stem: path for path in (ESTIMATORS.parent / "examples" / "manifests").glob("*.yaml")}
 
 
-WORKED = {block.split()[1]: block for block in blocks("text") if block.startswith("name: ")}
-
-
-@pytest.mark.parametrize("name", WORKED)
-def test_the_manifests_of_known_systems_in_the_docs_are_valid(tmp_path, name):
-    (tmp_path / "estimator.yaml").write_text(WORKED[name])
+@pytest.mark.parametrize("name", MANIFESTS)
+def test_the_manifests_of_known_systems_in_the_examples_are_valid(tmp_path, name):
+    (tmp_path / "estimator.yaml").write_text(MANIFESTS[name].read_text(encoding="utf-8"))
     manifest = read_manifest(tmp_path)
     assert manifest.name == name
     assert manifest.command or manifest.stream
 
 
 def test_there_are_those_that_people_ask_for():
-    assert set(WORKED) == {"orb_slam3", "openvins", "basalt", "stella_vslam", "libviso2", "dpvo", "cuvslam"}
+    assert set(MANIFESTS) == {"orb_slam3", "openvins", "basalt", "stella_vslam", "libviso2", "dpvo", "cuvslam"}

@@ -229,6 +229,12 @@ def test_noise_takes_the_same_draws_whatever_else_is_on(change: tuple[str, float
     assert states_after(FULL) == states_after(replace(FULL, **dict([change])))
 
 
+@pytest.mark.parametrize(("stops", "factor"), [(-3, 1 / 8), (-1, 1 / 2), (0, 1), (2, 4)])
+def test_a_stop_of_compensation_doubles_the_light_of_any_gain(stops: float, factor: float) -> None:
+    compensated = CameraSettings(exposure_gain=3.0, exposure_compensation_ev=stops)
+    assert compensated.white_e == CameraSettings(exposure_gain=3.0 * factor).white_e
+
+
 @pytest.mark.parametrize("change", [{"exposure_gain": 0.001}, {"exposure_ms": 1000.0}])
 def test_noise_takes_the_same_draws_whatever_the_aperture_is_set_for(change: dict[str, float]) -> None:
     assert states_after(FULL) == states_after(FULL, **change)

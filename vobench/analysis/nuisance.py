@@ -164,7 +164,7 @@ def _without_saturation(case: Case) -> Case:
         loop = replace(loop, target_share=loop.target_share / HEADROOM)
         exposure_gain = camera.exposure_gain
     else:
-        gain_of_white = 10 ** (-camera.gain_db / 20)
+        gain_of_white = 10 ** (-camera.gain_db / 20) / camera.compensation
         exposure_gain = min(camera.exposure_gain, gain_of_white)
 
     white_e = replace(camera, exposure_gain=exposure_gain).white_e

@@ -113,11 +113,12 @@ def _remedy(case: Case, light: Path) -> "Remedy":
     """
     from vobench.suite.white import Remedy, white_of
 
-    amplification = 10 ** (case.camera.gain_db / 20)
+    camera = case.camera
+    amplification = camera.compensation * 10 ** (camera.gain_db / 20)
     is_white_at_fault = case.scene.white_cd_m2 is not None and not case.lighting
     return Remedy(
         white_cd_m2=white_of(case.scene, light),
-        exposure_gain=case.camera.exposure_gain,
+        exposure_gain=camera.exposure_gain,
         amplification=amplification,
         changes_white=is_white_at_fault,
     )

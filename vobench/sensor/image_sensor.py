@@ -1,5 +1,6 @@
 """A camera's image sensor after EMVA 1288: photons to electrons to 8-bit values, grey or in colour. Pure."""
 
+import math
 from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Literal
 
@@ -221,7 +222,8 @@ class CameraSettings:
     it is, rgb interpolates it. White light gives each of them the same grey value.
 
     The aperture is set for `exposure_ms`: then, and without gain, radiance 1 comes to 200 grey values;
-    `exposure_gain` multiplies that light. `readout_ms` of a rolling shutter is height × line delay.
+    `exposure_gain` multiplies that light, and each step of `exposure_compensation_ev` doubles it.
+    `readout_ms` of a rolling shutter is height × line delay.
     `vignetting` 1 is cos⁴θ (the exponent is 4 · vignetting), cut off by the lens's rims at `vignetting_cutoff_deg`;
     `blur_sigma_px` is a Gaussian's, `defocus_px` the diameter of the disc that a point out of focus makes,
     `dirt` the mean share of light that dirt on the front lens keeps from its way, `flare` the share that lens and
@@ -232,6 +234,7 @@ class CameraSettings:
     colour: Colour = "mono"
     spectrum: tuple[NonNegative, NonNegative, NonNegative] = LUMINANCE
     exposure_gain: Positive = 1.0
+    exposure_compensation_ev: Annotated[float, Ge(-12), Le(12)] = 0.0
     exposure_ms: Annotated[float, Ge(0.001), Le(1000)] = 5.0
     gain_db: Annotated[float, Ge(0), Le(48)] = 0.0
     auto_exposure: AutoExposure | None = None
@@ -281,11 +284,16 @@ class CameraSettings:
         return (self.readout_ms or 0.0) / MS_PER_S
 
     @property
+    def compensation(self) -> float:
+        """The factor on the light that exposure_compensation_ev states."""
+        return math.exp2(self.exposure_compensation_ev)
+
+    @property
     def white_e(self) -> float:
         """Mean electrons (mu_e) of radiance 1 at the exposure that the aperture is set for."""
         stored = np.array(WHITE_DN / FULL_SCALE_DN)
         share = float(self.chip.curve.decode(stored))
-        return share * self.chip.full_well_e * self.exposure_gain
+        return share * self.chip.full_well_e * self.exposure_gain * self.compensation
 
 
 @dataclass(frozen=True, slots=True)

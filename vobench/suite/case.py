@@ -24,8 +24,8 @@ CALIBRATION_STREAM = 7_301  # an arbitrary number that separates calibration err
 class Case:
     """One sequence to simulate, with all settings that determine it.
 
-    `name` is unique within the suite and valid as the name of a folder, for example office-dim. It joins those names
-    of `variant` that are not the same in the whole suite.
+    `name` is unique within the suite and valid as the name of a folder, for example office-dim. It consists of the
+    names in `variant`, without those of the axes on which all cases of the suite are equal.
     `variant` maps each axis to the name of the scene, lighting, rig, trajectory or camera.
     `replayed` is the text of the replayed trajectory in TUM format, None for a trajectory that is generated.
     `truth` lists the channels of per-pixel ground truth to record, such as depth.
@@ -56,7 +56,7 @@ class Case:
 
     def build_scene(self) -> Scene:
         """The scene with this case's lighting."""
-        from vobench.suite.scene_build import build
+        from vobench.suite.scene_build import build  # slow to import, and most commands build no scene
 
         return build(self.scene, self.lighting)
 
