@@ -1,4 +1,4 @@
-"""A course over ground: its derivatives are those of its poses, it lies on the ground, and it tilts or stays upright."""
+"""A course over ground: its derivatives are those of its poses, and a body on it tilts with the ground or not."""
 
 import numpy as np
 import pytest

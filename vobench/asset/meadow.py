@@ -9,7 +9,7 @@ from vobench.asset import picture
 from vobench.asset.furniture import Part, matt, put
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.shape import at, cards_arrays, lathe
-from vobench.scene.material import Material, Picture
+from vobench.scene.material import Material, Picture, Texture
 
 NEEDLE_TINTS = ("#f4fff0", "#ffffe8", "#e6f8f4")
 WHORL_M = 0.34  # between the whorls of a conifer
@@ -142,7 +142,7 @@ def _needles(draw: ImageDraw.ImageDraw, rng: Rng, foot: np.ndarray, tip: np.ndar
             draw.line([tuple(middle.tolist()), tuple(end.tolist())], fill=ink, width=3)
 
 
-def cut_out(tint: str, texture: Picture) -> Material:
+def cut_out(tint: str, texture: Texture) -> Material:
     """A material whose transparent parts are holes."""
     return replace(matt(tint, texture), cutout=0.5)
 

@@ -70,7 +70,7 @@ class ParkGround:
 
     def surface_m(self, points_m: Array) -> Array:
         """The height (N,) of the ground at points (N, 2), also below water."""
-        height_m = np.zeros(len(points_m))
+        height_m: Array = np.zeros(len(points_m))
         for amplitude_m, along_x, along_y, phase_rad in self.waves.tolist():
             height_m = height_m + amplitude_m * np.sin(points_m @ [along_x, along_y] + phase_rad)
         edge = np.max(np.abs(points_m) / self.half_m, axis=1)
@@ -80,7 +80,8 @@ class ParkGround:
         share = self.pond.share(points_m)
         is_dry = _smooth_step((share - 1.1) / 0.9)
         hollow = _smooth_step((1.15 - share) / 0.6)
-        return self.level_m + is_dry * (height_m - self.level_m) - self.pond.depth_m * hollow
+        shaped_m: Array = self.level_m + is_dry * (height_m - self.level_m) - self.pond.depth_m * hollow
+        return shaped_m
 
     def heights_m(self, points_m: Array) -> Array:
         """The height (N,) of the ground at points (N, 2); NaN where the water is too deep to stand."""
