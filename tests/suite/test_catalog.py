@@ -151,7 +151,7 @@ def test_a_name_beats_nothing_that_merely_lies_in_the_working_directory(here):
 def test_an_unknown_name_gets_the_nearest_and_all_there_are(here):
     with pytest.raises(UnknownNameError) as refused:
         catalog.find("suite", "quikstart")
-    known = "daily, full, hand, paper, quickstart, regression, sensors, street"
+    known = "daily, full, hand, paper, quickstart, regression, sensors, street, worlds"
     assert str(refused.value) == f"no suite named 'quikstart'. Did you mean 'quickstart'? Known: {known}"
 
 
