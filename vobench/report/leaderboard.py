@@ -7,7 +7,7 @@ from itertools import groupby
 from vobench.report.board_metric import METRICS
 from vobench.report.breakdown import BreakdownCurve, breakdown_curves
 from vobench.report.cell import CaseFacts, Cell, make_cell
-from vobench.report.division import divisions
+from vobench.report.division import divisions, truth_copy_remarks, with_truth_copies
 from vobench.report.frame_statistics import Answered, EstimatorStatistics
 from vobench.report.pair_sentence import named_pairs
 from vobench.report.total import Total, rank_division
@@ -79,7 +79,11 @@ def make_board(
     unmade = unavailable_cases(scores)
     trials = list(with_sequence(scores))
     cells = make_cells(trials, answered, facts or {})
-    all_remarks = [*remarks, *_unmade_remark(unmade, cases=len({score.case for score in scores}))]
+    all_remarks = [
+        *remarks,
+        *truth_copy_remarks(trials),
+        *_unmade_remark(unmade, cases=len({score.case for score in scores})),
+    ]
 
     totals, division_remarks = _rank(cells, is_sequential=until_ratio is not None)
     all_remarks += _until_remarks(cells, until_ratio)
@@ -117,12 +121,12 @@ def _rank(cells: Sequence[Cell], *, is_sequential: bool) -> tuple[list[Total], l
 
 
 def make_cells(trials: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts]) -> list[Cell]:
-    """One cell for each case and estimator, in order of their names."""
+    """One cell for each case and estimator, in order of their names. A truth copy is one in all of its cells."""
 
     def cell_key(trial: TrialScore) -> tuple[str, str]:
         return trial.case, trial.estimator
 
-    ordered = sorted(trials, key=lambda trial: (*cell_key(trial), trial.repeat))
+    ordered = sorted(with_truth_copies(list(trials)), key=lambda trial: (*cell_key(trial), trial.repeat))
     cells = []
     for (case, estimator), members in groupby(ordered, key=cell_key):
         statistics = answered.get((case, estimator), EstimatorStatistics())
