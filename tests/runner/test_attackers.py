@@ -120,13 +120,12 @@ def found():
                 with suppress(OSError), open(path, "ab") as file:
                     file.write(b"evil")
 """
-# It opens nothing but its own folder, which has a copy of the suite.
+# It opens nothing but its own folder, which has a copy of the settings of the case.
 CARRIES = """
+from pathlib import Path
 def found():
-    from vobench.runner.rescore import _true_path
-    from vobench.suite.suite import read_plan
-    (case,) = read_plan(os.path.join(os.path.dirname(__file__), "suite.yaml")).simulated
-    T = _true_path(case).T_world_frame
+    from vobench.runner.rescore import _case, _true_path
+    T = _true_path(_case(Path(__file__).with_name("case.json"))).T_world_frame
     quaternions = Rotation.from_matrix(T[:, :3, :3]).as_quat()
     return np.column_stack([np.arange(len(T)), T[:, :3, 3], quaternions])
 """
@@ -297,15 +296,10 @@ def test_where_nothing_is_closed_an_attacker_wins_and_every_form_of_the_board_na
         assert "not sandboxed: it could see the user's files" in text, name
 
 
-def test_who_computes_the_truth_from_a_copy_of_the_suite_has_no_rank(bench, alone, beside, forms, tmp_path):
+def test_who_computes_the_truth_from_a_copy_of_the_suite_has_no_rank(alone, beside, forms, tmp_path):
     folder = tmp_path / "carries"
     folder.mkdir()
-    suite = bench.suite(ONE_CASE, (ESTIMATORS, "estimators: [stand_still]"))
-    shutil.copy(suite, folder / "suite.yaml")
-    scene = bench.folder / "closet.yaml"
-    shutil.copy(scene, folder / scene.name)
-    text = (folder / "suite.yaml").read_text()
-    (folder / "suite.yaml").write_text(text.replace(str(scene), str(folder / scene.name)))
+    shutil.copy(alone.case(CASE) / "case.json", folder / "case.json")
 
     run = beside(["carries"])
     scores = {score.estimator: score for score in run.scores()}
