@@ -85,7 +85,7 @@ def opened_memory(descriptor: int) -> Image | None:
     if address == MAP_FAILED:
         raise OSError(ctypes.get_errno(), "the memory for frames cannot be mapped")
     os.close(descriptor)
-    memory: Image = np.frombuffer((ctypes.c_uint8 * size).from_address(address), np.uint8)
+    memory: Image = np.frombuffer(memoryview((ctypes.c_uint8 * size).from_address(address)), np.uint8)
     memory.flags.writeable = False
     return memory
 
