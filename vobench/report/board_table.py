@@ -25,7 +25,8 @@ LEGEND = (
     "marked; the median over cases. × best: error relative to the first-ranked estimator where both survive, with its "
     "95 % interval for other places and drives of this kind. Lost: failed trials. Estimators are ordered by the score "
     "(1 is perfect), in which a failed trial loses at least 1/2. Ranks in brackets: their 95 % interval. Decided: "
-    "against the estimator above, by a t test over places (2 %, Holm). Baselines and oracles have no rank."
+    "against the estimator above, by a t test over places (2 %, Holm). Baselines, oracles and estimates that equal the "
+    "truth have no rank."
 )
 
 

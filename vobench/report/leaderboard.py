@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from vobench.report.board_metric import METRICS
 from vobench.report.breakdown import BreakdownCurve, breakdown_curves
 from vobench.report.cell import CaseFacts, Cell, make_cell, trials_by_cell
-from vobench.report.division import divisions
+from vobench.report.division import divisions, truth_copy_remarks, with_truth_copies
 from vobench.report.frame_statistics import Answered, EstimatorStatistics
 from vobench.report.pair_sentence import named_pairs
 from vobench.report.total import Total, rank_division
@@ -88,7 +88,11 @@ def make_board(
     unmade = unavailable_cases(scores)
     trials = list(with_sequence(scores))
     cells = [_corrected(cell, refuted) for cell in make_cells(trials, answered, facts or {})]
-    all_remarks = [*remarks, *_unmade_remark(unmade, cases=len({score.case for score in scores}))]
+    all_remarks = [
+        *remarks,
+        *truth_copy_remarks(trials),
+        *_unmade_remark(unmade, cases=len({score.case for score in scores})),
+    ]
 
     totals, division_remarks = _rank(cells, is_sequential=until_ratio is not None)
     all_remarks += _until_remarks(cells, until_ratio)
@@ -133,9 +137,10 @@ def _corrected(cell: Cell, refuted: Collection[str]) -> Cell:
 
 
 def make_cells(trials: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts]) -> list[Cell]:
-    """One cell for each case and estimator, in order of their names."""
+    """One cell for each case and estimator, in order of their names. A truth copy is one in all of its cells."""
+    marked_trials = with_truth_copies(list(trials))
     cells = []
-    for (case, estimator), members in trials_by_cell(trials, facts).items():
+    for (case, estimator), members in trials_by_cell(marked_trials, facts).items():
         statistics = answered.get((case, estimator), EstimatorStatistics())
         cells.append(make_cell(members, statistics, facts.get(case, facts.get(members[0].case, CaseFacts()))))
     return cells
