@@ -79,12 +79,14 @@ def test_samples_lie_further_apart_in_a_large_place_where_nothing_is_asked_for()
     things[1] = replace(things[1], spacing_m=0.5)
     place = Scene("place", tuple(things), {"grey": Material()}, ())
     faces = triangles(place)
-    spacing_m = spacings_m(place, faces, BakeSettings())
+    no_edge = np.zeros(len(faces), bool)
+    spacing_m = spacings_m(place, faces, BakeSettings(), no_edge)
     samples = (areas_m2(faces.corners_m) / spacing_m**2)[faces.thing != 1].sum()
     assert samples == pytest.approx(SAMPLES)
     assert np.unique(spacing_m[faces.thing == 1]) == [0.5]
     alone = replace(place, things=place.things[:2])
-    assert np.unique(spacings_m(alone, triangles(alone), BakeSettings())[:2]) == [BakeSettings().spacing_m]
+    spacing_m = spacings_m(alone, triangles(alone), BakeSettings(), no_edge[:4])
+    assert np.unique(spacing_m[:2]) == [BakeSettings().spacing_m]
 
 
 @pytest.mark.parametrize("height_m", [1.0, 2.0, 4.0])
