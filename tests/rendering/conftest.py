@@ -46,7 +46,8 @@ def light_evenly(scene: Scene, *, illuminance_lx: float = 100.0, level: Level = 
     mean = np.average(albedo[own], 0, areas[own]) if own.any() else np.zeros(3)
     patches = Patches(middle, mean[None].astype(np.float32), np.array([max(areas[own].sum(), 1e-9)], np.float32), dark)
     parts = FaceParts.whole(len(faces))
-    return BakedScene(lit, parts, faces, atlas, direct, dark, scipy.sparse.csr_matrix((9, 1), dtype=np.float32), patches)
+    spread = scipy.sparse.csr_matrix((9, 1), dtype=np.float32)
+    return BakedScene(lit, parts, faces, atlas, direct, dark, spread, patches)
 
 
 @pytest.fixture(scope="session")

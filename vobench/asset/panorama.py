@@ -164,14 +164,16 @@ class _Canvas:
         lamps: Floats | None = None,
     ) -> None:
         """Lay colours (r, c, 3) over the map by how much they cover (r, c), in the haze of a distance."""
-        place = (rows, columns % COLUMNS)
         clear = np.float32(np.exp(-distance_m / HAZE_M))
-        share = cover[..., None]
-        hazy = clear * np.asarray(colour, np.float32) + (1 - clear) * self._haze[columns % COLUMNS]
-        self.colour[place] += share * (hazy - self.colour[place])
-        self.lamps[place] *= 1 - cover
-        if lamps is not None:
-            self.lamps[place] += cover * lamps
+        seen_colour = clear * np.asarray(colour, np.float32)
+        for part, seen in _runs(columns):
+            hazy = seen_colour[:, seen] + (1 - clear) * self._haze[part]
+            colours = self.colour[rows, part]
+            colours += cover[:, seen, None] * (hazy - colours)
+            of_lamps = self.lamps[rows, part]
+            of_lamps *= 1 - cover[:, seen]
+            if lamps is not None:
+                of_lamps += cover[:, seen] * lamps[:, seen]
 
     def reflected(self, albedo: ArrayLike, lux: ArrayLike) -> Floats:
         """Luminance (..., 3) of diffuse surfaces."""
@@ -191,6 +193,18 @@ class _Canvas:
         faded_coarse = _blurred_pattern(coarse, footprint_m, 6.0)
         faded_fine = _blurred_pattern(fine, footprint_m, 0.25)
         return np.asarray(0.16 * faded_coarse + 0.22 * faded_fine)
+
+
+def _runs(columns: Columns) -> list[tuple[slice, slice]]:
+    """The columns of the map that consecutive columns (C,), which may go around, are; and where each run is in them."""
+    runs = []
+    start = 0
+    while start < len(columns):
+        first = int(columns[start]) % COLUMNS
+        length = min(len(columns) - start, COLUMNS - first)
+        runs.append((slice(first, first + length), slice(start, start + length)))
+        start += length
+    return runs
 
 
 HAZE_M = 9000.0  # distance at which e^-1 of the contrast is left
@@ -243,20 +257,35 @@ def _smooth(values: Floats) -> Floats:
 
 
 def _sampled(tile: Floats, u: Floats, v: Floats) -> Floats:
-    """Values of a periodic tile (N, N) at places (...) in tiles, interpolated."""
+    """Values of a periodic tile (N, N) at places (r, c) in tiles, interpolated; N is a power of two."""
+    result = np.empty(u.shape, np.float32)
+    for start in range(0, len(u), BAND_ROWS):
+        band = slice(start, start + BAND_ROWS)
+        result[band] = _sampled_band(tile, u[band], v[band])
+    return result
+
+
+BAND_ROWS = 16  # of a map that are worked on at a time: their arrays stay in the processor's cache
+
+
+def _sampled_band(tile: Floats, u: Floats, v: Floats) -> Floats:
     size = len(tile)
+    last = size - 1  # by which & takes a number modulo the size
+    values = tile.ravel()
     x = u * size
     y = v * size
     left = np.floor(x)
     top = np.floor(y)
     right_share = x - left
     lower_share = y - top
-    column = left.astype(np.int32) % size
-    row = top.astype(np.int32) % size
-    next_column = (column + 1) % size
-    next_row = (row + 1) % size
-    upper = (1 - right_share) * tile[row, column] + right_share * tile[row, next_column]
-    lower = (1 - right_share) * tile[next_row, column] + right_share * tile[next_row, next_column]
+    column = left.astype(np.int32)
+    row = top.astype(np.int32)
+    next_column = (column + 1) & last
+    next_row = ((row + 1) & last) * size
+    column = column & last
+    row = (row & last) * size
+    upper = (1 - right_share) * values.take(row + column) + right_share * values.take(row + next_column)
+    lower = (1 - right_share) * values.take(next_row + column) + right_share * values.take(next_row + next_column)
     return np.asarray((1 - lower_share) * upper + lower_share * lower)
 
 
@@ -983,9 +1012,10 @@ def _paint_suburb(canvas: _Canvas) -> None:
     is_road = np.abs(across_m - road_m) < 2.8
     is_path = np.abs(np.abs(across_m - road_m) - 3.7) < 0.9
     lawn = np.exp(canvas.grown(x_m, y_m, footprint_m))[..., None] * np.array(LAWN, np.float32)
-    paved = np.where(is_path[..., None], PAVING, lawn)
-    albedo = np.where(is_road[..., None], ASPHALT, paved)
-    _paint_ground(canvas, albedo.astype(np.float32))
+    albedo = lawn
+    albedo[is_path] = PAVING
+    albedo[is_road] = ASPHALT
+    _paint_ground(canvas, albedo)
 
     scenery = _Scenery(canvas)
     for ring in range(4):

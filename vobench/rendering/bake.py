@@ -16,6 +16,7 @@ from vobench import stop
 from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
+from vobench.rendering import freed_memory
 from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.direct_light import direct_light, mirror_images
@@ -232,9 +233,12 @@ def bake(
 
     `report` is called now and then with the share of the work that is done, about.
     """
+    _paint(scene)
+    freed_memory.give_back()
     parts, faces, spacing_m = sampled_faces(scene, settings)
     atlas = unwrap(faces, spacing_m, bodies(scene, faces))
     visibility, points, layout, point_areas_m2 = static_points(scene, faces, atlas, settings.seed)
+    freed_memory.give_back()
     thing = faces.thing[points.face]
     cell_m = CELL_TEXELS * spacing_m[points.face]
     step_m = np.maximum(settings.indirect_spacing_m, cell_m).astype(np.float32)
@@ -274,17 +278,7 @@ def bake(
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
     reflectors = Reflectors(gatherer, points, point_areas_m2, settings.seed)
 
-    def by_photons(row: int, light: Floats, scattered_lm: float) -> Floats:
-        """The illuminance (2, S) by way of mirroring faces, by each half of the photons."""
-        index, t_ns = instants[row]
-        if not settings.bounces or isinstance(scene.lights[index], Sky):
-            return np.zeros((2, len(groups)), np.float32)
-        share = settings.indirect_rays / INDIRECT_RAYS / len(instants)
-        effort = share * reflectors.effort(light, scattered_lm)
-        light_emitters = emitters(scene.lights[index], visibility, t_ns=t_ns)
-        flux_lm = reflectors.flux_lm(light_emitters, light, effort=effort, seed=[settings.seed, row])
-        return smoothing.density(flux_lm.T, area_m2).T
-
+    by_photons = _PhotonLight(scene, settings, reflectors, smoothing, instants=instants, area_m2=area_m2)
     straight = _straight(
         scene,
         settings,
@@ -296,7 +290,8 @@ def bake(
         by_photons=by_photons,
         report=report,
     )
-    del static, points, layout  # bounces take memory of their own
+    del static, points, layout, reflectors, by_photons  # bounces take memory of their own
+    freed_memory.give_back()
     indirect, noise = _bounces(scene, settings, rounds, smoothing, straight=straight, instants=instants)
     first = [instants.index((index, key_times_ns(light)[0])) for index, light in enumerate(scene.lights)]
     patches = Patches(
@@ -310,6 +305,55 @@ def bake(
     return BakedScene(
         scene, parts, faces, atlas, straight.direct, indirect[first], spread, patches, settings, tracks, mean_noise
     )
+
+
+class _PhotonLight:
+    """What lamps and suns at some instants give surfels by way of mirroring faces."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        settings: BakeSettings,
+        reflectors: Reflectors,
+        smoothing: Smoothing,
+        *,
+        instants: list[tuple[int, float]],
+        area_m2: Floats,
+    ) -> None:
+        self._scene = scene
+        self._settings = settings
+        self._reflectors = reflectors
+        self._smoothing = smoothing
+        self._instants = instants
+        self._area_m2 = area_m2
+
+    def lx(self, row: int, light: Floats, scattered_lm: float) -> Floats:
+        """The illuminance (2, S) by each half of the photons of the light of an instant.
+
+        `light` (P,) is its direct light on points, which scatter `scattered_lm`.
+        """
+        index, t_ns = self._instants[row]
+        lamp = self._scene.lights[index]
+        if not self._settings.bounces or isinstance(lamp, Sky):
+            return np.zeros((2, len(self._area_m2)), np.float32)
+        share = self._settings.indirect_rays / INDIRECT_RAYS / len(self._instants)
+        effort = share * self._reflectors.effort(light, scattered_lm)
+        seed = [self._settings.seed, row]
+        light_emitters = emitters(lamp, self._reflectors.visibility, t_ns=t_ns)
+        flux_lm = self._reflectors.flux_lm(light_emitters, light, effort=effort, seed=seed)
+        return self._smoothing.density(flux_lm.T, self._area_m2).T
+
+
+def _paint(scene: Scene) -> None:
+    """Paint the textures and panoramas of a scene, which are cached, while nothing else takes memory."""
+    names = {thing.material for thing in scene.things} & scene.materials.keys()
+    for name in sorted(names):
+        texture = scene.materials[name].texture
+        if texture is not None:
+            texture.pixels()
+    for light in scene.lights:
+        if isinstance(light, Sky) and light.panorama is not None:
+            light.panorama.map_under(light)
 
 
 @dataclass(frozen=True, slots=True)
@@ -336,11 +380,12 @@ def _straight(
     *,
     area_m2: Floats,
     instants: list[tuple[int, float]],
-    by_photons: Callable[[int, Floats, float], Floats],
+    by_photons: "_PhotonLight",
     report: Report,
 ) -> _Straight:
     """Trace the direct light of the lights at some instants; weights (P,) of points in their surfels, area_m2 (S,)."""
     scatters = albedo(static.faces, scene.materials, static.points)
+    freed_memory.give_back()
     direct = np.zeros((len(scene.lights), static.atlas.height, static.atlas.width), np.float32)
     illuminance_lx = np.zeros((len(instants), len(groups)), np.float32)
     received = np.zeros((len(instants), len(groups), 3), np.float32)
@@ -353,7 +398,8 @@ def _straight(
         received[row] = groups.mean(scatters * light[:, None], weights)
         direct[index] = direct_layer(scene, index, static, light)
         scattered_lm = float((received[row] @ LUMINANCE * area_m2).sum())
-        by_mirrors_lx[:, row] = by_photons(row, light, scattered_lm)
+        by_mirrors_lx[:, row] = by_photons.lx(row, light, scattered_lm)
+        freed_memory.give_back()
         report(1 - (1 - GATHER_DONE) * row / len(instants))
     return _Straight(direct, groups.mean(scatters, weights), illuminance_lx, received, by_mirrors_lx)
 

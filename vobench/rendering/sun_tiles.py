@@ -82,7 +82,7 @@ def sunlit_parts(
 
     small_key = 6 * faces.thing.astype(np.int64) + nearest_axis(faces.plane)
     edge_keys = probes.mixed(small_key[probes.face], is_small[probes.face])
-    has_edge = is_small & np.isin(faces.thing, edge_keys // 6) & (is_receiver & is_towards)
+    has_edge = is_receiver & is_small & np.isin(faces.thing, edge_keys // 6)
 
     large = receivers[~is_small[receivers]]
     if not len(large):
@@ -207,9 +207,7 @@ class _Tiles:
         return result
 
 
-def _divided(
-    faces: Triangles, large: Rows, tiles: _Tiles, edge_tiles: Rows, has_edge: Mask
-) -> tuple[FaceParts, Mask]:
+def _divided(faces: Triangles, large: Rows, tiles: _Tiles, edge_tiles: Rows, has_edge: Mask) -> tuple[FaceParts, Mask]:
     """The faces, of which the large ones (N,) are divided where only some of their tiles have an edge."""
     cut = large[_are_cut(faces, large, tiles.side_m[large])]
     uncut = np.setdiff1d(large, cut)
