@@ -89,6 +89,7 @@ def texels(
         beside,
         is_outside,
         points_m=points.points_m,
+        normals=points.normals,
         planes=points.planes,
         atlas=atlas,
         owner=owner,
