@@ -8,6 +8,7 @@ import pytest
 import trimesh
 
 from tests.rendering.panoramas import waves
+from tests.rendering.parts import light_at
 from tests.rendering.rectangles import Rectangle, box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import RenderError
@@ -52,10 +53,10 @@ def scene(*lamps: Light, things: tuple[Rectangle, ...] = (FLOOR,)) -> Scene:
 
 def on_quad(baked: BakedScene, light: Array, thing: int, s: Array, t: Array) -> Array:
     """What a map shows at fractions s and t of the edges of a thing that is a rectangle."""
-    first = int(np.flatnonzero(baked.faces.thing == thing)[0])
+    first = int(baked.parts.parent[baked.faces.thing == thing].min())
     upper = (t > s).ravel()
     u, v = np.where(t > s, s, s - t).ravel(), np.where(t > s, t - s, t).ravel()
-    return baked.atlas.read(light, (first + upper).astype(np.int32), u, v).reshape(*s.shape, *light.shape[2:])
+    return light_at(baked, light, first + upper, u, v).reshape(*s.shape, *light.shape[2:])
 
 
 def floor_light(baked: BakedScene) -> tuple[Array, Array, Array]:

@@ -17,6 +17,7 @@ MARGIN_SAMPLES = 2  # around a tile, in which an edge makes it fine
 SMALL_M2 = 10.0  # of a thing that is not divided: all of it is fine if any edge crosses it
 OUTLINE_SAMPLES = 0.5  # from the outline of a large face, where it may reach behind what adjoins it
 LEAST_SIDES = 0.25  # of a tile's side that a face must extend to be divided
+LEAST_SHARE = 1e-9  # of a face that a part of it is
 GOLDEN = np.array([0.7548776662, 0.5698402910])  # steps of a sequence that fills the unit square: Roberts (2018), R2
 IN_PLANE = np.array([[1, 2], [0, 2], [0, 1]])  # the other two axes of each axis
 
@@ -216,6 +217,7 @@ def _divided(faces: Triangles, large: Rows, tiles: _Tiles, edge_tiles: Rows, has
     for face in cut:
         for polygon in _polygons(faces.corners_m[face], faces.plane[face], float(tiles.side_m[face])):
             fan = np.stack([np.broadcast_to(polygon[0], polygon[1:-1].shape), polygon[1:-1], polygon[2:]], 1)
+            fan = fan[np.abs(np.linalg.det(fan)) > LEAST_SHARE]  # not three corners in a row
             parents.append(np.full(len(fan), face, np.int32))
             weights.append(fan)
     parts = FaceParts(np.concatenate(parents), np.concatenate(weights))
