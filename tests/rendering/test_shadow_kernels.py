@@ -79,5 +79,6 @@ def test_segments_meet_a_box_as_geometry_says(
 ) -> None:
     boxes_m = np.array([[[8, 8, 8], [9, 9, 9]], [[0, 0, 0], [1, 1, 1]]], np.float32)
     result = np.empty(1, bool)
-    meet_boxes(np.array([origin_m], np.float32), np.array([segment_m], np.float32), boxes_m, result)
+    around_m = np.stack([boxes_m[:, 0].min(0), boxes_m[:, 1].max(0)])
+    meet_boxes(np.array([origin_m], np.float32), np.array([segment_m], np.float32), around_m, boxes_m, result)
     assert result[0] == is_met
