@@ -1,6 +1,6 @@
 """The map of a panorama while it is painted: its pixels, the light outside, the haze, and noise for textures."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -154,14 +154,17 @@ class PanoramaCanvas:
         lamps: Floats | None = None,
     ) -> None:
         """Lay colours (r, c, 3) over the map by how much they cover (r, c), in the haze of a distance."""
-        pixels = (rows, columns % COLUMNS)
         clear = np.float32(np.exp(-distance_m / HAZE_M))
-        haze_cd_m2 = self.haze_cd_m2[columns % COLUMNS]
-        hazy = clear * np.asarray(colour, np.float32) + (1 - clear) * haze_cd_m2
-        self.colour[pixels] += cover[..., None] * (hazy - self.colour[pixels])
-        self.lamps[pixels] *= 1 - cover
-        if lamps is not None:
-            self.lamps[pixels] += cover * lamps
+        clear_colour = clear * np.asarray(colour, np.float32)
+        for run in _runs(columns):
+            run_cover = cover[:, run.in_columns]
+            hazy = clear_colour[:, run.in_columns] + (1 - clear) * self.haze_cd_m2[run.in_map]
+            map_colour = self.colour[rows, run.in_map]  # a view, as is map_lamps
+            map_colour += run_cover[..., None] * (hazy - map_colour)
+            map_lamps = self.lamps[rows, run.in_map]
+            map_lamps *= 1 - run_cover
+            if lamps is not None:
+                map_lamps += run_cover * lamps[:, run.in_columns]
 
     def grain(self, u: Floats, v: Floats) -> Floats:
         """Noise of unit variance at places in units of its tile, which repeats."""
@@ -180,6 +183,25 @@ class PanoramaCanvas:
         faded_coarse = fade_pattern(coarse, footprint_m, 6.0)
         faded_fine = fade_pattern(fine, footprint_m, 0.25)
         return np.asarray(0.16 * faded_coarse + 0.22 * faded_fine)
+
+
+class _Run(NamedTuple):
+    """Successive columns: where they are in the map, and in the columns that were asked for."""
+
+    in_map: slice
+    in_columns: slice
+
+
+def _runs(columns: Columns) -> list[_Run]:
+    """Successive columns (C,), of which those beyond the last column of the map go on at its first one."""
+    runs = []
+    start = 0
+    while start < len(columns):
+        first = int(columns[start]) % COLUMNS
+        length = min(len(columns) - start, COLUMNS - first)
+        runs.append(_Run(slice(first, first + length), slice(start, start + length)))
+        start += length
+    return runs
 
 
 def _directions(azimuth: Floats, sine: Floats, cosine: Floats) -> Floats:

@@ -7,9 +7,20 @@ from numpy.typing import NDArray
 
 Floats = NDArray[Any]  # float32 where there are many
 
+BAND_ROWS = 16  # of a map that are worked on at a time, so that their arrays stay in the processor's cache
+
 
 def sample_tile(tile: Floats, u: Floats, v: Floats) -> Floats:
-    """Values of a periodic tile (N, N) at places (...) in tiles, interpolated bilinearly."""
+    """Values (r, c) of a periodic tile (N, N) at places (r, c) in tiles, interpolated; N is a power of two."""
+    values = np.empty(u.shape, np.float32)
+    for start in range(0, len(u), BAND_ROWS):
+        band = slice(start, start + BAND_ROWS)
+        values[band] = _sample_band(tile, u[band], v[band])
+    return values
+
+
+def _sample_band(tile: Floats, u: Floats, v: Floats) -> Floats:
+    """The values at places in some rows."""
     size = len(tile)
     x = u * size
     y = v * size
@@ -18,13 +29,18 @@ def sample_tile(tile: Floats, u: Floats, v: Floats) -> Floats:
     right_share = x - left
     lower_share = y - top
 
-    column = left.astype(np.int32) % size
-    row = top.astype(np.int32) % size
-    next_column = (column + 1) % size
-    next_row = (row + 1) % size
+    # `& last` takes an index modulo the size, which is a power of two. The tile is indexed as one row of pixels.
+    last = size - 1
+    column = left.astype(np.int32) & last
+    row = top.astype(np.int32) & last
+    next_column = (column + 1) & last
+    row_start = row * size
+    next_row_start = ((row + 1) & last) * size
 
-    upper = (1 - right_share) * tile[row, column] + right_share * tile[row, next_column]
-    lower = (1 - right_share) * tile[next_row, column] + right_share * tile[next_row, next_column]
+    pixels = tile.ravel()
+    left_share = 1 - right_share
+    upper = left_share * pixels.take(row_start + column) + right_share * pixels.take(row_start + next_column)
+    lower = left_share * pixels.take(next_row_start + column) + right_share * pixels.take(next_row_start + next_column)
     return np.asarray((1 - lower_share) * upper + lower_share * lower)
 
 

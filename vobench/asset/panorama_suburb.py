@@ -44,10 +44,10 @@ def _ground_albedo(canvas: PanoramaCanvas) -> Floats:
     to_road_m = np.abs(across_m - (canvas.nearest_m - ROAD_TO_FRONT_M))
     is_road = to_road_m < ROAD_HALF_M
     is_path = np.abs(to_road_m - PATH_TO_ROAD_M) < PATH_HALF_M
-    lawn = np.exp(canvas.grass(x_m, y_m, footprint_m))[..., None] * np.array(LAWN, np.float32)
-    paved = np.where(is_path[..., None], PAVING, lawn)
-    albedo = np.where(is_road[..., None], ASPHALT, paved)
-    return np.asarray(albedo.astype(np.float32))
+    albedo = np.exp(canvas.grass(x_m, y_m, footprint_m))[..., None] * np.array(LAWN, np.float32)
+    albedo[is_path] = PAVING
+    albedo[is_road] = ASPHALT
+    return np.asarray(albedo)
 
 
 def _add_row_of_houses(canvas: PanoramaCanvas, scenery: Scenery, ring: int, side: int) -> None:
