@@ -222,9 +222,8 @@ def run_command(
         return
 
     from vobench.report import page
-    from vobench.report.advice import cost_of_deciding
 
-    cost = ""
+    ended = None
     if sequential.until:
         ended = _run_until_decided(
             lambda number: limits.apply(selection.draw(suite, values, number)),
@@ -235,12 +234,9 @@ def run_command(
             budget_s=budget_s,
         )
         folder = ended.folder
-        cost = ended.cost
-        if not ended.has_ended:
-            seeds = f", with --set base_seed={plan.suite.base_seed} for --fresh-units" if changes.fresh_units else ""
-            cost += f"\nTo resume, run the same command again{seeds}"
     else:
         folder = _run(plan, out, execution, progress)
+
     scores = folder.scores()
     board = page.run_board(folder, scores)
     _print_board(board, as_json=json)
@@ -248,12 +244,26 @@ def run_command(
         _print_remarks(folder, scores, shares_time=execution.share_time or plan.suite.share_time)
         for doubt in doubts_of_run(plan, folder):
             terminal.warn(doubt)
-        if not sequential.until:
-            jobs = execution.jobs or default_jobs()
-            cost = cost_of_deciding(board.totals, plan, typical_seconds(cache_folder()), jobs=jobs)
+        cost = _cost_of_deciding(board, plan, execution) if ended is None else _cost_so_far(ended, plan, changes)
         if cost:
             terminal.console().print(cost)
     _exit_if_failed(scores, board, thresholds)
+
+
+def _cost_of_deciding(board: "Board", plan: Plan, execution: Execution) -> str:
+    """What it would cost to decide between the estimators that the board cannot tell apart; empty if it can."""
+    from vobench.report.advice import cost_of_deciding
+
+    jobs = execution.jobs or default_jobs()
+    return cost_of_deciding(board.totals, plan, typical_seconds(cache_folder()), jobs=jobs)
+
+
+def _cost_so_far(ended: "UntilDecided", plan: Plan, changes: Changes) -> str:
+    """What it has cost to decide between estimators and, if that has not ended, how to resume."""
+    if ended.has_ended:
+        return ended.cost
+    seeds = f", with --set base_seed={plan.suite.base_seed} for --fresh-units" if changes.fresh_units else ""
+    return f"{ended.cost}\nTo resume, run the same command again{seeds}"
 
 
 def _exit_if_failed(scores: "Sequence[TrialScore]", board: "Board", thresholds: "Sequence[Threshold]") -> None:
