@@ -49,6 +49,26 @@ def test_every_variant_is_run_by_the_plan_runner_with_the_estimator_of_the_trial
     assert {estimator_entry.label for plan in plans for estimator_entry in plan.estimator_entries} == {"blind"}
 
 
+def trial_score(status, reason=""):
+    return SimpleNamespace(status=status, reason=reason, estimator="mine")
+
+
+@pytest.mark.parametrize(
+    ("explained", "ended"),
+    [("ok", ["crashed", "lost"]), ("crashed", ["crashed", "crashed"]), ("diverged", ["ok", "ok"])],
+)
+def test_trials_that_fail_as_the_explained_one_or_in_part_are_compared(explained, ended):
+    explain_trial_module._require_answers(trial_score(explained), [trial_score(status) for status in ended])
+
+
+def test_an_estimator_that_no_longer_answers_is_not_explained_by_the_case():
+    ended = [trial_score("crashed", "ImportError: no module named 'torch'"), trial_score("crashed")]
+    with pytest.raises(
+        InputError, match=r"all of 2 trials .* 'crashed' \(ImportError.*has mine or what it needs changed"
+    ):
+        explain_trial_module._require_answers(trial_score("ok"), ended)
+
+
 def never(plan, /):
     raise AssertionError("nothing should be run")
 

@@ -1,7 +1,7 @@
 """Explains why a trial fails by running its case again without each of its nuisances."""
 
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,6 +15,7 @@ from vobench.analysis.trial_data import read_conditions, read_outcome
 from vobench.errors import InputError
 from vobench.runner.data_frame import data_frame
 from vobench.runner.finished_trial import FinishedTrial, read_finished_trial, run_variants
+from vobench.runner.folder import FINISHED_TRIAL, TrialScore
 from vobench.runner.frames import read_frames
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.store import SILENT, Progress
@@ -178,7 +179,8 @@ def explain_trial(
         progress: hears what the explanation will cost, and whether the estimator has changed since the run.
 
     Raises:
-        InputError: there is no such trial, it is of a recording, or its case has no nuisance.
+        InputError: there is no such trial, it is of a recording, its case has no nuisance, or the estimator answered in
+            the trial and no longer does.
         UnknownNameError: the run has no such case or estimator.
         SuiteError: a variant cannot be simulated.
     """
@@ -191,10 +193,27 @@ def explain_trial(
     def measure(cases: Mapping[str, Case]) -> dict[str, list[Outcome]]:
         with forecast.stage(len(cases)):
             folder = run_variants(finished, cases, name=suite_name, run_plan=run_plan)
-            return {score.case: [read_outcome(folder, score)] for score in folder.scores()}
+            scores = folder.scores()
+            _require_answers(finished.score, scores)
+            return {score.case: [read_outcome(folder, score)] for score in scores}
 
     explanation = explain(finished.case, nuisances, measure, seeds=seeds)
     return TrialExplanation(finished.score.case, finished.score.estimator, explanation)
+
+
+def _require_answers(explained: TrialScore, scores: Sequence[TrialScore]) -> None:
+    """Raise InputError if an estimator answered to the end in the trial, and in none of the trials of a stage.
+
+    Then it is not the case that makes it fail.
+    """
+    is_answered = any(score.status in FINISHED_TRIAL for score in scores)
+    if is_answered or explained.status not in FINISHED_TRIAL:
+        return
+    first = scores[0]
+    raise InputError(
+        f"the trial ended in '{explained.status}', but all of {len(scores)} trials without a nuisance in '{first.status}' "
+        f"({first.reason}): has {explained.estimator} or what it needs changed since?"
+    )
 
 
 @dataclass(slots=True)
