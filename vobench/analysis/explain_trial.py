@@ -210,9 +210,10 @@ def _require_answers(explained: TrialScore, scores: Sequence[TrialScore]) -> Non
     if is_answered or explained.status not in FINISHED_TRIAL:
         return
     first = scores[0]
+    cause = f"in '{first.status}' ({first.reason})"
     raise InputError(
-        f"the trial ended in '{explained.status}', but all of {len(scores)} trials without a nuisance in '{first.status}' "
-        f"({first.reason}): has {explained.estimator} or what it needs changed since?"
+        f"the trial ended in '{explained.status}', but all of {len(scores)} trials without a nuisance {cause}: "
+        f"has {explained.estimator} or what it needs changed since?"
     )
 
 
