@@ -85,7 +85,7 @@ def test_best_is_bold_failures_are_italic_and_undecided_ones_have_a_tilde(scored
     text = latex(make_board([*trials, scored("c", "lost")], {}))
     assert r"\textbf{1.00}$^{\sim}$" in text
     assert r"\textit{lost}" in text
-    assert r"2.00 {\tiny 0.800--2.00}" in text
+    assert r"2.00$^{\sim}$ {\tiny 0.800--2.00}" in text
 
 
 def test_calibration_groups_have_no_totals_in_the_table(scored):
