@@ -78,10 +78,14 @@ def test_ranges_are_shown_where_at_most_three_columns_need_room(scored, columns,
 
 
 def test_best_is_bold_failures_are_italic_and_undecided_ones_have_a_tilde(scored):
-    text = latex(make_board([scored("a", ate_m=0.01), scored("b", ate_m=0.02), scored("c", "lost")], {}))
+    trials = []
+    for repeat in range(4):
+        trials.append(scored("a", repeat=repeat, ate_m=0.01 + 1e-6 * repeat))
+        trials.append(scored("b", repeat=repeat, ate_m=0.02 * (0.4 if repeat == 0 else 1.0) + 1e-6 * repeat))
+    text = latex(make_board([*trials, scored("c", "lost")], {}))
     assert r"\textbf{1.00}$^{\sim}$" in text
     assert r"\textit{lost}" in text
-    assert " 2.00 " in text
+    assert r"2.00$^{\sim}$ {\tiny 0.800--2.00}" in text
 
 
 def test_calibration_groups_have_no_totals_in_the_table(scored):

@@ -13,7 +13,7 @@ def test_the_best_of_a_case_is_marked_and_whoever_is_not_decided_against_it(scor
         return [scored(name, repeat=n, ate_m=ate) for n, ate in enumerate(errors)]
 
     few = make_board([*trials("a", [0.01]), *trials("b", [0.02])], {})
-    assert marks(few, "ate") == {("down", "a"): "*~"}
+    assert marks(few, "ate") == {("down", "a"): "*"}
     near = trials("b", [0.0105, 0.0125, 0.0135, 0.0145])
     many = make_board([*trials("a", [0.01, 0.011, 0.012, 0.013]), *near, *trials("c", [0.2, 0.3, 0.4, 0.5])], {})
     assert marks(many, "ate") == {("down", "a"): "*~", ("down", "b"): "~", ("down", "c"): "~"}
@@ -28,9 +28,9 @@ def repeated(scored, name, errors, **changes):
 
 def test_of_a_score_the_highest_is_the_best(scored):
     made = make_board([scored("a", ate_m=0.01), scored("b", ate_m=0.02)], {})
-    assert marks(made, "score") == {("down", "a"): "*~"}
+    assert marks(made, "score") == {("down", "a"): "*"}
     made = make_board([scored("a", coverage=0.5), scored("b", coverage=0.9)], {})
-    assert marks(made, "coverage") == {("down", "b"): "*~"}
+    assert marks(made, "coverage") == {("down", "b"): "*"}
 
 
 def test_two_with_the_same_median_are_both_the_best(scored):
@@ -48,7 +48,7 @@ def test_a_tie_is_marked_from_four_trials_on(scored, trials, is_marked):
 
 def test_a_failed_trial_is_the_worst_of_all(scored):
     made = make_board([scored("a", ate_m=0.02), scored("b", "lost", ate_m=1e-6), scored("c", ate_m=0.03)], {})
-    assert marks(made, "ate") == {("down", "a"): "*~"}
+    assert marks(made, "ate") == {("down", "a"): "*"}
 
 
 def test_a_copy_of_the_truth_is_not_the_best_of_a_case(scored):

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from vobench.errors import InputError
+from vobench.report.cell_notes import disparity_offset_sentence
 from vobench.report.practice import FRAMES as COUNT
 from vobench.report.practice import PRACTICES, STEP_NS
 from vobench.report.trial_view import NO_OUTPUT, summary, trial_view
@@ -148,3 +149,10 @@ def test_the_summary_is_the_score_in_markdown(trial):
     ]
     unscored = trial.model_copy(update={"score": None, "reason": ""})
     assert summary(unscored).splitlines()[2:] == ["**lost**", "", f"{COUNT} frames, 0.10 m, coverage 100.0%"]
+
+
+def test_the_summary_has_the_offset_of_disparities_that_the_estimator_found(trial):
+    note = disparity_offset_sentence(1.1)
+    assert summary(trial, note).splitlines()[6] == (
+        "Disparities of this stereo pair look off by +1.1 px: check its calibration"
+    )

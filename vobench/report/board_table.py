@@ -32,8 +32,8 @@ LEGEND = (
 
 # The same for a terminal.
 SHORT_LEGEND = (
-    "* best of its case; ~ not decided against it. × best: error relative to the first, where both survive. "
-    "◆ nothing better is cheaper. leaderboard.html explains the rest."
+    "* best of its case; ~ not decided against it, by four repeats or more. × best: error relative to the first, where "
+    "both survive. ◆ nothing better is cheaper. leaderboard.html explains the rest."
 )
 
 

@@ -14,7 +14,7 @@ def notes(cell: Cell) -> list[str]:
         _revised_estimate(cell),
         _scale_drift(cell),
         cell.consistency,
-        _disparity_offset(cell),
+        disparity_offset_sentence(cell.answered.offset_px),
         _frame_reason(cell),
     )
     return [f"{cell.estimator}: {sentence}" for sentence in sentences if sentence]
@@ -51,8 +51,8 @@ def _scale_drift(cell: Cell) -> str:
     return f"aligned with scale, which drifts by {cell.scale_drift_percent_per_m:+.2g} % per metre"
 
 
-def _disparity_offset(cell: Cell) -> str:
-    offset_px = cell.answered.offset_px
+def disparity_offset_sentence(offset_px: float | None) -> str:
+    """The sentence on the offset of a stereo pair's disparities that an estimator found; empty if it found none."""
     if offset_px is None or abs(offset_px) < LEAST_OFFSET_PX:
         return ""
     return f"disparities of this stereo pair look off by {offset_px:+.2g} px: check its calibration"

@@ -21,7 +21,8 @@ def marks(board: Board, metric: str) -> dict[tuple[str, str], str]:
     """The marks of a metric by case and estimator.
 
     The best estimator of a case has `*`. Each estimator that is not decided against the best has `~`, and so has the
-    best one then. A failed trial counts as the worst of all. Costs are not marked.
+    best one then; with fewer than MIN_TRIALS trials nothing is tested, and none has it. A failed trial counts as the
+    worst of all. Costs are not marked.
     """
     if metric in COSTS:
         return {}
@@ -44,12 +45,12 @@ def _marks_of_case(cells: Sequence[Cell], metric: str) -> dict[str, str]:
         return {}
 
     best = min(medians, key=lambda name: (medians[name], name))
+    if len(losses[best]) < MIN_TRIALS:
+        return {best: BEST}
     others = [name for name in losses if name != best]
     worse = worse_than_best(losses, best)
     tied = [name for name in others if name not in worse]
     marked = {best: BEST + NOT_DECIDED if tied else BEST}
-    if len(losses[best]) < MIN_TRIALS:
-        return marked  # with so few trials nothing is decided, and a mark would say nothing
     for name in tied:
         is_as_good = medians.get(name) == medians[best]
         marked[name] = BEST if is_as_good else NOT_DECIDED

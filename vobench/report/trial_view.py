@@ -13,6 +13,8 @@ from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
+from vobench.report.cell_notes import disparity_offset_sentence
+from vobench.report.frame_statistics import summarize_frames
 from vobench.report.rerun_scene import SceneMesh, scene_mesh
 from vobench.report.rerun_tracks import Tracks
 from vobench.report.rerun_truth import TruthView
@@ -98,7 +100,7 @@ def trial_view(folder: RunFolder, trial: TrialScore, *, window: slice = slice(No
         points=_points(place, alignment, first, end),
         stats=_stats(shown),
         costs=_costs(shown),
-        summary_md=summary(trial),
+        summary_md=summary(trial, disparity_offset_sentence(summarize_frames([rows]).offset_px)),
         truth=_truth_view(link),
         scene=scene_mesh(folder, trial.case),
         wrong_at=None if trial.status in SURVIVED else _largest_jump(error_m),
@@ -184,8 +186,8 @@ def _largest_jump(error_m: Array) -> int | None:
     return int(np.argmax(growth_m)) + 1
 
 
-def summary(trial: TrialScore) -> str:
-    """The score of a trial in Markdown."""
+def summary(trial: TrialScore, note: str = "") -> str:
+    """The score of a trial in Markdown, with a note on its stereo pair if there is one."""
     reason = f" — {trial.reason}" if trial.reason else ""
     lines = [
         f"# {trial.estimator} on {trial.case}",
@@ -195,6 +197,8 @@ def summary(trial: TrialScore) -> str:
         f"{trial.frames} frames, {trial.path_m:.2f} m, coverage {trial.coverage:.1%}",
         "",
     ]
+    if note:
+        lines += [note[0].upper() + note[1:], ""]
     if trial.score:
         lines += ["| metric | rmse | mean | max |", "|---|---|---|---|"]
         for metric in trial.score["metrics"]:
