@@ -136,8 +136,8 @@ def test_a_broken_file_beside_the_good_ones_is_listed_with_its_reason(vobench, h
 
 
 WRONG = [
-    (("run", "tinny"), "no suite named 'tinny'. Did you mean 'tiny'? Known: daily, full, hand, paper, quickstart, regression, sensors, street, tiny"),
-    (("check", "./no.yaml"), "no suite file at no.yaml. Known by name: daily, full, hand, paper, quickstart, regression, sensors, street, tiny"),
+    (("run", "tinny"), "no suite named 'tinny'. Did you mean 'tiny'? Known: daily, full, hand, paper, quickstart, regression, sensors, street, tiny, worlds"),
+    (("check", "./no.yaml"), "no suite file at no.yaml. Known by name: daily, full, hand, paper, quickstart, regression, sensors, street, tiny, worlds"),
     (("run", "tiny", "-e", "stand_stil"), "no estimator named 'stand_stil'. Did you mean 'stand_still'? Known: constant_velocity, feature_vo, imu_dead_reckoning, "
      "imu_visual, lk_epipolar, mono_vo, noisy_truth, planar_floor, stand_still, stereo_pnp, wheel_odometry, wheel_visual"),
     (("run", "tiny", "--out", "suites/tiny.yaml"), "out should be a folder that can be written (File exists): suites/tiny.yaml"),
