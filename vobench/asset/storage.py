@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -15,7 +16,9 @@ from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 
 PALLET_M = (1.2, 0.8, 0.144)
 CARTONS = 5  # pictures of cartons
+CARTON_GRIDS = ((3, 2), (2, 2), (4, 2), (2, 1))  # columns and rows on a pallet
 CARTON_TINTS = ("#ffffff", "#f3ead9", "#e5e9ea", "#fff3dc", "#e9d8c2")
+CRATE_M = 0.26  # height
 CRATE_COLOURS = ("#27445c", "#8d1f1c", "#3d7a7c", "#5d6468", "#c8a23a", "#2f4a36")
 YELLOW = coated("#d8a614", roughness=0.4)
 
@@ -24,16 +27,17 @@ def pallet() -> list[Part]:
     """A pallet of planks."""
     plank = matt(texture=picture.boards("beech", 9, rows=6))
     length_m, width_m, high_m = PALLET_M
-    feet = [(block_arrays((length_m, 0.1, 0.1), bevel_m=0, uv_m=(y, y)), at(0, y, 0.05)) for y in (-0.35, 0.0, 0.35)]
-    cross = [
-        (block_arrays((0.14, width_m, 0.022), bevel_m=0, uv_m=(x, x)), at(x, 0, 0.111)) for x in (-0.53, 0.0, 0.53)
-    ]
-    top_z = high_m - 0.011
-    top = [
-        (block_arrays((length_m, 0.12, 0.022), bevel_m=0, uv_m=(3 * y, y)), at(0, y, top_z))
-        for y in (-0.33, -0.165, 0.0, 0.165, 0.33)
-    ]
-    return [Part(joined_arrays([board.moved(T) for board, T in (*feet, *cross, *top)]), plank)]
+    boards = []
+    for y_m in (-0.35, 0.0, 0.35):
+        foot = block_arrays((length_m, 0.1, 0.1), bevel_m=0, uv_m=(y_m, y_m))
+        boards.append(foot.moved(at(0, y_m, 0.05)))
+    for x_m in (-0.53, 0.0, 0.53):
+        crosspiece = block_arrays((0.14, width_m, 0.022), bevel_m=0, uv_m=(x_m, x_m))
+        boards.append(crosspiece.moved(at(x_m, 0, 0.111)))
+    for y_m in (-0.33, -0.165, 0.0, 0.165, 0.33):
+        deck_board = block_arrays((length_m, 0.12, 0.022), bevel_m=0, uv_m=(3 * y_m, y_m))
+        boards.append(deck_board.moved(at(0, y_m, high_m - 0.011)))
+    return [Part(joined_arrays(boards), plank)]
 
 
 def load(rng: Rng, high_m: float) -> list[Part]:
@@ -45,26 +49,27 @@ def load(rng: Rng, high_m: float) -> list[Part]:
 
 def _cartons(rng: Rng, high_m: float) -> list[Part]:
     """Cartons of one size in layers, of which some of the uppermost are gone."""
-    columns, rows = ((3, 2), (2, 2), (4, 2), (2, 1))[int(rng.integers(4))]
-    x_m = 1.18 / columns
-    y_m = 0.78 / rows
-    z_m = float(rng.uniform(0.22, 0.46))
-    layers = max(1, min(int(high_m / z_m), 5))
-    layers = int(rng.integers(max(1, layers - 1), layers + 1))
+    columns, rows = CARTON_GRIDS[int(rng.integers(len(CARTON_GRIDS)))]
+    length_m = 1.18 / columns
+    width_m = 0.78 / rows
+    layer_m = float(rng.uniform(0.22, 0.46))
+    most_layers = max(1, min(int(high_m / layer_m), 5))
+    layers = int(rng.integers(max(1, most_layers - 1), most_layers + 1))
     is_open = rng.random() < 0.5
-    tile_m = max(x_m, y_m, z_m)
+    middle_m = max(length_m, width_m, layer_m) / 2  # of the picture
+    size_m = (length_m - 0.012, width_m - 0.012, layer_m - 0.002)
+    carton = block_arrays(size_m, bevel_m=0, uv_m=(middle_m, middle_m), upright=True)
     boxes = []
     for layer, column, row in np.ndindex(layers, columns, rows):
-        is_gone = layer == layers - 1 and layers > 1 and is_open and rng.random() < 0.4
-        if is_gone:
+        may_be_gone = is_open and layers > 1 and layer == layers - 1
+        if may_be_gone and rng.random() < 0.4:
             continue
-        box = block_arrays(
-            (x_m - 0.012, y_m - 0.012, z_m - 0.002), bevel_m=0, uv_m=(tile_m / 2, tile_m / 2), upright=True
-        )
-        x = (column - (columns - 1) / 2) * x_m
-        y = (row - (rows - 1) / 2) * y_m
-        turn_deg = 180.0 * int(rng.integers(2)) + float(np.clip(rng.normal(0, 0.4), -0.8, 0.8))
-        boxes.append(box.moved(at(x, y, (layer + 0.5) * z_m - 0.001 * (layer == 0), yaw=turn_deg)))
+        x_m = (column - (columns - 1) / 2) * length_m
+        y_m = (row - (rows - 1) / 2) * width_m
+        z_m = (layer + 0.5) * layer_m - 0.001 * (layer == 0)
+        half_turn_deg = 180.0 * int(rng.integers(2))
+        skew_deg = float(np.clip(rng.normal(0, 0.4), -0.8, 0.8))
+        boxes.append(carton.moved(at(x_m, y_m, z_m, yaw=half_turn_deg + skew_deg)))
     look = picture.carton(int(rng.integers(CARTONS)), 0.5)
     return [Part(joined_arrays(boxes), matt(one_of(rng, *CARTON_TINTS), look))]
 
@@ -94,27 +99,29 @@ def _sacks(rng: Rng, high_m: float) -> list[Part]:
     """Sacks in layers that lie crosswise."""
     z_m = 0.15
     layers = max(1, min(int(high_m / z_m) - 1, 5))
+    sack = as_arrays(cushion((0.39, 0.76, z_m + 0.03), power=4, cells=4))
     sacks = []
     for layer in range(layers):
-        for k in (-1, 0, 1):
-            sack = as_arrays(cushion((0.39, 0.76, z_m + 0.03), power=4, cells=4))
-            sacks.append(sack.moved(at(0.39 * k, 0, (layer + 0.5) * z_m + 0.015, yaw=float(rng.normal(0, 1)))))
-    return [Part(joined_arrays(sacks), matt(one_of(rng, "#d9d4c8", "#c9b79a", "#e6e3da"), picture.fabric(2)))]
+        for column in (-1, 0, 1):
+            middle_z_m = (layer + 0.5) * z_m + 0.015
+            sacks.append(sack.moved(at(0.39 * column, 0, middle_z_m, yaw=float(rng.normal(0, 1)))))
+    fabric = matt(one_of(rng, "#d9d4c8", "#c9b79a", "#e6e3da"), picture.fabric(2))
+    return [Part(joined_arrays(sacks), fabric)]
 
 
 def _crates(rng: Rng, high_m: float) -> list[Part]:
     """Plastic crates in stacks of unlike height."""
     colour = one_of(rng, *CRATE_COLOURS)
+    body = block_arrays((0.57, 0.37, 0.22), bevel_m=0)
+    rim = block_arrays((0.595, 0.395, 0.04), bevel_m=0)
+    most_levels = max(2, int(high_m / CRATE_M))
     crates = []
-    for x in (-0.3, 0.3):
-        for y in (-0.2, 0.2):
-            for level in range(int(rng.integers(1, max(2, int(high_m / 0.26)) + 1))):
-                if (level + 1) * 0.26 > high_m:
-                    break
-                crates += [
-                    block_arrays((0.57, 0.37, 0.22), bevel_m=0).moved(at(x, y, level * 0.26 + 0.11)),
-                    block_arrays((0.595, 0.395, 0.04), bevel_m=0).moved(at(x, y, level * 0.26 + 0.24)),
-                ]
+    for x_m, y_m in product((-0.3, 0.3), (-0.2, 0.2)):
+        for level in range(int(rng.integers(1, most_levels + 1))):
+            if (level + 1) * CRATE_M > high_m:
+                break
+            crates.append(body.moved(at(x_m, y_m, level * CRATE_M + 0.11)))
+            crates.append(rim.moved(at(x_m, y_m, level * CRATE_M + 0.24)))
     return [Part(joined_arrays(crates), coated(colour, roughness=0.3))]
 
 
