@@ -30,7 +30,7 @@ from vobench.suite.scene_file import read_place
 from vobench.suite.suite import read_plan
 from vobench.suite.viewpoint import Viewpoint
 
-PLACES = ("flat", "office", "street", "warehouse")
+PLACES = ("flat", "office", "park", "room", "street", "warehouse")
 STAGES = ("build", "light", "open", "picture")
 CAMERA = Pinhole(752, 480, 458.0, 458.0, 375.5, 239.5)
 EYE_HEIGHT_M = 1.2
