@@ -1,20 +1,23 @@
-"""End with 0 if every trial of a run has an estimate, else name those without: python board.py RUN_FOLDER."""
+"""End with 0 if each trial of a run is ok, or lost as quickstart intends, else name the others: board.py RUN_FOLDER."""
 
 import json
 import sys
 from pathlib import Path
 
+ENDED = ("ok", "lost")
+
 
 def main(folder: Path) -> None:
-    """Read the board of a run and require the status `ok` of each trial."""
+    """Read the board of a run, and require that each trial ran to its end and most of them are ok."""
     board = json.loads((folder / "leaderboard.json").read_text(encoding="utf-8"))
     cells = board["cells"]
-    failed = [cell for cell in cells if cell["status"] != "ok"]
+    failed = [cell for cell in cells if cell["status"] not in ENDED]
     for cell in failed:
         print(f"{cell['case']}: {cell['estimator']}: {cell['status']}: {cell['reason']}", file=sys.stderr)
-    if failed or not cells:
-        raise SystemExit(f"{len(failed)} of {len(cells)} trials of {folder} failed")
-    print(f"{len(cells)} of {len(cells)} trials of {folder} are ok")
+    ok = sum(cell["status"] == "ok" for cell in cells)
+    if failed or 2 * ok <= len(cells):
+        raise SystemExit(f"{len(failed)} of {len(cells)} trials of {folder} failed, {ok} are ok")
+    print(f"{ok} of {len(cells)} trials of {folder} are ok")
 
 
 main(Path(sys.argv[1]))

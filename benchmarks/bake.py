@@ -76,7 +76,7 @@ ALL_SCENES = (
 )
 # stages of a bake by the functions that they consist of, as the module of the bake calls them
 STAGES = {
-    "spacings_m": "spacings",
+    "sampled_faces": "spacings",
     "unwrap": "unwrap",
     "static_points": "texels",
     "surfels": "surfels",
@@ -110,8 +110,9 @@ def _stages(name: str) -> str:
 
     for function, stage in STAGES.items():
         setattr(bake_module, function, timed(getattr(bake_module, function), lambda *_, stage=stage: stage))
-    gather = bake_module.Gatherer.gather
-    bake_module.Gatherer.gather = timed(gather, lambda *_: "gather")  # type: ignore[method-assign,assignment]
+    for name_of_method in ("sample", "light", "deposited"):
+        method = getattr(bake_module.Gatherer, name_of_method)
+        setattr(bake_module.Gatherer, name_of_method, timed(method, lambda *_, stage=name_of_method: stage))
     direct_light = bake_module.direct_light
     bake_module.direct_light = timed(  # type: ignore[attr-defined]
         direct_light, lambda emitter, *_: f"direct {type(emitter).__name__}"

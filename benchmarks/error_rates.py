@@ -1,6 +1,6 @@
 """How often the conclusions of a board are wrong, on boards whose truth is known.
 
-    python benchmarks/error_rates.py [--boards 1000] [--seed 1]
+    python benchmarks/error_rates.py [--boards 1000] [--seed 1] [--table false_decisions]
 
 The logarithm of a trial's loss is drawn as: case + estimator + estimator × place + estimator × drive + repeat, with
 the standard deviations that a row names. Over the ten built-in places, the logarithm of the ratio of two real
@@ -20,14 +20,14 @@ from scipy.spatial.transform import Rotation
 from vobench.geometry.se3 import Array
 from vobench.metric.ranking import DECIDED, MIN_DRIVES, TrialTable, rank
 from vobench.metric.repeat_test import worse_than_best
-from vobench.metric.sequential import half_width
+from vobench.metric.sequential import log_wealths
 from vobench.metric.significance import PairedDifference
 from vobench.metric.unit import make_design
 from vobench.report.cell import CaseFacts
-from vobench.report.compare import NOT_DETERMINISTIC, REGRESSIONS, compare
+from vobench.report.compare import REGRESSIONS, compare
 from vobench.report.leaderboard import Board, make_board
 from vobench.runner.estimate import FINISHED, EstimatorOutcome
-from vobench.runner.folder import TrialScore
+from vobench.runner.folder import NOT_DETERMINISTIC, TrialScore
 from vobench.runner.score import score_estimate, status_of
 from vobench.trajectory.trajectory import Trajectory
 
@@ -256,52 +256,44 @@ def false_marks(boards: int, rng: Generator) -> Iterator[list[str]]:
 
 @dataclass(frozen=True, slots=True)
 class Looks:
-    """Differences of log losses over places, looked at after every place, and what each look states.
+    """What each look at differences of log losses (B, N) of B boards states, after every place, at the level alpha."""
 
-    low, high: the ends of the sequence (B, N) after each place; infinite before the first statement.
-    """
+    differences: Array
+    alpha: float
+    ratio: float
 
-    low: Array
-    high: Array
-
-    def claims(self, ratio: float) -> tuple[Array, Array, Array]:
+    def claims(self) -> tuple[Array, Array, Array]:
         """Whether each look states that the first is better, that the second is, and that they are alike (B, N)."""
-        limit = np.log(ratio)
-        return self.low > 0, self.high < 0, (self.low > -limit) & (self.high < limit)
+        threshold = np.log(2 / self.alpha)
+        limit = np.log(self.ratio)
+        first_better = log_wealths(self.differences, 0.0) >= threshold
+        second_better = log_wealths(-self.differences, 0.0) >= threshold
+        is_less = log_wealths(-self.differences, -limit) >= threshold
+        is_more = log_wealths(self.differences, -limit) >= threshold
+        return first_better, second_better, is_less & is_more
 
-    def places_until_settled(self, ratio: float) -> Array:
-        """The number of places (B,) after which a board ends; NaN for one that never does."""
-        is_settled = np.logical_or.reduce(self.claims(ratio))
-        return np.where(is_settled.any(axis=1), is_settled.argmax(axis=1) + 1.0, np.nan)
+    def places_until_settled(self) -> Array:
+        """The number of places (B,) after which a board ends; infinite for one that never does."""
+        is_settled = np.logical_or.reduce(self.claims())
+        return np.where(is_settled.any(axis=1), is_settled.argmax(axis=1) + 1.0, np.inf)
 
-    def falsehoods(self, mean: float, ratio: float) -> float:
+    def falsehoods(self, mean: float) -> float:
         """The share of boards of which any look states what a true mean contradicts."""
-        first_better, second_better, alike = self.claims(ratio)
-        is_false = second_better & (mean >= 0) | first_better & (mean <= 0) | alike & (abs(mean) >= np.log(ratio))
+        first_better, second_better, alike = self.claims()
+        is_false = second_better & (mean >= 0) | first_better & (mean <= 0) | alike & (abs(mean) >= np.log(self.ratio))
         return float(is_false.any(axis=1).mean())
-
-
-def looks(differences: Array, alpha: float) -> Looks:
-    """The looks at differences (B, N) of boards after every place."""
-    numbers = np.arange(1, differences.shape[1] + 1)
-    means = differences.cumsum(axis=1) / numbers
-    squares = (differences**2).cumsum(axis=1) - numbers * means**2
-    stds = np.sqrt(np.maximum(squares, 0.0) / np.maximum(numbers - 1, 1))
-    of_unit_std = np.array([half_width(PairedDifference(count, 0.0, 1.0), alpha) for count in numbers.tolist()])
-    with np.errstate(invalid="ignore"):
-        half = np.where(np.isinf(of_unit_std), np.inf, of_unit_std * stds)
-    return Looks(means - half, means + half)
 
 
 MOST_PLACES = 400
 RATIO = 1.5
 REAL_STD = 0.62  # of lk_epipolar against stereo_pnp, over the ten built-in places
+FAILURE = 4.0  # how much larger the logarithm of the loss of a failed trial is
 
 
-def _failing(shape: tuple[int, int], rng: Generator, *, both: bool) -> Array:
-    """Differences of mean 0 where one estimator, or each of the two, fails in a tenth of places at 4 log units."""
-    differences = 0.4 * rng.standard_normal(shape) + 4.0 * (rng.random(shape) < 0.1)
-    other = 4.0 * (rng.random(shape) < 0.1) if both else 0.4
+def _failing(shape: tuple[int, int], rng: Generator, *, both: bool, share: float = 0.1) -> Array:
+    """Differences of mean 0 where one estimator, or each of the two, fails in a share of places."""
+    differences = 0.4 * rng.standard_normal(shape) + FAILURE * (rng.random(shape) < share)
+    other = FAILURE * (rng.random(shape) < share) if both else FAILURE * share
     return np.asarray(differences - other)
 
 
@@ -315,12 +307,14 @@ def until_decided(boards: int, rng: Generator) -> Iterator[list[str]]:
         "two in three are ties": lambda: REAL_STD * rng.standard_normal(shape) * (rng.random(shape) < 1 / 3),
         "each fails in a tenth of places": lambda: _failing(shape, rng, both=True),
         "skewed, exponential": lambda: REAL_STD * (rng.exponential(size=shape) - 1),
+        "skewed to the other side": lambda: REAL_STD * (1 - rng.exponential(size=shape)),
         "one fails in a tenth of places, and is better elsewhere": lambda: _failing(shape, rng, both=False),
+        "one fails in 1 of 30 places, and is better elsewhere": lambda: _failing(shape, rng, both=False, share=1 / 30),
     }
     for name, draw in kinds.items():
         log_ratio = float(np.log(RATIO))
-        at_1 = looks(draw(), DECIDED).falsehoods(0.0, RATIO)
-        at_ratio = looks(draw() + log_ratio, DECIDED).falsehoods(log_ratio, RATIO)
+        at_1 = Looks(draw(), DECIDED, RATIO).falsehoods(0.0)
+        at_ratio = Looks(draw() + log_ratio, DECIDED, RATIO).falsehoods(log_ratio)
         yield [name, f"{at_1:.3f}", f"{at_ratio:.3f}", f"{_repeated_t_test(draw()):.3f}"]
 
 
@@ -344,8 +338,7 @@ def places_until_decided(boards: int, rng: Generator) -> Iterator[list[str]]:
             row = [f"{std:g}", f"{ratio:g}"]
             for pairs in (1, 3):
                 differences = np.log(ratio) + std * rng.standard_normal((boards, MOST_PLACES))
-                needed = looks(differences, DECIDED / pairs).places_until_settled(RATIO)
-                needed = np.nan_to_num(needed, nan=np.inf)
+                needed = Looks(differences, DECIDED / pairs, RATIO).places_until_settled()
                 shown = np.quantile(needed, [0.1, 0.5, 0.9], method="higher")
                 row.append(", ".join(_count(value) for value in shown))
             fixed = PairedDifference(MOST_PLACES, 0.0, std).units_needed(np.log(ratio), DECIDED) if ratio > 1 else None
@@ -559,8 +552,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--boards", type=int, default=1000)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--table", choices=[table.__name__ for table in TABLES], help="print this one alone")
     arguments = parser.parse_args()
     for number, table in enumerate(TABLES):
+        if arguments.table not in (None, table.__name__):
+            continue
         rng = np.random.default_rng([arguments.seed, number])
         print(f"\n{table.__doc__}\n")
         for row, cells in enumerate(table(arguments.boards, rng)):

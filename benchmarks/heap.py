@@ -4,9 +4,10 @@
 
 Three processes, one after the other, each make up to so many sequences and, for every tenth of them, the light of their
 scene: with one thread of Mesa's llvmpipe (`LP_NUM_THREADS=1`), with two, and with two on a single core, where Embree
-has one thread, as TBB counts the cores that a process may use. The budget, in seconds, is of all three together; they
-take turns of a third each. Printed is how many sequences each made, how it ended, and what glibc and faulthandler said.
-The sequences of every process must have the same bytes; a corrupted heap may show there before it ends a process.
+has one thread, as TBB counts the cores that a process may use. A sequence has two stereo pairs of 72 × 48 pixels. The
+budget, in seconds, is of all three together; they take turns of a third each. Printed is how many sequences each made,
+how it ended, and what glibc and faulthandler said. The sequences of every process must have the same bytes; a corrupted
+heap may show there before it ends a process.
 """
 
 import argparse
@@ -14,6 +15,7 @@ import faulthandler
 import hashlib
 import json
 import os
+import resource
 import subprocess
 import sys
 import tempfile
@@ -32,7 +34,8 @@ lamps: [{name: lamp, center_m: [0, 0, 1.4], size_m: [0.4, 0.4], power_lm: 600}]
 """
 SUITE = """name: tiny
 scenes: [closet]
-rigs: {down: {pitch_deg: 60}}
+rigs: {down: {pitch_deg: 60, picture_scale: 0.1}}
+frames: [0, 2]
 trajectories: {short: {targets_m: [[0.1, 0]], tolerance_m: 0.04, rate_hz: 3}}
 truth: [depth, flow]
 estimators: [stand_still]
@@ -84,14 +87,18 @@ def run(setting: Setting, folder: Path, sequences: int, budget_s: float) -> None
     cores = sorted(os.sched_getaffinity(0))[: setting.cores]
     command = ["taskset", "-c", ",".join(map(str, cores)), sys.executable, __file__, "--work", str(folder)]
     command += ["--sequences", str(sequences), "--budget", str(budget_s)]
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu_before_s = before.ru_utime + before.ru_stime
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     facts = [json.loads(line) for line in done.stdout.splitlines()]
     lights = sum("light_s" in fact for fact in facts)
     made = [fact for fact in facts if "bytes" in fact]
     kinds = Counter(fact["bytes"] for fact in made)
+    usage = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu_s = usage.ru_utime + usage.ru_stime - cpu_before_s
     print(
-        f"{setting.name}: {len(made)} sequences and {lights} lights, {len(kinds)} kind(s) of bytes {[*kinds][:3]}, "
-        f"exit code {done.returncode}",
+        f"{setting.name}: {len(made)} sequences and {lights} lights in {cpu_s:.0f} s of CPU, "
+        f"{len(kinds)} kind(s) of bytes {[*kinds][:3]}, exit code {done.returncode}",
         flush=True,
     )
     if done.returncode:

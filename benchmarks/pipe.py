@@ -1,5 +1,7 @@
 """What it costs to hand an estimator a stereo pair in a process of its own, against calling the class directly.
 
+Frames go through shared memory where the kernel has it; the second column is what a pipe takes instead.
+
     python benchmarks/pipe.py [--frames 500] [--repeats 3] [--starts 20]
 
 The estimator answers with a pose, 300 tracks and two numbers. Medians of the best repeat.
@@ -11,7 +13,9 @@ import platform
 import resource
 import tempfile
 import time
+from dataclasses import replace
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
@@ -57,7 +61,8 @@ def main() -> None:
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--starts", type=int, default=20)
     args = parser.parse_args()
-    rig = stereo_rig(LENSES["paper_blender"], pitch_deg=90)
+    lens = LENSES["paper_blender"]
+    rig = stereo_rig(lens, pitch_deg=90)
     rng = np.random.default_rng(0)
     print(f"{platform.machine()}, Python {platform.python_version()}; ms a pair")
     with tempfile.TemporaryDirectory() as place:
@@ -67,14 +72,21 @@ def main() -> None:
         direct.start(rig, {}, 0)
         for size, shape in SIZES.items():
             picture = rng.integers(0, 255, shape).astype(np.uint8)
-            best = []
+            height_px, width_px = shape[:2]
+            rig = stereo_rig(replace(lens, width_px=width_px, height_px=height_px), pitch_deg=90)
+            shared_ms = []
+            piped_ms = []
             frames = max(args.frames * 480 * 720 // picture.size, 20)
             for _ in range(args.repeats):
-                with started(folder) as process:
-                    process.start(rig, {}, 0)
-                    best.append(median_ms(process.process, picture, frames))
+                with started(folder) as shared, started(folder) as piped:
+                    shared.start(rig, {}, 0)
+                    with mock.patch("vobench.estimator.process.frame_memory", return_value=None):
+                        piped.start(rig, {}, 0)
+                    shared_ms.append(median_ms(shared.process, picture, frames))
+                    piped_ms.append(median_ms(piped.process, picture, frames))
             alone = median_ms(direct.process, picture, frames)
-            print(f"{size:>20}: {min(best):7.3f} piped, {alone:7.3f} direct")
+            shown = f"{min(shared_ms):7.3f} shared, {min(piped_ms):7.3f} piped, {alone:7.3f} direct"
+            print(f"{size:>20}: {shown}")
         spent = []
         for _ in range(args.starts):
             before = resource.getrusage(resource.RUSAGE_CHILDREN)

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vobench.asset import home, place_check, site_check, street, warehouse, workplace
+from vobench.asset import home, paper_room, park, place_check, site_check, street, warehouse, workplace
 from vobench.asset.daylight import LIGHTINGS
 from vobench.asset.interior import Interior
 from vobench.asset.site import Site
@@ -24,6 +24,8 @@ from vobench.geometry.triangle import areas_m2
 MAKERS = {
     "flat": home.furnished_flat,
     "office": workplace.furnished_office,
+    "park": park.generated_park,
+    "room": paper_room.generated_paper_room,
     "street": street.generated_street,
     "warehouse": warehouse.generated_warehouse,
 }

@@ -17,8 +17,10 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from vobench.analysis.explain import Change, Explanation, Outcome, Removal, effort, explain
+from vobench.analysis.explain import effort, explain
+from vobench.analysis.explanation import Change, Explanation, Removal
 from vobench.analysis.nuisance import Nuisance
+from vobench.analysis.segment_loss import Outcome
 from vobench.geometry.se3 import Array
 from vobench.suite.case import Case
 from vobench.suite.suite import read_plan

@@ -13,7 +13,7 @@ import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from vobench.report.board_table import LEGEND
+from vobench.report.board_table import SHORT_LEGEND
 from vobench.runner.folder import open_run
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -45,7 +45,7 @@ def printed(run: Path) -> str:
     """The board of a run as a terminal shows it, without the legend, which docs/boards.md explains."""
     command = [sys.executable, "-c", "from vobench.cli import main; main()", "report", str(run)]
     text = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    legend = LEGEND.split(";")[0]
+    legend = SHORT_LEGEND.split(";")[0]
     lines = [line.rstrip() for line in text.splitlines()]
     begins = next((at for at, line in enumerate(lines) if line.startswith(legend)), len(lines))
     ends = next((at for at, line in enumerate(lines) if line.startswith("Made on ")), len(lines))

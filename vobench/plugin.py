@@ -15,8 +15,8 @@ Makers       Thing make_mesh joined moved copies flipped two_sided textured: mes
              Part Piece put stood things mm bars bulb kitchen: furniture
              Opening shell FINISHES OUTWARD: rooms
              AreaLight PointLight SpotLight Sun Sky Steady Flicker Dimmer Switched: lights
-             Surroundings GeneratedPlace home workplace street warehouse: the panorama of a sky, what a generator
-             returns, furnished flats and offices, streets, warehouses
+             Surroundings GeneratedPlace: the panorama of a sky, what a generator returns
+             home workplace street warehouse park paper_room: places by seed, from flats to variants of the paper's room
 Layouts      Layout Writing ReadOptions Topics: the definition of a layout, and the options of its reader
              Recording RecordedFrame RecordedPicture PictureStream assemble picture_files numbered truth_file unread
              chain_rig: reading
@@ -36,7 +36,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from vobench.asset import home, kitchen, picture, street, warehouse, workplace
+    from vobench.asset import home, kitchen, paper_room, park, picture, street, warehouse, workplace
     from vobench.asset.fitting import bars
     from vobench.asset.furniture import (
         BLACK,
@@ -177,6 +177,8 @@ HOMES = {
     "picture": "vobench.asset.picture",
     "home": "vobench.asset.home",
     "kitchen": "vobench.asset.kitchen",
+    "paper_room": "vobench.asset.paper_room",
+    "park": "vobench.asset.park",
     "street": "vobench.asset.street",
     "warehouse": "vobench.asset.warehouse",
     "workplace": "vobench.asset.workplace",
@@ -422,7 +424,9 @@ __all__ = [
     "mm",
     "moved",
     "numbered",
+    "paper_room",
     "parameters",
+    "park",
     "picture",
     "picture_files",
     "pierced",

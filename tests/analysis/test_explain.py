@@ -6,25 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vobench.analysis.explain import (
-    Change,
-    Effort,
-    Explanation,
-    Outcome,
-    _block_means,
-    _change,
-    _suspects,
-    effort,
-    explain,
-    folder_name,
-    is_sufficient,
-    loss_between,
-    segment_loss,
-)
+from tests.analysis.changes import change
+from vobench.analysis.explain import Effort, _change, _suspects, effort, explain, folder_name
+from vobench.analysis.explanation import Change, Explanation
 from vobench.analysis.nuisance import Nuisance
-from vobench.geometry import se3
+from vobench.analysis.segment_loss import Outcome
 from vobench.suite.case import Case
-from vobench.trajectory.trajectory import Trajectory
 
 Error = Callable[[set[str]], float]
 NAMES = ("mirrors", "gloss", "blur", "noise", "calibration", "moving things")
@@ -206,81 +193,6 @@ def test_no_explanation_takes_more_trials_than_were_announced(hard: Case) -> Non
         assert SEEDS.screening_trials(8) <= found.trials <= SEEDS.most_trials(8)
 
 
-def straight(count: int = 31) -> Trajectory:
-    along = np.linspace(0, 3, count)
-    R = np.eye(3)
-    return Trajectory(
-        (np.arange(count) * 10**8).astype(np.int64), se3.transform(R, np.stack([along, 0 * along, 0 * along], 1))
-    )
-
-
-def test_the_truth_has_no_error_and_no_poses_have_all_of_it() -> None:
-    gt = straight()
-    assert segment_loss(gt, gt) == pytest.approx(0, abs=1e-9)
-    assert (segment_loss(gt, Trajectory(gt.t_ns[:0], gt.T_world_frame[:0])) == 1).all()
-
-
-def test_the_error_is_a_share_of_the_way_wherever_the_estimate_starts() -> None:
-    gt = straight()
-    T = gt.T_world_frame.copy()
-    T[:, :3, 3] *= 1.1
-    start = se3.transform(se3.rotation_z(0.9), np.array([3.0, 2.0, 1.0]))
-    est = Trajectory(gt.t_ns, start @ T)
-    assert segment_loss(gt, est) == pytest.approx(0.1)
-    assert segment_loss(gt, est, scale=1 / 1.1) == pytest.approx(0, abs=1e-9)
-
-
-def test_a_wrong_turn_costs_its_radians_and_a_gap_its_two_steps() -> None:
-    gt, at = straight(), np.arange(31)
-    T, here = gt.T_world_frame.copy(), gt.T_world_frame[11]
-    T[11:] = here @ se3.transform(se3.rotation_z(0.2), np.zeros(3)) @ se3.inverse(here) @ T[11:]
-    assert loss_between(gt, Trajectory(gt.t_ns, T), at) == pytest.approx(np.where(at[:-1] == 10, 0.2, 0.0), abs=1e-6)
-    kept = np.arange(31) != 10
-    loss = loss_between(gt, Trajectory(gt.t_ns[kept], gt.T_world_frame[kept]), at)
-    assert np.flatnonzero(loss).tolist() == [9, 10]
-
-
-# --- The error of a trial ---
-
-
-@pytest.mark.parametrize(("frames", "segments"), [(2, 1), (3, 1), (5, 2), (31, 15), (49, 24), (500, 24)])
-def test_a_trial_has_24_segments_or_as_many_as_have_two_steps(frames: int, segments: int) -> None:
-    assert len(segment_loss(straight(frames), straight(frames))) == segments
-
-
-def test_segments_end_at_the_frames_that_are_nearest_to_equal_parts_of_the_time() -> None:
-    t_ns = np.array([0, 10, 30, 38, 52, 60, 100]) * 10**7
-    gt = Trajectory(t_ns, straight(7).T_world_frame)
-    assert len(segment_loss(gt, gt)) == 3  # with borders at 33.3 and 66.7, so at the frames 2 and 5
-    for lost, expected in ((2, [1, 1, 0]), (5, [0, 1, 1]), (3, [0, 0, 0]), (0, [1, 0, 0]), (6, [0, 0, 1])):
-        kept = np.arange(7) != lost
-        est = Trajectory(t_ns[kept], gt.T_world_frame[kept])
-        assert segment_loss(gt, est).round(6).tolist() == expected, lost
-
-
-def test_where_the_body_stands_still_errors_count_relative_to_the_mean_length() -> None:
-    positions_m = np.zeros((5, 3))
-    positions_m[:, 0] = [0, 0, 0, 1, 2]
-    gt = Trajectory(np.arange(5) * 10**8, se3.transform(np.eye(3), positions_m))
-    T = gt.T_world_frame.copy()
-    T[1:, 1, 3] += 0.1
-    found = loss_between(gt, Trajectory(gt.t_ns, T), np.array([0, 1, 2, 3, 4]))
-    assert found == pytest.approx([0.1 / 0.5, 0, 0, 0])
-    still = Trajectory(gt.t_ns, np.repeat(gt.T_world_frame[:1], 5, axis=0))
-    T = still.T_world_frame.copy()
-    T[1:, 1, 3] += 2e-4
-    assert loss_between(still, Trajectory(gt.t_ns, T), np.arange(5)) == pytest.approx([0.2, 0, 0, 0])
-
-
-def test_no_error_is_larger_than_that_of_a_lost_segment() -> None:
-    gt = straight()
-    T = gt.T_world_frame.copy()
-    T[16:, 1, 3] += 50
-    loss = loss_between(gt, Trajectory(gt.t_ns, T), np.arange(31))
-    assert loss.max() == 1
-    assert loss.sum() == pytest.approx(1)
-
-
 # --- Sentences about variants ---
 
 
@@ -307,35 +219,6 @@ def test_of_two_nuisances_variants_are_named_by_what_is_removed() -> None:
 # --- Decisions ---
 
 
-def change(*removed: str, mended: float = 0.5, is_sure: bool = True, high: float = 0.9, loss: float = 0.1) -> Change:
-    p = 0.01 if is_sure else 0.2
-    low = 0.1 if is_sure else -0.1
-    p_more = 0.01 if mended < 0 else 0.9
-    return Change(removed, loss, mended, low, high, 1, 6, p_less=p, p_more=p_more, is_confirmed=True)
-
-
-@pytest.mark.parametrize(
-    ("mended", "is_sure", "is_enough"), [(0.61, True, True), (0.59, True, False), (0.9, False, False)]
-)
-def test_a_change_is_sufficient_if_it_surely_achieves_two_thirds_of_everything(mended, is_sure, is_enough) -> None:
-    of_blur = change("blur", mended=mended, is_sure=is_sure)
-    assert is_sufficient(of_blur, change("all", mended=0.9)) == is_enough
-
-
-@pytest.mark.parametrize(("mended", "is_enough"), [(0.51, True), (0.49, False)])
-def test_where_removing_all_does_not_help_half_of_the_error_is_sufficient(mended: float, is_enough: bool) -> None:
-    for everything in (change("all", is_sure=False), None):
-        assert is_sufficient(change("blur", mended=mended), everything) == is_enough
-
-
-def test_nothing_is_sure_from_the_seeds_that_it_was_selected_with() -> None:
-    assert change("blur").is_sure
-    assert not replace(change("blur"), is_confirmed=False).is_sure
-    assert change("blur", mended=-0.2).is_harmful
-    assert not replace(change("blur", mended=-0.2), is_confirmed=False).is_harmful
-    assert not change("blur", mended=-0.05).is_harmful
-
-
 def test_suspects_are_the_three_that_cost_most_as_the_only_one_removed_or_left() -> None:
     everything = change("all", mended=0.8, loss=0.1)  # 0.5 before, so 0.4 to gain
     singles = [change(name, mended=mended) for name, mended in zip("abcde", (0.4, 0.08, 0.0, 0.0, 0.24), strict=True)]
@@ -345,40 +228,6 @@ def test_suspects_are_the_three_that_cost_most_as_the_only_one_removed_or_left()
     assert _suspects(singles, {**alone, "d": 0.24}, everything) == {"a", "c", "d"}
     nothing_left = change("all", mended=1.0, loss=0.0)
     assert _suspects(singles, {**dict.fromkeys("abcde", 0.0), "d": 0.45, "b": 0.3}, nothing_left) == {"a", "d", "b"}
-
-
-def explanation(**parts) -> Explanation:
-    given = {
-        "loss": 0.5,
-        "status": "lost",
-        "repeats_differ": True,
-        "everything": change("blur", "noise", "gloss", mended=0.9),
-        "singles": (change("blur", mended=0.3), change("noise", mended=0.2)),
-        "alone": {},
-        "pairs": (change("noise", "gloss", mended=0.7), change("blur", "noise", mended=0.35)),
-        "trials": 40,
-    }
-    return Explanation(**{**given, **parts})
-
-
-@pytest.mark.parametrize(
-    ("parts", "relation", "named"),
-    [
-        ({}, "together", ("noise", "gloss")),
-        ({"everything": change("all", mended=0.9, is_sure=False), "pairs": ()}, "none", ()),
-        ({"singles": (change("blur", mended=0.7),)}, "one", ("blur",)),
-        ({"singles": (change("blur", mended=0.3, is_sure=False),), "pairs": ()}, "none", ()),
-        ({"singles": (change("blur", mended=0.55),), "pairs": ()}, "one", ("blur",)),
-        ({"pairs": ()}, "none", ()),
-        ({"pairs": (change("noise", "gloss", mended=0.7, is_sure=False),)}, "none", ()),
-        ({"singles": (change("noise", mended=0.58),)}, "one", ("noise",)),  # the pair gains 12 % more
-        ({"singles": (change("noise", mended=0.54),)}, "together", ("noise", "gloss")),
-        ({"singles": (change("blur", mended=0.8), change("noise", mended=0.7))}, "either", ("blur",)),
-    ],
-)
-def test_what_is_named_explains_most_and_is_sure(parts, relation, named) -> None:
-    found = explanation(**parts)
-    assert (found.relation, found.named) == (relation, named)
 
 
 # --- Figures of a change ---
@@ -431,13 +280,6 @@ def test_where_nothing_is_random_the_interval_is_over_blocks_of_segments() -> No
     assert found.is_sure
     same = changed(outcomes(*[before] * 6), outcomes(*[before[::-1]] * 6))
     assert same.low < 0 < same.high
-
-
-def test_blocks_are_three_successive_segments_and_go_round_the_end() -> None:
-    outcome = Outcome("ok", True, 2.0 ** np.arange(6))
-    starts = np.array([[0.0, 0.5], [0.2, 0.99], [1 / 6 + 1e-9, 0.0]])
-    expected = [[0, 1, 2, 3, 4, 5], [1, 2, 3, 5, 0, 1], [1, 2, 3, 0, 1, 2]]
-    assert _block_means(outcome, starts) == pytest.approx([np.mean(2.0 ** np.array(rows)) for rows in expected])
 
 
 def test_the_status_is_the_most_frequent_one_and_repeats_differ_if_one_does(hard: Case) -> None:

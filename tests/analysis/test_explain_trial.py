@@ -8,8 +8,9 @@ import pytest
 
 from tests.analysis.conftest import NoisyRun
 from vobench.analysis import explain_trial as explain_trial_module
-from vobench.analysis.explain import Change, Explanation, effort
+from vobench.analysis.explain import effort
 from vobench.analysis.explain_trial import TrialExplanation, _Forecast, explain_trial
+from vobench.analysis.explanation import Change, Explanation
 from vobench.errors import InputError, UnknownNameError
 
 slow = pytest.mark.slow  # run by `pytest -m slow`, and by CI

@@ -18,7 +18,7 @@ def test_a_failure_within_few_frames_is_found_within_twelve_trials(hard: Case, w
         return case.frames[0] <= needed[0] and case.frames[1] >= needed[1]
 
     nuisances = [nuisance for nuisance in nuisances_of(hard) if not nuisance.is_circumstance]
-    found = shrink(hard, (0, 300), likely, nuisances, fails, trials=12)
+    found = shrink(hard, (0, 300), is_likely=likely, nuisances=nuisances, fails=fails, trials=12)
     assert fails(found.case)
     assert found.case.frames is not None
     assert found.case.frames[1] - found.case.frames[0] <= 60
@@ -31,12 +31,15 @@ def test_nuisances_that_it_fails_without_go_and_the_one_that_it_fails_for_stays(
         return case.rig.calibration_error == hard.rig.calibration_error
 
     nuisances = [nuisance for nuisance in nuisances_of(hard) if not nuisance.is_circumstance]
-    found = shrink(hard, (0, 40), lambda _: True, nuisances, fails, trials=40)
+    found = shrink(hard, (0, 40), is_likely=lambda _: True, nuisances=nuisances, fails=fails, trials=40)
     assert set(found.removed) == {nuisance.name for nuisance in nuisances} - {"calibration"}
 
 
 def test_what_fails_as_a_whole_alone_stays_whole(hard: Case) -> None:
-    found = shrink(hard, (0, 100), lambda _: True, (), lambda case: case.frames in (None, (0, 100)), trials=12)
+    def fails(case: Case) -> bool:
+        return case.frames in (None, (0, 100))
+
+    found = shrink(hard, (0, 100), is_likely=lambda _: True, nuisances=(), fails=fails, trials=12)
     assert found.case.frames in (None, (0, 100))
     assert len(found.tried) <= 12
 
@@ -72,7 +75,7 @@ def windows_tried(hard: Case, whole, fails, *, likely=lambda _: True, trials=50)
         ran.append(case.frames)
         return fails(case.frames)
 
-    shrink(hard, whole, likely, (), run, trials=trials)
+    shrink(hard, whole, is_likely=likely, nuisances=(), fails=run, trials=trials)
     return ran
 
 
@@ -115,9 +118,14 @@ def test_no_window_is_shorter_than_four_frames(hard: Case) -> None:
     assert min(end - first for first, end in ran) == 4
 
 
+def shrink_unlikely(hard: Case, whole, nuisances, fails, *, trials: int):
+    """Shrink a case of which no part of the estimate seems to fail."""
+    return shrink(hard, whole, is_likely=lambda _: False, nuisances=nuisances, fails=fails, trials=trials)
+
+
 def test_trials_are_limited_and_described(hard: Case) -> None:
     nuisances = [nuisance for nuisance in nuisances_of(hard) if nuisance.name in ("blur", "noise")]
-    found = shrink(hard, (0, 8), lambda _: False, nuisances, lambda case: case.camera.motion_blur, trials=20)
+    found = shrink_unlikely(hard, (0, 8), nuisances, lambda case: case.camera.motion_blur, trials=20)
     assert found.window == (0, 4)
     assert (found.whole, found.removed) == ((0, 8), ("noise",))
     assert found.tried == (
@@ -126,17 +134,17 @@ def test_trials_are_limited_and_described(hard: Case) -> None:
         ("frames 0 to 3 without blur", False),
         ("frames 0 to 3 without noise", True),
     )
-    limited = shrink(hard, (0, 8), lambda _: False, nuisances, lambda case: case.camera.motion_blur, trials=2)
+    limited = shrink_unlikely(hard, (0, 8), nuisances, lambda case: case.camera.motion_blur, trials=2)
     assert limited.tried == found.tried[:2]
     assert limited.removed == ()
 
 
 def test_all_nuisances_are_removed_at_once_if_it_fails_without_them(hard: Case) -> None:
     nuisances = [nuisance for nuisance in nuisances_of(hard) if nuisance.name in ("blur", "noise")]
-    found = shrink(hard, (0, 4), lambda _: False, nuisances, lambda _: True, trials=20)
+    found = shrink_unlikely(hard, (0, 4), nuisances, lambda _: True, trials=20)
     assert found.removed == ("blur", "noise")
     assert len(found.tried) == 1
-    single = shrink(hard, (0, 4), lambda _: False, nuisances[:1], lambda _: False, trials=20)
+    single = shrink_unlikely(hard, (0, 4), nuisances[:1], lambda _: False, trials=20)
     assert len(single.tried) == 1
 
 

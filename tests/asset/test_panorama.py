@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from vobench.asset import PANORAMAS
-from vobench.asset.panorama import COLUMNS, ROWS, Surroundings, _painted
+from vobench.asset.panorama import Surroundings, _painted
+from vobench.asset.panorama_canvas import COLUMNS, ROWS
 from vobench.scene.light import Sky, Sun
 from vobench.scene.material import LUMINANCE, Map
 from vobench.scene.panorama import PanoramaMap

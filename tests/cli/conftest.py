@@ -132,3 +132,43 @@ def ran(one_run: Path, here: Path) -> Path:
     """The suite's folder in the working directory, with one run in it."""
     shutil.copytree(one_run / "runs", here / "runs", symlinks=True)
     return here / "runs" / "tiny"
+
+
+GENERATOR = '''"""Closets by seed."""
+
+import trimesh
+
+from vobench.plugin import GeneratedPlace, Material, Thing
+
+GREY = (0.5, 0.5, 0.5)
+
+
+def generate(seed, lighting):
+    """A plain floor with a wall whose distance depends on the seed, and a lamp that shines."""
+    floor = trimesh.creation.box((6.0, 6.0, 0.1))
+    floor.apply_translation((0.0, 0.0, -0.05))
+    wall = trimesh.creation.box((0.1, 6.0, 2.0))
+    wall.apply_translation((2.5 + 0.01 * (seed % 10), 0.0, 1.0))
+    lamp = trimesh.creation.box((0.5, 0.5, 0.02))
+    lamp.apply_translation((0.0, 0.0, 2.0))
+    materials = {"grey": Material(colour=GREY), "lamp": Material(colour=GREY, emission_cd_m2=(500.0, 500.0, 500.0))}
+    things = [Thing("floor", floor, "grey"), Thing("wall", wall, "grey"), Thing("lamp", lamp, "lamp")]
+    return GeneratedPlace(things, materials)
+'''
+DRAWN = """name: drawn
+scenes: [{name: cells, seeds: 4}]
+rigs: {down: {pitch_deg: 90}}
+trajectories: {tour: {kind: wander, body: pioneer, length_m: 0.5, rate_hz: 4, seed: 1}}
+estimators: [wheel_odometry, {name: wheel_odometry, label: twin}]
+"""
+
+
+@pytest.fixture
+def drawn(here):
+    """A suite with places by seed."""
+    folder = here / "scenes" / "cells"
+    folder.mkdir()
+    (folder / "scene.yaml").write_text("name: cells\nwhite_cd_m2: 50\ngenerator: generator.py\n")
+    (folder / "generator.py").write_text(GENERATOR)
+    (here / "suites" / "drawn.yaml").write_text(DRAWN)
+    return here / "runs" / "drawn"

@@ -80,7 +80,7 @@ def test_scenes_with_a_generator_have_seeds_and_others_and_other_kinds_have_not(
     (here / "scenes" / "plain.yaml").write_text(SCENE.replace("generator:", "# generator:"))
     rows = vobench("list", "--json").json["entries"]
     with_seeds = [row["name"] for row in rows if row["seeds"]]
-    assert with_seeds == ["cell", "flat", "office", "street", "warehouse"]
+    assert with_seeds == ["cell", "flat", "office", "park", "room", "street", "warehouse"]
     table = vobench("list", "scenes").out
     line = next(line for line in table.splitlines() if " flat " in line)
     assert " yes " in line

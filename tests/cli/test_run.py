@@ -202,7 +202,7 @@ def test_a_run_in_which_no_estimator_finishes_a_trial_ends_with_code_1_and_one_l
     failed = vobench("run", "tiny", "-e", "blind", "-n", "2")
     (sentence,) = [line for line in failed.err.splitlines() if "no estimator finished" in line]
     assert failed.code == 1
-    assert sentence.startswith("vobench: no estimator finished a trial: 2 refused; blind on short: estimator 'blind'")
+    assert sentence.startswith("vobench: no estimator finished a trial: 3 refused; blind on short: estimator 'blind'")
     assert "ValueError: no eyes" in sentence
     assert "blind" in failed.out  # the board is there all the same
 

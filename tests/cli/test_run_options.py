@@ -104,7 +104,7 @@ def test_fewer_units_leave_the_places_as_they_are(spread_suite):
 
 def test_units_of_a_suite_without_a_design_are_refused():
     with pytest.raises(SuiteError, match="--units is for suites with `spread`, and this suite has none"):
-        Changes(units=3).values("quickstart")
+        Changes(units=3).values("regression")
 
 
 def test_fresh_units_have_a_base_seed_of_their_own_that_is_far_from_any_other():

@@ -453,8 +453,8 @@ def test_stated_covariances_are_held_against_the_errors(vobench, files_scoring):
     assert found["bold"]["consistency"]["covered_90"] < 0.05
     assert {"nees_pose", "nees_trans", "nees_rot"} <= {metric["name"] for metric in found["honest"]["metrics"]}
     assert "claims too much: errors are " in vobench("score", "gt.tum", "est.tum", "--cov", "bold.txt").out
-    refused = vobench("score", "gt.tum", "est.tum", "gt.tum", "est.tum", "--cov", "bold.txt")
-    assert "--cov should be given once for each pair of files, 2 times (got 1)" in refused.err
+    refused = vobench("score", "gt.tum", "est.tum", "est.tum", "--cov", "bold.txt")
+    assert "--cov should be given once for each estimate, 2 times (got 1)" in refused.err
 
 
 def test_covariances_of_odometry_are_held_against_errors_aligned_at_the_first_pose(vobench, files_scoring):
@@ -477,7 +477,7 @@ def test_several_sequences_have_a_row_each_and_one_for_all_of_their_errors(voben
     (files_scoring / "short").write_text(
         "".join((files_scoring / "e.format_tum").read_text().splitlines(keepends=True)[:60])
     )
-    words = ("score", "g.format_tum", "e.format_tum", "g.format_tum", "short")
+    words = ("score", "--pairs", "g.format_tum", "e.format_tum", "g.format_tum", "short")
     said = vobench(*words, "--json").json
     assert [(part["gt"], part["est"]) for part in said["sequences"]] == [
         ("g.format_tum", "e.format_tum"),
@@ -504,10 +504,33 @@ def test_sequences_may_stand_in_a_list_beside_their_files(vobench, files_scoring
         "# truth and estimate\n../g.format_tum ../e.format_tum\n\n../g.kitti ../e.kitti\n"
     )
     listed = vobench("score", "--list", "sub/list", "--json").json
-    given = vobench("score", "g.format_tum", "e.format_tum", "g.kitti", "e.kitti", "--json").json
+    given = vobench("score", "--pairs", "g.format_tum", "e.format_tum", "g.kitti", "e.kitti", "--json").json
     assert listed["pooled"] == given["pooled"]
-    assert vobench("score", "g.format_tum", "e.format_tum", "g.kitti").code == 2
+    refused = vobench("score", "--pairs", "g.format_tum", "e.format_tum", "g.kitti")
+    assert refused.code == 2
+    assert "files in pairs, GT EST, but there are 3" in " ".join(refused.err.split())
     assert vobench("score").code == 2
+    assert vobench("score", "g.format_tum").code == 2
+
+
+def test_several_estimates_of_one_truth_stand_side_by_side(vobench, files_scoring):
+    (files_scoring / "short").write_text(
+        "".join((files_scoring / "e.format_tum").read_text().splitlines(keepends=True)[:60])
+    )
+    words = ("score", "g.format_tum", "e.format_tum", "short", "g.format_tum")
+    names = list(words[2:])
+    found = vobench(*words, "--json").json
+    assert list(found) == ["gt", "estimates"]
+    assert found["gt"] == "g.format_tum"
+    for name, content in zip(names, found["estimates"], strict=True):
+        alone = vobench("score", "g.format_tum", name, "--json").json
+        assert content == {"est": name, **alone}
+    for form in ((), ("--md",)):
+        out = vobench(*words, *form).out
+        assert "pooled" not in out
+        assert all(f"{content['metrics'][0]['rmse']:.6g}" in out for content in found["estimates"])
+    rows = list(csv.DictReader(io.StringIO(vobench(*words, "--csv").out)))
+    assert [row["estimate"] for row in rows] == [name for name in names for _ in range(6)]
 
 
 def test_an_estimate_that_gives_up_is_said_to(vobench, files_scoring):

@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 from scipy.spatial.transform import Rotation
 
 from vobench.dataset import export as exporting
-from vobench.dataset.export import TRAJECTORY_FORMS, export, export_trajectory
+from vobench.dataset.export import FORMS_WITHOUT_STAMPS, TRAJECTORY_FORMS, export, export_trajectory
 from vobench.dataset.layout import read, sniff, writable
 from vobench.dataset.rectified_view import rectified
 from vobench.errors import InputError, SequenceError, VobenchError
@@ -307,7 +307,8 @@ def test_every_form_returns_stamps_exactly_and_poses_to_1e_9(
     path, file = random_path(seed, count, start_ns), tmp_path_factory.mktemp("path") / "path.txt"
     written = export_trajectory(path, file, form)
     found = parse_any(file.read_text(encoding="utf-8"), name="path")
-    stamps = parse_times(written[1].read_text(encoding="utf-8"), name="times") if form == "kitti" else found.t_ns
+    has_times = form in FORMS_WITHOUT_STAMPS
+    stamps = parse_times(written[1].read_text(encoding="utf-8"), name="times") if has_times else found.t_ns
     np.testing.assert_array_equal(stamps, path.t_ns)
     scale = max(1.0, float(np.abs(path.positions_m).max()))
     np.testing.assert_allclose(found.T, path.T_world_frame, atol=1e-9 * scale, rtol=0)
@@ -328,7 +329,7 @@ def test_euroc_says_its_unit_and_order_and_tum_is_what_evo_reads(tmp_path: Path)
 
 def test_a_file_that_is_there_and_an_unknown_form_are_sentences(tmp_path: Path) -> None:
     path, file = random_path(2, 3, 0), tmp_path / "path.txt"
-    with pytest.raises(InputError, match=r"no form of trajectory 'csv'\. Known: tum, kitti, euroc"):
+    with pytest.raises(InputError, match=r"no form of trajectory 'csv'\. Known: tum, kitti, euroc, tartanair"):
         export_trajectory(path, file, "csv")
     assert not list(tmp_path.iterdir())
     export_trajectory(path, file, "kitti")

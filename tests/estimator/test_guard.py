@@ -28,7 +28,13 @@ SET_NAME = 15  # PR_SET_NAME of linux/prctl.h
 @contextmanager
 def guarded(*argv, file_bytes=1 << 20, program=None):
     """A guard that has been sent the plan of a program without isolation; with the socket to it."""
-    plan = {"program": program or argv[0], "argv": list(argv), "is_isolated": False, "file_bytes": file_bytes}
+    plan = {
+        "program": program or argv[0],
+        "argv": list(argv),
+        "is_isolated": False,
+        "file_bytes": file_bytes,
+        "inherited": [],
+    }
     line, guard_line = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
     line.settimeout(PATIENCE_S)
     number = guard_line.fileno()

@@ -20,6 +20,7 @@ def test_a_plan_is_the_same_after_marshal_and_has_what_was_asked_for(tmp_path: P
         estimator_folder=own,
         hidden=[secret],
         limits=Limits(disk_mib=3, memory_mib=65),
+        inherited=[7],
     )
     assert marshal.loads(marshal.dumps(plan)) == plan
     assert plan["argv"] == ["sh", "-c", "true"]
@@ -30,3 +31,4 @@ def test_a_plan_is_the_same_after_marshal_and_has_what_was_asked_for(tmp_path: P
     assert plan["file_bytes"] == 3 << 20
     assert plan["disk_bytes"] > plan["file_bytes"]
     assert plan["memory_bytes"] == 65 << 20
+    assert plan["inherited"] == [7]

@@ -20,12 +20,15 @@ from vobench.estimator.message import (
     STATUSES,
     answered,
     calibration,
+    counted_parts,
     framed,
     pickled,
     read_answer,
     read_revision,
     revision,
+    shared_parts,
     unpickled,
+    unpickled_shared,
 )
 from vobench.estimator.protocol import EncoderReadings, Frame, ImuReadings, Result, Status, Tracks
 from vobench.geometry import se3
@@ -169,11 +172,19 @@ def test_a_frame_without_pictures_has_no_size_and_a_colour_one_has_three_channel
 
 def test_a_frame_for_the_worker_is_read_as_it_was_written():
     left = RNG.integers(0, 256, (30, 40)).astype(np.uint8)
-    frame = unpickled(bytearray(b"".join(pickled(Frame(2, 6, left, None, ENCODERS, IMU)))))
-    assert (frame.index, frame.t_ns, frame.right) == (2, 6, None)
-    np.testing.assert_array_equal(frame.left, left)
-    np.testing.assert_array_equal(frame.encoders.ticks, ENCODERS.ticks)
-    np.testing.assert_array_equal(frame.imu.accel_mps2, IMU.accel_mps2)
+    contents = pickled(Frame(2, 6, left, None, ENCODERS, IMU))
+    memory = bytearray(b"".join(contents[1:]))
+    frames = [
+        unpickled(bytearray(b"".join(counted_parts(contents)))),
+        unpickled_shared(
+            memoryview(b"".join(shared_parts(contents))), lambda length: memoryview(bytearray(memory[:length]))
+        ),
+    ]
+    for frame in frames:
+        assert (frame.index, frame.t_ns, frame.right) == (2, 6, None)
+        np.testing.assert_array_equal(frame.left, left)
+        np.testing.assert_array_equal(frame.encoders.ticks, ENCODERS.ticks)
+        np.testing.assert_array_equal(frame.imu.accel_mps2, IMU.accel_mps2)
 
 
 def test_a_calibration_is_json_that_names_every_sensor_and_has_none_for_a_missing_one():

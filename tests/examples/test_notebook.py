@@ -19,11 +19,12 @@ SUITE = """
 name: quickstart
 scenes: [room, car_park]
 rigs:
-  down: {lens: paper_blender, picture_scale: 0.5, pitch_deg: 60}
   ahead: {lens: paper_blender, picture_scale: 0.5, pitch_deg: 10}
 cameras: {noisy: {sensor: mt9v034, gain_db: 4}}
 trajectories: {short: {targets_m: [[0.2, 0.05]], tolerance_m: 0.04, rate_hz: 10}}
-estimators: [lk_epipolar, wheel_odometry]
+scenarios: {unlike_eyes: [1]}
+spread: {over: [scene], units: 2, each: 2}
+estimators: [lk_epipolar, stereo_pnp]
 """
 
 

@@ -1,5 +1,7 @@
 """A body that wanders keeps clear of everything, goes as far as asked, and moves as smoothly as its derivatives say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy
@@ -62,3 +64,32 @@ def test_the_seed_decides_the_drive_and_nothing_else_does() -> None:
 def test_a_closet_is_refused_in_one_line() -> None:
     with pytest.raises(MotionError, match=r"no path of 9 m was found on which a pioneer with seed 1 keeps clear"):
         Wander(length_m=9).motion(room(0.25))
+
+
+def hills(half_m: float = 4.0) -> Clearance:
+    """A square of uneven ground around the origin."""
+    flat = room(half_m)
+    centres = flat.x_m + flat.cell_m * np.arange(flat.distance_m.shape[1])
+    x, y = np.meshgrid(centres, centres)
+    return replace(flat, ground_m=0.3 * np.sin(0.6 * x) + 0.2 * np.cos(0.5 * y))
+
+
+@pytest.mark.parametrize(
+    ("body", "above_m"), [("pioneer", (-0.02, 0.02)), ("hand", (1.3, 1.6)), ("quadrotor", (0.4, 1.8))]
+)
+def test_on_uneven_ground_bodies_follow_the_ground(body, above_m) -> None:
+    ground = hills()
+    motion = Wander(body=body, length_m=6, seed=3).motion(ground).motion
+    positions = motion.at(np.linspace(motion.start_ns, motion.end_ns, 500)).T_world_body[:, :3, 3]
+    heights_m = positions[:, 2] - ground.ground_at(positions[:, :2])
+    assert np.ptp(ground.ground_at(positions[:, :2])) > 0.1
+    assert above_m[0] < heights_m.min() <= heights_m.max() < above_m[1]
+
+
+def test_a_car_on_uneven_ground_is_refused_in_one_line() -> None:
+    with pytest.raises(MotionError, match="the ground of this place is uneven, where a car does not wander; choose"):
+        Wander(body="car", length_m=6).motion(hills(12))
+
+
+def test_the_ground_of_a_level_floor_is_its_height() -> None:
+    assert room(3).ground_at(np.zeros((2, 2))).tolist() == [0.2, 0.2]

@@ -9,7 +9,7 @@ import pytest
 
 import vobench
 from tests.forgery import forged
-from vobench.errors import InputError, MissingDependencyError, UnknownNameError
+from vobench.errors import InputError, MissingDependencyError, SuiteError, UnknownNameError
 from vobench.notebook.runs import plan
 
 
@@ -56,6 +56,27 @@ def test_cells_trials_and_frames_have_a_row_each(ran):
     assert {"case", "estimator", "repeat", "rig", "ate"} <= set(run.trials.columns)
     per_trial = run.frames.groupby("estimator")["frame"].count()
     assert per_trial.to_dict() == dict(zip(run.trials["estimator"], run.trials["frames"], strict=True))
+
+
+def test_until_decided_ends_with_what_is_known_of_each_pair(drawn, capsys):
+    run = vobench.run("drawn", until="decided", ratio=10, budget="20min", jobs=1, quiet=True)
+    assert capsys.readouterr().out == ""
+    (pair,) = run.pairs.to_dict("records")
+    assert (pair["places"], pair["verdict"]) == (8, "alike within 10 ×")
+    assert 0.1 < pair["low"] < pair["ratio"] == 1 < pair["high"] < 10
+
+
+def test_until_decided_needs_places_to_draw_and_has_a_ratio_and_a_budget(here, drawn, ran):
+    with pytest.raises(SuiteError, match="fresh units require places"):
+        vobench.run("tiny", until="decided", quiet=True)
+    with pytest.raises(InputError, match="budget requires until='decided'"):
+        vobench.run("drawn", budget="3min")
+    with pytest.raises(InputError, match="ratio should be above 1, got 1"):
+        vobench.run("drawn", until="decided", ratio=1.0)
+    with pytest.raises(InputError, match="until should be 'decided' or None, got 'done'"):
+        vobench.run("drawn", until="done")
+    with pytest.raises(InputError, match="only a run with until='decided' has pairs"):
+        _ = vobench.read_run(ran).pairs
 
 
 def test_only_chooses_cases_scenes_or_estimators(here):

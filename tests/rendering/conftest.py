@@ -20,6 +20,7 @@ from vobench.rendering.atlas import Atlas
 from vobench.rendering.bake import BakedScene, Patches
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
+from vobench.rendering.sun_tiles import FaceParts
 from vobench.scene.light import STEADY, Level, PointLight
 from vobench.scene.material import Material, reflectance
 from vobench.scene.scene import Scene, triangles
@@ -44,7 +45,9 @@ def light_evenly(scene: Scene, *, illuminance_lx: float = 100.0, level: Level = 
     own = albedo.any(1)
     mean = np.average(albedo[own], 0, areas[own]) if own.any() else np.zeros(3)
     patches = Patches(middle, mean[None].astype(np.float32), np.array([max(areas[own].sum(), 1e-9)], np.float32), dark)
-    return BakedScene(lit, faces, atlas, direct, dark, scipy.sparse.csr_matrix((9, 1), dtype=np.float32), patches)
+    parts = FaceParts.whole(len(faces))
+    spread = scipy.sparse.csr_matrix((9, 1), dtype=np.float32)
+    return BakedScene(lit, parts, faces, atlas, direct, dark, spread, patches)
 
 
 @pytest.fixture(scope="session")

@@ -8,6 +8,7 @@ import pytest
 import trimesh
 
 from tests.rendering.panoramas import waves
+from tests.rendering.parts import light_at
 from tests.rendering.rectangles import Rectangle, box, rectangle, room
 from vobench.asset.texture import Procedural
 from vobench.errors import RenderError
@@ -52,10 +53,10 @@ def scene(*lamps: Light, things: tuple[Rectangle, ...] = (FLOOR,)) -> Scene:
 
 def on_quad(baked: BakedScene, light: Array, thing: int, s: Array, t: Array) -> Array:
     """What a map shows at fractions s and t of the edges of a thing that is a rectangle."""
-    first = int(np.flatnonzero(baked.faces.thing == thing)[0])
+    first = int(baked.parts.parent[baked.faces.thing == thing].min())
     upper = (t > s).ravel()
     u, v = np.where(t > s, s, s - t).ravel(), np.where(t > s, t - s, t).ravel()
-    return baked.atlas.read(light, (first + upper).astype(np.int32), u, v).reshape(*s.shape, *light.shape[2:])
+    return light_at(baked, light, first + upper, u, v).reshape(*s.shape, *light.shape[2:])
 
 
 def floor_light(baked: BakedScene) -> tuple[Array, Array, Array]:
@@ -79,12 +80,14 @@ def test_samples_lie_further_apart_in_a_large_place_where_nothing_is_asked_for()
     things[1] = replace(things[1], spacing_m=0.5)
     place = Scene("place", tuple(things), {"grey": Material()}, ())
     faces = triangles(place)
-    spacing_m = spacings_m(place, faces, BakeSettings())
+    no_edge = np.zeros(len(faces), bool)
+    spacing_m = spacings_m(place, faces, BakeSettings(), no_edge)
     samples = (areas_m2(faces.corners_m) / spacing_m**2)[faces.thing != 1].sum()
     assert samples == pytest.approx(SAMPLES)
     assert np.unique(spacing_m[faces.thing == 1]) == [0.5]
     alone = replace(place, things=place.things[:2])
-    assert np.unique(spacings_m(alone, triangles(alone), BakeSettings())[:2]) == [BakeSettings().spacing_m]
+    spacing_m = spacings_m(alone, triangles(alone), BakeSettings(), no_edge[:4])
+    assert np.unique(spacing_m[:2]) == [BakeSettings().spacing_m]
 
 
 @pytest.mark.parametrize("height_m", [1.0, 2.0, 4.0])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.blend_kernels import LEAST, WIDTH, count_weights, write_weights
+from vobench.rendering.blend_kernels import LEAST, WIDTH, Blending, count_weights, write_weights
 
 Z = np.array([0.0, 0.0, 1.0], np.float32)
 SPACING_M = 0.1
@@ -22,23 +22,23 @@ def row_of_surfels(*points_m: float, hidden: tuple[int, ...] = (), turned: tuple
     is_hidden[2, list(hidden)] = True
     positions_m = np.zeros((count, 3), np.float32)
     positions_m[:, 0] = points_m
-    inputs = (
-        np.arange(count + 1, dtype=np.int32),  # the last texel has no point
-        positions_m,
-        np.tile(Z, (count, 1)),
-        np.full(count, 2, np.int32),
-        np.tile(np.arange(5), (5, 1)),
-        is_hidden,
-        middles_m,
-        normals,
-        np.full(5, SPACING_M, np.float32),
+    source = np.arange(count + 1, dtype=np.int32)  # the last texel has no point
+    blending = Blending(
+        points_m=positions_m,
+        point_normals=np.tile(Z, (count, 1)),
+        surfel_of_point=np.full(count, 2, np.int32),
+        neighbours=np.tile(np.arange(5), (5, 1)),
+        is_hidden=is_hidden,
+        middles_m=middles_m,
+        normals=normals,
+        step_m=np.full(5, SPACING_M, np.float32),
     )
     counts = np.zeros(count + 1, np.int32)
-    count_weights(*inputs, counts)
+    count_weights(source, blending, counts)
     assert counts[-1] == 0
     columns = np.full(counts.sum(), -1, np.int32)
     values = np.zeros(counts.sum(), np.float32)
-    write_weights(*inputs, columns, values)
+    write_weights(source, blending, columns, values)
     result = np.zeros((count, 5))
     result[np.repeat(np.arange(count), counts[:-1]), columns] = values
     return result

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from tests.rendering.panoramas import PANORAMA, level_illuminance_lx
+from tests.rendering.parts import light_at
 from tests.rendering.rectangles import Rectangle, rectangle
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import BakeSettings, bake
 from vobench.scene.light import SUN_RADIUS_RAD, Light, Sky, Sun
 from vobench.scene.material import Material, pane_reflectance
 from vobench.scene.mesh import quad, two_sided
@@ -34,20 +35,16 @@ X, Y, Z = np.eye(3)
 def floor_light(light: Light, *others: Rectangle, settings: BakeSettings = DIRECT) -> tuple[Array, Array, Array]:
     """Places x, y and illuminance (rows, columns) of the floor's samples."""
     baked = bake(Scene("day", (FLOOR, *others), PANES, (light,)), settings)
-    s, t = np.meshgrid(*[np.linspace(0, 1, round(4 / settings.spacing_m * finer(baked)) + 1)] * 2)
+    s, t = np.meshgrid(*[np.linspace(0, 1, round(4 / settings.spacing_m) + 1)] * 2)
     upper = (t > s).ravel()
     u, v = np.where(t > s, s, s - t).ravel(), np.where(t > s, t - s, t).ravel()
-    return 4 * s - 2, 4 * t - 2, baked.atlas.read(baked.direct[0], upper.astype(np.int32), u, v).reshape(s.shape)
+    light = light_at(baked, baked.direct[0], upper.astype(np.int64), u, v)
+    return 4 * s - 2, 4 * t - 2, light.reshape(s.shape)
 
 
 def test_an_open_floor_gets_the_light_of_a_panorama() -> None:
     _, _, illuminance_lx = floor_light(PANORAMA, settings=replace(DIRECT, light_rays=256))
     assert illuminance_lx.mean() == pytest.approx(level_illuminance_lx(), rel=0.01)
-
-
-def finer(baked: BakedScene) -> int:
-    """How many times as fine as asked the floor's samples are."""
-    return round(np.ptp(baked.atlas.light_px[0, :, 0]) * baked.settings.spacing_m / 4)
 
 
 def roof_with_opening(half_m: float, height_m: float, glazing: str | None) -> list[Rectangle]:

@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import scipy
 
+from tests.rendering.parts import light_at
 from vobench.asset.shape import block
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
@@ -45,10 +45,11 @@ def scene(*lights: Light, things: tuple[Thing, ...] = ROOM, movers: tuple[Mover,
 
 def on(baked: BakedScene, light: np.ndarray, name: str) -> np.ndarray:
     """Light (N,) at places all over the faces of one thing."""
-    faces, (height, width) = baked.faces, light.shape[:2]
-    own = [faces.things[thing].name == name for thing in faces.thing]
-    u, v = np.moveaxis(PLACES @ baked.light_uv[own].astype(float), -1, 0).reshape(2, -1)
-    return scipy.ndimage.map_coordinates(light[..., 1], [v * height - 0.5, u * width - 0.5], order=1, mode="nearest")
+    of_thing = [baked.faces.things[thing].name == name for thing in baked.faces.thing]
+    faces = np.unique(baked.parts.parent[of_thing])
+    face = np.repeat(faces, len(PLACES))
+    _, u, v = np.tile(PLACES, (len(faces), 1)).T
+    return light_at(baked, light[..., 1], face, u, v)
 
 
 def layer(baked: BakedScene, index: int) -> np.ndarray:

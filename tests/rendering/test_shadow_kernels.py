@@ -3,7 +3,16 @@
 import numpy as np
 import pytest
 
-from vobench.rendering.shadow_kernels import blur_along, dilate, entering_light, lit_rays, meet_boxes, places_in_cell
+from vobench.rendering.shadow_kernels import (
+    aim_at_triangles,
+    along_curve_of,
+    blur_along,
+    dilate,
+    entering_light,
+    lit_rays,
+    meet_boxes,
+    places_in_cell,
+)
 from vobench.scene.material import fresnel
 
 RNG = np.random.default_rng(0)
@@ -79,5 +88,36 @@ def test_segments_meet_a_box_as_geometry_says(
 ) -> None:
     boxes_m = np.array([[[8, 8, 8], [9, 9, 9]], [[0, 0, 0], [1, 1, 1]]], np.float32)
     result = np.empty(1, bool)
-    meet_boxes(np.array([origin_m], np.float32), np.array([segment_m], np.float32), boxes_m, result)
+    around_m = np.stack([boxes_m[:, 0].min(0), boxes_m[:, 1].max(0)])
+    meet_boxes(np.array([origin_m], np.float32), np.array([segment_m], np.float32), around_m, boxes_m, result)
     assert result[0] == is_met
+
+
+def test_a_place_along_the_curve_has_the_bits_of_both_numbers_by_turns() -> None:
+    assert along_curve_of(0.0, 0.0) == 0
+    assert along_curve_of(0.5, 0.0) == 0.5
+    assert along_curve_of(0.0, 0.5) == 0.25
+    assert along_curve_of(0.25, 0.75) == 0.25 + 0.125 + 0.0625
+
+
+def test_rays_to_triangles_end_on_them_in_proportion_to_their_areas_with_lamberts_strength() -> None:
+    rng = np.random.default_rng(0)
+    count = 4000
+    corners_m = np.array([[[0, 0, 2.0], [0, 1, 2], [1, 0, 2]], [[3, 0, 2.0], [3, 2, 2], [6, 0, 2]]])  # 0.5 and 3 m²
+    normals = np.array([[0, 0, -1.0], [0, 0, -1.0]])
+    points_m = rng.uniform(-1, 1, (count, 3)).astype(np.float32)
+    a, b = rng.random((2, count), dtype=np.float32)
+    vectors_m = np.empty((count, 3), np.float32)
+    strength = np.empty(count, np.float32)
+    aim_at_triangles(points_m, corners_m, normals, np.array([0.5, 3.5]), 100.0, a, b, vectors_m, strength)
+
+    x, y, z = (points_m + vectors_m).T
+    np.testing.assert_allclose(z, 2, atol=1e-5)
+    is_first = x < 2
+    assert (y >= -1e-5).all()
+    assert (x + y)[is_first].max() <= 1 + 1e-5
+    assert ((x - 3) / 3 + y / 2)[~is_first].max() <= 1 + 1e-5
+    assert is_first.mean() == pytest.approx(0.5 / 3.5, abs=0.02)
+    distance_m = np.linalg.norm(vectors_m, axis=1)
+    expected = 100.0 * 3.5 * (vectors_m[:, 2] / distance_m) / distance_m**2
+    np.testing.assert_allclose(strength, expected, rtol=1e-4)

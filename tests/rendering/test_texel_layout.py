@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from vobench.rendering.atlas import Atlas
 from vobench.rendering.texel import Texels, texels
 from vobench.rendering.texel_layout import STRIDES, TexelLayout
 from vobench.rendering.texel_owner import owners
@@ -90,3 +91,18 @@ def test_where_points_are_far_apart_a_finer_grid_stands_for_a_coarse_one() -> No
         inner = (row > row.min()) & (row < row.max()) & (column > column.min()) & (column < column.max())
         for grid, stride in zip(layout.grids, strides, strict=True):
             np.testing.assert_array_equal(grid[inner], ((row % stride == 0) & (column % stride == 0))[inner])
+
+
+def test_light_is_not_smoothed_across_a_crease_within_one_chart() -> None:
+    size_m, spacing_m = 0.4, 0.05
+    floor = Thing("floor", quad([0, 0, 0], [size_m, 0, 0], [0, size_m, 0]), "grey")
+    wall = Thing("wall", quad([size_m, 0, 0], [0, 0, size_m], [0, size_m, 0]), "grey")
+    faces = triangle_table([floor, wall], [-1, -1], [-1, -1])
+    across_m = faces.corners_m[..., 0] + faces.corners_m[..., 2]
+    light_px = np.stack([across_m, faces.corners_m[..., 1]], -1) / spacing_m + 0.5
+    everything = np.ones(len(faces), bool)
+    atlas = Atlas(light_px.astype(np.float32), np.zeros(len(faces), np.int32), 10, 18)
+    points, layout = texels(faces, MATERIALS, atlas, owners(atlas), among=everything, seed=0)
+    is_wall = faces.thing[points.face] == 1
+    assert set(is_wall.tolist()) == {False, True}
+    np.testing.assert_array_equal(layout.blurred(is_wall.astype(float)), is_wall)

@@ -1,5 +1,8 @@
 """What holds for a board in every format."""
 
+import csv
+import html
+import io
 import re
 
 import pytest
@@ -7,6 +10,7 @@ import pytest
 from vobench.report import page
 from vobench.report.board_formats import FORMATS
 from vobench.report.leaderboard import make_board
+from vobench.runner.folder import TRUTH_COPY
 
 
 @pytest.mark.parametrize("form", FORMATS)
@@ -21,6 +25,28 @@ def test_every_form_names_processor_driver_and_date(placed, form):
     text = FORMATS[form](placed, "ate")
     for part in ("CPU 9", "x86-64-v3", "pipe", "2026-11-24"):
         assert part in text
+
+
+@pytest.mark.parametrize("form", [*FORMATS, "html"])
+def test_every_form_names_an_estimator_that_equals_the_truth(tmp_path, scored, write_run, form):
+    scores = [scored("copy", ate_m=1e-12, claims=(TRUTH_COPY,)), scored("fair")]
+    folder = write_run(tmp_path / "suite" / "stamp", scores)
+    made = page.run_board(folder, scores)
+    text = page.board_page(folder, scores, made, tmp_path) if form == "html" else FORMATS[form](made, "ate")
+    assert {"csv": "equals_truth"}.get(form, f"copy [{TRUTH_COPY}]") in plain(text) or form == "json"
+    if form in ("md", "html", "json"):
+        assert "copy is not ranked: on down, its motion equals the ground truth" in plain(text)
+    if form == "csv":
+        rows = csv.DictReader(io.StringIO(text))
+        assert {row["estimator"]: row["equals_truth"] for row in rows if row["case"] == "down"} == {
+            "copy": "True",
+            "fair": "False",
+        }
+
+
+def plain(text):
+    """A text without the escapes of HTML, LaTeX and Markdown."""
+    return html.unescape(text).replace("\\", "")
 
 
 HOSTILE = "<script>alert(1)</script>|&_%$#{}~^\\\x1b[2J\0"

@@ -230,8 +230,8 @@ def test_trials_that_are_all_alike_have_no_interval(scored):
 
 def test_a_deterministic_cell_that_fails_more_often_fails_now_and_one_that_fails_less_is_mended(scored):
     partly = ([0.01, 0.01], ["ok", "lost"])
-    assert cell_change(scored, ([0.01, 0.01],), partly).verdict == FAILS
-    assert cell_change(scored, ([0.01, 0.01], ["lost", "lost"]), partly).verdict == MENDED
+    assert cell_change(scored, ([0.01, 0.02],), partly).verdict == FAILS
+    assert cell_change(scored, ([0.01, 0.02], ["lost", "lost"]), partly).verdict == MENDED
     assert cell_change(scored, ([0.01, 0.01], ["lost", "lost"]), ([0.01, 0.01],)).verdict == MENDED
 
 

@@ -7,7 +7,7 @@ import pytest
 from vobench.report.cell import CaseFacts, Cell
 from vobench.report.division import METRIC, Division, divisions, is_ranked
 from vobench.report.frame_statistics import EstimatorStatistics
-from vobench.runner.folder import ORACLE
+from vobench.runner.folder import ORACLE, TRUTH_COPY
 from vobench.runner.score import NO_SCALE
 
 BASELINE = ("baseline",)
@@ -41,6 +41,7 @@ def test_baselines_and_oracles_have_no_rank_whatever_else_they_claim():
     assert is_ranked(cell("p", claims=(NO_SCALE, "not causal")))
     assert not is_ranked(cell("b", claims=("not causal", *BASELINE)))
     assert not is_ranked(cell("o", claims=(ORACLE,)))
+    assert not is_ranked(cell("c", claims=(TRUTH_COPY,)))
 
 
 def test_every_ranked_cell_is_in_exactly_one_division():

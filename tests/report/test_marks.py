@@ -5,6 +5,7 @@ import pytest
 from vobench.report.frame_statistics import EstimatorStatistics
 from vobench.report.leaderboard import make_board
 from vobench.report.marks import marks
+from vobench.runner.folder import TRUTH_COPY
 
 
 def test_the_best_of_a_case_is_marked_and_whoever_is_not_decided_against_it(scored):
@@ -47,6 +48,12 @@ def test_a_tie_is_marked_from_four_trials_on(scored, trials, is_marked):
 
 def test_a_failed_trial_is_the_worst_of_all(scored):
     made = make_board([scored("a", ate_m=0.02), scored("b", "lost", ate_m=1e-6), scored("c", ate_m=0.03)], {})
+    assert marks(made, "ate") == {("down", "a"): "*~"}
+
+
+def test_a_copy_of_the_truth_is_not_the_best_of_a_case(scored):
+    copy = scored("copy", ate_m=1e-12, claims=(TRUTH_COPY,))
+    made = make_board([scored("a", ate_m=0.02), copy, scored("b", ate_m=0.03)], {})
     assert marks(made, "ate") == {("down", "a"): "*~"}
 
 

@@ -84,7 +84,7 @@ def test_each_cell_has_its_number_its_path_and_files_that_exist(data, run):
     assert data["metrics"]["ate"]["text"][data["cases"].index("down")][0][0] == "0.200"
     assert len(data["details"]) == 6
     detail = data["details"][f"{data['cases'].index('down')}|0"]
-    assert len(detail["path"]) == 3 == len(data["truths"]["0"])
+    assert len(detail["path"]) == 3 == len(data["truths"]["down"])
     assert all((run.path / link).is_file() for _, link in detail["files"])
 
 
@@ -221,7 +221,7 @@ def test_the_header_states_the_machine(run, mixed):
 
 
 def test_costs_are_means_and_memory_a_maximum(scored, write_run, tmp_path):
-    trials = [scored("a", repeat=repeat) for repeat in (0, 1)]
+    trials = [scored("a", repeat=repeat, ate_m=0.1 + repeat) for repeat in (0, 1)]
     folder = write_run(tmp_path / "suite" / "stamp", trials)
     with new_table(folder.estimate("down", "a", 1) / TIMES, TIME_COLUMNS) as table:
         table.writerow({"frame": 0, "wall_ms": 4.0, "cpu_ms": 8.0, "memory_mib": 1.0})

@@ -18,8 +18,8 @@ def cells(scored, losses_of, **changes):
 
 
 def test_the_better_estimator_is_named_first_with_the_ratio_of_the_other(scored):
-    losses = [0.01, 0.012, 0.009, 0.011, 0.01, 0.013, 0.008, 0.01]
-    spread = [1.0, 1.1, 0.9, 1.0, 1.1, 0.9, 1.05, 0.95]
+    losses = [0.01, 0.012, 0.009, 0.011, 0.01, 0.013, 0.008, 0.01] * 3
+    spread = [1.0, 1.1, 0.9, 1.0, 1.1, 0.9, 1.05, 0.95] * 3
     worse = [4 * loss * factor for loss, factor in zip(losses, spread, strict=True)]
     (pair,) = named_pairs(cells(scored, {"a": worse, "b": losses}), ratio=1.5)
     assert (pair.first, pair.second) == ("b", "a")

@@ -55,6 +55,30 @@ def test_sequences_are_rows_with_the_quoted_statistic_and_a_last_row_of_all():
     assert rows == [["one", "0.988", "0.25", "0.25"], ["two", "0.988", "0.5", ""], ["pooled", "", "0.4", ""]]
 
 
+def compared_content():
+    first, second = pooled_content()["sequences"]
+    for part, poses in ((first, "12/12"), (second, "11/12")):
+        part["metrics"][0]["id"] = f"ate.rmse[pairs=all; n={poses}]"
+    return {"gt": "truth", "estimates": [first, second]}
+
+
+def test_estimates_of_one_truth_are_rows_without_a_last_row():
+    ((headings, rows),) = score_table.tables(compared_content(), per_length=False)
+    assert headings == ["estimate", "coverage", "ate rmse m", "rot rmse deg"]
+    assert rows == [["one", "0.988", "0.25", "0.25"], ["two", "0.988", "0.5", ""]]
+    assert score_table.ids(compared_content()) == ["ate.rmse[pairs=all]", "rot.rmse[pairs=all]"]
+    assert score_table.warnings(compared_content()) == ["one: few poses"]
+
+
+def test_lengths_of_estimates_stand_together():
+    given = compared_content()
+    for part in given["estimates"]:
+        part["per_length"] = [metric("seg", "%", length_m=length_m) for length_m in (1.0, 2.0)]
+    *_, (headings, rows) = score_table.tables(given, per_length=True)
+    assert headings[:4] == ["estimate", "metric", "unit", "length m"]
+    assert [(row[0], row[3]) for row in rows] == [("one", "1"), ("two", "1"), ("one", "2"), ("two", "2")]
+
+
 def test_a_ratio_has_no_unit_and_another_statistic_is_named():
     given = pooled_content()
     given["pooled"]["metrics"] = [metric("cov", "1", "mean")]

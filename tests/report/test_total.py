@@ -6,6 +6,7 @@ from vobench.report.board_markdown import markdown
 from vobench.report.cell import CaseFacts
 from vobench.report.frame_statistics import EstimatorStatistics
 from vobench.report.leaderboard import make_board
+from vobench.runner.folder import TRUTH_COPY
 
 
 def test_who_lacks_a_sensor_in_some_cases_is_ranked_on_the_others_and_in_all_of_them_behind(scored):
@@ -68,6 +69,20 @@ def test_baselines_and_oracles_stand_beside_the_ranking(scored):
     assert ratios == pytest.approx({"good": 1, "bad": 5, "still": 2, "cheat": 0.1})
     alone = make_board(beside, {}).totals
     assert [(total.estimator, total.rank) for total in alone] == [("cheat", None), ("still", None)]
+
+
+def test_who_equals_the_truth_on_one_case_stands_beside_the_ranking_on_all(scored):
+    trials = [scored(name, case=case, ate_m=0.01) for name in ("good", "fair") for case in ("down", "ahead")]
+    copy = [scored("copy", ate_m=1e-12, claims=(TRUTH_COPY,)), scored("copy", case="ahead", ate_m=0.02)]
+    made = make_board([*trials, *copy], {})
+    honest = make_board(trials, {})
+    assert made.totals[:2] == honest.totals
+    assert (made.totals[2].estimator, made.totals[2].rank, made.totals[2].claims) == ("copy", None, (TRUTH_COPY,))
+    assert [remark for remark in made.remarks if "copy" in remark] == [
+        "copy is not ranked: on down, its motion equals the ground truth to rounding (1 µm and 1 µrad a frame), "
+        "which cannot be measured"
+    ]
+    assert not [remark for remark in honest.remarks if "not ranked" in remark]
 
 
 def test_a_baseline_that_lacks_a_case_takes_none_from_the_ranking(scored):

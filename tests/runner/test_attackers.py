@@ -26,7 +26,7 @@ from vobench.report.board_formats import FORMATS
 from vobench.report.verify import verify_run
 from vobench.runner.bundle import bundle, opened
 from vobench.runner.estimate import ESTIMATE
-from vobench.runner.folder import SCORE, seen_by
+from vobench.runner.folder import SCORE, TRUTH_COPY, seen_by
 from vobench.runner.frames import FRAMES, GROUND_TRUTH
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="the sandbox is Linux's")]
@@ -120,6 +120,15 @@ def found():
                 with suppress(OSError), open(path, "ab") as file:
                     file.write(b"evil")
 """
+# It opens nothing but its own folder, which has a copy of the settings of the case.
+CARRIES = """
+from pathlib import Path
+def found():
+    from vobench.runner.rescore import _case, _true_path
+    T = _true_path(_case(Path(__file__).with_name("case.json"))).T_world_frame
+    quaternions = Rotation.from_matrix(T[:, :3, :3]).as_quat()
+    return np.column_stack([np.arange(len(T)), T[:, :3, 3], quaternions])
+"""
 CLASSES = {"opens": OPENS, "searches": SEARCHES, "asks": ASKS_ITS_PROCESS, "sabotages": SABOTAGES}
 # Commands that put something else in the place of their answers. The first word after `-c` or `-e` is the truth.
 COMMANDS = {
@@ -174,11 +183,14 @@ def beside(bench, alone, tmp_path):
 
 def attacker(name, folder, places):
     """The folder of an attacker."""
-    folder.mkdir()
+    folder.mkdir(exist_ok=True)
     keys = {"name": name, "version": "'1'", "pose_of": "left_camera", "needs": "[stereo]", "limits": PATIENT}
     if name in CLASSES:
         keys["class"] = "estimator:Bad"
         (folder / "estimator.py").write_text(CLASS.format(places=places, attack=CLASSES[name]))
+    elif name == "carries":
+        keys["class"] = "estimator:Bad"
+        (folder / "estimator.py").write_text(CLASS.format(places={}, attack=CARRIES))
     else:
         words = ["./copies"] if name == "copies" else COMMANDS[name]
         keys["command"] = [*words, places["truth"], "{out}"]
@@ -282,6 +294,32 @@ def test_where_nothing_is_closed_an_attacker_wins_and_every_form_of_the_board_na
     for name, text in forms(run).items():
         assert "opens" in text, name
         assert "not sandboxed: it could see the user's files" in text, name
+
+
+def test_who_computes_the_truth_from_a_copy_of_the_suite_has_no_rank(alone, beside, forms, tmp_path):
+    folder = tmp_path / "carries"
+    folder.mkdir()
+    shutil.copy(alone.case(CASE) / "case.json", folder / "case.json")
+
+    run = beside(["carries"])
+    scores = {score.estimator: score for score in run.scores()}
+    assert ate_m(scores["carries"]) < 1e-9, scores["carries"]
+    assert scores["carries"].claims == (TRUTH_COPY,)
+    assert scores[HONEST].claims == ()
+
+    totals = {total.estimator: total for total in page.run_board(run, run.scores()).totals}
+    (total_alone,) = page.run_board(alone, alone.scores()).totals
+    assert totals["carries"].rank is None
+    assert (totals[HONEST].rank, totals[HONEST].error_ratio) == (1, 1.0)
+    assert totals[HONEST].score == total_alone.score
+
+    for form, text in forms(run).items():
+        shown = "equals_truth" if form == "csv" else TRUTH_COPY
+        assert shown in text or "equals the ground truth" in text, form
+    for name in (ESTIMATE, FRAMES, SCORE):
+        assert (alone.estimate(CASE, HONEST, 0) / name).read_bytes() == (
+            run.estimate(CASE, HONEST, 0) / name
+        ).read_bytes()
 
 
 @first_time

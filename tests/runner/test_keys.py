@@ -83,7 +83,18 @@ OTHER = {
 RATE_HZ = 6  # few pictures, for a body goes its way whatever is taken of it
 # What the encoders count, when a drive or a replay gives up, whose poses a file holds,
 # how many drives there are, and where the cameras sit (tests/suite).
-NOT_OF_THE_MOTION = {"kind", "encoders", "max_time_s", "max_gap_s", "file", "seeds", "times", "recorded_hz", "axes", "mount"}
+NOT_OF_THE_MOTION = {
+    "kind",
+    "encoders",
+    "max_time_s",
+    "max_gap_s",
+    "file",
+    "seeds",
+    "times",
+    "recorded_hz",
+    "axes",
+    "mount",
+}
 # Nothing turns on a straight way, and nothing drives on in a turn on the spot.
 IDLE = {("stop_and_go", "max_turn_accel_radps2"), ("pure_rotation", "max_accel_mps2")}
 KIND = TypeAdapter(TrajectorySpec)

@@ -14,7 +14,7 @@ import pytest
 from vobench.errors import InputError
 from vobench.report import board_records, page
 from vobench.runner.bundle import bundle, merged, opened
-from vobench.runner.folder import HASHES
+from vobench.runner.folder import HASHES, TRUTH_COPY
 from vobench.runner.rescore import check, wrong_truths
 from vobench.runner.signature import sign, signature_sentence
 
@@ -243,3 +243,13 @@ def test_a_case_whose_path_would_take_minutes_is_refused_in_one_line_at_once(hon
     assert told
     assert all(sentence in each and "\n" not in each for each in told), told
     assert time.process_time() - began_s < 5
+
+
+def test_who_hides_that_its_estimate_is_the_truth_is_not_ranked(honest, tmp_path):
+    forged = honest | {f"{OTHER}/estimate.tum": honest[TRUTH]}
+    with opened(packed(forged, tmp_path / "forged.zip")) as folder:
+        scores = check(folder).scores
+        board = page.run_board(folder, scores)
+    claims = {score.case: score.claims for score in scores if score.estimator == "wheel_odometry"}
+    assert claims == {"full": (TRUTH_COPY,), "dim": ()}
+    assert {total.estimator: total.rank for total in board.totals} == {"wheel_odometry": None, "stand_still": None}

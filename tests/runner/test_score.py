@@ -1,25 +1,35 @@
 """Estimate to score: the status of a trial follows from its estimate, by limits that are checked from both sides."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from vobench.geometry import se3
 from vobench.metric.definitions import DEFINITIONS
+from vobench.motion.motor import MotorConstants
+from vobench.motion.wheeled import Wheeled
 from vobench.runner.estimate import FINISHED, REVISED, EstimatorOutcome
+from vobench.runner.folder import ORACLE, TRUTH_COPY
 from vobench.runner.score import (
     LEAST_DIVERGED_M,
+    NO_SCALE,
     OF_NO_SCALE,
     STILL_M,
     STILL_RAD,
     drift_m,
     extent_m,
+    judged_claims,
     scale_of,
     score_estimate,
     score_revised,
+    senses_exactly,
     stands_still,
     status_of,
     status_of_handed,
 )
+from vobench.sensor.imu import IMUS
+from vobench.suite.suite import read_plan
 from vobench.trajectory.trajectory import Trajectory
 from vobench.trajectory.tum import format_tum
 
@@ -205,3 +215,39 @@ def test_revised_poses_are_scored_where_there_are_some(tmp_path):
     assert score_revised(tmp_path, gt, ()) is None
     (tmp_path / REVISED).write_text(format_tum(gt))
     assert score_revised(tmp_path, gt, ()).metric("ate_trans").statistics.rmse < 1e-9
+
+
+def case_with(*, imu=None, motors=None):
+    """A case with an IMU, and with motors on wheels of a size of their own."""
+    case = next(case for case in read_plan("quickstart").simulated if isinstance(case.trajectory, Wheeled))
+    trajectory = replace(case.trajectory, motors=motors)
+    return replace(case, rig=replace(case.rig, imu=imu), trajectory=trajectory)
+
+
+TINY_WHEELS = MotorConstants(r_m=0.03)  # a tick is 2.5 µm
+
+
+@pytest.mark.parametrize(
+    ("case", "sensors", "is_exact"),
+    [
+        (case_with(), ("stereo", "encoders"), False),
+        (case_with(motors=TINY_WHEELS), ("stereo", "encoders"), True),
+        (case_with(motors=TINY_WHEELS), ("stereo",), False),
+        (case_with(imu=IMUS["exact"]), ("stereo", "imu"), True),
+        (case_with(imu=IMUS["exact"]), ("stereo",), False),
+        (case_with(imu=IMUS["adis16448"]), ("imu",), False),
+        (None, ("imu", "encoders"), False),
+    ],
+)
+def test_only_ideal_sensors_measure_a_motion_exactly(case, sensors, is_exact):
+    assert senses_exactly(case, sensors) == is_exact
+
+
+def test_a_copy_of_the_truth_is_claimed_unless_its_sensors_are_exact_or_it_is_an_oracle():
+    gt = straight(2.0)
+    assert judged_claims((), gt, gt, is_exactly_sensed=False) == (TRUTH_COPY,)
+    assert judged_claims((TRUTH_COPY,), gt, gt, is_exactly_sensed=True) == ()
+    assert judged_claims((ORACLE,), gt, gt, is_exactly_sensed=False) == (ORACLE,)
+    assert judged_claims((TRUTH_COPY,), straight(2.1), gt, is_exactly_sensed=False) == ()
+    scaled = straight(2.0, scale=3.0)
+    assert judged_claims((NO_SCALE,), scaled, gt, is_exactly_sensed=False) == (NO_SCALE, TRUTH_COPY)

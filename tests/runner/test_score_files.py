@@ -56,6 +56,15 @@ def test_of_several_pairs_all_errors_are_pooled(pair):
     assert content["pooled"]["metrics"][0] == found.pool.metrics[0].as_dict()
 
 
+def test_estimates_that_are_compared_are_not_pooled(pair):
+    found = score_files([pair("one.tum", 0.01), pair("other.tum", 0.03)], pool=False)
+    assert found.pool is None
+    assert list(found.as_dict()) == ["gt", "estimates"]
+    frame = found.to_frame()
+    assert frame.columns[0] == "estimate"
+    assert len(frame) == sum(len(each.metrics) for each in found.scores)
+
+
 def test_the_table_has_every_metric_of_every_sequence_and_of_all_together(pair):
     found = score_files([pair("one.tum", 0.01), pair("other.tum", 0.03)])
     frame = found.to_frame()

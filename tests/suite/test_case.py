@@ -12,7 +12,7 @@ from vobench.suite.suite import read_plan
 
 NOISY = """name: noisy
 seed: 3
-noise_seeds: 3
+repeats: 3
 scenes: [{name: flat, seed: 1}]
 trajectories: {tour: {kind: wander, body: pioneer, length_m: 2, seed: 1}}
 estimators: [lk_epipolar]
@@ -78,10 +78,12 @@ def test_without_rigs_a_pair_looks_ahead_ten_degrees_below_the_horizon(bent):
     assert (case.rig.forward_m, case.rig.height_m, case.rig.picture_scale) == (0.25, 0.4, 1)
 
 
-def test_draws_of_noise_share_place_and_drive_and_differ_in_their_seed(tmp_path):
+def test_repeats_share_place_and_drive_and_differ_in_their_seed(tmp_path):
     suite = tmp_path / "noisy.yaml"
     suite.write_text(NOISY)
     first, second, third = read_plan(str(suite)).simulated
-    assert [case.name for case in (second, third)] == [f"{first.name}-noise2", f"{first.name}-noise3"]
+    assert [case.name for case in (second, third)] == [f"{first.name}-repeat2", f"{first.name}-repeat3"]
     assert len({case.seed for case in (first, second, third)}) == 3
-    assert replace(second, name=first.name, seed=first.seed) == first
+    assert [case.repeat for case in (first, second, third)] == [0, 1, 2]
+    assert {case.repeat_of for case in (second, third)} == {first.name}
+    assert replace(second, name=first.name, seed=first.seed, repeat=0, repeat_of=None) == first

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vobench.asset.shape import at, block
+from vobench.asset.shape import at, block, sheet
 from vobench.errors import SuiteError
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.material import Material
@@ -16,6 +16,7 @@ from vobench.suite.free_space import (
     CELL_M,
     FLOOR_STEP_M,
     MOST_LENGTH_M,
+    MOST_RADIUS_M,
     RATE_HZ,
     SPEED_MPS,
     FreeCircle,
@@ -237,3 +238,48 @@ def test_what_is_smaller_than_a_body_drives_in_is_refused_as_an_object() -> None
     with pytest.raises(SuiteError, match=r"it is only 1\.9 m wide.*if it is an object, put it into a scene's YAML"):
         circular_path(scene(floor(1.9, 1.5)))
     assert circular_path(scene(floor(2.1, 1.5))).poses
+
+
+def hills(side_m: float = 20.0) -> Thing:
+    """A square of uneven ground around the origin."""
+    steps_m = np.arange(-side_m / 2, side_m / 2 + 0.01, 0.5)
+    x, y = np.meshgrid(steps_m, steps_m)
+    return Thing("ground", sheet(np.stack([x, y, _hill_m(x, y)], axis=-1)), "grey")
+
+
+def _hill_m(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 0.4 * np.sin(0.4 * x) + 0.3 * np.cos(0.3 * y)
+
+
+def test_the_map_of_uneven_ground_has_its_heights_and_leaves_out_water_and_things() -> None:
+    pond = floor(4, 4, x_m=5, y_m=5, z_m=0.8)
+    faces = triangles(scene(hills(), pond, box(-5, -5, (1, 1, 2), z_m=-1)), t_ns=0)
+    ground = floor_map(faces, RayCaster(faces))
+    assert ground is not None
+    assert ground.ground_m is not None
+    expected_m = _hill_m(*np.meshgrid(ground.x_m, ground.y_m))
+    assert np.abs(ground.ground_m - expected_m).max() < 0.02
+    near = {name: int(np.abs(ground.x_m - x_m).argmin()) for name, x_m in (("pond", 5), ("box", -5), ("lawn", 0))}
+    assert not ground.free[near["pond"], near["pond"]]
+    assert not ground.free[near["box"], near["box"]]
+    assert ground.free[near["lawn"], near["lawn"]]
+    assert ground.free.mean() > 0.8
+
+
+def test_the_circle_on_uneven_ground_is_as_high_as_the_highest_ground_in_it() -> None:
+    free = circle(hills())
+    assert free is not None
+    assert free.radius_m > 9
+    angles_rad = np.linspace(0, 2 * np.pi, 60)
+    shares = np.linspace(0, 1, 20)[:, None]
+    x_m = free.x_m + MOST_RADIUS_M * shares * np.cos(angles_rad)
+    y_m = free.y_m + MOST_RADIUS_M * shares * np.sin(angles_rad)
+    assert free.floor_m == pytest.approx(_hill_m(x_m, y_m).max(), abs=0.02)
+
+
+def test_a_level_floor_with_hills_of_less_area_stays_a_floor() -> None:
+    faces = triangles(scene(floor(40, 40), hills(10)), t_ns=0)
+    level = floor_map(faces, RayCaster(faces))
+    assert level is not None
+    assert level.ground_m is None
+    assert level.floor_m == 0

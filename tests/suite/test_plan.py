@@ -4,11 +4,32 @@ import pytest
 
 from vobench.errors import UnknownNameError
 
+REPEATED = ("seed: 1", "seed: 1\nrepeats: 3")
 
-def test_every_estimator_runs_repeats_times_on_every_case(bent):
-    planned = bent(("seed: 1", "seed: 1\nrepeats: 3"))
-    runs = [run for case in planned.cases for run in planned.trials(case)]
-    assert len(runs) == len({(run.case.name, run.estimator_entry.label, run.repeat) for run in runs}) == 2 * 2 * 3
+
+def trials_of(plan):
+    return [(run.case.name, run.estimator_entry.label, run.repeat) for case in plan.cases for run in plan.trials(case)]
+
+
+def test_a_repeat_is_a_case_with_new_noise_and_another_seed_of_the_estimator(bent):
+    plan = bent(REPEATED)
+    assert names(plan) == [f"{name}{copy}" for name in ("full", "dim") for copy in ("", "-repeat2", "-repeat3")]
+    assert len({case.seed for case in plan.cases}) == 3
+    assert {(case, repeat) for case, _, repeat in trials_of(plan)} >= {("dim", 0), ("dim-repeat2", 1)}
+
+
+def test_deterministic_estimators_answer_the_first_case_twice_and_every_other_once(bent):
+    once = trials_of(bent())
+    repeated = trials_of(bent(REPEATED))
+    again = {("full", label, 1) for _, label, _ in once}
+    assert len(repeated) == len(set(repeated)) == 3 * len(once) + len(again)
+    assert again <= set(repeated)
+
+
+def test_the_name_of_a_case_selects_its_repeats(bent):
+    plan = bent(REPEATED)
+    assert names(plan.only(("dim",), ())) == ["dim", "dim-repeat2", "dim-repeat3"]
+    assert names(plan.only(("dim-repeat2",), ())) == ["dim-repeat2"]
 
 
 MORE = ("{clean: {sensor: clean}}", "{clean: {sensor: clean}, noisy: {sensor: mt9v034}}")
@@ -82,11 +103,9 @@ def test_limits_replace_those_of_every_estimator_and_no_others(bent):
         assert after.params == before.params
 
 
-def test_trials_count_their_repeats_from_0_and_have_a_name(bent):
-    plan = bent(("seed: 1", "seed: 1\nrepeats: 2"))
-    trials = plan.trials(plan.cases[0])
-    assert [trial.repeat for trial in trials] == [0, 1, 0, 1]
-    assert trials[0].name == "stand_still on full"
+def test_trials_have_the_names_of_their_estimator_and_case(bent):
+    plan = bent()
+    assert plan.trials(plan.cases[0])[0].name == "stand_still on full"
 
 
 def test_mistakes_in_a_plan_begin_with_none(bent):

@@ -1,5 +1,7 @@
 """Recordings in a suite: paths, patterns, names, and what is said where there is none."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -108,6 +110,15 @@ def test_recordings_stand_beside_simulated_cases(suite):
     )
     assert [case.name for case in plan.cases] == ["short", "v1"]
     assert [run.case.name for case in plan.cases for run in plan.trials(case)] == ["short", "v1"]
+
+
+def test_only_estimators_that_are_not_deterministic_are_repeated_on_recordings(suite):
+    plan = suite("data/V1", "repeats: 3\n")
+    (case,) = plan.cases
+    entry = plan.estimator_entries[0]
+    random = replace(entry, manifest=replace(entry.manifest, deterministic=False))
+    assert [trial.repeat for trial in plan.trials(case)] == [0, 1]
+    assert [trial.repeat for trial in replace(plan, estimator_entries=(random,)).trials(case)] == [0, 1, 2]
 
 
 def test_a_recording_may_not_take_a_simulated_cases_name(suite):

@@ -147,7 +147,7 @@ def test_every_suite_of_the_house_is_valid_and_called_as_its_file(name, monkeypa
 # ruff: noqa: E501 - a sentence stands in one line
 
 
-SUITE_KEYS = "base_seed, calibrations, cameras, estimators, frames, include, lightings, modes, name, noise_seeds, rendering, repeats, rigs, scenarios, scenes, seed, share_time, source, spread, summary, trajectories, truth, truth_noise"
+SUITE_KEYS = "base_seed, calibrations, cameras, estimators, frames, include, lightings, modes, name, rendering, repeats, rigs, scenarios, scenes, seed, share_time, source, spread, summary, trajectories, truth, truth_noise"
 RIG_KEYS = """baseline_m, calib, calibration_error, camchain, forward_m, height_m, imu, lens, own, picture_scale,\
  pitch_deg, size_px"""
 LENSES = "d435i, euroc, fisheye, paper_blender, paper_literal, tartanair, zed2i"

@@ -59,8 +59,7 @@ class Cause:
     """One or several collinear conditions, and the factor by which they multiply the error.
 
     The factor compares the 95th with the 5th percentile of the condition over all segments. `low` and `high` are its
-    95 % confidence interval. `p` is the probability that any condition is as closely related to errors that do not
-    depend on conditions.
+    95 % confidence interval. `p` is the p-value, corrected for the number of conditions by `corrected_p_values`.
     """
 
     conditions: tuple[str, ...]
@@ -138,30 +137,30 @@ class _Window:
         return [self.mean(self.trial.conditions[name]) for name in names]
 
 
-def reason_for_no_answer(courses: Sequence[ErrorSeries]) -> str:
+def reason_for_no_answer(trials: Sequence[ErrorSeries]) -> str:
     """Why nothing can be said about the causes of the errors of some trials; empty if something can."""
-    windows = list(_windows(courses))
+    windows = list(_windows(trials))
     if len(windows) < MIN_SEGMENTS:
         return f"{len(windows)} segments of {SEGMENT_FRAMES} frames are too few to learn causes from ({MIN_SEGMENTS})"
     failing = sum(window.mean_loss() >= MIN_FAILING_LOSS for window in windows)
     if failing < MIN_FAILING_SEGMENTS:
         return f"the error is below {MIN_FAILING_LOSS:.1%} of the path nearly everywhere, so there is little to explain"
-    if not _varies(_levels(windows, tuple(courses[0].conditions))).any():
+    if not _varies(_levels(windows, tuple(trials[0].conditions))).any():
         return "no condition varies in this run"
     return ""
 
 
-def attribute(courses: Sequence[ErrorSeries]) -> Attribution | None:
+def attribute(trials: Sequence[ErrorSeries]) -> Attribution | None:
     """Regress the logarithm of the error on all conditions that vary; return None if there is a reason for no answer.
 
     Conditions whose correlation is COLLINEAR or more are merged. Significance and confidence intervals come from
     permuted errors (`error_permutation`), and are corrected for the number of conditions by the largest statistic.
     """
-    if reason_for_no_answer(courses):
+    if reason_for_no_answer(trials):
         return None
-    windows = list(_windows(courses))
+    windows = list(_windows(trials))
 
-    names = tuple(courses[0].conditions)
+    names = tuple(trials[0].conditions)
     levels = _levels(windows, names)  # (M, C)
     varies = _varies(levels)
     varying = [names[index] for index in np.flatnonzero(varies)]
@@ -171,7 +170,7 @@ def attribute(courses: Sequence[ErrorSeries]) -> Attribution | None:
     log_losses = np.log(np.maximum(losses, MIN_LOSS))
     groups, predictors = _merge_collinear(varying, levels[:, varies])  # (M, K)
     fit = fit_ridge(predictors, log_losses[None])
-    null = fit_ridge(predictors, _permuted(courses))  # of PERMUTATIONS rows
+    null = fit_ridge(predictors, _permuted(trials))  # of PERMUTATIONS rows
     slopes = fit.slopes[0]  # (K,)
     half_widths = np.percentile(null.t, INTERVAL_PERCENT, axis=0) * fit.standard_errors[0]
     p_values = corrected_p_values(fit.t[0], null.t)
@@ -179,7 +178,8 @@ def attribute(courses: Sequence[ErrorSeries]) -> Attribution | None:
     ranges = _usual_ranges(predictors)
     causes = []
     for k, group in enumerate(groups):
-        effects = np.array([slopes[k], slopes[k] - half_widths[k], slopes[k] + half_widths[k]]) * ranges[k]
+        slope_and_interval = np.array([slopes[k], slopes[k] - half_widths[k], slopes[k] + half_widths[k]])
+        effects = slope_and_interval * ranges[k]
         factor, low, high = np.exp(effects.clip(-LARGEST_EFFECT, LARGEST_EFFECT)).tolist()
         causes.append(Cause(group, factor, low, high, float(p_values[k])))
 
@@ -193,13 +193,13 @@ def attribute(courses: Sequence[ErrorSeries]) -> Attribution | None:
     )
 
 
-def _permuted(courses: Sequence[ErrorSeries]) -> Array:
+def _permuted(trials: Sequence[ErrorSeries]) -> Array:
     """The logarithms (PERMUTATIONS, M) of the errors of segments if they did not depend on conditions."""
-    cases = [course.case for course in courses]
-    places = [course.place or course.case for course in courses]
-    drives = [course.drive or course.case for course in courses]
+    cases = [trial.case for trial in trials]
+    places = [trial.place or trial.case for trial in trials]
+    drives = [trial.drive or trial.case for trial in trials]
     design = make_series_design(cases, places, drives)
-    losses = [course.loss[1:] for course in courses]
+    losses = [trial.loss[1:] for trial in trials]
     return permuted_log_means(losses, design, segment=SEGMENT_FRAMES, floor=MIN_LOSS, draws=PERMUTATIONS)
 
 
@@ -247,15 +247,19 @@ def corrected_p_values(observed: Array, null: Array) -> Array:
     return np.asarray((exceeding + 1) / (len(null) + 1))
 
 
-def _windows(courses: Sequence[ErrorSeries]) -> Iterator[_Window]:
+def _windows(trials: Sequence[ErrorSeries]) -> Iterator[_Window]:
     """Yield all segments of all trials. The first frame is in no segment, because it has no error."""
-    for number, course in enumerate(courses):
-        for first in range(1, len(course.loss), SEGMENT_FRAMES):
-            yield _Window(course, number, first)
+    for number, trial in enumerate(trials):
+        for first in range(1, len(trial.loss), SEGMENT_FRAMES):
+            yield _Window(trial, number, first)
 
 
 def _levels(windows: Sequence[_Window], names: Sequence[str]) -> Array:
-    """The square root of the mean of each condition over each segment (M, C)."""
+    """The square root of the mean of each condition over each segment (M, C).
+
+    Conditions are 0 or more, and many have a few values that are far larger than the others. The root keeps these from
+    deciding the regression alone.
+    """
     means = np.array([window.mean_conditions(names) for window in windows])
     return np.asarray(np.sqrt(means))
 
@@ -315,22 +319,29 @@ def _factors(causes: Sequence[Cause], contributions: Array) -> tuple[tuple[Cause
 def _merge_collinear(names: Sequence[str], levels: Array) -> tuple[list[tuple[str, ...]], Array]:
     """Standardise conditions (M, C), and replace those that correlate by their mean.
 
-    Returns the names in each group, and the predictors (M, K). A condition that correlates negatively with the first
-    of its group is negated before the mean is taken.
+    Returns the names in each group, and the predictors (M, K), one for each group. A condition that correlates
+    negatively with the first of its group is negated before the mean is taken.
     """
     standardised = (levels - levels.mean(0)) / levels.std(0)
     correlation = standardised.T @ standardised / len(standardised)
 
-    group = np.arange(len(names))
+    merged_names = []
+    predictors = []
+    for members in _collinear_groups(correlation):
+        signs = np.sign(correlation[members[0], members])
+        predictors.append((standardised[:, members] * signs).mean(1))
+        merged_names.append(tuple(names[member] for member in members))
+    return merged_names, np.stack(predictors, 1)
+
+
+def _collinear_groups(correlation: Array) -> list[list[int]]:
+    """The indices of conditions that are connected by collinear pairs, by their correlation (C, C).
+
+    Groups are transitive: two conditions that both correlate with a third one are in one group with it.
+    """
+    group = np.arange(len(correlation))  # of each condition; each begins as a group of its own
     is_collinear_pair = np.triu(np.abs(correlation) >= COLLINEAR, 1)
     for first, second in np.argwhere(is_collinear_pair).tolist():
-        group[group == group[second]] = group[first]
-
-    merged_names = []
-    columns = []
-    for number in dict.fromkeys(group.tolist()):
-        members = np.flatnonzero(group == number).tolist()
-        signs = np.sign(correlation[members[0], members])
-        merged_names.append(tuple(names[member] for member in members))
-        columns.append((standardised[:, members] * signs).mean(1))
-    return merged_names, np.stack(columns, 1)
+        is_in_second = group == group[second]
+        group[is_in_second] = group[first]
+    return [np.flatnonzero(group == number).tolist() for number in dict.fromkeys(group.tolist())]

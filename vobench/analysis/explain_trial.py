@@ -7,17 +7,10 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vobench.analysis.explain import (
-    MATERIAL,
-    Change,
-    Effort,
-    Explanation,
-    Outcome,
-    effort,
-    explain,
-    is_sufficient,
-)
+from vobench.analysis.explain import Effort, effort, explain
+from vobench.analysis.explanation import MATERIAL, Change, Explanation, is_sufficient
 from vobench.analysis.nuisance import NUISANCES, Nuisance, nuisances_of
+from vobench.analysis.segment_loss import Outcome
 from vobench.analysis.trial_data import read_conditions, read_outcome
 from vobench.errors import InputError
 from vobench.runner.data_frame import data_frame
@@ -69,15 +62,19 @@ class TrialExplanation:
         What seems to differ by the seeds of the screening, but was not run with others, is "unconfirmed".
         """
         if change.is_sure and change.mended >= MATERIAL:
-            is_named = set(change.removed) == set(self.named) or change.removed in self.explanation.alternatives
-            fixes = is_named or is_sufficient(change, self.explanation.everything)
-            return "fixes it" if fixes else "helps"
+            return "fixes it" if self._fixes(change) else "helps"
         if change.is_harmful:
             return "harms"
         if change.is_sure or change.is_ruled_out:
             return "no difference"
         seems_to_differ = change.low > 0 or change.high < 0
         return "unconfirmed" if seems_to_differ and not change.is_confirmed else "undecided"
+
+    def _fixes(self, change: Change) -> bool:
+        """Whether a change is named as a remedy, or achieves most of what removing all nuisances does."""
+        is_named = set(change.removed) == set(self.named)
+        is_alternative = change.removed in self.explanation.alternatives
+        return is_named or is_alternative or is_sufficient(change, self.explanation.everything)
 
     def rows(self) -> list[dict[str, Any]]:
         """One row per variant of the case: single nuisances removed, then pairs, then all of them.

@@ -12,7 +12,7 @@ from vobench.errors import require_known
 from vobench.geometry.se3 import Array
 from vobench.runner.data_frame import data_frame
 from vobench.runner.finished_trial import read_simulated_case
-from vobench.runner.folder import ORACLE, RunFolder, TrialScore, open_run, with_sequence
+from vobench.runner.folder import ORACLE, TRUTH_COPY, RunFolder, TrialScore, open_run, with_sequence
 from vobench.runner.store import SILENT, Progress
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ BASELINE = "baseline"  # the claim of estimators that are no competitors
 UNEXPLAINED_CLAIMS = {
     ORACLE: "it is given the ground truth, so its errors are drawn, not caused",
     BASELINE: "it is a baseline, which does not react to what it sees",
+    TRUTH_COPY: "its estimate equals the ground truth, so it has no errors to explain",
 }
 WORST_SEGMENTS = 8  # the default number of segments that are listed
 

@@ -18,7 +18,8 @@ from vobench.suite.viewpoint import is_place
 EYE_HEIGHT_M = 1.2  # the height of the viewer above the floor, about that of a robot's mast
 DIRECTIONS = 4096  # the number of random directions in which a survey looks for the backs of faces
 SEED = 0  # of these directions, so that a survey is repeatable
-MAX_FACES_OF_RECTANGLE = 2  # an object with more faces should be a closed surface
+# An object with at most this many faces counts as a rectangle, which has open edges. Others should be closed surfaces.
+MAX_FACES_OF_RECTANGLE = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +86,12 @@ def _above_floor_m(circle: FreeCircle) -> Array:
 
 def _textures(scene: Scene) -> set[Texture]:
     """The distinct textures of all materials."""
-    textures: set[Texture | None] = set()
+    textures = set()
     for material in scene.materials.values():
-        textures |= {material.texture, material.emission_texture}
-    return {texture for texture in textures if texture is not None}
+        for texture in (material.texture, material.emission_texture):
+            if texture is not None:
+                textures.add(texture)
+    return textures
 
 
 def _rounded(point_m: ArrayLike) -> tuple[float, float, float]:

@@ -2,8 +2,10 @@
 
 import re
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import takewhile
+from typing import NamedTuple
 
 from vobench.analysis.nuisance import Nuisance, without
 from vobench.suite.case import Case
@@ -13,6 +15,7 @@ FIRST_SHARE = 0.1  # of all frames, in the first windows
 WINDOW_OVERLAP = 4  # windows begin a quarter of their length apart
 MIN_FRAMES = 4
 MIN_STEP_SHARE = 1 / 8  # of a window, by which it is still cut
+NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +28,14 @@ class Failure:
     @classmethod
     def of(cls, status: str, reason: str) -> "Failure":
         """The kind of the failure with a status and a reason."""
-        return cls(status, re.sub(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?", "#", reason))
+        return cls(status, NUMBER.sub("#", reason))
+
+
+class TriedPart(NamedTuple):
+    """A candidate that was run, and whether it fails in the same way."""
+
+    description: str
+    fails: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,41 +43,41 @@ class Shrunk:
     """The smallest case found that fails in the same way, and the candidates that were tried with their results.
 
     `window` is its range of frames, and `whole` the range of the whole case.
+    `removed` lists the nuisances that it is without.
     """
 
     case: Case
     window: Window
     whole: Window
     removed: tuple[str, ...]
-    tried: tuple[tuple[str, bool], ...]
+    tried: tuple[TriedPart, ...]
 
 
 class _TrialsUsedUp(Exception):  # noqa: N818 - no error: the search ends
-    pass
+    """Ends the search, however deep in its steps, when no more trials may be run."""
 
 
 def shrink(
     case: Case,
     whole: Window,
-    likely: Callable[[Window], bool],
+    *,
+    is_likely: Callable[[Window], bool],
     nuisances: Sequence[Nuisance],
     fails: Callable[[Case], bool],
-    *,
     trials: int,
 ) -> Shrunk:
     """Cut a case down to a part of its frames, then remove nuisances, in a limited number of trials.
 
-    First, find a window in which the estimate of the whole trial fails in the same way, according to `likely`; double
-    it until it also fails by itself. Then move its end and its start inwards, by half the length and less. Then remove
-    all nuisances at once, or one after the other. `fails` runs a case and returns whether it fails in the same way.
+    First, find a window in which the estimate of the whole trial fails in the same way, according to `is_likely`;
+    double it until it also fails by itself. Then move its end and its start inwards, by half the length and less. Then
+    remove all nuisances at once, or one after the other. `fails` runs a case and returns whether it fails in the same
+    way.
     """
     search = _Search(case, whole, fails, trials)
-    try:
-        search.find_window(likely)
+    with suppress(_TrialsUsedUp):
+        search.find_window(is_likely)
         search.cut_window()
         search.remove(nuisances)
-    except _TrialsUsedUp:
-        pass
     return Shrunk(search.case, search.window, whole, tuple(search.removed), tuple(search.tried))
 
 
@@ -87,22 +97,22 @@ class _Search:
         self._trials_left = trials
         self.window = whole
         self.removed: list[str] = []
-        self.tried: list[tuple[str, bool]] = []
+        self.tried: list[TriedPart] = []
 
     @property
     def case(self) -> Case:
         """The smallest case that is known to fail."""
         return self._variant(self.window, self.removed)
 
-    def find_window(self, likely: Callable[[Window], bool]) -> None:
+    def find_window(self, is_likely: Callable[[Window], bool]) -> None:
         """Find a window that fails, by doubling its length; the whole case if no shorter window fails."""
         first, end = self._whole
         length = max(MIN_FRAMES, round(FIRST_SHARE * (end - first)))
         while length < end - first:
             step = max(1, length // WINDOW_OVERLAP)
             starts = [*range(first, end - length, step), end - length]
-            is_likely = [likely((start, start + length)) for start in starts]
-            middle = middle_of_first_run(is_likely)
+            likely = [is_likely((start, start + length)) for start in starts]
+            middle = middle_of_first_run(likely)
             if middle is not None and self._try((starts[middle], starts[middle] + length)):
                 return
             length *= 2
@@ -141,7 +151,7 @@ class _Search:
         description = f"frames {window[0]} to {window[1] - 1}"
         if removed:
             description += f" without {', '.join(removed)}"
-        self.tried.append((description, is_failure))
+        self.tried.append(TriedPart(description, is_failure))
         if is_failure:
             self.window = window
             self.removed = [*removed]

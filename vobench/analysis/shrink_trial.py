@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
-from vobench.analysis.explain import segment_loss
 from vobench.analysis.nuisance import nuisances_of
+from vobench.analysis.segment_loss import segment_loss
 from vobench.analysis.shrink import MIN_FRAMES, Failure, Shrunk, shrink
 from vobench.analysis.trial_data import TrialPaths, read_paths
 from vobench.errors import InputError
@@ -199,7 +199,7 @@ def _search(trial: FinishedTrial, failure: TrialFailure, run_plan: PlanRunner, t
     whole = (first, first + len(stamps_ns))
     is_likely = _likely_windows(trial, dict(enumerate(stamps_ns, first)), failure)
     nuisances = [nuisance for nuisance in nuisances_of(trial.case) if not nuisance.is_circumstance]
-    return shrink(trial.case, whole, is_likely, nuisances, fails_alike, trials=trials)
+    return shrink(trial.case, whole, is_likely=is_likely, nuisances=nuisances, fails=fails_alike, trials=trials)
 
 
 def _likely_windows(

@@ -7,7 +7,7 @@ import numpy as np
 
 from vobench.analysis.causes import ErrorSeries
 from vobench.analysis.conditions import FEW_TRACKS, conditions
-from vobench.analysis.explain import Outcome, loss_between, segment_loss
+from vobench.analysis.segment_loss import Outcome, loss_between, segment_loss
 from vobench.errors import InputError
 from vobench.geometry.se3 import Array
 from vobench.runner.estimate import ESTIMATE

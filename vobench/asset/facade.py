@@ -5,6 +5,7 @@ A house is built in the frame of its lot: its front is on x = 0 and faces x; it 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 from PIL import Image, ImageDraw
@@ -35,19 +36,28 @@ REVEAL_M = 0.17
 FOUNDATION_M = KERB_M + 0.02  # of a house below the pavement
 PICTURES = 8  # of what is behind windows
 FASCIA_PX = 96  # height of the picture of a shop's name
+FASCIA_LENGTH_PX = 1024
+DOOR_M = 1.0
+DOOR_HEAD_M = 2.25
+DOOR_TO_END_M = 0.55  # from a door to the end of the front
+PLINTH_M = 0.34
+FOLDS = 9  # of a curtain
 
 
 @dataclass(frozen=True, slots=True)
 class FrontStyle:
-    """How a house looks."""
+    """How a house looks.
+
+    `window_m` is the width and the height of windows, and `module_m` the distance between their middles.
+    """
 
     wall: Material
     trim: Material
     frame: Material
-    window_m: tuple[float, float]  # width and height
-    module_m: float  # distance between windows
+    window_m: tuple[float, float]
+    module_m: float
     is_modern: bool
-    roof: str  # flat, pitched
+    roof: Literal["flat", "pitched"]
     has_balconies: bool
 
 
@@ -66,22 +76,13 @@ class House:
 
 def front_style(rng: Rng) -> FrontStyle:
     """The style of a house."""
-    # Few textures, in many tints: painting one takes up to half a second.
     kind = one_of(rng, *STYLES)
-    seed = int(rng.integers(2))
-    if kind == "brick":
-        wall = matt(one_of(rng, *BRICK_TINTS), picture.masonry("brick", seed))
-    elif kind == "render":
-        wall = matt(one_of(rng, *RENDER_TINTS), picture.ground("plaster", seed, 1024, 3.2))
-    elif kind == "stone":
-        blocks = picture.masonry("paving", 0, 512, 2.4, rows=8, columns=3)
-        wall = matt(one_of(rng, *STONE_TINTS), blocks)
-    else:
-        panels = picture.masonry("tile", 0, 512, 3.6, rows=3, columns=2, bond=0.0)
-        wall = coated(one_of(rng, *PANEL_TINTS), panels, 0.35)
+    wall = _wall_material(rng, kind)
     is_modern = kind == "panel" or rng.random() < 0.15
-    width_m = float(rng.uniform(1.5, 2.1) if is_modern else rng.uniform(0.9, 1.25))
-    height_m = float(rng.uniform(1.4, 1.8) if is_modern else rng.uniform(1.45, 1.9))
+    width_range_m = (1.5, 2.1) if is_modern else (0.9, 1.25)
+    height_range_m = (1.4, 1.8) if is_modern else (1.45, 1.9)
+    width_m = float(rng.uniform(*width_range_m))
+    height_m = float(rng.uniform(*height_range_m))
     return FrontStyle(
         wall=wall,
         trim=matt(one_of(rng, *TRIMS), picture.ground("concrete", 4)),
@@ -94,29 +95,47 @@ def front_style(rng: Rng) -> FrontStyle:
     )
 
 
+def _wall_material(rng: Rng, kind: str) -> Material:
+    """The material of walls. There are few textures, in many tints: painting one takes up to half a second."""
+    seed = int(rng.integers(2))
+    match kind:
+        case "brick":
+            return matt(one_of(rng, *BRICK_TINTS), picture.masonry("brick", seed))
+        case "render":
+            return matt(one_of(rng, *RENDER_TINTS), picture.ground("plaster", seed, 1024, 3.2))
+        case "stone":
+            blocks = picture.masonry("paving", 0, 512, 2.4, rows=8, columns=3)
+            return matt(one_of(rng, *STONE_TINTS), blocks)
+        case _:
+            panels = picture.masonry("tile", 0, 512, 3.6, rows=3, columns=2, bond=0.0)
+            return coated(one_of(rng, *PANEL_TINTS), panels, 0.35)
+
+
 def house(rng: Rng, lot: Lot, *, has_shop: bool, number: int) -> House:
     """The house on a lot."""
     style = front_style(rng)
     storeys = int(rng.integers(1, 5) if lot.is_far else rng.integers(1, 4))
     ground_m = SHOP_STOREY_M if has_shop else HOME_STOREY_M + 0.3
     high_m = ground_m + storeys * HOME_STOREY_M + 0.5
-    made = House()
-    _front(rng, made, lot, style, storeys=storeys, ground_m=ground_m, high_m=high_m, has_shop=has_shop, number=number)
+    building = House()
+    _front(
+        rng, building, lot, style, storeys=storeys, ground_m=ground_m, high_m=high_m, has_shop=has_shop, number=number
+    )
     for is_open, side in zip(lot.is_open, (-1, 1), strict=True):
         if is_open:
-            _flank(rng, made, lot, style, side=side, storeys=storeys, ground_m=ground_m, high_m=high_m)
-    _body(rng, made, lot, style, high_m)
-    return _raised(made, KERB_M)
+            _flank(rng, building, lot, style, side=side, storeys=storeys, ground_m=ground_m, high_m=high_m)
+    _body(rng, building, lot, style, high_m)
+    return _raised(building, KERB_M)
 
 
-def _raised(made: House, z_m: float) -> House:
+def _raised(building: House, z_m: float) -> House:
     """The house on the pavement."""
     T = at(z_m=z_m)
     return House(
-        [part.moved(T) for part in made.parts],
-        [part.moved(T) for part in made.shop_parts],
-        [lamp.moved(T) for lamp in made.shop_lamps],
-        [window.moved(T) for window in made.windows],
+        [part.moved(T) for part in building.parts],
+        [part.moved(T) for part in building.shop_parts],
+        [lamp.moved(T) for lamp in building.shop_lamps],
+        [window.moved(T) for window in building.windows],
     )
 
 
@@ -125,7 +144,7 @@ def _raised(made: House, z_m: float) -> House:
 
 def _front(
     rng: Rng,
-    made: House,
+    building: House,
     lot: Lot,
     style: FrontStyle,
     *,
@@ -136,54 +155,77 @@ def _front(
     number: int,
 ) -> None:
     """The front with its door, its windows, and a shop or a ground floor of a home."""
-    w = lot.width_m
-    windows = _upper_windows(style, w, storeys, ground_m)
-    door_width_m = 1.0
-    door_is_left = bool(rng.random() < 0.5)
-    door_u = w - 0.55 - door_width_m if door_is_left else 0.55
-    door: Hole = (door_u, door_u + door_width_m, 0.0, 2.25)
-    window: Hole | None = None
+    width_m = lot.width_m
+    windows = _upper_windows(style, width_m, storeys, ground_m)
+
+    # Along the front, from the right end: the door is at one end, the shop window or windows take the rest.
+    is_door_left = bool(rng.random() < 0.5)
+    door_u_m = width_m - DOOR_TO_END_M - DOOR_M if is_door_left else DOOR_TO_END_M
+    door: Hole = (door_u_m, door_u_m + DOOR_M, 0.0, DOOR_HEAD_M)
+    shop_window: Hole | None = None
     if has_shop:
-        window = (0.5, door_u - 0.5, 0.42, 2.85) if door_is_left else (door_u + 1.5, w - 0.5, 0.42, 2.85)
+        first_m = 0.5 if is_door_left else door_u_m + 1.5
+        last_m = door_u_m - 0.5 if is_door_left else width_m - 0.5
+        shop_window = (first_m, last_m, 0.42, 2.85)
     else:
-        room = (0.3, door_u - 0.3) if door_is_left else (door_u + 1.3, w - 0.3)
-        windows += _row(style, room, 0.85)
-    openings = [*windows, door] + ([window] if window else [])
+        first_m = 0.3 if is_door_left else door_u_m + 1.3
+        last_m = door_u_m - 0.3 if is_door_left else width_m - 0.3
+        windows += _row(style, (first_m, last_m), 0.85)
+    openings = [*windows, door]
+    if shop_window:
+        openings.append(shop_window)
     _wall(
         rng,
-        made,
+        building,
         style,
-        width_m=w,
+        width_m=width_m,
         high_m=high_m,
         openings=openings,
         windows=windows,
         is_far=lot.is_far,
     )
+    _door(rng, building, style, door, width_m=width_m, high_m=high_m, number=number)
+    building.parts += _plinth(style, door, width_m)
+    if shop_window:
+        _shop(rng, building, lot, shop_window, high_m)
 
-    y = (door[0] + door[1]) / 2 - w / 2
-    corner = np.array([0.0, -w / 2, 0.0])
-    made.parts.append(Part(reveal(corner, (0, w, 0), (0, 0, high_m), door, 0.3), style.trim))
-    leaf = wood(one_of(rng, "oak", "walnut")) if rng.random() < 0.4 else coated(one_of(rng, *FASCIAS), roughness=0.25)
-    made.parts += [
-        stood((0.06, door_width_m, 2.25), leaf, -0.27, y, 0, bevel=0.004),
-        stood((0.04, 0.5, 0.7), coated("#12161a", roughness=0.08), -0.25, y, 1.25, bevel=0.003),
-        put(block_arrays((0.05, 0.03, 0.3), bevel_m=0.008), BLACK, -0.22, y + 0.38, 1.05),
-        put(card_arrays((0.24, 0.12)), matt(texture=picture.sign(str(number))), 0.006, y + 0.78, 1.9),
-    ]
-    made.parts.append(stood((0.28, door_width_m + 0.2, 0.05), style.trim, 0.13, y, 0, bevel=0.01))
-    plinth_m = 0.34
-    for first, last in _gaps(w, [door]):
-        made.parts.append(
-            stood((0.05, last - first, plinth_m), style.trim, 0.02, (first + last) / 2 - w / 2, 0, bevel=0)
-        )
-    if window:
-        _shop(rng, made, lot, window, high_m)
-    band_m = (0.14, w, 0.16)
-    made.parts.append(stood(band_m, style.trim, 0.04, 0, ground_m - 0.2, bevel=0))
+    band_m = (0.14, width_m, 0.16)  # above the ground floor
+    building.parts.append(stood(band_m, style.trim, 0.04, 0, ground_m - 0.2, bevel=0))
     if style.has_balconies and not lot.is_far:
-        _balconies(made, style, windows, w)
-    pipe_y = w / 2 - 0.14
-    made.parts.append(put(block_arrays((0.09, 0.09, high_m - 0.3), bevel_m=0), DARK, 0.05, pipe_y, high_m / 2 - 0.15))
+        _balconies(building, style, windows, width_m)
+    downpipe = block_arrays((0.09, 0.09, high_m - 0.3), bevel_m=0)
+    building.parts.append(put(downpipe, DARK, 0.05, width_m / 2 - 0.14, high_m / 2 - 0.15))
+
+
+def _door(
+    rng: Rng, building: House, style: FrontStyle, door: Hole, *, width_m: float, high_m: float, number: int
+) -> None:
+    """A door in its reveal, with a pane, a handle, the number of the house and a step."""
+    y_m = (door[0] + door[1]) / 2 - width_m / 2
+    corner_m = np.array([0.0, -width_m / 2, 0.0])
+    building.parts.append(Part(reveal(corner_m, (0, width_m, 0), (0, 0, high_m), door, 0.3), style.trim))
+
+    is_wooden = rng.random() < 0.4
+    leaf = wood(one_of(rng, "oak", "walnut")) if is_wooden else coated(one_of(rng, *FASCIAS), roughness=0.25)
+    pane = coated("#12161a", roughness=0.08)
+    handle = block_arrays((0.05, 0.03, 0.3), bevel_m=0.008)
+    sign = card_arrays((0.24, 0.12))
+    building.parts += [
+        stood((0.06, DOOR_M, DOOR_HEAD_M), leaf, -0.27, y_m, 0, bevel=0.004),
+        stood((0.04, 0.5, 0.7), pane, -0.25, y_m, 1.25, bevel=0.003),
+        put(handle, BLACK, -0.22, y_m + 0.38, 1.05),
+        put(sign, matt(texture=picture.sign(str(number))), 0.006, y_m + 0.78, 1.9),
+        stood((0.28, DOOR_M + 0.2, 0.05), style.trim, 0.13, y_m, 0, bevel=0.01),
+    ]
+
+
+def _plinth(style: FrontStyle, door: Hole, width_m: float) -> list[Part]:
+    """The plinth of a front, on both sides of its door."""
+    parts = []
+    for first_m, last_m in _gaps(width_m, [door]):
+        y_m = (first_m + last_m) / 2 - width_m / 2
+        parts.append(stood((0.05, last_m - first_m, PLINTH_M), style.trim, 0.02, y_m, 0, bevel=0))
+    return parts
 
 
 def _gaps(width_m: float, holes: Sequence[Hole]) -> list[tuple[float, float]]:
@@ -197,29 +239,32 @@ def _gaps(width_m: float, holes: Sequence[Hole]) -> list[tuple[float, float]]:
 
 def _upper_windows(style: FrontStyle, width_m: float, storeys: int, ground_m: float) -> list[Hole]:
     """The windows of the upper storeys."""
-    found = []
+    windows = []
     for storey in range(storeys):
-        found += _row(style, (0.25, width_m - 0.25), ground_m + storey * HOME_STOREY_M + 0.75)
-    return found
+        floor_m = ground_m + storey * HOME_STOREY_M
+        windows += _row(style, (0.25, width_m - 0.25), floor_m + 0.75)
+    return windows
 
 
 def _row(style: FrontStyle, span: tuple[float, float], sill_m: float) -> list[Hole]:
     """Windows side by side between two places along a front."""
-    w, h = style.window_m
-    length_m = span[1] - span[0]
+    width_m, height_m = style.window_m
+    first_m, last_m = span
+    length_m = last_m - first_m
     count = int(length_m / style.module_m)
-    if count == 0 and length_m > w + 0.3:
+    if count == 0 and length_m > width_m + 0.3:
         count = 1
-    middles = span[0] + (np.arange(count) + 0.5) * length_m / max(count, 1)
-    return [(u - w / 2, u + w / 2, sill_m, sill_m + h) for u in middles.tolist()]
+    middles_m = first_m + (np.arange(count) + 0.5) * length_m / max(count, 1)
+    return [(u_m - width_m / 2, u_m + width_m / 2, sill_m, sill_m + height_m) for u_m in middles_m.tolist()]
 
 
 def _flank(
-    rng: Rng, made: House, lot: Lot, style: FrontStyle, *, side: int, storeys: int, ground_m: float, high_m: float
+    rng: Rng, building: House, lot: Lot, style: FrontStyle, *, side: int, storeys: int, ground_m: float, high_m: float
 ) -> None:
     """The wall of a side that is seen from a street, with windows in its upper storeys."""
     flank = House()
-    windows = _upper_windows(style, lot.depth_m, storeys, ground_m)[:: 1 + int(rng.random() < 0.5)]
+    every = 2 if rng.random() < 0.5 else 1  # second window, or each
+    windows = _upper_windows(style, lot.depth_m, storeys, ground_m)[::every]
     _wall(
         rng,
         flank,
@@ -230,15 +275,15 @@ def _flank(
         windows=windows,
         is_far=lot.is_far,
     )
-    flank.parts.append(stood((0.05, lot.depth_m, 0.34), style.trim, 0.02, 0, 0, bevel=0))
+    flank.parts.append(stood((0.05, lot.depth_m, PLINTH_M), style.trim, 0.02, 0, 0, bevel=0))
     T = at(-lot.depth_m / 2, side * lot.width_m / 2, 0, yaw=90 * side)
-    made.parts += [part.moved(T) for part in flank.parts]
-    made.windows += [window.moved(T) for window in flank.windows]
+    building.parts += [part.moved(T) for part in flank.parts]
+    building.windows += [window.moved(T) for window in flank.windows]
 
 
 def _wall(
     rng: Rng,
-    made: House,
+    building: House,
     style: FrontStyle,
     *,
     width_m: float,
@@ -248,132 +293,158 @@ def _wall(
     is_far: bool,
 ) -> None:
     """A wall on x = 0, centred along y, with openings, and what is in its windows."""
-    corner = np.array([0.0, -width_m / 2, 0.0])
+    corner_m = np.array([0.0, -width_m / 2, 0.0])
     along_m = (0.0, width_m, 0.0)
-    up = (0.0, 0.0, high_m)
-    made.parts.append(Part(pierced(corner, along_m, up, openings), style.wall))
+    up_m = (0.0, 0.0, high_m)
+    building.parts.append(Part(pierced(corner_m, along_m, up_m, openings), style.wall))
     if windows:
-        reveals = [as_arrays(reveal(corner, along_m, up, hole, REVEAL_M)) for hole in windows]
-        made.parts.append(Part(joined_arrays(reveals), style.trim if not style.is_modern else style.frame))
-    by_picture: dict[int, list[MeshArrays]] = {}
+        reveals = [as_arrays(reveal(corner_m, along_m, up_m, hole, REVEAL_M)) for hole in windows]
+        building.parts.append(Part(joined_arrays(reveals), style.frame if style.is_modern else style.trim))
+
+    panes_by_picture: dict[int, list[MeshArrays]] = {}
     bars = []
     sills = []
     for u0, u1, v0, v1 in windows:
-        y = (u0 + u1) / 2 + corner[1]
-        z = (v0 + v1) / 2
-        w = u1 - u0
-        h = v1 - v0
-        pane = card_arrays((w, h)).moved(at(-REVEAL_M + 0.03, y, z))
-        by_picture.setdefault(int(rng.integers(PICTURES)), []).append(pane)
-        made.windows.append(pane.moved(at(0.003)))
-        bars += _bars(w, h, y, z, is_modern=style.is_modern, is_far=is_far)
-        sills.append(block_arrays((0.2, w + 0.16, 0.07), bevel_m=0).moved(at(0.0, y, v0 - 0.035)))
-    for number, panes in by_picture.items():
+        y_m = (u0 + u1) / 2 + corner_m[1]
+        z_m = (v0 + v1) / 2
+        window_m = (u1 - u0, v1 - v0)
+        pane = card_arrays(window_m).moved(at(-REVEAL_M + 0.03, y_m, z_m))
+        panes_by_picture.setdefault(int(rng.integers(PICTURES)), []).append(pane)
+        building.windows.append(pane.moved(at(0.003)))
+        bars += _bars(*window_m, y_m, z_m, is_modern=style.is_modern, is_far=is_far)
+        sill = block_arrays((0.2, u1 - u0 + 0.16, 0.07), bevel_m=0)
+        sills.append(sill.moved(at(0.0, y_m, v0 - 0.035)))
+    for number, panes in panes_by_picture.items():
         glass = coated("#ffffff", window_picture(number), roughness=0.06)
-        made.parts.append(Part(joined_arrays(panes), glass))
+        building.parts.append(Part(joined_arrays(panes), glass))
     if bars:
-        made.parts += [Part(joined_arrays(bars), style.frame), Part(joined_arrays(sills), style.trim)]
+        building.parts += [Part(joined_arrays(bars), style.frame), Part(joined_arrays(sills), style.trim)]
 
 
-def _bars(w: float, h: float, y: float, z: float, *, is_modern: bool, is_far: bool) -> list[MeshArrays]:
-    """The frame of a window."""
-    x = -REVEAL_M + 0.055
-    upright = block_arrays((0.05, 0.06, h), bevel_m=0)
-    level = block_arrays((0.05, w, 0.06), bevel_m=0)
-    ys = [-w / 2 + 0.03, w / 2 - 0.03] + ([] if is_far else [0.0])
-    zs = [-h / 2 + 0.03, h / 2 - 0.03] + ([] if is_far or is_modern else [0.16 * h])
-    uprights = [upright.moved(at(x, y + dy, z)) for dy in ys]
-    return uprights + [level.moved(at(x, y, z + dz)) for dz in zs]
+def _bars(
+    width_m: float, height_m: float, y_m: float, z_m: float, *, is_modern: bool, is_far: bool
+) -> list[MeshArrays]:
+    """The frame of a window, with bars in the middle of those that are seen from near."""
+    x_m = -REVEAL_M + 0.055
+    upright = block_arrays((0.05, 0.06, height_m), bevel_m=0)
+    level = block_arrays((0.05, width_m, 0.06), bevel_m=0)
+    upright_y_m = [-width_m / 2 + 0.03, width_m / 2 - 0.03]
+    level_z_m = [-height_m / 2 + 0.03, height_m / 2 - 0.03]
+    if not is_far:
+        upright_y_m.append(0.0)
+    if not is_far and not is_modern:
+        level_z_m.append(0.16 * height_m)
+    uprights = [upright.moved(at(x_m, y_m + offset_m, z_m)) for offset_m in upright_y_m]
+    levels = [level.moved(at(x_m, y_m, z_m + offset_m)) for offset_m in level_z_m]
+    return uprights + levels
 
 
-def _balconies(made: House, style: FrontStyle, windows: Sequence[Hole], width_m: float) -> None:
+def _balconies(building: House, style: FrontStyle, windows: Sequence[Hole], width_m: float) -> None:
     """Balconies of a slab and rails before every other window."""
     rails = []
-    for u0, u1, v0, _ in windows[::2]:
-        y = (u0 + u1) / 2 - width_m / 2
-        w = u1 - u0 + 0.5
-        if v0 < 2.5:
+    for u0, u1, sill_m, _ in windows[::2]:
+        is_on_ground_floor = sill_m < 2.5
+        if is_on_ground_floor:
             continue
-        made.parts.append(stood((0.95, w, 0.14), style.trim, 0.475, y, v0 - 0.2, bevel=0))
-        top = block_arrays((0.04, w, 0.04), bevel_m=0).moved(at(0.92, y, v0 + 0.85))
-        rails.append(top)
-        bar = block_arrays((0.016, 0.016, 0.9), bevel_m=0).moved(at(0.92, y, v0 + 0.4))
-        rails += [bar.moved(at(0, dy)) for dy in np.arange(-w / 2 + 0.04, w / 2, 0.16).tolist()]
+        y_m = (u0 + u1) / 2 - width_m / 2
+        balcony_m = u1 - u0 + 0.5
+        building.parts.append(stood((0.95, balcony_m, 0.14), style.trim, 0.475, y_m, sill_m - 0.2, bevel=0))
+        handrail = block_arrays((0.04, balcony_m, 0.04), bevel_m=0)
+        rails.append(handrail.moved(at(0.92, y_m, sill_m + 0.85)))
+        bar = block_arrays((0.016, 0.016, 0.9), bevel_m=0).moved(at(0.92, y_m, sill_m + 0.4))
+        bar_y_m = np.arange(-balcony_m / 2 + 0.04, balcony_m / 2, 0.16)
+        rails += [bar.moved(at(0, offset_m)) for offset_m in bar_y_m.tolist()]
     if rails:
-        made.parts.append(Part(joined_arrays(rails), DARK))
+        building.parts.append(Part(joined_arrays(rails), DARK))
 
 
 # --- The ground floor of a shop ---
 
 
-def _shop(rng: Rng, made: House, lot: Lot, window: Hole, high_m: float) -> None:
+def _shop(rng: Rng, building: House, lot: Lot, window: Hole, high_m: float) -> None:
     """A shop window with a room behind its pane, a fascia with the name above it, and perhaps an awning."""
-    w = lot.width_m
-    u0, u1, v0, v1 = window
-    middle = (u0 + u1) / 2 - w / 2
-    width_m = u1 - u0
+    first_m, last_m, sill_m, head_m = window
+    middle_y_m = (first_m + last_m) / 2 - lot.width_m / 2
+    width_m = last_m - first_m
     ink = one_of(rng, *FASCIAS)
     paint = coated(ink, roughness=0.3)
-    corner = np.array([0.0, -w / 2, 0.0])
-    made.parts.append(Part(reveal(corner, (0, w, 0), (0, 0, high_m), window, 0.22), paint))
-    bays = max(1, round(width_m / 2.2))
-    for k in range(bays + 1):
-        y = middle - width_m / 2 + k * width_m / bays
-        made.parts.append(put(block_arrays((0.07, 0.06, v1 - v0), bevel_m=0), paint, -0.12, y, (v0 + v1) / 2))
-    pane = quad_arrays((-0.12, middle - width_m / 2, v0), (0, width_m, 0), (0, 0, v1 - v0))
-    made.shop_parts.append(Part(pane, PANE))
+    building.parts += _shop_frame(lot, window, high_m, paint)
+    pane = quad_arrays((-0.12, middle_y_m - width_m / 2, sill_m), (0, width_m, 0), (0, 0, head_m - sill_m))
+    building.shop_parts.append(Part(pane, PANE))
 
     kind = shop.drawn_kind(rng)
-    inside = shop.interior(rng, kind, width_m=width_m, sill_m=v0, depth_m=lot.depth_m * 0.4)
-    T = at(-0.22, middle, 0)
-    made.shop_parts += [part.moved(T) for part in inside.parts]
-    made.shop_lamps += [lamp.moved(T) for lamp in inside.lamps]
+    inside = shop.interior(rng, kind, width_m=width_m, sill_m=sill_m, depth_m=lot.depth_m * 0.4)
+    T_house_shop = at(-0.22, middle_y_m, 0)
+    building.shop_parts += [part.moved(T_house_shop) for part in inside.parts]
+    building.shop_lamps += [lamp.moved(T_house_shop) for lamp in inside.lamps]
 
     name = one_of(rng, *shop.NAMES[kind])
     board_m = (0.12, width_m + 0.3, 0.62)
-    made.parts.append(stood(board_m, paint, 0.06, middle, v1 + 0.06, bevel=0.01))
+    building.parts.append(stood(board_m, paint, 0.06, middle_y_m, head_m + 0.06, bevel=0.01))
     length_m = min(width_m, 5.0)
-    letters = card_arrays((length_m, length_m * FASCIA_PX / 1024))
-    made.parts.append(put(letters, matt(texture=fascia(name, ink)), 0.125, middle, v1 + 0.37))
+    letters = card_arrays((length_m, length_m * FASCIA_PX / FASCIA_LENGTH_PX))
+    building.parts.append(put(letters, matt(texture=fascia(name, ink)), 0.125, middle_y_m, head_m + 0.37))
+
     choice = rng.random()
-    if choice < 0.3 and not lot.is_far:
-        _awning(made, ink, middle, width_m, v1)
-    elif choice < 0.6 and not lot.is_far:
-        _hanging_sign(rng, made, name, ink, middle + width_m / 2 - 0.2)
+    if lot.is_far:
+        return
+    if choice < 0.3:
+        _awning(building, ink, middle_y_m, width_m, head_m)
+    elif choice < 0.6:
+        _hanging_sign(rng, building, name, ink, middle_y_m + width_m / 2 - 0.2)
 
 
-def _awning(made: House, ink: str, middle: float, width_m: float, head_m: float) -> None:
-    """Striped cloth over a shop window."""
+def _shop_frame(lot: Lot, window: Hole, high_m: float, paint: Material) -> list[Part]:
+    """The reveal of a shop window, and the posts that divide it into bays."""
+    first_m, last_m, sill_m, head_m = window
+    middle_y_m = (first_m + last_m) / 2 - lot.width_m / 2
+    width_m = last_m - first_m
+    corner_m = np.array([0.0, -lot.width_m / 2, 0.0])
+    parts = [Part(reveal(corner_m, (0, lot.width_m, 0), (0, 0, high_m), window, 0.22), paint)]
+    bays = max(1, round(width_m / 2.2))
+    post = block_arrays((0.07, 0.06, head_m - sill_m), bevel_m=0)
+    for number in range(bays + 1):
+        y_m = middle_y_m - width_m / 2 + number * width_m / bays
+        parts.append(put(post, paint, -0.12, y_m, (sill_m + head_m) / 2))
+    return parts
+
+
+def _awning(building: House, ink: str, middle_y_m: float, width_m: float, head_m: float) -> None:
+    """Cloth over a shop window, in stripes of two colours."""
     count = max(4, round(width_m / 0.45))
     stripe_m = width_m / count
-    stripes: tuple[list[MeshArrays], list[MeshArrays]] = ([], [])
-    for k in range(count):
-        y = middle + (k - (count - 1) / 2) * stripe_m
-        cloth = block_arrays((1.15, stripe_m, 0.015), bevel_m=0).moved(at(0.66, y, head_m - 0.1, pitch=15))
-        hem = block_arrays((0.012, stripe_m, 0.18), bevel_m=0).moved(at(1.22, y, head_m - 0.33))
-        stripes[k % 2].extend([cloth, hem])
-    made.parts += [Part(joined_arrays(stripes[0]), matt(ink)), Part(joined_arrays(stripes[1]), matt("#e4ded0"))]
+    stripes: tuple[list[MeshArrays], list[MeshArrays]] = ([], [])  # of the first and of the second colour
+    for number in range(count):
+        y_m = middle_y_m + (number - (count - 1) / 2) * stripe_m
+        cloth = block_arrays((1.15, stripe_m, 0.015), bevel_m=0).moved(at(0.66, y_m, head_m - 0.1, pitch=15))
+        hem = block_arrays((0.012, stripe_m, 0.18), bevel_m=0).moved(at(1.22, y_m, head_m - 0.33))
+        stripes[number % 2].extend([cloth, hem])
+    first, second = stripes
+    building.parts += [Part(joined_arrays(first), matt(ink)), Part(joined_arrays(second), matt("#e4ded0"))]
 
 
-def _hanging_sign(rng: Rng, made: House, name: str, ink: str, y: float) -> None:
+def _hanging_sign(rng: Rng, building: House, name: str, ink: str, y_m: float) -> None:
     """A sign that hangs out over the pavement."""
     word = name.partition(" ")[0][:7]
-    plate = matt(texture=picture.sign(word, ink))
-    z = float(rng.uniform(2.95, 3.2))
-    body = block_arrays((0.7, 0.04, 0.37), bevel_m=0.004)
-    made.parts.append(put(body, DARK, 0.55, y, z))
+    lettering = matt(texture=picture.sign(word, ink))
+    z_m = float(rng.uniform(2.95, 3.2))
+    plate = block_arrays((0.7, 0.04, 0.37), bevel_m=0.004)
+    arm = block_arrays((0.8, 0.03, 0.03), bevel_m=0)
+    building.parts.append(put(plate, DARK, 0.55, y_m, z_m))
     for side in (-1, 1):
-        made.parts.append(put(card_arrays((0.68, 0.34)), plate, 0.55, y + side * 0.022, z, yaw=side * 90))
-    made.parts.append(put(block_arrays((0.8, 0.03, 0.03), bevel_m=0), DARK, 0.4, y, z + 0.22))
+        face = card_arrays((0.68, 0.34))
+        building.parts.append(put(face, lettering, 0.55, y_m + side * 0.022, z_m, yaw=side * 90))
+    building.parts.append(put(arm, DARK, 0.4, y_m, z_m + 0.22))
 
 
 @picture.painted
 def fascia(name: str, ink: str) -> Picture:
     """The name of a shop on its board."""
-    image = Image.new("RGB", (1024, FASCIA_PX), ink)
+    image = Image.new("RGB", (FASCIA_LENGTH_PX, FASCIA_PX), ink)
     draw = ImageDraw.Draw(image)
-    letters = INK if sum(picture.rgb(ink)) > 450 else PAPER
-    draw.text((512, FASCIA_PX // 2), name, font=picture._font(64), fill=letters, anchor="mm")
+    is_bright = sum(picture.rgb(ink)) > 450
+    middle_px = (FASCIA_LENGTH_PX // 2, FASCIA_PX // 2)
+    draw.text(middle_px, name, font=picture._font(64), fill=INK if is_bright else PAPER, anchor="mm")
     return Picture(np.asarray(image))
 
 
@@ -381,48 +452,65 @@ def fascia(name: str, ink: str) -> Picture:
 def window_picture(number: int) -> Picture:
     """What is behind a window by day: a dim room with curtains, a blind, a plant or a lamp."""
     rng = np.random.default_rng([number, 77])
-    w = 128
-    h = 192
-    dim = 26 + 10 * rng.random()
-    image = Image.new("RGB", (w, h), (int(dim), int(dim * 1.02), int(dim * 1.05)))
+    width_px = 128
+    height_px = 192
+    grey = 26 + 10 * rng.random()  # of the room
+    image = Image.new("RGB", (width_px, height_px), (int(grey), int(grey * 1.02), int(grey * 1.05)))
     draw = ImageDraw.Draw(image)
-    back = int(dim * 1.5)
-    draw.rectangle([0.25 * w, 0.1 * h, 0.8 * w, 0.62 * h], fill=(back, back - 2, back - 6))
-    draw.rectangle([0, 0.9 * h, w, h], fill=(int(dim * 1.8), int(dim * 1.6), int(dim * 1.3)))
+    back = int(grey * 1.5)
+    back_wall = [0.25 * width_px, 0.1 * height_px, 0.8 * width_px, 0.62 * height_px]
+    draw.rectangle(back_wall, fill=(back, back - 2, back - 6))
+    floor = [0, 0.9 * height_px, width_px, height_px]
+    draw.rectangle(floor, fill=(int(grey * 1.8), int(grey * 1.6), int(grey * 1.3)))
+
     cloth = picture.rgb(one_of(rng, "#8f887a", "#a49c8c", "#77807f", "#9a8878", "#b5b0a4"))
-    kind = number % 4
-    if kind == 0:
-        _curtains(draw, rng, cloth, w, h, share=0.24)
-    elif kind == 1:
-        drop = rng.uniform(0.3, 0.75)
-        for y in np.arange(0, drop * h, 5).tolist():
-            draw.rectangle([0, y, w, y + 3], fill=cloth)
-    elif kind == 2:
-        _curtains(draw, rng, cloth, w, h, share=0.12)
-        for _ in range(26):
-            x = rng.normal(0.6 * w, 0.09 * w)
-            y = rng.normal(0.78 * h, 0.07 * h)
-            draw.ellipse([x - 6, y - 3, x + 6, y + 3], fill=(42, 62 + int(rng.integers(30)), 34))
-    else:
-        _curtains(draw, rng, cloth, w, h, share=0.5)
+    match number % 4:
+        case 0:
+            _curtains(draw, rng, cloth, width_px, height_px, share=0.24)
+        case 1:
+            _blind(draw, rng, cloth, width_px, height_px)
+        case 2:
+            _curtains(draw, rng, cloth, width_px, height_px, share=0.12)
+            _plant(draw, rng, width_px, height_px)
+        case _:
+            _curtains(draw, rng, cloth, width_px, height_px, share=0.5)
     return Picture(np.asarray(image))
 
 
-def _curtains(draw: ImageDraw.ImageDraw, rng: Rng, cloth: Sequence[int], w: int, h: int, *, share: float) -> None:
+def _blind(draw: ImageDraw.ImageDraw, rng: Rng, cloth: tuple[int, int, int], width_px: int, height_px: int) -> None:
+    """A blind of slats that is let down in part."""
+    share = rng.uniform(0.3, 0.75)
+    for y_px in np.arange(0, share * height_px, 5).tolist():
+        draw.rectangle([0, y_px, width_px, y_px + 3], fill=cloth)
+
+
+def _plant(draw: ImageDraw.ImageDraw, rng: Rng, width_px: int, height_px: int) -> None:
+    """The leaves of a plant on the window sill."""
+    for _ in range(26):
+        x_px = rng.normal(0.6 * width_px, 0.09 * width_px)
+        y_px = rng.normal(0.78 * height_px, 0.07 * height_px)
+        green = 62 + int(rng.integers(30))
+        draw.ellipse([x_px - 6, y_px - 3, x_px + 6, y_px + 3], fill=(42, green, 34))
+
+
+def _curtains(
+    draw: ImageDraw.ImageDraw, rng: Rng, cloth: Sequence[int], width_px: int, height_px: int, *, share: float
+) -> None:
     """Curtains in folds that cover a share of a window from either side."""
+    fold_px = share * width_px / FOLDS
     for side in (0, 1):
-        for fold in range(9):
-            x = fold * share * w / 9
+        for fold in range(FOLDS):
+            x_px = fold * share * width_px / FOLDS
             tone = 0.72 + 0.28 * np.sin(1.9 * fold + rng.uniform(0, 0.6))
             fill = tuple(int(channel * tone) for channel in cloth)
-            left = x if side == 0 else w - x - share * w / 9
-            draw.rectangle([left, 0, left + share * w / 9 + 1, h], fill=fill)
+            left_px = x_px if side == 0 else width_px - x_px - fold_px
+            draw.rectangle([left_px, 0, left_px + fold_px + 1, height_px], fill=fill)
 
 
 # --- The rest of a house ---
 
 
-def _body(rng: Rng, made: House, lot: Lot, style: FrontStyle, high_m: float) -> None:
+def _body(rng: Rng, building: House, lot: Lot, style: FrontStyle, high_m: float) -> None:
     """The sides that nobody sees well, the back, and the roof."""
     corners = lot.local_corners_m
     right, left, back_left, back_right = (np.array([x, y, 0.0]) for x, y in corners.tolist())
@@ -432,17 +520,17 @@ def _body(rng: Rng, made: House, lot: Lot, style: FrontStyle, high_m: float) -> 
         walls.append(quad_arrays(left, back_left - left, up))
     if not lot.is_open[0]:
         walls.append(quad_arrays(back_right, right - back_right, up))
-    made.parts.append(Part(joined_arrays(walls), style.wall))
-    made.parts.append(Part(_foundation(right, left, back_left, back_right), style.trim))
-    parapet_m = 0.3 if style.roof == "flat" else 0.0
+    building.parts.append(Part(joined_arrays(walls), style.wall))
+    building.parts.append(Part(_foundation(right, left, back_left, back_right), style.trim))
     top = _polygon([right + up, left + up, back_left + up, back_right + up])
-    made.parts.append(Part(top, DARK))
-    w = lot.width_m
+    building.parts.append(Part(top, DARK))
     if style.roof == "flat":
-        made.parts.append(stood((0.3, w, parapet_m), style.trim, -0.06, 0, high_m - 0.06, bevel=0))
+        parapet_m = (0.3, lot.width_m, 0.3)
+        building.parts.append(stood(parapet_m, style.trim, -0.06, 0, high_m - 0.06, bevel=0))
         return
-    made.parts.append(stood((0.5, w, 0.14), style.trim, 0.1, 0, high_m - 0.16, bevel=0))
-    _pitched_roof(rng, made, lot, style, high_m)
+    eaves_m = (0.5, lot.width_m, 0.14)
+    building.parts.append(stood(eaves_m, style.trim, 0.1, 0, high_m - 0.16, bevel=0))
+    _pitched_roof(rng, building, lot, style, high_m)
 
 
 def _foundation(right: Array, left: Array, back_left: Array, back_right: Array) -> MeshArrays:
@@ -466,7 +554,7 @@ def _polygon(corners_m: Sequence[Array]) -> MeshArrays:
     return MeshArrays(vertices_m, np.array([[0, 1, 2], [0, 2, 3]]), vertices_m[:, :2].copy(), normals)
 
 
-def _pitched_roof(rng: Rng, made: House, lot: Lot, style: FrontStyle, high_m: float) -> None:
+def _pitched_roof(rng: Rng, building: House, lot: Lot, style: FrontStyle, high_m: float) -> None:
     """Two slopes with a ridge along the street, gables, and a chimney."""
     right, left, back_left, back_right = lot.local_corners_m
     ridge_m = high_m + float(rng.uniform(2.2, 3.4))
@@ -475,26 +563,27 @@ def _pitched_roof(rng: Rng, made: House, lot: Lot, style: FrontStyle, high_m: fl
     eaves_x = np.array([0.25, 0.0])
     eave_right = np.array([*(right + eaves_x), high_m - 0.02])
     eave_left = np.array([*(left + eaves_x), high_m - 0.02])
-    back_r = np.array([*back_right, high_m - 0.02])
-    back_l = np.array([*back_left, high_m - 0.02])
+    back_eave_right = np.array([*back_right, high_m - 0.02])
+    back_eave_left = np.array([*back_left, high_m - 0.02])
     tint = one_of(rng, "#b98d7c", "#8a8f94", "#6f7276", "#a86a52", "#5d5f62")
     tiles = matt(tint, picture.masonry("tile", 1, 512, 2.0, rows=12, columns=8))
     slopes = [
         _slope(eave_right, eave_left, ridge_left, ridge_right),
-        _slope(back_l, back_r, ridge_right, ridge_left),
+        _slope(back_eave_left, back_eave_right, ridge_right, ridge_left),
     ]
-    made.parts.append(Part(joined_arrays(slopes), tiles))
+    building.parts.append(Part(joined_arrays(slopes), tiles))
     gables = [
         _triangle(np.array([*left, high_m]), np.array([*back_left, high_m]), ridge_left),
         _triangle(np.array([*back_right, high_m]), np.array([*right, high_m]), ridge_right),
     ]
-    made.parts.append(Part(joined_arrays(gables), style.wall))
+    building.parts.append(Part(joined_arrays(gables), style.wall))
     if rng.random() < 0.7:
-        stack_m = (0.5, 0.9, 1.5)
-        middle = (ridge_left + ridge_right) / 2
-        y = float(middle[1] + rng.uniform(-0.3, 0.3) * lot.width_m)
-        chimney = matt("#b98d7c", picture.masonry("brick", 1))
-        made.parts.append(stood(stack_m, chimney, float(middle[0]), y, ridge_m - 0.6, bevel=0))
+        chimney_m = (0.5, 0.9, 1.5)
+        middle_m = (ridge_left + ridge_right) / 2
+        x_m = float(middle_m[0])
+        y_m = float(middle_m[1] + rng.uniform(-0.3, 0.3) * lot.width_m)
+        bricks = matt("#b98d7c", picture.masonry("brick", 1))
+        building.parts.append(stood(chimney_m, bricks, x_m, y_m, ridge_m - 0.6, bevel=0))
 
 
 def _slope(a: Array, b: Array, c: Array, d: Array) -> MeshArrays:

@@ -436,20 +436,10 @@ def office_plan(rng: Rng) -> FloorPlan:
     cells, closed_sides = layouts[int(rng.choice(len(layouts), p=[0.4, 0.3, 0.3]))](rng)
     height_m = round(float(rng.uniform(2.7, 3.2)), 2)
     rooms = rooms_of(cells)
-    hub = next((room for room in rooms if room.use == "hall"), None)
-    hub = hub or next(room for room in rooms if room.use == "open")
-    has_glass = bool(rng.random() < 0.7)
-    passages = list[Passage]()
-    for room in rooms:
-        if room is hub:
-            continue
-        door = door_between(rng, room, hub, leaf_share=0.45)
-        if door is None:
-            raise ValueError(f"the wall between {room.name} and {hub.name} is too short for a door")
-        passages.append(door)
-        if has_glass and room.use in ("meeting", "cell"):
-            passages += _glass_beside(room, hub, door)
-    passages = without_obstructing_leaves(rooms, passages)
+    halls = [room for room in rooms if room.use == "hall"]
+    open_rooms = [room for room in rooms if room.use == "open"]
+    hub = [*halls, *open_rooms][0]  # the room that all others open to
+    passages = _office_passages(rng, rooms, hub)
 
     entrance = _entrance(hub)
     outer = FloorPlan(tuple(rooms), (), (), entrance, height_m).outer
@@ -467,6 +457,22 @@ def office_plan(rng: Rng) -> FloorPlan:
                 windows += windows_along(rng, room, side, style)
     plan = FloorPlan(tuple(rooms), tuple(passages), tuple(windows), entrance, height_m)
     return _turned_at_random(rng, plan)
+
+
+def _office_passages(rng: Rng, rooms: Sequence[Room], hub: Room) -> list[Passage]:
+    """A door from each room to the hub, beside it perhaps a pane."""
+    has_glass = bool(rng.random() < 0.7)
+    passages = list[Passage]()
+    for room in rooms:
+        if room is hub:
+            continue
+        door = door_between(rng, room, hub, leaf_share=0.45)
+        if door is None:
+            raise ValueError(f"the wall between {room.name} and {hub.name} is too short for a door")
+        passages.append(door)
+        if has_glass and room.use in ("meeting", "cell"):
+            passages += _glass_beside(room, hub, door)
+    return without_obstructing_leaves(rooms, passages)
 
 
 def _glass_beside(room: Room, hub: Room, door: Passage) -> Iterator[Passage]:
@@ -653,30 +659,41 @@ def _flat_passages(rng: Rng, rooms: Sequence[Room], height_m: float) -> list[Pas
     hall = next(room for room in rooms if room.use == "hall")
     living = next(room for room in rooms if room.use == "living")
     head_m = round(min(height_m - 0.25, 2.3), 2)
-    passages = list[Passage]()
-    opened = set[str]()
-    for room in rooms:
-        joins_living = room.use == "kitchen" and rng.random() < 0.7
-        if joins_living:
-            opening = opening_between(rng, room, living, head_m=head_m)
-            if opening is not None:
-                passages.append(opening)
-                opened.add(room.name)
+    openings = _kitchen_openings(rng, rooms, living, head_m)
+    passages = list(openings.values())
     for room in rooms:
         if room is hall:
             continue
-        needs_no_door = room.name in opened and rng.random() < 0.6
+        needs_no_door = room.name in openings and rng.random() < 0.6
         if needs_no_door:
             continue
-        passage = None
-        if room is living and rng.random() < 0.35:
-            passage = opening_between(rng, room, hall, head_m=head_m, most_m=1.7)
-        passage = passage or door_between(rng, room, hall)
-        if passage is None and room.name not in opened:
+        passage = _passage_to_hall(rng, room, hall, opening_head_m=head_m if room is living else None)
+        if passage is None and room.name not in openings:
             passage = door_between(rng, room, living)
         if passage is not None:
             passages.append(passage)
     return without_obstructing_leaves(rooms, passages)
+
+
+def _kitchen_openings(rng: Rng, rooms: Sequence[Room], living: Room, head_m: float) -> dict[str, Passage]:
+    """The openings to the living room, by the names of the kitchens that have one."""
+    openings = {}
+    for room in rooms:
+        joins_living = room.use == "kitchen" and rng.random() < 0.7
+        opening = opening_between(rng, room, living, head_m=head_m) if joins_living else None
+        if opening is not None:
+            openings[room.name] = opening
+    return openings
+
+
+def _passage_to_hall(rng: Rng, room: Room, hall: Room, *, opening_head_m: float | None) -> Passage | None:
+    """A door to the hall or, if its height is given, perhaps an opening; None if they share too short a wall."""
+    may_be_open = opening_head_m is not None and rng.random() < 0.35
+    if may_be_open and opening_head_m is not None:
+        opening = opening_between(rng, room, hall, head_m=opening_head_m, most_m=1.7)
+        if opening is not None:
+            return opening
+    return door_between(rng, room, hall)
 
 
 def without_obstructing_leaves(rooms: Sequence[Room], passages: Sequence[Passage]) -> list[Passage]:

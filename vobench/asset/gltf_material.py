@@ -27,6 +27,10 @@ PANE_OPACITY = 0.5
 ABSENT_OPACITY = 0.02
 CUTOFF = 0.5  # the default of glTF for masks; also used for blended materials that are cut out
 GLASS_ETA = 1.5
+# A blended picture is cut out if this share of it is nearly clear or nearly solid, by these opacities.
+CLEAR_OPACITY = 0.1
+SOLID_OPACITY = 0.9
+CUT_OUT_SHARE = 0.8
 DIM_CD_M2 = 3.0  # an emission with at most this sum over the channels probably lacks its strength
 
 
@@ -94,9 +98,11 @@ class MaterialReader:
         picture = self._picture(surface.get("metallicRoughnessTexture"))
         if picture is None:
             return roughness, metalness, []
-        means = picture.values[..., 1:].mean((0, 1))  # green is the roughness, and blue the metalness
-        roughness, metalness = np.array([roughness, metalness]) * means / 255
-        return roughness, metalness, [f"is {metalness:.0%} metal and {roughness:.0%} rough, the means of its texture"]
+        _, mean_green, mean_blue = picture.values.mean((0, 1))
+        mean_roughness = roughness * mean_green / 255
+        mean_metalness = metalness * mean_blue / 255
+        note = f"is {mean_metalness:.0%} metal and {mean_roughness:.0%} rough, the means of its texture"
+        return mean_roughness, mean_metalness, [note]
 
     def _material(
         self,
@@ -105,10 +111,7 @@ class MaterialReader:
         metalness: float,
         emission_cd_m2: tuple[float, float, float],
     ) -> Material:
-        """The material of a surface.
-
-        The reflectance of its coat follows from the index of refraction. GGX alpha is the square of the roughness.
-        """
+        """The material of a surface; a pane if most of the light passes through it."""
         surface = source.get("pbrMetallicRoughness", {})
         extensions = source.get("extensions", {})
         red, green, blue, _ = _base_colour(surface)
@@ -116,24 +119,19 @@ class MaterialReader:
         texture = self._picture(surface.get("baseColorTexture"), channels)
         emits = sum(emission_cd_m2) > 0
         emission_texture = self._picture(source.get("emissiveTexture")) if emits else None
-        material = Material(
+
+        coat = _coat(extensions, roughness, metalness)
+        transmission = extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0)
+        if transmission > PANE_OPACITY:
+            tint = float(np.dot((red, green, blue), LUMINANCE))
+            return Material("pane", eta=max(coat.eta, GLASS_ETA), tint=tint)
+        return replace(
+            coat,
             colour=(red, green, blue),
             texture=texture,
             emission_cd_m2=emission_cd_m2,
             emission_texture=emission_texture,
         )
-
-        alpha = roughness**2
-        is_diffuse = alpha > DIFFUSE_ALPHA or "KHR_materials_unlit" in extensions
-        if not is_diffuse:
-            eta = float(extensions.get("KHR_materials_ior", {}).get("ior", GLASS_ETA))
-            material = replace(material, eta=max(eta, 1.0), roughness=float(alpha), metal=float(metalness))
-
-        transmission = extensions.get("KHR_materials_transmission", {}).get("transmissionFactor", 0)
-        if transmission > PANE_OPACITY:
-            tint = float(np.dot((red, green, blue), LUMINANCE))
-            return Material("pane", eta=max(material.eta, GLASS_ETA), tint=tint)
-        return material
 
     def _picture(
         self,
@@ -185,6 +183,19 @@ def _decoded(data: bytes | memoryview) -> Image.Image:
         has_16_bits = image.mode.startswith("I")
         image8 = image.point(lambda grey: grey * (1 / 257)).convert("L") if has_16_bits else image
         return image8.convert("RGBA" if image.has_transparency_data else "RGB")
+
+
+def _coat(extensions: Json, roughness: float, metalness: float) -> Material:
+    """A material with the reflections of a surface and no colour; it reflects none if it is rough or unlit.
+
+    The reflectance follows from the index of refraction. GGX alpha is the square of the roughness.
+    """
+    alpha = roughness**2
+    is_diffuse = alpha > DIFFUSE_ALPHA or "KHR_materials_unlit" in extensions
+    if is_diffuse:
+        return Material()
+    eta = float(extensions.get("KHR_materials_ior", {}).get("ior", GLASS_ETA))
+    return Material(eta=max(eta, 1.0), roughness=float(alpha), metal=float(metalness))
 
 
 def _base_colour(surface: Json) -> list[float]:
@@ -281,8 +292,8 @@ def _blended(
     """The material that a blended material probably represents: an open pane, holes, glass, or an opaque material."""
     if opacity.max() < ABSENT_OPACITY:
         return _open_pane()
-    is_clear_or_solid = (opacity < 0.1) | (opacity > 0.9)
-    if opacity.min() < CUTOFF and is_clear_or_solid.mean() > 0.8:
+    is_clear_or_solid = (opacity < CLEAR_OPACITY) | (opacity > SOLID_OPACITY)
+    if opacity.min() < CUTOFF and is_clear_or_solid.mean() > CUT_OUT_SHARE:
         note = "is blended: cut out where it is less than half opaque"
         return replace(material, cutout=min(CUTOFF / factor, 1.0)), [note]
     mean = opacity.mean()

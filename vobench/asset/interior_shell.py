@@ -14,9 +14,13 @@ from vobench.asset.room import Instance
 from vobench.asset.shape import at
 from vobench.asset.wall import Hole, pierced, planked, reveal
 from vobench.scene.material import Material
+from vobench.scene.mesh_arrays import quad_arrays
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
+
+THRESHOLD_M = 0.006  # thickness
+THRESHOLD_BEVEL_M = 0.002
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,28 +41,36 @@ def shell(
 ) -> Iterator[Instance]:
     """Floors, ceilings and walls of all rooms, the sides of the holes in them, and the panes of windows."""
     for number, room in enumerate(plan.rooms):
-        finish = finishes[room.name]
-        rect = room.rect
-        yield f"{room.name}.floor", [Part(_floor(rect, finish.floor, number), finish.floor)]
-        top = pierced((rect.x0, rect.y0, plan.height_m), (0, rect.depth_m, 0), (rect.width_m, 0, 0))
-        yield f"{room.name}.ceiling", [Part(top, finish.ceiling)]
-        for side in SIDES:
-            wall = _wall(plan, room, side)
-            yield f"{room.name}.wall_{side}", [Part(wall, finish.walls[side])]
+        yield from _room_surfaces(plan, room, finishes[room.name], seed=number)
     for number, passage in enumerate(plan.passages):
-        room = plan.room(passage.rooms[0])
-        frame = _WallFrame(room, room.side_at(passage.rect), plan.height_m)
-        hole = frame.hole(passage.rect, passage.sill_m, passage.head_m)
-        depth_m = passage.rect.width_m if is_along_y(passage.rect) else passage.rect.depth_m
-        sides = reveal(frame.corner_m, frame.edge_m, frame.up_m, hole, depth_m)
-        finish = finishes[room.name]
-        yield f"passage_{number}", [Part(sides, finish.walls[room.side_at(passage.rect)])]
+        yield f"passage_{number}", [_passage_reveal(plan, passage, finishes)]
         if passage.is_walkable:
             yield f"threshold_{number}", [_threshold(passage, thresholds)]
         else:
             yield f"glazing_{number}", _glazing(passage)
     for number, window in enumerate(plan.windows):
         yield f"window_{number}", _window(plan, window, reveals)
+
+
+def _room_surfaces(plan: FloorPlan, room: Room, finish: RoomFinish, *, seed: int) -> Iterator[Instance]:
+    """The floor, the ceiling and the walls of a room; the seed orders the planks of the floor."""
+    rect = room.rect
+    yield f"{room.name}.floor", [Part(_floor(rect, finish.floor, seed), finish.floor)]
+    ceiling = pierced((rect.x0, rect.y0, plan.height_m), (0, rect.depth_m, 0), (rect.width_m, 0, 0))
+    yield f"{room.name}.ceiling", [Part(ceiling, finish.ceiling)]
+    for side in SIDES:
+        yield f"{room.name}.wall_{side}", [Part(_wall(plan, room, side), finish.walls[side])]
+
+
+def _passage_reveal(plan: FloorPlan, passage: Passage, finishes: Mapping[str, RoomFinish]) -> Part:
+    """The sides of the hole of a passage, with the finish of the wall of its first room."""
+    room = plan.room(passage.rooms[0])
+    side = room.side_at(passage.rect)
+    frame = _WallFrame(room, side, plan.height_m)
+    hole = frame.hole(passage.rect, passage.sill_m, passage.head_m)
+    depth_m = passage.rect.width_m if is_along_y(passage.rect) else passage.rect.depth_m
+    sides = reveal(frame.corner_m, frame.edge_m, frame.up_m, hole, depth_m)
+    return Part(sides, finishes[room.name].walls[side])
 
 
 def _floor(rect: Rect, material: Material, seed: int) -> "Trimesh":
@@ -89,14 +101,14 @@ class _WallFrame:
         self.up_m = np.array([0.0, 0.0, height_m])
 
     def hole(self, rect: Rect, sill_m: float, head_m: float) -> Hole:
-        """A hole of the wall: first and last coordinate along its edge and upwards."""
-        ends = [float((np.array([x, y, 0.0]) - self.corner_m) @ self.right) for x, y in _diagonal(rect)]
-        return min(ends), max(ends), sill_m, head_m
+        """The hole that a rectangle of the plan cuts out of the wall: along its edge, then upwards."""
+        first_m = self._along_m(rect.x0, rect.y0)
+        second_m = self._along_m(rect.x1, rect.y1)
+        return min(first_m, second_m), max(first_m, second_m), sill_m, head_m
 
-
-def _diagonal(rect: Rect) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Two opposite corners of a rectangle."""
-    return (rect.x0, rect.y0), (rect.x1, rect.y1)
+    def _along_m(self, x_m: float, y_m: float) -> float:
+        """The coordinate along the edge of a place on the floor."""
+        return float((np.array([x_m, y_m, 0.0]) - self.corner_m) @ self.right)
 
 
 def _wall(plan: FloorPlan, room: Room, side: Side) -> "Trimesh":
@@ -105,9 +117,13 @@ def _wall(plan: FloorPlan, room: Room, side: Side) -> "Trimesh":
     holes = list[Hole]()
     doors = list[Hole]()
     for passage in plan.passages_of(room):
-        if room.side_at(passage.rect) == side:
-            kind = doors if passage.is_walkable else holes
-            kind.append(frame.hole(passage.rect, passage.sill_m, passage.head_m))
+        if room.side_at(passage.rect) != side:
+            continue
+        hole = frame.hole(passage.rect, passage.sill_m, passage.head_m)
+        if passage.is_walkable:
+            doors.append(hole)
+        else:
+            holes.append(hole)
     for window in plan.windows_of(room):
         if room.side_at(window.rect) == side:
             holes.append(frame.hole(window.rect, window.sill_m, window.head_m))
@@ -128,20 +144,22 @@ def _glazing(passage: Passage) -> list[Part]:
 def _threshold(passage: Passage, material: Material) -> Part:
     """A strip on the floor of a doorway."""
     x, y = passage.rect.center_m
-    size_m = (passage.rect.width_m, passage.rect.depth_m, 0.006)
-    return furniture.stood(size_m, material, x, y, 0, bevel=0.002)
+    size_m = (passage.rect.width_m, passage.rect.depth_m, THRESHOLD_M)
+    return furniture.stood(size_m, material, x, y, 0, bevel=THRESHOLD_BEVEL_M)
 
 
 def _window(plan: FloorPlan, window: Window, reveals: Material) -> list[Part]:
     """The reveals and the pane of a window."""
-    from vobench.scene.mesh_arrays import quad_arrays
-
     room = plan.room(window.room)
     frame = _WallFrame(room, room.side_at(window.rect), plan.height_m)
     hole = frame.hole(window.rect, window.sill_m, window.head_m)
     depth_m = float(abs(frame.outward[:2] @ [window.rect.width_m, window.rect.depth_m]))
-    u0, u1, v0, v1 = hole
-    corner_m = frame.corner_m + frame.right * u0 + [0, 0, v0] + frame.outward * depth_m
-    pane = quad_arrays(corner_m, frame.right * (u1 - u0), (0, 0, v1 - v0))
+    left_m, right_m, sill_m, head_m = hole
+    in_wall_m = frame.corner_m + frame.right * left_m + [0, 0, sill_m]
+    pane = quad_arrays(
+        in_wall_m + frame.outward * depth_m,
+        frame.right * (right_m - left_m),
+        (0, 0, head_m - sill_m),
+    )
     sides = reveal(frame.corner_m, frame.edge_m, frame.up_m, hole, depth_m)
     return [Part(sides, reveals), Part(pane, fitting.PANE)]

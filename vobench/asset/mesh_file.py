@@ -6,6 +6,9 @@ from pathlib import Path
 from vobench.asset.gltf_file import MOST_FACES
 from vobench.errors import ModelError
 
+STL_HEAD_BYTES = 84
+STL_FACE_BYTES = 50
+
 
 def read_as_glb(path: Path) -> tuple[bytes, list[str]]:
     """The file converted to .glb, and notes on what it lacks. No material is a metal, and textures are not tinted.
@@ -51,7 +54,7 @@ def _require_readable(path: Path) -> list[str]:
         faces = data.count(b"\nf ")
         notes = _notes_on_missing(path.parent, data)
     elif kind == ".stl":
-        faces = data.count(b"facet normal") or int.from_bytes(data[80:84], "little")
+        faces = data.count(b"facet normal") or _binary_stl_faces(data)
     elif kind == ".ply":
         header = data[:65536]
         counts = re.findall(rb"element (?:face|vertex) (\d+)", header)
@@ -61,7 +64,25 @@ def _require_readable(path: Path) -> list[str]:
     if faces > MOST_FACES:
         advice = "make them fewer, as by Blender's Decimate"
         raise ModelError(f"has {faces:,} faces, more than {MOST_FACES:,}; {advice}")
+    if kind == ".stl":
+        _require_whole_stl(data)
     return notes
+
+
+def _binary_stl_faces(data: bytes) -> int:
+    """The number of faces that the head of a binary STL states."""
+    return int.from_bytes(data[80:STL_HEAD_BYTES], "little")
+
+
+def _require_whole_stl(data: bytes) -> None:
+    """Raise ModelError for an STL that is neither a whole binary file nor a text.
+
+    trimesh takes a torn binary file for a text where a package for guessing encodings is installed.
+    """
+    expected = STL_HEAD_BYTES + STL_FACE_BYTES * _binary_stl_faces(data)
+    is_text = b"endsolid" in data
+    if len(data) != expected and not is_text:
+        raise ModelError(f"has {len(data):,} bytes, but its head states {expected:,}: is it cut off? Export it as .glb")
 
 
 def _notes_on_missing(folder: Path, obj: bytes) -> list[str]:

@@ -230,6 +230,15 @@ class RoomLayout:
         area_m2 = float((labels == found.pop()).sum()) * CELL_M**2
         return area_m2 > min(0.6, 0.06 * rect.area_m2)
 
+    def free_share(self) -> float:
+        """The share of the floor on which nothing stands."""
+        taken_m2 = sum(body.rect.area_m2 for body in self._bodies)
+        return 1 - taken_m2 / self.room.rect.area_m2
+
+    def tall_bodies(self, height_m: float) -> list[Rect]:
+        """The footprints of what is higher than a height."""
+        return [body.rect for body in self._bodies if body.height_m > height_m]
+
     # Placing
 
     def spots(

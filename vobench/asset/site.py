@@ -13,12 +13,18 @@ from vobench.geometry.se3 import Array
 from vobench.scene.generated_place import GeneratedPlace
 from vobench.scene.light import Light
 
-BODY_HEIGHT_M = 2.0  # what is higher than this above the lowest point of a piece is in nobody's way
+BODY_HEIGHT_M = 2.0  # a body passes below what is higher than this above the lowest point of a piece
+ON_EDGE_M2 = 1e-9  # a point counts as inside an area if it is outside by this cross product with an edge
+LEAST_EDGE_M = 1e-9  # shorter edges of polygons have no direction
 
 
 @dataclass(frozen=True, slots=True)
 class Built:
-    """A part of the ground or of a building: its name, its parts, and the distance between samples of its light."""
+    """A part of the ground or of a building.
+
+    `parts` are in the frame of the place.
+    `spacing_m` is the distance between samples of its light.
+    """
 
     name: str
     parts: tuple[Part, ...]
@@ -27,10 +33,13 @@ class Built:
 
 @dataclass(frozen=True, slots=True)
 class SitePiece:
-    """Something that stands on the ground, or on the piece named by `support`; parts in the frame of the place.
+    """Something that stands on the ground, on the deck of a rack, or on another piece.
 
-    base_m: the height of the deck of a rack on which it stands instead.
-    sunk_m: how far it may reach into the ground, such as the trunk of a tree on a slope.
+    `parts` are in the frame of the place.
+    `spacing_m` is the distance between samples of its light.
+    `support` names the piece on which it stands; empty if there is none.
+    `sunk_m` is how far it may reach into the ground, as the trunk of a tree on a slope does.
+    `base_m` is the height of the deck on which it stands; None if it stands on the ground or on a piece.
     """
 
     name: str
@@ -43,30 +52,40 @@ class SitePiece:
 
 @dataclass(frozen=True, slots=True)
 class Footprint:
-    """The convex hull (N, 2) of what a piece has within the height of a body, and its lowest and highest z."""
+    """The ground that a piece occupies.
+
+    `corners_m` (N, 2) is the convex hull of what the piece has within the height of a body.
+    `low_m` and `high_m` are its lowest and its highest z.
+    """
 
     corners_m: Array
     low_m: float
     high_m: float
 
     def meets(self, other: "Footprint", tolerance_m: float) -> float:
-        """How far two pieces enter each other, if that is more than a tolerance; 0 otherwise."""
-        is_beside = self.high_m > other.low_m + tolerance_m and other.high_m > self.low_m + tolerance_m
-        is_near = (self.corners_m.min(0) < other.corners_m.max(0)).all()
-        is_near &= (self.corners_m.max(0) > other.corners_m.min(0)).all()
-        if not (is_beside and is_near):
+        """The depth by which two pieces overlap, if it is more than a tolerance; 0 otherwise."""
+        is_above = self.low_m + tolerance_m >= other.high_m
+        is_below = self.high_m <= other.low_m + tolerance_m
+        if is_above or is_below or not self._has_overlapping_box(other):
             return 0.0
         depth_m = overlap_m(self.corners_m, other.corners_m)
         return depth_m if depth_m > tolerance_m else 0.0
+
+    def _has_overlapping_box(self, other: "Footprint") -> bool:
+        """Whether the bounding rectangles along the axes overlap, which is quick to see."""
+        begins_before = self.corners_m.min(0) < other.corners_m.max(0)
+        ends_after = self.corners_m.max(0) > other.corners_m.min(0)
+        return bool(begins_before.all() and ends_after.all())
 
 
 def footprint(piece: SitePiece) -> Footprint:
     """The footprint of a piece."""
     vertices_m = np.concatenate([part.arrays.vertices_m for part in piece.parts])
     low_m = float(vertices_m[:, 2].min())
-    near_m = vertices_m[vertices_m[:, 2] < low_m + BODY_HEIGHT_M, :2]
-    hull = ConvexHull(near_m)
-    return Footprint(near_m[hull.vertices], low_m, float(vertices_m[:, 2].max()))
+    is_in_the_way = vertices_m[:, 2] < low_m + BODY_HEIGHT_M
+    points_m = vertices_m[is_in_the_way, :2]
+    hull = ConvexHull(points_m)
+    return Footprint(points_m[hull.vertices], low_m, float(vertices_m[:, 2].max()))
 
 
 class Terrain(Protocol):
@@ -89,7 +108,8 @@ class Area:
         for start, end in zip(self.corners_m, np.roll(self.corners_m, -1, axis=0), strict=True):
             edge = end - start
             to_point = points_m - start
-            inside &= edge[0] * to_point[:, 1] - edge[1] * to_point[:, 0] >= -1e-9
+            cross_m2 = edge[0] * to_point[:, 1] - edge[1] * to_point[:, 0]
+            inside &= cross_m2 >= -ON_EDGE_M2
         return inside
 
 
@@ -112,9 +132,10 @@ class LevelAreas:
 class Site:
     """A place outdoors or in a large hall.
 
-    roads: the areas in which a body has to get from the first to the last of the `stations_m` (N, 2), with its middle
-    `body_radius_m` away from everything. walls: footprints (4, 2) that nothing may enter. blocked: footprints (4, 2) of
-    racks, which pieces may enter and bodies may not.
+    `roads` are the areas in which a body has to get from the first to the last of the `stations_m` (N, 2).
+    `body_radius_m` is how far the middle of the body stays away from everything.
+    `walls` are footprints (4, 2) that nothing may enter.
+    `blocked` are footprints (4, 2) of racks, which pieces may enter and bodies may not.
     """
 
     built: tuple[Built, ...]
@@ -136,9 +157,9 @@ class Site:
         """The things, materials and lights of the site."""
         groups: list[Built | SitePiece] = [*self.built, *self.pieces]
         instances: list[Instance] = [(group.name, group.parts) for group in groups]
-        made, materials = things(instances)
+        unspaced, materials = things(instances)
         spacing_m = {group.name: group.spacing_m for group in groups}
-        spaced = [replace(thing, spacing_m=spacing_m[thing.name]) for thing in made]
+        spaced = [replace(thing, spacing_m=spacing_m[thing.name]) for thing in unspaced]
         return GeneratedPlace(tuple(spaced), materials, self.lights)
 
 
@@ -150,27 +171,35 @@ def polygon_area_m2(corners_m: Array) -> float:
 
 
 def overlap_m(one_m: Array, other_m: Array) -> float:
-    """How far two convex polygons (N, 2) enter each other, by the separating axis theorem; negative if they do not."""
+    """The depth by which two convex polygons (N, 2) overlap, by the separating axis theorem; negative if they do not.
+
+    It is the shortest distance by which one of them has to be moved so that they only touch.
+    """
     least_m = np.inf
     for polygon in (one_m, other_m):
         edges = np.roll(polygon, -1, axis=0) - polygon
         lengths = np.linalg.norm(edges, axis=1)
-        for edge in edges[lengths > 1e-9]:
+        for edge in edges[lengths > LEAST_EDGE_M]:
             normal = np.array([edge[1], -edge[0]]) / np.linalg.norm(edge)
-            first = one_m @ normal
-            second = other_m @ normal
-            depth_m = min(first.max(), second.max()) - max(first.min(), second.min())
+            one_along_m = one_m @ normal
+            other_along_m = other_m @ normal
+            begin_m = max(one_along_m.min(), other_along_m.min())
+            end_m = min(one_along_m.max(), other_along_m.max())
+            depth_m = end_m - begin_m
             least_m = min(least_m, float(depth_m))
     return least_m
 
 
 def has_overlap(polygons_m: Sequence[Array], tolerance_m: float) -> bool:
-    """Whether any two of several convex polygons enter each other by more than a tolerance."""
-    lows = np.array([polygon.min(axis=0) for polygon in polygons_m])
-    highs = np.array([polygon.max(axis=0) for polygon in polygons_m])
+    """Whether any two of several convex polygons overlap by more than a tolerance."""
+    low_corners_m = np.array([polygon.min(axis=0) for polygon in polygons_m])
+    high_corners_m = np.array([polygon.max(axis=0) for polygon in polygons_m])
     for first in range(len(polygons_m)):
-        is_near = ((lows[first] < highs) & (highs[first] > lows)).all(axis=1)
-        for second in np.flatnonzero(is_near).tolist():
-            if second > first and overlap_m(polygons_m[first], polygons_m[second]) > tolerance_m:
+        # Only polygons with overlapping bounding rectangles are compared, each pair once.
+        begins_before = low_corners_m[first] < high_corners_m
+        ends_after = high_corners_m[first] > low_corners_m
+        candidates = np.flatnonzero((begins_before & ends_after).all(axis=1))
+        for second in candidates[candidates > first].tolist():
+            if overlap_m(polygons_m[first], polygons_m[second]) > tolerance_m:
                 return True
     return False

@@ -16,6 +16,8 @@ TRIES = 400
 TOUCHING_M = 0.02  # that lots may share
 LEFT = 1
 RIGHT = -1
+PARKING_SIDES: tuple[tuple[int, ...], ...] = ((LEFT,), (RIGHT,), (LEFT, RIGHT), ())
+PARKING_SHARES = (0.3, 0.3, 0.25, 0.15)  # of streets with cars on these sides
 CLEAR_OF_BEND_M = 11.0  # from a side street to a bend or an end
 
 
@@ -154,10 +156,9 @@ def street_plan(rng: Rng) -> StreetPlan:
     """A plan in which no two lots overlap."""
     for _ in range(TRIES):
         plan = _drawn(rng)
-        corners = [lot.corners_m for lot in plan.lots]
-        blocked = [*corners, *(area.corners_m for area in (*plan.roads, *plan.pavements))]
-        lots_meet = has_overlap(corners, TOUCHING_M)
-        if not lots_meet and not _covers_a_street(corners, blocked[len(corners) :]):
+        lots_m = [lot.corners_m for lot in plan.lots]
+        streets_m = [area.corners_m for area in (*plan.roads, *plan.pavements)]
+        if not has_overlap(lots_m, TOUCHING_M) and not _covers_a_street(lots_m, streets_m):
             return plan
     raise AssertionError("no plan of a street without overlaps was found")
 
@@ -169,7 +170,7 @@ def _covers_a_street(lots: Sequence[Array], streets: Sequence[Array]) -> bool:
 
 def _drawn(rng: Rng) -> StreetPlan:
     """A plan, in which lots may overlap."""
-    parking: tuple[int, ...] = ((LEFT,), (RIGHT,), (LEFT, RIGHT), ())[int(rng.choice(4, p=[0.3, 0.3, 0.25, 0.15]))]
+    parking = PARKING_SIDES[int(rng.choice(len(PARKING_SIDES), p=PARKING_SHARES))]
     road_m = float(rng.uniform(5.8, 7.4)) + PARKING_M * len(parking)
     pavement_m = float(rng.uniform(2.2, 4.6))
     segments = _segments(rng)
@@ -177,7 +178,8 @@ def _drawn(rng: Rng) -> StreetPlan:
     front_m = road_m / 2 + pavement_m
     builder = _Builder(road_m, pavement_m)
     for index, segment in enumerate(segments):
-        builder.add_segment(rng, segment, [side for side in sides if side.segment == index], _ends(segments, index))
+        leaving = [side for side in sides if side.segment == index]
+        builder.add_segment(rng, segment, leaving, _ends(segments, index))
     for side in sides:
         segment = segments[side.segment]
         builder.add_side(rng, segment.frame.frame(side.x_m, 0, 90.0 * side.side), side)
@@ -186,17 +188,17 @@ def _drawn(rng: Rng) -> StreetPlan:
     for end in (first, last):
         builder.add_end(rng, end, front_m)
     return StreetPlan(
-        segments,
-        sides,
-        road_m,
-        pavement_m,
-        parking,
-        _crossing(rng, segments, sides),
-        tuple(builder.roads),
-        tuple(builder.pavements),
-        tuple(builder.kerbs),
-        tuple(builder.walks),
-        tuple(builder.lots),
+        segments=segments,
+        sides=sides,
+        road_m=road_m,
+        pavement_m=pavement_m,
+        parking=parking,
+        crossing=_crossing(rng, segments, sides),
+        roads=tuple(builder.roads),
+        pavements=tuple(builder.pavements),
+        kerbs=tuple(builder.kerbs),
+        walks=tuple(builder.walks),
+        lots=tuple(builder.lots),
     )
 
 
@@ -206,22 +208,26 @@ def _segments(rng: Rng) -> tuple[StreetSegment, ...]:
     length_m = float(rng.uniform(54, 74))
     shares = rng.uniform(0.7, 1.3, count)
     lengths_m = (length_m * shares / shares.sum()).tolist()
-    turns_deg = [0.0, *(rng.uniform(6, 17, count - 1) * rng.choice([-1, 1], count - 1)).tolist(), 0.0]
+    bends_deg = rng.uniform(6, 17, count - 1) * rng.choice([-1, 1], count - 1)
+    turns_deg = [0.0, *bends_deg.tolist(), 0.0]
+
     heading_deg = float(rng.uniform(0, 360))
-    corners = [np.zeros(2)]
-    headings = []
-    for index in range(count):
-        heading_deg += turns_deg[index]
-        headings.append(heading_deg)
+    corners_m = [np.zeros(2)]
+    headings_deg = []
+    for length_m, turn_deg in zip(lengths_m, turns_deg, strict=False):  # the last turn is at the end of the street
+        heading_deg += turn_deg
+        headings_deg.append(heading_deg)
         angle_rad = np.deg2rad(heading_deg)
-        corners.append(corners[-1] + lengths_m[index] * np.array([np.cos(angle_rad), np.sin(angle_rad)]))
-    middle = (corners[0] + corners[-1]) / 2
-    found = []
+        direction = np.array([np.cos(angle_rad), np.sin(angle_rad)])
+        corners_m.append(corners_m[-1] + length_m * direction)
+
+    middle_m = (corners_m[0] + corners_m[-1]) / 2
+    segments = []
     for index in range(count):
-        x, y = (corners[index] - middle).tolist()
-        turns = (turns_deg[index], turns_deg[index + 1])
-        found.append(StreetSegment(PlanFrame(x, y, headings[index]), lengths_m[index], turns))
-    return tuple(found)
+        x_m, y_m = (corners_m[index] - middle_m).tolist()
+        frame = PlanFrame(x_m, y_m, headings_deg[index])
+        segments.append(StreetSegment(frame, lengths_m[index], (turns_deg[index], turns_deg[index + 1])))
+    return tuple(segments)
 
 
 def _side_streets(rng: Rng, segments: Sequence[StreetSegment]) -> Iterator[SideStreet]:
@@ -236,10 +242,10 @@ def _side_streets(rng: Rng, segments: Sequence[StreetSegment]) -> Iterator[SideS
     x_m = float(rng.uniform(CLEAR_OF_BEND_M + 3, length_m - CLEAR_OF_BEND_M - 3))
     road_m = float(rng.uniform(5.0, 6.5))
     pavement_m = float(rng.uniform(1.6, 2.4))
-    both = choice > 0.75
+    is_on_both_sides = choice > 0.75
     first = LEFT if rng.random() < 0.5 else RIGHT
     yield SideStreet(index, x_m, first, road_m, pavement_m)
-    if both:
+    if is_on_both_sides:
         yield SideStreet(index, x_m, -first, road_m, pavement_m)
 
 
@@ -250,8 +256,8 @@ def _crossing(rng: Rng, segments: Sequence[StreetSegment], sides: Sequence[SideS
     for _ in range(20):
         index = int(rng.integers(len(segments)))
         x_m = float(rng.uniform(7, max(segments[index].length_m - 7, 8)))
-        near = [side for side in sides if side.segment == index and abs(side.x_m - x_m) < side.half_m + 5]
-        if not near and x_m < segments[index].length_m - 6:
+        is_clear = all(side.segment != index or abs(side.x_m - x_m) >= side.half_m + 5 for side in sides)
+        if is_clear and x_m < segments[index].length_m - 6:
             return index, x_m
     return None
 
@@ -268,6 +274,30 @@ def _split(rng: Rng, length_m: float, least_m: float = 6.0, most_m: float = 12.5
     weights = rng.uniform(0.75, 1.25, count)
     widths_m: list[float] = (length_m * weights / weights.sum()).tolist()
     return widths_m
+
+
+@dataclass(frozen=True, slots=True)
+class _Stretch:
+    """A part of one side of a segment between two side streets; None at an end of the segment."""
+
+    before: SideStreet | None
+    after: SideStreet | None
+
+    @property
+    def before_m(self) -> float:
+        """The width of the pavement of the side street before it, 0 at an end of the segment."""
+        return self.before.pavement_m if self.before else 0.0
+
+    @property
+    def after_m(self) -> float:
+        """The width of the pavement of the side street after it, 0 at an end of the segment."""
+        return self.after.pavement_m if self.after else 0.0
+
+    def along_m(self, reach_m: tuple[float, float]) -> tuple[float, float]:
+        """The first and the last x of the stretch, given those of the segment at the same distance from its middle."""
+        start_m = self.before.x_m + self.before.half_m if self.before else reach_m[0]
+        end_m = self.after.x_m - self.after.half_m if self.after else reach_m[1]
+        return start_m, end_m
 
 
 class _Builder:
@@ -332,71 +362,59 @@ class _Builder:
         corners = [(right[0], -half_m), (right[1], -half_m), (left[1], half_m), (left[0], half_m)]
         self._road(np.array([frame.point(x, y) for x, y in corners]))
         for side in (LEFT, RIGHT):
-            gaps = sorted(
-                (street.x_m - street.half_m, street.x_m + street.half_m, street.pavement_m)
-                for street in sides
-                if street.side == side
-            )
-            self._side_of(rng, segment, side, gaps, at_end)
+            on_side = sorted((street for street in sides if street.side == side), key=lambda street: street.x_m)
+            befores = [None, *on_side]  # the side street before and after each stretch; None at the segment's ends
+            afters = [*on_side, None]
+            for before, after in zip(befores, afters, strict=True):
+                self._add_stretch(rng, segment, side, _Stretch(before, after), at_end)
 
-    def _side_of(
-        self,
-        rng: Rng,
-        segment: StreetSegment,
-        side: int,
-        gaps: Sequence[tuple[float, float, float]],
-        at_end: tuple[bool, bool],
+    def _add_stretch(
+        self, rng: Rng, segment: StreetSegment, side: int, stretch: "_Stretch", at_end: tuple[bool, bool]
     ) -> None:
-        """Kerb, pavement and lots on one side, with gaps for side streets (start, end, width of their pavement)."""
+        """Kerb, pavement and lots along one side of a segment, from one side street to the next."""
         frame = segment.frame
-        near_m = side * self.road_m / 2
-        far_m = side * self.front_m
-        near = segment.reach_m(near_m)
-        far = segment.reach_m(far_m)
-        corner_m = self.pavement_m  # of the pavement along the street at an end
-        starts: list[float | None] = [None, *(gap[1] for gap in gaps)]
-        ends: list[float | None] = [*(gap[0] for gap in gaps), None]
-        kerb_trim = [0.0, *(gap[2] for gap in gaps)]
-        for index, (start, end) in enumerate(zip(starts, ends, strict=True)):
-            near_start = near[0] if start is None else start
-            near_end = near[1] if end is None else end
-            far_start = far[0] if start is None else start
-            far_end = far[1] if end is None else end
-            kerb_start = near_start - (0.0 if start is None else kerb_trim[index])
-            kerb_end = near_end + (0.0 if end is None else gaps[index][2])
-            self._kerb(frame, (kerb_start, near_m), (kerb_end, near_m))
-            if start is None and at_end[0]:
-                near_start += corner_m
-                far_start += corner_m
-            if end is None and at_end[1]:
-                near_end -= corner_m
-                far_end -= corner_m
-            ring = [(near_start, near_m), (near_end, near_m), (far_end, far_m), (far_start, far_m)]
-            corners = np.array([frame.point(x, y) for x, y in ring])
-            self._pavement(corners if side == LEFT else corners[::-1])
-            inner_start = max(near_start, far_start)
-            inner_end = min(near_end, far_end)
-            self.walks.append(
-                Walk(frame.frame(inner_start, near_m), inner_end - inner_start, self.pavement_m, side == RIGHT)
-            )
-            self._lots_of(rng, segment, side, span_m=(far_start, far_end), cuts=(start, end), at_end=at_end)
+        kerb_y_m = side * self.road_m / 2
+        front_y_m = side * self.front_m
+        kerb_x_m = stretch.along_m(segment.reach_m(kerb_y_m))
+        front_x_m = stretch.along_m(segment.reach_m(front_y_m))
+        self._kerb(frame, (kerb_x_m[0] - stretch.before_m, kerb_y_m), (kerb_x_m[1] + stretch.after_m, kerb_y_m))
 
-    def _lots_of(
+        # The pavement along the street at an end has the corner.
+        start_corner_m = self.pavement_m if stretch.before is None and at_end[0] else 0.0
+        end_corner_m = self.pavement_m if stretch.after is None and at_end[1] else 0.0
+        kerb_start_m = kerb_x_m[0] + start_corner_m
+        kerb_end_m = kerb_x_m[1] - end_corner_m
+        front_start_m = front_x_m[0] + start_corner_m
+        front_end_m = front_x_m[1] - end_corner_m
+        corners = [
+            frame.point(kerb_start_m, kerb_y_m),
+            frame.point(kerb_end_m, kerb_y_m),
+            frame.point(front_end_m, front_y_m),
+            frame.point(front_start_m, front_y_m),
+        ]
+        self._pavement(np.array(corners if side == LEFT else corners[::-1]))
+
+        walk_start_m = max(kerb_start_m, front_start_m)
+        walk_length_m = min(kerb_end_m, front_end_m) - walk_start_m
+        self.walks.append(Walk(frame.frame(walk_start_m, kerb_y_m), walk_length_m, self.pavement_m, side == RIGHT))
+        self._add_lots(rng, segment, side, stretch, span_m=(front_start_m, front_end_m), at_end=at_end)
+
+    def _add_lots(
         self,
         rng: Rng,
         segment: StreetSegment,
         side: int,
+        stretch: "_Stretch",
         *,
         span_m: tuple[float, float],
-        cuts: tuple[float | None, float | None],
         at_end: tuple[bool, bool],
     ) -> None:
-        """The lots along a stretch of one side of a segment."""
-        tangents = np.tan(np.deg2rad(segment.turn_deg) / 2).tolist()
-        start_skew_m = side * tangents[0] * LOT_DEPTH_M if cuts[0] is None else 0.0
-        end_skew_m = -side * tangents[1] * LOT_DEPTH_M if cuts[1] is None else 0.0
-        start_open = at_end[0] or cuts[0] is not None
-        end_open = at_end[1] or cuts[1] is not None
+        """The lots along a stretch of one side of a segment. They are skewed at bends, and open to side streets."""
+        start_tangent, end_tangent = np.tan(np.deg2rad(segment.turn_deg) / 2).tolist()
+        start_skew_m = side * start_tangent * LOT_DEPTH_M if stretch.before is None else 0.0
+        end_skew_m = -side * end_tangent * LOT_DEPTH_M if stretch.after is None else 0.0
+        start_open = at_end[0] or stretch.before is not None
+        end_open = at_end[1] or stretch.after is not None
         length_m = span_m[1] - span_m[0]
         far_m = side * self.front_m
         if side == LEFT:

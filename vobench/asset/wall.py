@@ -84,12 +84,11 @@ def _lap_cells(width_m: float, height_m: float, doors: Sequence[Hole]) -> list[H
     door_spans = sorted((u0, u1) for u0, u1, _, _ in doors)
     starts = [full_u[0], *(u1 for _, u1 in door_spans)]
     ends = [*(u0 for u0, _ in door_spans), full_u[1]]
-    return [
-        *((start, end, -LAP_M, LAP_M) for start, end in zip(starts, ends, strict=True)),
-        (*full_u, height_m - LAP_M, height_m + LAP_M),
-        (-LAP_M, LAP_M, *full_v),
-        (width_m - LAP_M, width_m + LAP_M, *full_v),
-    ]
+    bottom = [(start, end, -LAP_M, LAP_M) for start, end in zip(starts, ends, strict=True)]
+    top = (*full_u, height_m - LAP_M, height_m + LAP_M)
+    left = (-LAP_M, LAP_M, *full_v)
+    right = (width_m - LAP_M, width_m + LAP_M, *full_v)
+    return [*bottom, top, left, right]
 
 
 def _rectangle(corner: Array, u: Array, v: Array, cell: Hole) -> MeshArrays:

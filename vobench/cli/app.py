@@ -54,10 +54,11 @@ def _replace_unprintable_characters() -> None:
 
 
 def _call_command() -> None:
-    """Call the command that the arguments name, and flush its output. Always raises SystemExit or an error."""
+    """Call the command that the arguments name, and flush its output. It ends by SystemExit or an error."""
     try:
         with trust.gate(warn, trusted_folders=_trusted_folders, hash_folder=_hash_folder):
-            # --debug is accepted before and after the command.
+            # --debug is accepted before and after the command; `report_and_exit` looks for it in sys.argv. An argument
+            # of a command can therefore not have the value "--debug".
             arguments = [argument for argument in sys.argv[1:] if argument != DEBUG]
             app(arguments, prog_name=app.info.name)
     finally:

@@ -12,12 +12,11 @@ from vobench.errors import printable
 from vobench.report.board_metric import METRICS
 from vobench.report.board_table import (
     DEFAULT_METRIC,
-    LEGEND,
+    SHORT_LEGEND,
     ShownCell,
-    cell_notes,
+    board_notes,
     matrix,
     origin,
-    remarks,
     totals,
 )
 from vobench.report.leaderboard import Board
@@ -48,12 +47,12 @@ def print_board(board: Board, metric: str = DEFAULT_METRIC) -> None:
     for group, (headings, *rows) in totals(board):
         fitted = _fit_totals(f"totals over {group}", headings, rows, console)
         _print_fitted(fitted, console)
-    notes = [*remarks(board), *cell_notes(board)]
+    notes = board_notes(board)
     for note in notes[:MOST_NOTES]:
         console.print(f"  {printable(note)}")
     if len(notes) > MOST_NOTES:
         console.print(f"  {len(notes) - MOST_NOTES} more notes: see {PAGE}, or --format md", style="dim")
-    console.print(LEGEND, style="dim")
+    console.print(SHORT_LEGEND, style="dim")
     for line in (board.visible, origin(board)):
         if line:
             console.print(printable(line), style="dim")

@@ -23,6 +23,7 @@ COMMANDS = {
     "schema": "vobench.cli.schema:schema_command",
     "score": "vobench.cli.score:score_command",
     "diagnose": "vobench.cli.diagnose:diagnose_command",
+    "convert": "vobench.cli.convert:convert_command",
     "new": "vobench.cli.new:new_command",
     "try": "vobench.cli.try_estimator:try_command",
     "metrics": "vobench.cli.metrics:metrics_command",

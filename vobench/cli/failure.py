@@ -16,7 +16,9 @@ CHANGE_HEADINGS = ("without", "instead", "error", "less", "95 % interval", "surv
 
 TrialPath = Annotated[
     Path,
-    typer.Argument(metavar="RUN/CASE/ESTIMATOR", help="A trial, such as runs/quickstart/latest/room-down/lk_epipolar."),
+    typer.Argument(
+        metavar="RUN/CASE/ESTIMATOR", help="A trial, such as runs/quickstart/latest/unlike_eyes-3-room/feature_vo."
+    ),
 ]
 
 

@@ -9,11 +9,11 @@ import typer
 from vobench.cli import terminal
 from vobench.cli.option import Json, with_option_groups
 from vobench.cli.recording_option import FormCommand, ImuFile, RecordingOptions, RecordingPath
-from vobench.dataset.conversion import convert
+from vobench.dataset.export import export as export_sequence
 from vobench.errors import counted
 from vobench.runner.import_recording import import_dataset
 
-COMMAND_CLASS = FormCommand  # both commands are of this class, which lists the known forms in its help
+COMMAND_CLASS = FormCommand  # `CommandGroup` reads it: both commands list the known forms in their help
 
 
 @with_option_groups
@@ -37,19 +37,19 @@ def import_command(
 
 
 def export_command(
-    source: Annotated[Path, typer.Argument(metavar="SOURCE", help="The folder of a sequence, or a trajectory file.")],
-    out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder or file to write; it must not exist.")],
+    sequence: Annotated[Path, typer.Argument(metavar="SEQUENCE", help="The folder of a sequence.")],
+    out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder to write; it must not exist.")],
     *,
     form: Annotated[str, typer.Option(help="The form to write")],
     json: Json = False,
 ) -> None:
-    """Write a sequence in another layout, or a trajectory in another format, and print what was lost."""
-    exported = convert(source, out, form)
+    """Write a sequence in another layout, and print what was lost."""
+    exported = export_sequence(sequence, out, form)
     if json:
-        content = {"form": form, "path": str(out), "files": exported.file_count, "notes": exported.notes}
+        content = {"form": form, "path": str(out), "files": len(exported.files), "notes": exported.notes}
         terminal.print_json(content)
         return
-    files = counted(exported.file_count, "file")
+    files = counted(len(exported.files), "file")
     _print_result(exported.notes, f"exported {files} (form: {form}): {out}")
 
 

@@ -7,7 +7,6 @@ import typer
 from typer.core import TyperCommand, TyperOption
 
 from vobench.cli.option import option_group
-from vobench.dataset.export import TRAJECTORY_FORMS
 from vobench.dataset.layout import layouts, writable
 from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import UnknownNameError, unknown_name_sentence
@@ -59,9 +58,8 @@ class FormCommand(TyperCommand):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help with the names of the forms."""
-        forms = ", ".join(layouts())
-        if self.name == "export":
-            forms = f"{', '.join(writable())}; for a trajectory, {', '.join(TRAJECTORY_FORMS)}"
+        known = writable() if self.name == "export" else layouts()
+        forms = ", ".join(known)
         for option in self.params:
             if option.name == "form" and isinstance(option, TyperOption):
                 option.help = f"{option.help}: {forms}."

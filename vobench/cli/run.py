@@ -29,7 +29,6 @@ from vobench.suite.plan import Plan
 from vobench.suite.spread import changes_for_units
 from vobench.suite.suite import read_plan
 from vobench.suite.suite_spec import Suite
-from vobench.temporary import temporary_folder
 
 if TYPE_CHECKING:
     from vobench.report.leaderboard import Board
@@ -223,9 +222,8 @@ def run_command(
         return
 
     from vobench.report import page
-    from vobench.report.advice import cost_of_deciding
 
-    cost = ""
+    ended = None
     if sequential.until:
         ended = _run_until_decided(
             lambda number: limits.apply(selection.draw(suite, values, number)),
@@ -236,12 +234,9 @@ def run_command(
             budget_s=budget_s,
         )
         folder = ended.folder
-        cost = ended.cost
-        if not ended.has_ended:
-            seeds = f", with --set base_seed={plan.suite.base_seed} for --fresh-units" if changes.fresh_units else ""
-            cost += f"\nTo resume, run the same command again{seeds}"
     else:
         folder = _run(plan, out, execution, progress)
+
     scores = folder.scores()
     board = page.run_board(folder, scores)
     _print_board(board, as_json=json)
@@ -249,12 +244,26 @@ def run_command(
         _print_remarks(folder, scores, shares_time=execution.share_time or plan.suite.share_time)
         for doubt in doubts_of_run(plan, folder):
             terminal.warn(doubt)
-        if not sequential.until:
-            jobs = execution.jobs or default_jobs()
-            cost = cost_of_deciding(board.totals, plan, typical_seconds(cache_folder()), jobs=jobs)
+        cost = _cost_of_deciding(board, plan, execution) if ended is None else _cost_so_far(ended, plan, changes)
         if cost:
             terminal.console().print(cost)
     _exit_if_failed(scores, board, thresholds)
+
+
+def _cost_of_deciding(board: "Board", plan: Plan, execution: Execution) -> str:
+    """What it would cost to decide between the estimators that the board cannot tell apart; empty if it can."""
+    from vobench.report.advice import cost_of_deciding
+
+    jobs = execution.jobs or default_jobs()
+    return cost_of_deciding(board.totals, plan, typical_seconds(cache_folder()), jobs=jobs)
+
+
+def _cost_so_far(ended: "UntilDecided", plan: Plan, changes: Changes) -> str:
+    """What it has cost to decide between estimators and, if that has not ended, how to resume."""
+    if ended.has_ended:
+        return ended.cost
+    seeds = f", with --set base_seed={plan.suite.base_seed} for --fresh-units" if changes.fresh_units else ""
+    return f"{ended.cost}\nTo resume, run the same command again{seeds}"
 
 
 def _exit_if_failed(scores: "Sequence[TrialScore]", board: "Board", thresholds: "Sequence[Threshold]") -> None:
@@ -283,30 +292,16 @@ def _run_until_decided(
     budget_s: float,
 ) -> "UntilDecided":
     """Run draws of a suite with progress on the terminal until each pair of estimators is decided or alike."""
-    from vobench.report import page
-    from vobench.report.until_decided import record, run_until_decided
-
-    def write_reports(folder: "RunFolder", scores: "list[TrialScore]") -> None:
-        record(folder, ratio=ratio)
-        page.write_reports(folder, scores)
+    from vobench.report.until_decided_run import run_draws
 
     def say(sentence: str) -> None:
         if not progress.quiet:
             terminal.warn(sentence)
 
-    with temporary_folder() as looks:
-        return run_until_decided(
-            draw,
-            look=lambda plan: _run(plan, looks, execution, progress, finish=_no_reports),
-            finish=lambda plan: _run(plan, out, execution, progress, finish=write_reports),
-            ratio=ratio,
-            budget_s=budget_s,
-            tell=say,
-        )
+    def run(plan: Plan, parent: Path, finish: "Finish") -> "RunFolder":
+        return _run(plan, parent, execution, progress, finish=finish)
 
-
-def _no_reports(folder: "RunFolder", scores: "list[TrialScore]") -> None:
-    del folder, scores
+    return run_draws(draw, run, out=out, ratio=ratio, budget_s=budget_s, tell=say)
 
 
 def _run(
@@ -360,10 +355,11 @@ def _print_remarks(folder: "RunFolder", scores: "Sequence[TrialScore]", *, share
     if with_sequence(scores):
         trial = pick(scores, case=None, estimator=None)
         name = f"{folder.path}/{trial.case}/{trial.estimator}"
-        see = f"see it (`{command} view {name}`)"
-        # A recording cannot be simulated again.
-        ask = f", ask why (`{command} explain {name}`)" if "scene" in trial.variant else ""
-        console.print(f"{story(trial, case_facts(folder, trial.case))}: {see}{ask}")
+        lines = [f"{story(trial, case_facts(folder, trial.case))}:", f"  see it (`{command} view {name}`)"]
+        if "scene" in trial.variant:  # a recording cannot be simulated again
+            lines[-1] += ","
+            lines.append(f"  ask why (`{command} explain {name}`)")
+        console.print("\n".join(lines), soft_wrap=True)  # a command can be copied however wide the terminal is
 
 
 def _split_assignments(assignments: Sequence[str]) -> dict[str, str]:

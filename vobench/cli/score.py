@@ -103,6 +103,45 @@ def _nanoseconds(option: str, value_s: float | None, setting: str) -> int | None
 
 
 @option_group
+class SequenceOptions:
+    """Several sequences, each with its own ground truth."""
+
+    pairs: Annotated[
+        bool,
+        typer.Option("--pairs", help="The files are GT EST GT EST...: sequences, scored one by one and together."),
+    ] = False
+    listed: Annotated[
+        Path | None, typer.Option("--list", help="A file with GT and EST of a sequence on each line.")
+    ] = None
+
+    @property
+    def are_given(self) -> bool:
+        """Whether the files are sequences, not estimates of one ground truth."""
+        return self.pairs or self.listed is not None
+
+    def path_pairs(self, paths: Sequence[Path]) -> list[tuple[Path, Path]]:
+        """The ground truth and the estimate of each score. Raises BadParameter."""
+        if not self.are_given:
+            return _of_one_truth(paths)
+        if len(paths) % 2:
+            raise typer.BadParameter(f"--pairs and --list take files in pairs, GT EST, but there are {len(paths)}")
+        pairs = list(zip(paths[::2], paths[1::2], strict=True))
+        if self.listed:
+            from vobench.runner.score_files import read_pair_list
+
+            pairs += read_pair_list(self.listed)
+        return pairs
+
+
+def _of_one_truth(paths: Sequence[Path]) -> list[tuple[Path, Path]]:
+    """The first file with each of the others. Raises BadParameter."""
+    if len(paths) < 2:
+        raise typer.BadParameter("name a ground truth and one or more estimates, GT EST...")
+    gt, *estimates = paths
+    return [(gt, est) for est in estimates]
+
+
+@option_group
 class ScoreOutput:
     """The form of the output."""
 
@@ -128,27 +167,24 @@ def score_command(
     files: Annotated[
         list[Path] | None,
         typer.Argument(
-            metavar="GT EST",
-            help="Ground truth and estimate: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, detected from content, or "
-            "the folder of a sequence as ground truth. Several pairs are scored one by one and together. Or one bundle "
-            "of a run.",
+            metavar="GT EST...",
+            help="Ground truth and one or more estimates: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, detected from "
+            "content, or the folder of a sequence as ground truth. Or one bundle of a run.",
         ),
     ] = None,
     *,
-    listed: Annotated[
-        Path | None, typer.Option("--list", help="A file with GT and EST on each line, added to those given here.")
-    ] = None,
+    sequences: SequenceOptions,
     options: ScoreOptions,
     covariances: Annotated[
         list[Path] | None,
-        typer.Option("--cov", help="The covariances of EST (docs/score.md), one file for each pair; can be repeated."),
+        typer.Option("--cov", help="The covariances of EST (docs/score.md), one file for each EST; can be repeated."),
     ] = None,
     trajectories: TrajectoryOptions,
     output: ScoreOutput,
 ) -> None:
     """Score estimates against ground truth: ATE, RPE, segments, coverage."""
     form = output.form
-    paths = _all_paths(files or (), listed)
+    paths = files or []
     if len(paths) == 1 and paths[0].suffix.lower() == ".zip":
         from vobench.cli.bundle import score_bundle
 
@@ -157,41 +193,32 @@ def score_command(
 
     from vobench.runner.score_files import score_files
 
-    pairs = _file_pairs(paths, covariances or (), trajectories)
-    scored = score_files(pairs, settings=options.settings(), times=trajectories.time_files)
+    pairs = _file_pairs(sequences.path_pairs(paths), covariances or (), trajectories)
+    scored = score_files(
+        pairs,
+        settings=options.settings(),
+        times=trajectories.time_files,
+        pool=sequences.are_given,
+    )
     _print_score(scored, form=form, per_length=output.per_length)
 
 
-def _all_paths(files: Sequence[Path], listed: Path | None) -> list[Path]:
-    """The paths of the command line and of the list."""
-    from vobench.runner.score_files import read_pair_list
-
-    paths = list(files)
-    if listed:
-        for pair in read_pair_list(listed):
-            paths += pair
-    return paths
-
-
 def _file_pairs(
-    paths: Sequence[Path], covariances: Sequence[Path], trajectories: TrajectoryOptions
+    path_pairs: Sequence[tuple[Path, Path]], covariances: Sequence[Path], trajectories: TrajectoryOptions
 ) -> list["FilePair"]:
     """The pairs of ground truth and estimate, with covariances if there are any. Raises BadParameter."""
     from vobench.runner.score_files import FilePair
 
-    if not paths or len(paths) % 2:
-        verb = "is" if len(paths) == 1 else "are"
-        raise typer.BadParameter(f"files come in pairs, GT EST, but there {verb} {len(paths)}")
-    pair_count = len(paths) // 2
-    if covariances and len(covariances) != pair_count:
+    count = len(path_pairs)
+    if covariances and len(covariances) != count:
         raise typer.BadParameter(
-            f"--cov should be given once for each pair of files, {pair_count} times (got {len(covariances)})"
+            f"--cov should be given once for each estimate, {count} times (got {len(covariances)})"
         )
 
     pairs = list[FilePair]()
-    for index in range(pair_count):
-        truth = trajectories.truth(paths[2 * index])
-        estimate = trajectories.estimate(paths[2 * index + 1])
+    for index, (gt, est) in enumerate(path_pairs):
+        truth = trajectories.truth(gt)
+        estimate = trajectories.estimate(est)
         covariance = covariances[index] if covariances else None
         pairs.append(FilePair(truth, estimate, covariance))
     return pairs

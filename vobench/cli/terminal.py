@@ -14,7 +14,13 @@ if TYPE_CHECKING:
 
 REDIRECTED_WIDTH = 200  # the number of characters in a line, if standard output is not a terminal
 # The beginning of a number, such as "-0.5", "+3 %", "≥ 2", "×1.3", "[0.9" or ".7"; or a cell without a value.
-NUMBER = re.compile(r"[-+−±<>≤≥~≈×\[(]*\s*\.?\d|[-–—]?$")
+NUMBER_OR_EMPTY = re.compile(
+    r"""
+    [-+−±<>≤≥~≈×\[(]* \s* \.? \d  # signs, then a digit
+    | [-–—]? $                     # nothing, or a dash
+    """,
+    re.VERBOSE,
+)
 
 
 def print_json(content: Any) -> None:
@@ -31,10 +37,10 @@ def console() -> "Console":
     """A console that prints to standard output without markup. Lines have a fixed width if that is not a terminal."""
     from rich.console import Console
 
-    result = Console(markup=False, highlight=False)
-    if not result.is_terminal:
-        result.width = REDIRECTED_WIDTH
-    return result
+    rich_console = Console(markup=False, highlight=False)
+    if not rich_console.is_terminal:
+        rich_console.width = REDIRECTED_WIDTH
+    return rich_console
 
 
 def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) -> "Table":
@@ -43,11 +49,11 @@ def table(title: str, headings: Sequence[str], rows: Iterable[Sequence[str]]) ->
     from rich.table import Table
 
     cells = [list(map(printable, row)) for row in rows]
-    result = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE, pad_edge=False)
+    rich_table = Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE, pad_edge=False)
     for column, heading in enumerate(headings):
-        has_numbers = all(NUMBER.match(row[column]) for row in cells)
+        has_numbers = all(NUMBER_OR_EMPTY.match(row[column]) for row in cells)
         justify: Literal["left", "right"] = "right" if has_numbers else "left"
-        result.add_column(heading, justify=justify, overflow="fold")
+        rich_table.add_column(heading, justify=justify, overflow="fold")
     for row in cells:
-        result.add_row(*row)
-    return result
+        rich_table.add_row(*row)
+    return rich_table

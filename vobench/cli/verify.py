@@ -18,14 +18,13 @@ def verify_command(run: RunPath, *, json: Json = False) -> None:
         rows = [asdict(item) for item in items]
         terminal.print_json({"run": str(run), "checked": len(items), "wrong": len(wrong), "findings": rows})
     else:
-        _print_items(items)
+        _print_items(items, wrong)
     raise SystemExit(1 if wrong else 0)
 
 
-def _print_items(items: Sequence[VerifiedItem]) -> None:
+def _print_items(items: Sequence[VerifiedItem], wrong: Sequence[VerifiedItem]) -> None:
     """Print each item that is wrong, and the number of unchanged items of each kind."""
     console = terminal.console()
-    wrong = [item for item in items if item.wrong]
     for item in wrong:
         console.print(f"{item.kind}: {item.what}: {item.wrong}")
 

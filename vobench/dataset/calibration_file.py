@@ -65,10 +65,10 @@ class CalibrationFile:
             raise self.missing_key_error(section, self.tree)
         section_values = self.tree[section] if section else self.tree
         try:
-            checked: Model = _adapter(kind).validate_python(section_values)
+            model: Model = _adapter(kind).validate_python(section_values)
         except ValidationError as error:
             raise self._value_error(error, section) from None
-        return checked
+        return model
 
     def missing_key_error(self, key: str, section_values: Mapping[str, Any]) -> InputError:
         """The error about a key that is missing in a section with the given values."""
@@ -94,11 +94,7 @@ def read_yaml(path: Path) -> CalibrationFile:
     """Read a YAML 1.2 file. Raises InputError with the line and column, if they are known."""
     text = OPENCV_HEAD.sub("", read_text(path), count=1)
     _require_small(text, path)
-    with _parser_errors(path):
-        alias = _first_alias(text)
-    if alias is not None:
-        line = alias.start_mark.line + 1
-        raise InputError(f"{path}:{line}: a calibration may not use a YAML alias (*{alias.anchor})")
+    _require_no_alias(text, path)
     with _parser_errors(path):
         tree = YAML(typ="safe", pure=True).load(text)
     if not isinstance(tree, dict):
@@ -115,6 +111,18 @@ def _require_small(text: str, path: Path) -> None:
         raise InputError(f"{path}: a calibration in YAML should have at most {MOST_BRACKETS} brackets, not {brackets}")
 
 
+def _require_no_alias(text: str, path: Path) -> None:
+    """Raise InputError for a text with an alias, before the aliases are expanded.
+
+    A few nested aliases can expand to more than fits into memory.
+    """
+    with _parser_errors(path):
+        alias = _first_alias(text)
+    if alias is not None:
+        line = alias.start_mark.line + 1
+        raise InputError(f"{path}:{line}: a calibration may not use a YAML alias (*{alias.anchor})")
+
+
 @contextmanager
 def _parser_errors(path: Path) -> Iterator[None]:
     """Raise InputError with the place in the file for each error of the YAML parser in the block."""
@@ -129,7 +137,7 @@ def _parser_errors(path: Path) -> Iterator[None]:
 
 
 def _first_alias(text: str) -> AliasEvent | None:
-    """The first alias in a YAML text. A few nested aliases can expand to more than fits into memory."""
+    """The first alias in a YAML text; None if it has none."""
     for event in YAML(typ="safe", pure=True).parse(text):
         if isinstance(event, AliasEvent):
             return event

@@ -20,8 +20,10 @@ from vobench.dataset.rectified_view import Views
 from vobench.dataset.source import ExportSource, open_source
 from vobench.errors import InputError, SequenceError, unknown_name_sentence
 from vobench.geometry.rig import Rig
+from vobench.sequence.topic import SENSORS_FILE
 from vobench.trajectory.euroc import format_euroc
 from vobench.trajectory.kitti import format_kitti, format_times
+from vobench.trajectory.tartanair import format_tartanair
 from vobench.trajectory.trajectory import Stamps, Trajectory
 from vobench.trajectory.tum import format_tum
 
@@ -30,12 +32,18 @@ def _kitti_text(trajectory: Trajectory) -> str:
     return format_kitti(trajectory.T_world_frame)
 
 
+def _tartanair_text(trajectory: Trajectory) -> str:
+    return format_tartanair(trajectory.T_world_frame)
+
+
 TRAJECTORY_TEXTS: dict[str, Callable[[Trajectory], str]] = {
     "tum": format_tum,
     "kitti": _kitti_text,
     "euroc": format_euroc,
+    "tartanair": _tartanair_text,
 }
 TRAJECTORY_FORMS = tuple(TRAJECTORY_TEXTS)
+FORMS_WITHOUT_STAMPS = ("kitti", "tartanair")
 TIMES_SUFFIX = ".times.txt"
 
 
@@ -44,14 +52,16 @@ def export_trajectory(
     path: Path,
     form: str,
 ) -> tuple[Path, ...]:
-    """Write a trajectory without loss as one file, or as two files in KITTI's form, and return their paths.
+    """Write a trajectory without loss as one file, and return its path.
+
+    The forms of KITTI and TartanAir have no stamps, so a second file has these.
 
     Raises InputError for an unknown form, or if a file exists.
     """
     if form not in TRAJECTORY_TEXTS:
         raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
     texts = {path: TRAJECTORY_TEXTS[form](trajectory)}
-    if form == "kitti":
+    if form in FORMS_WITHOUT_STAMPS:
         times = path.with_name(path.stem + TIMES_SUFFIX)
         texts[times] = format_times(trajectory.t_ns)
     for file in texts:
@@ -87,6 +97,7 @@ class Exported:
 def export(sequence: Path, out: Path, form: str) -> Exported:
     """Export a sequence in another form to a new folder, and verify it by reading it.
 
+    `sequence` is the folder of a sequence, or its file of sensors.
     Raises InputError for an invalid folder or form, and SequenceError if the export differs from the sequence.
     """
     layout = writable().get(form)
@@ -94,7 +105,7 @@ def export(sequence: Path, out: Path, form: str) -> Exported:
         raise InputError(unknown_name_sentence("form to export to", form, list(writable())))
     out = out.resolve()
     require_free(out)
-    source = open_source(sequence)
+    source = open_source(_folder_of(sequence))
     views = layout.views(source.rig)
     stamps = layout.stamps(source)
     expected_path = _expected_path(source, views.rig, stamps, layout)
@@ -126,6 +137,16 @@ def _building(out: Path) -> Iterator[Path]:
             folder.replace(out)
     except OSError as error:
         raise SequenceError(f"cannot write the export ({error.strerror or error}): {out}") from error
+
+
+def _folder_of(sequence: Path) -> Path:
+    """The folder of a sequence, given that folder or its file of sensors. Raises InputError for anything else."""
+    folder = sequence.parent if sequence.name == SENSORS_FILE else sequence
+    if folder.is_file():
+        raise InputError(f"not the folder of a sequence; vobench convert converts trajectory files: {folder}")
+    if folder.is_dir() and not (folder / SENSORS_FILE).is_file():
+        raise InputError(f"not a vobench sequence (it has no {SENSORS_FILE}); vobench import creates one: {folder}")
+    return folder
 
 
 def write_calibration(rig: Rig, layout: Writing, folder: Path) -> list[str]:

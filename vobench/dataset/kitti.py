@@ -32,6 +32,12 @@ TRUTH_DESCRIPTION = (
     "x right, y down, z ahead to x ahead, y left, z up."
 )
 
+# Where the ground truth can be, as regular expressions.
+POSES_IN_SEQUENCE = r"[^/]*/poses\.txt"  # 00/poses.txt
+NAMED_POSES_IN_SEQUENCE = r"(?P<sequence>[^/]+)/(?P=sequence)\.txt"  # 00/00.txt
+POSES_IN_POSES_FOLDER = rf"{POSES_FOLDER}/[^/]*\.txt"  # poses/00.txt
+TRUTH_NAMES = "|".join([POSES_IN_SEQUENCE, NAMED_POSES_IN_SEQUENCE, POSES_IN_POSES_FOLDER])
+
 
 def _is_kitti(folder: Path) -> bool:
     """Whether a folder has pictures of a left camera."""
@@ -157,10 +163,6 @@ def _rig_of_calib_txt(path: Path, camera_folders: tuple[str, ...], size_px: tupl
     return CalibratedRig(rig, str(path), notes=(note,))
 
 
-POSES_IN_SEQUENCE = r"[^/]*/poses\.txt"  # 00/poses.txt
-NAMED_POSES_IN_SEQUENCE = r"(?P<sequence>[^/]+)/(?P=sequence)\.txt"  # 00/00.txt
-POSES_IN_POSES_FOLDER = rf"{POSES_FOLDER}/[^/]*\.txt"  # poses/00.txt
-TRUTH_NAMES = "|".join([POSES_IN_SEQUENCE, NAMED_POSES_IN_SEQUENCE, POSES_IN_POSES_FOLDER])
 LAYOUTS = (
     Layout(
         name="kitti",

@@ -56,10 +56,10 @@ class ExportSource:
 def open_source(folder: Path) -> ExportSource:
     """Open the sequence in a folder for an export. Raises SequenceError if one of its files is incomplete."""
     sequence = Sequence.open(folder)
-    readings = sequence.imu()
-    imu = readings if len(readings.t_ns) else None
+    imu = sequence.imu()
+    recorded_imu = imu if len(imu.t_ns) else None
     if not has_truth(folder):
-        return ExportSource(folder, sequence, sequence.rig, imu=imu)
+        return ExportSource(folder, sequence, sequence.rig, imu=recorded_imu)
 
     truth = read_truth(folder)
     bias = read_imu_bias(folder)
@@ -70,7 +70,7 @@ def open_source(folder: Path) -> ExportSource:
         truth=truth if len(truth) else None,
         twist=read_twist(folder),
         bias=bias if len(bias.t_ns) else None,
-        imu=imu,
+        imu=recorded_imu,
         channels=truth_channels(folder),
         case=_case(folder),
     )

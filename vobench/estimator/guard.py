@@ -78,7 +78,7 @@ def guard(line: _socket.socket, plan: "dict[str, Any]") -> "NoReturn":
     main = _started(plan, line, writes)
     status = None
     os.close(writes)
-    for fd in (0, 1):  # only the program holds them, so vobench notices when the program closes them
+    for fd in (0, 1, *plan["inherited"]):  # only the program holds them, so vobench notices when it closes them
         os.close(fd)
     while status is None:
         ready, _, _ = select.select([line.fileno(), heard], [], [], LOOK_S)
@@ -110,7 +110,7 @@ def _started(plan: "dict[str, Any]", line: _socket.socket, ended: int) -> int:
             _isolate(plan, line, has_pid_namespace=has_pid_namespace)
         line.close()
         if has_pid_namespace:
-            _be_first(writes, ended)
+            _be_first(writes, ended, plan["inherited"])
         try:
             os.execv(plan["program"], plan["argv"])
         except OSError as error:
@@ -143,7 +143,7 @@ def _be_ended_first() -> None:
         file.write(OOM_SCORE)
 
 
-def _be_first(writes: int, ended: int) -> None:
+def _be_first(writes: int, ended: int, inherited: "list[int]") -> None:
     """Make this process the first of its namespace, and return only in a child process, which becomes the program.
 
     When the first process of a namespace ends, the kernel kills all others.
@@ -153,7 +153,7 @@ def _be_first(writes: int, ended: int) -> None:
     if pid == 0:
         _prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         return
-    for fd in (0, 1, 2, writes):
+    for fd in (0, 1, 2, writes, *inherited):
         os.close(fd)
     while True:
         who, status = os.wait()

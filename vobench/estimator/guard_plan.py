@@ -23,6 +23,7 @@ class GuardPlan(TypedDict):
     `read` lists the folders that the program may read besides those of the system.
     `hidden` lists the real paths that appear empty to the program, even inside a readable folder.
     `graphics` is whether the program gets the devices of a graphics processor.
+    `inherited` lists the descriptors that only the program keeps.
     """
 
     is_isolated: bool
@@ -36,6 +37,7 @@ class GuardPlan(TypedDict):
     read: list[str]
     hidden: list[str]
     graphics: bool
+    inherited: list[int]
 
 
 def guard_plan(
@@ -46,6 +48,7 @@ def guard_plan(
     estimator_folder: Path | None,
     hidden: Sequence[Path],
     limits: Limits,
+    inherited: Sequence[int] = (),
 ) -> GuardPlan:
     """The plan of a program with the command line `argv`.
 
@@ -64,6 +67,7 @@ def guard_plan(
         "read": granted_folders(estimator_folder),
         "hidden": [str(path.resolve()) for path in hidden],
         "graphics": _has_graphics(),
+        "inherited": list(inherited),
     }
 
 

@@ -8,7 +8,7 @@ unpickled.
 import json
 import pickle
 import struct
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -93,19 +93,29 @@ def _frame_head(frame: Frame) -> bytes:
     return FRAME.pack(frame.index, frame.t_ns, width, height, channels, len(pictures), imu_readings, encoder_readings)
 
 
-def pickled(frame: Frame) -> list[bytes | memoryview]:
-    """The parts of a frame for vobench's worker: its pickle and its arrays, each after its length."""
+def pickled(frame: Frame) -> list[memoryview]:
+    """The contents of a frame for vobench's worker: its pickle, and its arrays."""
     arrays = list[pickle.PickleBuffer]()
     head = pickle.dumps(frame, 5, buffer_callback=arrays.append)
-    contents: list[bytes | memoryview] = [head, *(array.raw() for array in arrays)]
+    return [memoryview(head), *(array.raw() for array in arrays)]
+
+
+def counted_parts(contents: Sequence[memoryview]) -> list[bytes | memoryview]:
+    """The parts of a message with contents, each after its length."""
     parts: list[bytes | memoryview] = []
     for content in contents:
         parts += [COUNT.pack(len(content)), content]
     return parts
 
 
+def shared_parts(contents: Sequence[memoryview]) -> list[bytes | memoryview]:
+    """The parts of a message about a frame whose arrays are in shared memory: its pickle, and their lengths."""
+    head, *arrays = contents
+    return [COUNT.pack(len(head)), head, *(COUNT.pack(len(array)) for array in arrays)]
+
+
 def unpickled(payload: bytearray | memoryview) -> Frame:
-    """The frame in a payload of `pickled` parts. Its arrays share the memory of the payload."""
+    """The frame in a payload of `counted_parts`. Its arrays share the memory of the payload."""
     view = memoryview(payload)
     contents = list[memoryview]()
     while view:
@@ -113,7 +123,25 @@ def unpickled(payload: bytearray | memoryview) -> Frame:
         end = COUNT.size + length
         contents.append(view[COUNT.size : end])
         view = view[end:]
-    frame: Frame = pickle.loads(contents[0], buffers=contents[1:])
+    return _frame(contents[0], contents[1:])
+
+
+def unpickled_shared(payload: memoryview, copy: Callable[[int], memoryview]) -> Frame:
+    """The frame in a payload of `shared_parts`. `copy` returns a copy of the first bytes of the shared memory."""
+    (head_length,) = COUNT.unpack_from(payload)
+    head_end = COUNT.size + head_length
+    lengths = [length for (length,) in COUNT.iter_unpack(payload[head_end:])]
+    content = copy(sum(lengths))
+    arrays = list[memoryview]()
+    start = 0
+    for length in lengths:
+        arrays.append(content[start : start + length])
+        start += length
+    return _frame(payload[COUNT.size : head_end], arrays)
+
+
+def _frame(head: memoryview, arrays: Sequence[memoryview]) -> Frame:
+    frame: Frame = pickle.loads(head, buffers=arrays)
     return frame
 
 

@@ -19,6 +19,7 @@ from typing import Any, Self
 
 from vobench.estimator.check import InvalidOutputError
 from vobench.estimator.command import filled
+from vobench.estimator.frame_memory import FrameMemory, frame_memory
 from vobench.estimator.manifest import Limits
 from vobench.estimator.message import (
     ANSWER_BYTES,
@@ -27,10 +28,12 @@ from vobench.estimator.message import (
     REASON_BYTES,
     VERSION,
     calibration,
+    counted_parts,
     framed,
     pickled,
     read_answer,
     read_revision,
+    shared_parts,
 )
 from vobench.estimator.program import LOOK_S, Answer, EstimatorFailure, Program
 from vobench.estimator.program_path import hint_on_modules
@@ -48,11 +51,12 @@ WORKER = (sys.executable, "-P", "-m", "vobench.estimator.worker")
 class Connector:
     """The protocol of a kind of estimator.
 
-    `opened` returns the argv and the payload of the message CALB. `framed` returns the parts of the message FRAM.
+    `opened` returns the argv and the payload of the message CALB. `framed` returns the parts of the message FRAM. It is
+    None for vobench's worker, which gets the descriptor of a FrameMemory as its last argument.
     """
 
     opened: Callable[[Rig, Mapping[str, Any], int], tuple[Sequence[str], bytes]]
-    framed: Callable[[Frame], list[bytes | memoryview]]
+    framed: Callable[[Frame], list[bytes | memoryview]] | None
 
 
 class EstimatorProcess:
@@ -67,6 +71,7 @@ class EstimatorProcess:
         self._hidden = hidden
         self._folder = folder
         self._running: AbstractContextManager[Program] | None = None
+        self._memory: FrameMemory | None = None
 
     @property
     def sandbox(self) -> Sandbox | None:
@@ -96,7 +101,7 @@ class EstimatorProcess:
         def opened(rig: Rig, params: Mapping[str, Any], seed: int) -> tuple[Sequence[str], bytes]:
             return argv, pickle.dumps((rig, dict(params), seed, is_watched))
 
-        return cls(Connector(opened, pickled), log=log, limits=limits, hidden=hidden, folder=folder)
+        return cls(Connector(opened, framed=None), log=log, limits=limits, hidden=hidden, folder=folder)
 
     @classmethod
     def of_stream(
@@ -122,20 +127,26 @@ class EstimatorProcess:
             words = filled(argv, folder, {**params, "seed": seed, "rate_hz": rate_hz})
             return words, json.dumps(content, default=str).encode()
 
-        return cls(Connector(opened, framed), log=log, limits=limits, hidden=hidden, folder=folder)
+        return cls(Connector(opened, framed=framed), log=log, limits=limits, hidden=hidden, folder=folder)
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Start the estimator, send the calibration, and wait until it is ready. A second call starts it again."""
         argv, payload = self._door.opened(rig, params, seed)
         if self._running is None:
-            self._open(list(argv))
+            self._open(list(argv), rig)
         self._frames = 0
         until = self._until(self._limits.start_s)
         self._send(b"CALB", [payload], until)
         self._receive("its start", {b"REDY"}, until)
         self._program.look(at_once=True)
 
-    def _open(self, argv: list[str]) -> None:
+    def _open(self, argv: list[str], rig: Rig) -> None:
+        inherited = []
+        if self._door.framed is None:
+            self._memory = frame_memory(rig)
+            if self._memory:
+                inherited = [self._memory.descriptor]
+            argv = [*argv, str(self._memory.descriptor if self._memory else -1)]
         pipe = subprocess.PIPE
         self._program = self._running = Program(
             argv,
@@ -143,6 +154,7 @@ class EstimatorProcess:
             limits=self._limits,
             hidden=self._hidden,
             folder=self._folder,
+            inherited=inherited,
             stdin=pipe,
             stdout=pipe,
             bufsize=0,
@@ -159,12 +171,11 @@ class EstimatorProcess:
     def process(self, frame: Frame) -> Answer:
         """Send the next frame, and return the checked answer."""
         cpu_before_s = self._program.cpu_s
-        parts = self._door.framed(frame)
         self._refuse_early_answer(f"frame {frame.index}")
 
         began_s = time.monotonic()
         until = self._until(self._limits.frame_s)
-        self._send(b"FRAM", parts, until)
+        self._send_frame(frame, until)
         _, payload = self._receive(f"frame {frame.index}", {b"POSE"}, until)
         wall_s = time.monotonic() - began_s
 
@@ -176,6 +187,17 @@ class EstimatorProcess:
             raise EstimatorFailure("invalid_output", str(error)) from None
         cpu_s = self._program.cpu_s - cpu_before_s
         return Answer(result, 1e3 * wall_s, 1e3 * cpu_s, self._program.peak_mib)
+
+    def _send_frame(self, frame: Frame, until: float) -> None:
+        """Send a frame. The arrays for a worker are in shared memory, if there is one and they fit into it."""
+        if self._door.framed:
+            self._send(b"FRAM", self._door.framed(frame), until)
+            return
+        contents = pickled(frame)
+        if self._memory and self._memory.write(contents[1:]):
+            self._send(b"SHRD", shared_parts(contents), until)
+        else:
+            self._send(b"FRAM", counted_parts(contents), until)
 
     def finish(self) -> dict[int, Array]:
         """Tell the estimator that there are no more frames, and return the poses that it revises."""
@@ -274,8 +296,12 @@ class EstimatorProcess:
 
     def __exit__(self, *end: Any) -> None:
         """End the estimator and all processes that it has started."""
-        if self._running:
-            self._running.__exit__(*end)
+        try:
+            if self._running:
+                self._running.__exit__(*end)
+        finally:
+            if self._memory:
+                self._memory.close()
 
 
 def unsent_after(parts: Sequence[memoryview], count: int) -> list[memoryview]:

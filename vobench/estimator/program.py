@@ -118,7 +118,7 @@ class Program:
     Its output is written to `log`. It works in a home folder, is started without a shell, and has only the variables
     KEPT_ENVIRONMENT of vobench's environment. A guard is the ancestor of all processes that it starts, in whatever
     session, and kills them with it. It sees the files of `guard_plan`, of which `folder` is its own, except those
-    that are `hidden`; `sandbox` describes what it could see.
+    that are `hidden`; `sandbox` describes what it could see. It inherits the descriptors `inherited`.
     """
 
     def __init__(
@@ -130,6 +130,7 @@ class Program:
         home: Home | None = None,
         hidden: Sequence[Path] = (),
         folder: Path | None = None,
+        inherited: Sequence[int] = (),
         **streams: Any,
     ) -> None:
         self.limits = limits
@@ -166,7 +167,7 @@ class Program:
             line, guard_line = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
             self._line = undone.enter_context(line)
             with guard_line:
-                self.process = self._start_guard(guard_line, argv[0], streams)
+                self.process = self._start_guard(guard_line, argv[0], inherited, streams)
             for pipe in (self.process.stdin, self.process.stdout):
                 if pipe:
                     undone.callback(pipe.close)
@@ -179,11 +180,14 @@ class Program:
                 estimator_folder=folder,
                 hidden=hidden,
                 limits=limits,
+                inherited=inherited,
             )
             self._start_program(plan, folder)
             self._undone = undone.pop_all()
 
-    def _start_guard(self, guard_line: socket.socket, name: str, streams: dict[str, Any]) -> "subprocess.Popen[bytes]":
+    def _start_guard(
+        self, guard_line: socket.socket, name: str, inherited: Sequence[int], streams: dict[str, Any]
+    ) -> "subprocess.Popen[bytes]":
         """Start the guard, which then waits for the plan of the program."""
         options = {
             "stdin": subprocess.DEVNULL,
@@ -191,7 +195,7 @@ class Program:
             "stderr": self._log,
             "cwd": self.home,
             "env": self._environment(),
-            "pass_fds": [guard_line.fileno()],
+            "pass_fds": [guard_line.fileno(), *inherited],
             **streams,
         }
         command = [*GUARD, str(guard_line.fileno())]

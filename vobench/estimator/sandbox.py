@@ -51,10 +51,17 @@ def from_guard_report(visible: Sequence[str], no_mount_tree_reason: str) -> Sand
     `visible` lists what the program can see in spite of the isolation.
     `no_mount_tree_reason` is the reason why the kernel did not allow a private mount tree; empty if it did.
     """
-    level: Level = "partial" if visible else "full"
-    if isolation.FILES in visible and isolation.PROCESSES in visible:
-        level = "none"
-    return Sandbox(level, sees=tuple(visible), read=folders_opened_by_user(), why=no_mount_tree_reason)
+    return Sandbox(_level(visible), sees=tuple(visible), read=folders_opened_by_user(), why=no_mount_tree_reason)
+
+
+def _level(visible: Sequence[str]) -> Level:
+    """How well a program is isolated that can see these things."""
+    if not visible:
+        return "full"
+    # A program that sees the files and the processes of the user can read the ground truth and the harness's memory.
+    # Whether it also has the network makes no difference to that.
+    sees_user = isolation.FILES in visible and isolation.PROCESSES in visible
+    return "none" if sees_user else "partial"
 
 
 def unsandboxed() -> Sandbox:

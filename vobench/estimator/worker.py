@@ -12,6 +12,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import BinaryIO, cast
@@ -20,8 +21,9 @@ import numpy as np
 
 from vobench.errors import VobenchError, error_sentence
 from vobench.estimator.check import InvalidOutputError, checked, checked_revision, in_one_line
-from vobench.estimator.message import HEADER, answered, revision, unpickled
-from vobench.estimator.protocol import Estimator
+from vobench.estimator.frame_memory import copied, opened_memory
+from vobench.estimator.message import HEADER, answered, revision, unpickled, unpickled_shared
+from vobench.estimator.protocol import Estimator, Image
 
 NAMESPACE = "vobench_estimators"
 
@@ -94,18 +96,22 @@ def _cause(error: Exception, folder: Path) -> str:
 Message = tuple[bytes, bytes]  # tag and content
 
 
-def main(folder: Path, class_path: str, name: str, memory_bytes: int) -> None:
-    """Answer requests until vobench closes the connection."""
+def main(folder: Path, class_path: str, name: str, *, memory_bytes: int, frame_descriptor: int) -> None:
+    """Answer requests until vobench closes the connection.
+
+    `memory_bytes` is the limit of memory. `frame_descriptor` is that of the shared memory with frames, or -1.
+    """
     # If a fault ends this process, the calls of every thread are written to the log; since Python 3.14 also those of
     # libraries.
     faulthandler.enable()
     # Warnings about retired names are written to the log.
     warnings.filterwarnings("default", message=r"vobench\.", category=DeprecationWarning)
     resource.setrlimit(resource.RLIMIT_DATA, (memory_bytes, memory_bytes))
+    frame_memory = opened_memory(frame_descriptor)
     requests, answers = _taken_over()
     try:
         estimator = load(folder, class_path, name=name)
-        for tag, content in _answers(requests, estimator):
+        for tag, content in _answers(requests, estimator, frame_memory):
             answers.write(HEADER.pack(tag, len(content)) + content)
     except (EOFError, BrokenPipeError):
         return
@@ -129,7 +135,7 @@ def _taken_over() -> tuple[BinaryIO, BinaryIO]:
     return requests, answers
 
 
-def _answers(requests: BinaryIO, estimator: Estimator) -> Iterator[Message]:
+def _answers(requests: BinaryIO, estimator: Estimator, frame_memory: Image | None) -> Iterator[Message]:
     """The answers to all requests, in order. Requests come from vobench, so they can be unpickled."""
     is_watched = False
     while head := requests.read(HEADER.size):
@@ -138,8 +144,12 @@ def _answers(requests: BinaryIO, estimator: Estimator) -> Iterator[Message]:
         received = requests.readinto(payload)  # type: ignore[attr-defined]
         if received < length:
             raise EOFError
-        if tag == b"FRAM":
-            frame = unpickled(payload)
+        if tag in (b"FRAM", b"SHRD"):
+            if tag == b"SHRD":
+                assert frame_memory is not None
+                frame = unpickled_shared(payload, partial(copied, frame_memory))
+            else:
+                frame = unpickled(payload)
             before = pickle.dumps(frame) if is_watched else b""
             result = checked(estimator.process(frame), frame.index)
             if is_watched and pickle.dumps(frame) != before:
@@ -168,4 +178,10 @@ def _tag(error: Exception) -> bytes:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.argv[2], sys.argv[3], int(sys.argv[4]))
+    main(
+        Path(sys.argv[1]),
+        sys.argv[2],
+        sys.argv[3],
+        memory_bytes=int(sys.argv[4]),
+        frame_descriptor=int(sys.argv[5]),
+    )

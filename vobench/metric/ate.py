@@ -69,6 +69,35 @@ def _axis_measure(axis: str) -> Callable[[Comparison], Array]:
 PLACE_OF_ERROR = "where along the path an error arose: one early rotation error displaces all later poses"
 UNTRACKED_FRAMES = "frames without a pose: see coverage"
 _pose_metric = partial(MetricDefinition, settings=POSES)
+
+
+def _position_metric(axis: str) -> MetricDefinition:
+    """The metric of the signed position errors along an axis of the world."""
+    return _pose_metric(
+        id=f"ate_{axis}",
+        title=f"absolute trajectory error along the truth's {axis}",
+        unit="m",
+        formula=f"{axis} of p_est − p_gt, with its sign",
+        source=OURS,
+        blind=f"errors along the other axes; {UNTRACKED_FRAMES}",
+        measure=_axis_measure(axis),
+    )
+
+
+def _angle_metric(axis: str) -> MetricDefinition:
+    """The metric of the signed errors of one of the angles roll, pitch and yaw."""
+    return _pose_metric(
+        id=f"ate_{axis}",
+        title=f"absolute trajectory error in {axis}",
+        unit="deg",
+        formula=f"{axis} of R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll), with its sign",
+        source=ZHANG,
+        blind=f"roll and yaw separately at a pitch near 90°, where their axes coincide; {UNTRACKED_FRAMES}",
+        measure=_axis_measure(axis),
+    )
+
+
+# Of these metrics, `full=False` marks those that are also measured if not all metrics are requested.
 METRICS = (
     _pose_metric(
         id="ate_trans",
@@ -96,7 +125,7 @@ METRICS = (
         unit="1",
         formula="‖R_est⁻¹ R_gt − I‖_F = 2√2 sin(angle / 2)",
         source=HARTLEY,
-        blind=f"what ate_rot does not show: it is ate_rot on another scale; {UNTRACKED_FRAMES}",
+        blind=f"the same as ate_rot, of which it is a monotonic function; {UNTRACKED_FRAMES}",
         measure=lambda comparison: comparison.once(_matrix_errors).rotation,
     ),
     _pose_metric(
@@ -109,28 +138,10 @@ METRICS = (
         f"{UNTRACKED_FRAMES}",
         measure=lambda comparison: comparison.once(_matrix_errors).full,
     ),
-    *(
-        _pose_metric(
-            id=f"ate_{axis}",
-            title=f"absolute trajectory error along the truth's {axis}",
-            unit="m",
-            formula=f"{axis} of p_est − p_gt, with its sign",
-            source=OURS,
-            blind=f"errors along the other axes; {UNTRACKED_FRAMES}",
-            measure=_axis_measure(axis),
-        )
-        for axis in ("x", "y", "z")
-    ),
-    *(
-        _pose_metric(
-            id=f"ate_{axis}",
-            title=f"absolute trajectory error in {axis}",
-            unit="deg",
-            formula=f"{axis} of R_est R_gt⁻¹ = Rz(yaw) Ry(pitch) Rx(roll), with its sign",
-            source=ZHANG,
-            blind=f"roll and yaw separately at a pitch near 90°, where their axes coincide; {UNTRACKED_FRAMES}",
-            measure=_axis_measure(axis),
-        )
-        for axis in ("roll", "pitch", "yaw")
-    ),
+    _position_metric("x"),
+    _position_metric("y"),
+    _position_metric("z"),
+    _angle_metric("roll"),
+    _angle_metric("pitch"),
+    _angle_metric("yaw"),
 )

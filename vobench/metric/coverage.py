@@ -1,4 +1,13 @@
-"""Coverage of the ground truth by an estimate: the share with poses, the gaps and the tracks."""
+"""Coverage of the ground truth by an estimate: the share with poses, the gaps and the tracks.
+
+A slot is a frame, which is one true pose, or an interval of SLOT_NS. A gap is a run of slots without an estimated pose,
+a track is a run of slots with one:
+
+    slots      1   2   3   4   5   6   7   8   9
+    poses      x   x   x               x   x
+               |-------|---------------|---|---|
+                 track        gap      track gap
+"""
 
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
@@ -24,19 +33,18 @@ SlotKind = Literal["frames", "time"]
 class Coverage:
     """How much of a recording an estimate covers, and where it has gaps.
 
-    A slot is a frame, which is one true pose, or an interval of 0.2 s; `slot_kind` says which.
-    A gap is a run of slots without an estimated pose. It lasts from the last pose before the run, or the start of the
-    ground truth, to the first pose after the run, or the end.
-    A track is a run of estimated poses without a gap. Every track after the first one is a relocalisation.
+    A gap lasts from the last pose before it, or the start of the ground truth, to the first pose after it, or the end.
+    Every track after the first one is a relocalisation.
 
     `ratio` is the share of slots with an estimated pose.
     `gaps` and `relocalisations` are counts.
-    `longest_gap_frames` and `longest_gap_s` are the number of true poses in the gap with the most slots, and its
-    duration. Another gap can last longer.
+    `longest_gap_frames` and `longest_gap_s` are the number of true poses in the gap with the most slots, and the
+    duration of this gap.
     `first_lost_frame` is the index of the first true pose in a gap, None without gaps.
     `time_to_first_pose_s` is measured from the start of the ground truth; it is None without poses.
     `longest_track_s` is the longest duration of a track, 0 without poses.
-    `ends_lost` is whether the last slot has no pose or, for slots of 0.2 s, the last 0.1 s has none.
+    `slot_kind` is what a slot is.
+    `ends_lost` is whether the estimate is lost at the end; see `_ends_lost`.
     """
 
     ratio: float
@@ -68,7 +76,7 @@ def slots(gt_t_ns: Stamps, rule: CoverageOf) -> Slots:
     """The slots of a ground truth with stamps (N,). A complete estimate has a pose in every slot.
 
     With "frames", each true pose is a slot. With "auto", each true pose is a slot unless the ground truth is from
-    motion capture, which has more poses than a camera has frames; then each interval of 0.2 s is a slot.
+    motion capture, which has more poses than a camera has frames; then each interval of SLOT_NS is a slot.
     Slots do not depend on the estimate, so a missing pose cannot increase the coverage.
     """
     steps_ns = np.diff(gt_t_ns)
@@ -182,7 +190,7 @@ def _longest_track_ns(intervals: _Intervals) -> float:
 
 
 def _ends_lost(intervals: _Intervals, slot_kind: SlotKind) -> bool:
-    """Whether the last slot has no pose or, for slots of 0.2 s, the last 0.1 s has none."""
+    """Whether the last slot has no pose or, if slots are intervals, the last END_NS have none."""
     time_after_last_pose_ns = intervals.end_ns[-1] - intervals.begin_ns[-1]
     is_last_slot_lost = intervals.lost_slots[-1] > 0
     is_end_late = slot_kind == "time" and time_after_last_pose_ns > END_NS
@@ -196,7 +204,8 @@ METRICS = (
         title="share of the recording with a pose",
         unit="1",
         formula="slots with a pose / all slots; "
-        "a slot is a true pose, or 0.2 s if the truth has more than 33 poses per second",
+        f"a slot is a true pose, or {SLOT_NS / NS_PER_S:g} s if the truth has more than "
+        f"{NS_PER_S // MOTION_CAPTURE_STEP_NS} poses per second",
         source=OURS,
         settings=MATCHING_SETTINGS,
         blind="whether the poses are right",

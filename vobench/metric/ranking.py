@@ -91,20 +91,22 @@ class TrialTable:
         """The mean logarithm of the loss by estimator and place (E, P)."""
         return self.design.means(self.log_losses_by_case())
 
-    def p(self, difference: PairedDifference) -> float:
-        """The p-value of a difference between two of the estimators."""
-        if self.is_sequential:
-            return min(1.0, 1.0 / sequential.bayes_factor(difference))
-        return difference.p
-
-    def interval(self, difference: PairedDifference, alpha: float) -> tuple[float, float] | None:
-        """The confidence interval of a difference at the level 1 - alpha, None for too few units."""
+    def p(self, differences: Array) -> float:
+        """The p-value of the differences (P,) between two of the estimators; NaN marks a place without one."""
         if not self.is_sequential:
-            return difference.interval(alpha)
-        half_width = sequential.half_width(difference, alpha)
-        if np.isinf(half_width):
-            return None
-        return difference.mean - half_width, difference.mean + half_width
+            return paired_difference(differences).p
+        known = sequential.known_differences(differences)
+        bounded_mean = float(np.clip(known, -sequential.BOUND, sequential.BOUND).sum())
+        if known.sum() * bounded_mean <= 0:
+            return 1.0  # a few places beyond the bound turn the order, of which nothing is known then
+        return min(1.0, 1.0 / sequential.e_value(known))
+
+    def interval(self, differences: Array, alpha: float) -> tuple[float, float] | None:
+        """The confidence interval of the mean of differences (P,) at the level 1 - alpha, None for too few units."""
+        if not self.is_sequential:
+            return paired_difference(differences).interval(alpha)
+        known = sequential.known_differences(differences)
+        return sequential.interval(known, alpha) if len(known) >= sequential.MIN_UNITS else None
 
     def pair_p_values(self) -> Array:
         """The p-values (E, E) of all pairs of estimators over places; the diagonal is 1."""
@@ -113,7 +115,7 @@ class TrialTable:
             return paired_p_values(log_losses)
         p_values = np.ones((len(log_losses), len(log_losses)))
         for a, b in combinations(range(len(log_losses)), 2):
-            p_values[a, b] = self.p(_difference(log_losses, a, b))
+            p_values[a, b] = self.p(log_losses[b] - log_losses[a])
             p_values[b, a] = p_values[a, b]
         return p_values
 
@@ -135,8 +137,9 @@ def rank(trials: TrialTable) -> list[Standing]:
     log_losses = trials.log_losses()  # (E, P)
     means = _means(log_losses)
     order: list[int] = np.argsort(means, kind="stable").tolist()
-    neighbours = [_difference(log_losses, a, b) for a, b in pairwise(order)]
-    p_values = holm([trials.p(difference) for difference in neighbours])
+    differences = [log_losses[below] - log_losses[above] for above, below in pairwise(order)]  # (P,) each
+    neighbours = [paired_difference(of_pair) for of_pair in differences]
+    p_values = holm([trials.p(of_pair) for of_pair in differences])
     intervals = _place_intervals(trials, order, p_values) if trials.is_tested else None
     error_ratios = _error_ratios(trials, order)
 
@@ -184,11 +187,6 @@ def beside(trials: TrialTable) -> Standing:
     )
 
 
-def _difference(log_losses: Array, a: int, b: int) -> PairedDifference:
-    """How much worse estimator b is than a, over places."""
-    return paired_difference(log_losses[b] - log_losses[a])
-
-
 def _place_intervals(trials: TrialTable, order: Sequence[int], neighbour_p: Sequence[float]) -> list[tuple[int, int]]:
     """The first and the last place of each ranked estimator, by how many others are significantly better and worse.
 
@@ -220,9 +218,10 @@ def _error_ratios(trials: TrialTable, order: Sequence[int]) -> list[tuple[float 
     ratios = list[tuple[float | None, tuple[float, float] | None]]()
     for estimator in order:
         by_case = log_errors[estimator] - log_errors[order[0]]
-        difference = paired_difference(trials.design.means(by_case))
+        by_place = trials.design.means(by_case)
+        difference = paired_difference(by_place)
         ratio = float(np.exp(difference.mean)) if difference.units else None
-        ends = trials.interval(difference, level) if trials.is_tested and estimator != order[0] else None
+        ends = trials.interval(by_place, level) if trials.is_tested and estimator != order[0] else None
         interval = (float(np.exp(ends[0])), float(np.exp(ends[1]))) if ends else None
         ratios.append((ratio, interval))
     return ratios

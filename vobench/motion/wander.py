@@ -19,6 +19,7 @@ from vobench.geometry.rig import PIONEER_WHEELS, Mount, WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS, ackermann
 from vobench.motion.course import Course, CoursePiece, course
+from vobench.motion.ground_curve import GroundCurve, over_ground
 from vobench.motion.handheld import SHAKES, HandheldMotion, draw_shake
 from vobench.motion.quadrotor import Quadrotor
 from vobench.motion.spline import Pose
@@ -116,6 +117,7 @@ HAND_HEIGHT_M = (1.35, 1.55)
 HAND_PITCH_DEG = (2.0, 10.0)
 FLIGHT_HEIGHT_M = (0.7, 1.5)
 FLIGHT_POINT_M = 1.2  # about the distance between points of a flight
+GROUND_STEP_M = 0.4  # between heights of uneven ground under a path
 
 # The search.
 BENDS = 9  # curvatures among which each is drawn
@@ -137,7 +139,7 @@ CHECKS_PER_M = 20
 class Clearance:
     """The distance (H, W) in m from cells of a floor to the nearest one that is not free; 0 in those.
 
-    The centre of the first cell is at x_m, y_m. The floor is at floor_m.
+    The centre of the first cell is at x_m, y_m. The floor is at floor_m, or at ground_m (H, W) where it is uneven.
     """
 
     x_m: float
@@ -145,6 +147,16 @@ class Clearance:
     floor_m: float
     cell_m: float
     distance_m: Array
+    ground_m: Array | None = None
+
+    def ground_at(self, points_m: Array) -> Array:
+        """The height (N,) of the floor or ground at points (N, 2), linear between centres of cells."""
+        if self.ground_m is None:
+            return np.full(len(points_m), self.floor_m)
+        column = (points_m[:, 0] - self.x_m) / self.cell_m
+        row = (points_m[:, 1] - self.y_m) / self.cell_m
+        height_m: Array = scipy.ndimage.map_coordinates(self.ground_m, [row, column], order=1, mode="nearest")
+        return height_m
 
     def at(self, points_m: Array) -> Array:
         """The distance (...) at points (..., 2), linear between centres of cells; 0 beyond the floor."""
@@ -166,7 +178,8 @@ class Wander:
 
     `seeds` is the number of drives, with seeds from `seed` on, plus the base seed of the suite. A hand holds the body
     at about 1.45 m, and a quadrotor flies 0.7 to 1.5 m above the floor: their cameras should have height_m 0. The
-    wheels of pioneer and car roll without slip.
+    wheels of pioneer and car roll without slip. On uneven ground, such as that of a park, a pioneer tilts with the
+    ground, which is smoothed over half a metre, and there are no cars.
     """
 
     kind: Literal["wander"] = "wander"
@@ -195,13 +208,21 @@ class Wander:
         return CAR_WHEELS[CAR] if self.body == "car" else None
 
     def motion(self, clearance: Clearance) -> "WanderMotion":
-        """The drive of the seed in a place. Raises MotionError if there is no room for it."""
+        """The drive of the seed in a place.
+
+        Raises MotionError if there is no room for it, and for a car on uneven ground.
+        """
+        if self.body == "car" and clearance.ground_m is not None:
+            raise MotionError(
+                "the ground of this place is uneven, where a car does not wander; choose body pioneer, hand or "
+                "quadrotor, or a rail through points on the ground"
+            )
         rng = np.random.default_rng(self.seed)
         for _ in range(ATTEMPTS):
             planned = _planned(clearance, self.habits, self.length_m, rng)
             if planned is None:
                 continue
-            motion = _moved(self, clearance.floor_m, planned, rng)
+            motion = _moved(self, clearance, planned, rng)
             clear_m = least_clearance_m(motion, clearance, self.habits)
             if clear_m > 0:
                 return WanderMotion(motion, clear_m)
@@ -233,6 +254,17 @@ class PlannedPath:
         x_m, y_m, heading_rad = self.start[:, None]
         T: Array = level(x_m, y_m, heading_rad)[0]
         return T
+
+    @property
+    def length_m(self) -> float:
+        """The length of the path."""
+        return sum(piece.length for piece in self.pieces)
+
+    def points_m(self, s: Array) -> Array:
+        """Points (N, 2) of the path at arc lengths (N,)."""
+        T = self.T_world_start @ self.curve.at(s).T_world_body
+        points: Array = T[:, :2, 3]
+        return points
 
 
 # Planning
@@ -465,16 +497,29 @@ class Placed:
         return replace(mounted, T_world_body=T_world_body)
 
 
-def _moved(spec: Wander, floor_m: float, path: PlannedPath, rng: np.random.Generator) -> Motion:
+def _moved(spec: Wander, clearance: Clearance, path: PlannedPath, rng: np.random.Generator) -> Motion:
     """The motion of the body of a drive along a path."""
     habits = spec.habits
     if spec.body == "quadrotor":
-        return _flown(path, habits, floor_m, rng)
-    target = CurveMotion(path.curve, _law(path, habits, rng), path.T_world_start)
+        return _flown(path, habits, clearance, rng)
+    law = _law(path, habits, rng)
+    if clearance.ground_m is not None:
+        curve = _over_ground(path, clearance, is_level=spec.body == "hand")
+        on_ground = CurveMotion(curve, law, path.T_world_start)
+        return _carried(on_ground, 0.0, rng) if spec.body == "hand" else on_ground
+    target = CurveMotion(path.curve, law, path.T_world_start)
     if spec.body == "hand":
-        return _carried(target, floor_m, rng)
+        return _carried(target, clearance.floor_m, rng)
     driven: Motion = ackermann(target, ACKERMANNS[CAR]) if spec.body == "car" else target
-    return Placed(driven, floor_m, np.eye(4))
+    return Placed(driven, clearance.floor_m, np.eye(4))
+
+
+def _over_ground(path: PlannedPath, clearance: Clearance, *, is_level: bool) -> GroundCurve:
+    """The path over uneven ground."""
+    count = max(round(path.length_m / GROUND_STEP_M), 4)
+    stops_m = np.linspace(0.0, path.length_m, count + 1)
+    heights_m = clearance.ground_at(path.points_m(stops_m))
+    return over_ground(path.curve, stops_m, heights_m, is_level=is_level)
 
 
 def _carried(walk: Motion, floor_m: float, rng: np.random.Generator) -> Motion:
@@ -485,13 +530,12 @@ def _carried(walk: Motion, floor_m: float, rng: np.random.Generator) -> Motion:
     return HandheldMotion(held, draw_shake(SHAKES["walking"], rng))
 
 
-def _flown(path: PlannedPath, habits: BodyHabits, floor_m: float, rng: np.random.Generator) -> Motion:
+def _flown(path: PlannedPath, habits: BodyHabits, clearance: Clearance, rng: np.random.Generator) -> Motion:
     """A flight near a path, at heights that are drawn."""
-    length_m = sum(piece.length for piece in path.pieces)
-    count = max(round(length_m / FLIGHT_POINT_M), 1) + 1
-    T = path.T_world_start @ path.curve.at(np.linspace(0.0, length_m, count)).T_world_body
-    heights_m = floor_m + rng.uniform(*FLIGHT_HEIGHT_M, count)
-    points_m = np.column_stack([T[:, :2, 3], heights_m])
+    count = max(round(path.length_m / FLIGHT_POINT_M), 1) + 1
+    ground_points_m = path.points_m(np.linspace(0.0, path.length_m, count))
+    heights_m = clearance.ground_at(ground_points_m) + rng.uniform(*FLIGHT_HEIGHT_M, count)
+    points_m = np.column_stack([ground_points_m, heights_m])
     speed_mps = rng.uniform(*habits.speed_mps)
     flight = Quadrotor(points_m=tuple((x, y, z) for x, y, z in points_m.tolist()), speed_mps=speed_mps)
     return flight.motion()

@@ -6,8 +6,9 @@ import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from math import inf
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from vobench.errors import InputError, UnknownNameError, unknown_name_sentence
 from vobench.notebook.class_source import write_estimator
@@ -17,6 +18,7 @@ from vobench.runner.folder import open_run
 from vobench.runner.launch import run_plan
 from vobench.runner.motion import cut
 from vobench.runner.preflight import PlanSummary, summarize
+from vobench.suite.draw import Draws
 from vobench.suite.plan import Plan
 from vobench.suite.suite import read_plan
 
@@ -26,6 +28,8 @@ if TYPE_CHECKING:
 
     from vobench.report.compare import ScoreChange
     from vobench.report.leaderboard import Board
+    from vobench.runner.folder import RunFolder
+    from vobench.runner.run import Finish
 
 Names = str | Iterable[str]
 Estimators = str | type | Iterable[str | type]
@@ -62,9 +66,10 @@ class Run:
     @cached_property
     def trials(self) -> "pd.DataFrame":
         """One row per trial: case, estimator, repeat, the choices that make the case, its seeds, status and metrics."""
+        from vobench.report.case_facts import case_facts
         from vobench.report.run_tables import trial_frame
 
-        facts = {cell.case: cell.facts for cell in self._board.cells}
+        facts = {case: case_facts(self._folder, case) for case in self.cases}
         return trial_frame(self._scores, facts)
 
     @cached_property
@@ -73,6 +78,23 @@ class Run:
         from vobench.report.run_tables import frames_frame
 
         return frames_frame(self._folder, self._scores)
+
+    @cached_property
+    def pairs(self) -> "pd.DataFrame":
+        """What is known of each pair of estimators, one row each, in a run with `until="decided"`.
+
+        `ratio` is the second's loss relative to the first's, with the ends `low` and `high` of its interval. Raises
+        InputError for another run.
+        """
+        import pandas as pd
+
+        from vobench.report.pair_sentence import named_pairs
+        from vobench.report.until_decided import recorded_ratio
+
+        ratio = recorded_ratio(self._folder)
+        if ratio is None:
+            raise InputError(f"only a run with until='decided' has pairs: {self.path}")
+        return pd.DataFrame([pair.as_dict() for pair in named_pairs(self._board.cells, ratio=ratio)])
 
     @property
     def cases(self) -> list[str]:
@@ -156,7 +178,7 @@ class Run:
         parts = [_html_table(["case", *self.estimators], _matrix_rows(board), title)]
         for scope, (headings, *rows) in board_table.totals(board):
             parts.append(_html_table(headings, rows, f"totals over {scope}"))
-        sentences = [*board_table.remarks(board), *board_table.cell_notes(board), str(self.path)]
+        sentences = [*board_table.board_notes(board), str(self.path)]
         parts += [f"<small>{html.escape(sentence)}</small><br>" for sentence in sentences]
         return "\n".join(parts)
 
@@ -240,6 +262,9 @@ def run(
     frames: int | None = None,
     fresh: bool = False,
     quiet: bool = False,
+    until: Literal["decided"] | None = None,
+    ratio: float = 1.5,
+    budget: str | None = None,
 ) -> Run:
     """Run a suite: simulate, estimate, score. Results that are in the cache are reused.
 
@@ -255,26 +280,54 @@ def run(
         frames: Number of frames of each simulated case, from the first one; all by default.
         fresh: Whether to recompute everything instead of using the cache.
         quiet: Whether to hide the progress.
+        until: With "decided", fresh places are drawn until each pair of estimators is decided, or alike within the
+            ratio; `Run.pairs` has what is known of each. Interrupted, the same call resumes from the cache.
+        ratio: With `until`, the ratio of losses that is of interest.
+        budget: With `until`, the time after which no more places are drawn, as in "40min".
 
     Raises:
-        SuiteError: The suite is wrong; the message lists every mistake.
+        SuiteError: The suite is wrong; the message lists every mistake. Or it has no places that can be drawn.
         UnknownNameError: No suite, case or estimator has that name.
         MissingDependencyError: This machine cannot draw.
     """
     from vobench.report import page
 
-    planned = plan(suite, estimators=estimators, only=only, changes=changes)
-    if frames is not None:
-        planned = cut(planned, frames)
-    folder = run_plan(
-        planned,
-        out=Path(out),
-        finish=page.write_reports,
-        display=choose_display(is_quiet=quiet),
-        jobs=jobs,
-        is_fresh=fresh,
-    )
-    return Run(folder.path)
+    _check_until(until, ratio, budget)
+
+    def planned_draw(number: int | None) -> Plan:
+        planned = plan(suite, estimators=estimators, only=only, changes=changes, draw=number)
+        return planned if frames is None else cut(planned, frames)
+
+    def run_in(planned: Plan, parent: Path, finish: "Finish") -> "RunFolder":
+        display = choose_display(is_quiet=quiet)
+        return run_plan(planned, out=parent, finish=finish, display=display, jobs=jobs, is_fresh=fresh)
+
+    if until is None:
+        return Run(run_in(planned_draw(None), Path(out), page.write_reports).path)
+
+    from vobench.report.until_decided import parse_duration_s
+    from vobench.report.until_decided_run import run_draws
+
+    budget_s = inf if budget is None else parse_duration_s(budget)
+    tell = _silent if quiet else print
+    ended = run_draws(planned_draw, run_in, out=Path(out), ratio=ratio, budget_s=budget_s, tell=tell)
+    if not quiet:
+        print(ended.cost)
+    return Run(ended.folder.path)
+
+
+def _check_until(until: str | None, ratio: float, budget: str | None) -> None:
+    """Raise InputError for options of `until` that are wrong."""
+    if until not in (None, "decided"):
+        raise InputError(f"until should be 'decided' or None, got {until!r}")
+    if until is None and budget is not None:
+        raise InputError("budget requires until='decided'")
+    if ratio <= 1:
+        raise InputError(f"ratio should be above 1, got {ratio:g}")
+
+
+def _silent(sentence: str) -> None:
+    del sentence
 
 
 def read_run(path: Path | str) -> Run:
@@ -327,11 +380,18 @@ def plan(
     estimators: Estimators | None = None,
     only: Names | None = None,
     changes: Mapping[str, Any] | None = None,
+    draw: int | None = None,
 ) -> Plan:
-    """The plan of a suite, as `run` takes it. Raises SuiteError and UnknownNameError."""
+    """The plan of a suite, as `run` takes it. `draw` counts those of `run` with `until` from 0.
+
+    Raises SuiteError and UnknownNameError; for a draw also if the suite has no places that can be drawn.
+    """
     names = tuple(_estimator_name(each) for each in listed(estimators))
     stated = {key: _as_yaml(value) for key, value in (changes or {}).items()}
-    planned = read_plan(str(suite), only_estimators=names, changes=stated)
+    if draw is None:
+        planned = read_plan(str(suite), only_estimators=names, changes=stated)
+    else:
+        planned = Draws(str(suite), stated, names).plan(draw)
     return _only(planned, listed(only))
 
 

@@ -16,12 +16,13 @@ from vobench import stop
 from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
+from vobench.rendering import freed_memory
 from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.direct_light import direct_light, mirror_images
 from vobench.rendering.emitter import emitters
 from vobench.rendering.gathering import Rounds, Smoothing
-from vobench.rendering.geometry import FAR_M, RayCaster, are_panes, face_materials, offset_from_surface
+from vobench.rendering.geometry import are_panes, face_materials
 from vobench.rendering.indirect_light import (
     MOST_RAYS,
     Gatherer,
@@ -34,6 +35,7 @@ from vobench.rendering.indirect_light import (
     surfels,
 )
 from vobench.rendering.photons import Reflectors
+from vobench.rendering.sun_tiles import FaceParts, sunlit_parts
 from vobench.rendering.texel import Texels, texel_areas_m2, texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.texel_owner import owners
@@ -44,7 +46,6 @@ from vobench.scene.material import LUMINANCE, Material, Picture, Texture
 from vobench.scene.panorama import PanoramaMap
 from vobench.scene.scene import Scene, triangles
 from vobench.scene.triangles import Triangles
-from vobench.scene.weld import distinct_rows
 from vobench.setting import Positive, settings
 from vobench.trajectory.nanoseconds import NS_PER_S
 
@@ -55,11 +56,9 @@ Report = Callable[[float], object]
 MOVER_COARSER = 2
 SUNLIT_FINER = 2  # the half shadow of the sun is 1 cm wide for each metre to what casts it
 CELL_TEXELS = 2.5  # along a surfel's side at least, where samples are far from each other
-PROBES_M = 0.25  # between places that ask whether the sun reaches a face
 # the shares of a bake that are done after each, about
 PLACED_DONE = 0.1
 GATHER_DONE = 0.4
-SMALL_M2 = 10.0  # of a thing that is sunlit as a whole
 SKY_RAYS = 64  # at least from a surfel to tell whether it sees the sky
 BLIND = 0.02  # of a surfel's rays: one that sees less is inside something
 TEXTURE_FIELDS = ("texture", "emission_texture")
@@ -112,6 +111,7 @@ class Patches:
 class BakedScene:
     """A scene with its light: all that drawing a picture needs. Its faces' places on the map are in `atlas`.
 
+    faces (T,) is the table of the parts of the scene's faces, which have samples at different distances.
     direct (L, H, W): what each light alone gives straight at level 1 if it is white: illuminance in lux, under a coat
     the share that enters it; on a lamp pi times its luminance. bounced (L, S, 3): what it gives surfels by bounces;
     spread (H·W, S) lays that on the map. A moving sun's layers are those of its first instant; see `tracks` for more.
@@ -119,6 +119,7 @@ class BakedScene:
     """
 
     scene: Scene
+    parts: FaceParts
     faces: Triangles
     atlas: Atlas
     direct: Floats
@@ -157,59 +158,48 @@ def bodies(scene: Scene, faces: Triangles) -> Mask:
     return np.array([kind is not None and kind.kind == "body" for kind in kinds], bool)[faces.thing]
 
 
-def spacings_m(scene: Scene, faces: Triangles, settings: BakeSettings) -> Array:
-    """Between samples on each face (F,): what its thing asks for, finer where it is sunlit, coarser on movers.
+def sampled_faces(scene: Scene, settings: BakeSettings) -> tuple[FaceParts, Triangles, Array]:
+    """Parts of a scene's faces, the table (T,) of these, and the distance (T,) between samples on each.
+
+    Faces are divided so that samples are near to one another only where edges of the sun's shadows are.
+    """
+    faces = triangles(scene)
+    directions = []
+    for light in scene.lights:
+        if isinstance(light, Sun):
+            directions += [light.direction(t_ns) for t_ns in key_times_ns(light)]
+    is_static = faces.mover < 0
+    parts, is_fine = sunlit_parts(
+        faces,
+        is_receiver=bodies(scene, faces) & is_static,
+        is_opaque=is_static & ~are_panes(faces, scene.materials),
+        sun_directions=directions,
+        spacing_m=_asked_m(faces, settings),
+    )
+    parted = parts.of(faces)
+    return parts, parted, spacings_m(scene, parted, settings, is_fine)
+
+
+def _asked_m(faces: Triangles, settings: BakeSettings) -> Array:
+    """The distance between samples (F,) that the thing of each face asks for, or else the settings."""
+    things_ask_m = [thing.spacing_m or settings.spacing_m for thing in faces.things]
+    return np.array(things_ask_m)[faces.thing]
+
+
+def spacings_m(scene: Scene, faces: Triangles, settings: BakeSettings, is_fine: Mask) -> Array:
+    """Between samples on each face (F,): what its thing asks for, less on fine faces (F,), more on movers.
 
     On what asks for nothing it grows with the scene, so that SAMPLES do.
     """
-    things_ask_m = [thing.spacing_m or 0.0 for thing in faces.things]
-    asked_m = np.array(things_ask_m)[faces.thing]
-    static_factor = np.where(_sunlit(scene, faces), 1 / SUNLIT_FINER, 1.0)
+    static_factor = np.where(is_fine, 1 / SUNLIT_FINER, 1.0)
     factor = np.where(faces.mover < 0, static_factor, MOVER_COARSER)
-    spacing_m = np.where(asked_m, asked_m, settings.spacing_m) * factor
+    spacing_m = _asked_m(faces, settings) * factor
 
-    is_free = bodies(scene, faces) & (asked_m == 0)
+    asks = np.array([thing.spacing_m is not None for thing in faces.things])
+    is_free = bodies(scene, faces) & ~asks[faces.thing]
     sample_count = (areas_m2(faces.corners_m[is_free]) / spacing_m[is_free] ** 2).sum()
     growth = max(1.0, float(np.sqrt(sample_count / SAMPLES)))
     return np.asarray(spacing_m * np.where(is_free, growth, 1.0))
-
-
-def _sunlit(scene: Scene, faces: Triangles) -> Mask:
-    """The faces (F,) of planes and small things that the sun reaches, at any of the instants it is baked for."""
-    is_lit = np.zeros(len(faces), bool)
-    suns = [light for light in scene.lights if isinstance(light, Sun)]
-    static = np.flatnonzero(bodies(scene, faces) & (faces.mover < 0))
-    if not suns or not len(static):
-        return is_lit
-    area_m2 = areas_m2(faces.corners_m)
-    probe_count = 1 + (area_m2[static] / PROBES_M**2).astype(int)
-    face = np.repeat(static, probe_count)
-    a, b = np.random.default_rng(0).random((2, len(face), 1))
-    first, second, third = faces.corners_m[face].swapaxes(0, 1)
-    on_far_edge = second - first + b * (third - second)
-    probes_m = first + np.sqrt(a) * on_far_edge
-    origins_m = offset_from_surface(probes_m, faces.plane[face])
-
-    is_opaque = (faces.mover < 0) & ~are_panes(faces, scene.materials)
-    caster = RayCaster(faces, np.flatnonzero(is_opaque))
-    for sun in suns:
-        for t_ns in key_times_ns(sun):
-            direction = sun.direction(t_ns)
-            facing = np.flatnonzero(faces.plane[face] @ direction > 0)
-            segments_m = np.broadcast_to(FAR_M * direction, (len(facing), 3))
-            is_shaded = caster.stops(origins_m[facing], segments_m)
-            is_lit[face[facing[~is_shaded]]] = True
-
-    # All of a plane and of a small thing, so that no map changes its spacing in the middle of either.
-    thing_area_m2 = np.bincount(faces.thing, area_m2)
-    is_small = thing_area_m2[faces.thing] < SMALL_M2
-    offset_m = np.einsum("ij,ij->i", faces.plane, faces.corners_m[:, 0])
-    offset = np.rint(offset_m * 1e3)
-    normal = np.rint(faces.plane * 1e3)
-    plane_keys = [np.where(is_small, 0, column) for column in (*normal.T, offset)]
-    group = distinct_rows(np.column_stack([faces.thing, *plane_keys])).inverse
-    has_lit_face = np.bincount(group, is_lit) > 0
-    return np.asarray(has_lit_face[group])
 
 
 def static_points(
@@ -243,10 +233,12 @@ def bake(
 
     `report` is called now and then with the share of the work that is done, about.
     """
-    faces = triangles(scene)
-    spacing_m = spacings_m(scene, faces, settings)
+    _paint(scene)
+    freed_memory.give_back()
+    parts, faces, spacing_m = sampled_faces(scene, settings)
     atlas = unwrap(faces, spacing_m, bodies(scene, faces))
     visibility, points, layout, point_areas_m2 = static_points(scene, faces, atlas, settings.seed)
+    freed_memory.give_back()
     thing = faces.thing[points.face]
     cell_m = CELL_TEXELS * spacing_m[points.face]
     step_m = np.maximum(settings.indirect_spacing_m, cell_m).astype(np.float32)
@@ -286,17 +278,7 @@ def bake(
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
     reflectors = Reflectors(gatherer, points, point_areas_m2, settings.seed)
 
-    def by_photons(row: int, light: Floats, scattered_lm: float) -> Floats:
-        """The illuminance (2, S) by way of mirroring faces, by each half of the photons."""
-        index, t_ns = instants[row]
-        if not settings.bounces or isinstance(scene.lights[index], Sky):
-            return np.zeros((2, len(groups)), np.float32)
-        share = settings.indirect_rays / INDIRECT_RAYS / len(instants)
-        effort = share * reflectors.effort(light, scattered_lm)
-        light_emitters = emitters(scene.lights[index], visibility, t_ns=t_ns)
-        flux_lm = reflectors.flux_lm(light_emitters, light, effort=effort, seed=[settings.seed, row])
-        return smoothing.density(flux_lm.T, area_m2).T
-
+    by_photons = _PhotonLight(scene, settings, reflectors, smoothing, instants=instants, area_m2=area_m2)
     straight = _straight(
         scene,
         settings,
@@ -308,7 +290,8 @@ def bake(
         by_photons=by_photons,
         report=report,
     )
-    del static, points, layout  # bounces take memory of their own
+    del static, points, layout, reflectors, by_photons  # bounces take memory of their own
+    freed_memory.give_back()
     indirect, noise = _bounces(scene, settings, rounds, smoothing, straight=straight, instants=instants)
     first = [instants.index((index, key_times_ns(light)[0])) for index, light in enumerate(scene.lights)]
     patches = Patches(
@@ -320,8 +303,57 @@ def bake(
     mean_noise = float(np.sqrt(np.average(noise**2, weights=area_m2))) if area_m2.sum() > 0 else 0.0
     tracks = _tracks(instants, indirect, scene)
     return BakedScene(
-        scene, faces, atlas, straight.direct, indirect[first], spread, patches, settings, tracks, mean_noise
+        scene, parts, faces, atlas, straight.direct, indirect[first], spread, patches, settings, tracks, mean_noise
     )
+
+
+class _PhotonLight:
+    """What lamps and suns at some instants give surfels by way of mirroring faces."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        settings: BakeSettings,
+        reflectors: Reflectors,
+        smoothing: Smoothing,
+        *,
+        instants: list[tuple[int, float]],
+        area_m2: Floats,
+    ) -> None:
+        self._scene = scene
+        self._settings = settings
+        self._reflectors = reflectors
+        self._smoothing = smoothing
+        self._instants = instants
+        self._area_m2 = area_m2
+
+    def lx(self, row: int, light: Floats, scattered_lm: float) -> Floats:
+        """The illuminance (2, S) by each half of the photons of the light of an instant.
+
+        `light` (P,) is its direct light on points, which scatter `scattered_lm`.
+        """
+        index, t_ns = self._instants[row]
+        lamp = self._scene.lights[index]
+        if not self._settings.bounces or isinstance(lamp, Sky):
+            return np.zeros((2, len(self._area_m2)), np.float32)
+        share = self._settings.indirect_rays / INDIRECT_RAYS / len(self._instants)
+        effort = share * self._reflectors.effort(light, scattered_lm)
+        seed = [self._settings.seed, row]
+        light_emitters = emitters(lamp, self._reflectors.visibility, t_ns=t_ns)
+        flux_lm = self._reflectors.flux_lm(light_emitters, light, effort=effort, seed=seed)
+        return self._smoothing.density(flux_lm.T, self._area_m2).T
+
+
+def _paint(scene: Scene) -> None:
+    """Paint the textures and panoramas of a scene, which are cached, while nothing else takes memory."""
+    names = {thing.material for thing in scene.things} & scene.materials.keys()
+    for name in sorted(names):
+        texture = scene.materials[name].texture
+        if texture is not None:
+            texture.pixels()
+    for light in scene.lights:
+        if isinstance(light, Sky) and light.panorama is not None:
+            light.panorama.map_under(light)
 
 
 @dataclass(frozen=True, slots=True)
@@ -348,11 +380,12 @@ def _straight(
     *,
     area_m2: Floats,
     instants: list[tuple[int, float]],
-    by_photons: Callable[[int, Floats, float], Floats],
+    by_photons: "_PhotonLight",
     report: Report,
 ) -> _Straight:
     """Trace the direct light of the lights at some instants; weights (P,) of points in their surfels, area_m2 (S,)."""
     scatters = albedo(static.faces, scene.materials, static.points)
+    freed_memory.give_back()
     direct = np.zeros((len(scene.lights), static.atlas.height, static.atlas.width), np.float32)
     illuminance_lx = np.zeros((len(instants), len(groups)), np.float32)
     received = np.zeros((len(instants), len(groups), 3), np.float32)
@@ -365,7 +398,8 @@ def _straight(
         received[row] = groups.mean(scatters * light[:, None], weights)
         direct[index] = direct_layer(scene, index, static, light)
         scattered_lm = float((received[row] @ LUMINANCE * area_m2).sum())
-        by_mirrors_lx[:, row] = by_photons(row, light, scattered_lm)
+        by_mirrors_lx[:, row] = by_photons.lx(row, light, scattered_lm)
+        freed_memory.give_back()
         report(1 - (1 - GATHER_DONE) * row / len(instants))
     return _Straight(direct, groups.mean(scatters, weights), illuminance_lx, received, by_mirrors_lx)
 
@@ -556,6 +590,8 @@ def save_baked(folder: Path, baked: BakedScene) -> None:
         folder / PLACES,
         light_px=baked.atlas.light_px,
         chart=baked.atlas.chart,
+        parent=baked.parts.parent,
+        weights=baked.parts.weights,
         bounced=baked.bounced,
         **spread,
         **patches,
@@ -636,9 +672,11 @@ def load_baked(folder: Path, scene: Scene) -> BakedScene:
         spread = scipy.sparse.csr_matrix(spread_arrays, (texel_count, len(patches.area_m2)))
     except (OSError, EOFError, ValueError, KeyError, TypeError, zipfile.BadZipFile, SettingError) as error:
         raise RenderError(f"the scene's light cannot be read ({error}); delete this folder: {folder}") from error
+    parts = FaceParts(arrays["parent"], arrays["weights"])
     return BakedScene(
         pictured,
-        triangles(scene),
+        parts,
+        parts.of(triangles(scene)),
         atlas,
         light,
         arrays["bounced"],

@@ -11,19 +11,22 @@ from vobench.rendering.embree import Hits
 from vobench.scene.material import Material
 from vobench.scene.triangles import Triangles
 
+NO_CUTOUT = -1  # the index of faces whose material has no cut-out
+
 
 class CutOuts:
     """Finds the hits that lie in the hole of a cut-out.
 
-    `cutout_of_face` (F + 1,) is the index of each face's material among those with cut-outs, or -1. The last element is
-    -1, so that a ray that hits no face, whose face is -1, finds no material.
+    `cutout_of_face` (F + 1,) is the index of each face's material among those with cut-outs, or NO_CUTOUT. The last
+    element is NO_CUTOUT: a ray that hits no face has the face -1, which is the index of the last element.
     """
 
     def __init__(self, faces: Triangles, materials: dict[str, Material]) -> None:
         self._materials_with_holes = {name: material for name, material in materials.items() if _has_holes(material)}
         index_by_name = {name: index for index, name in enumerate(self._materials_with_holes)}
-        index_by_thing = np.array([index_by_name.get(thing.material, -1) for thing in faces.things], np.int32)
-        self.cutout_of_face = np.append(index_by_thing[faces.thing], -1)
+        index_by_thing = np.array([index_by_name.get(thing.material, NO_CUTOUT) for thing in faces.things], np.int32)
+        thing_of_face = faces.thing  # (F,), indices
+        self.cutout_of_face = np.append(index_by_thing[thing_of_face], NO_CUTOUT)
         self._uv = faces.uv
 
     def are_in_holes(self, hits: Hits) -> Mask:

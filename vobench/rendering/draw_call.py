@@ -33,7 +33,6 @@ class DrawCalls:
     """The draw calls of a scene, and the shader programs and buffers that they share.
 
     The OpenGL context in which an instance was created must be current whenever the instance is used.
-    In the methods, `weights` are the shares of red, green and blue in the luminance of a mono canvas.
     `light` is the id of the light-map texture.
     `panoramas` maps the index of a sky to its panorama; skies without a panorama are absent.
     The attribute `shader_defines` lists, for each batch, the preprocessor names of its shader.
@@ -45,7 +44,7 @@ class DrawCalls:
         light: int,
         panoramas: Mapping[int, PanoramaTexture],
     ) -> None:
-        self._program = cache(ShaderProgram)
+        self._program = cache(ShaderProgram)  # each program is compiled once for each set of preprocessor names
         self._light = light
         self._panoramas = panoramas
         self._batches = geometry.batches
@@ -70,7 +69,10 @@ class DrawCalls:
         weights: Rgb,
         probe: Probe | None,
     ) -> None:
-        """Set the uniforms, textures and state that are the same for all draw calls of a view."""
+        """Set the uniforms, textures and state that are the same for all draw calls of a view.
+
+        `weights` are the shares of red, green and blue in the luminance of a mono canvas.
+        """
         uniforms = self._pass_uniforms
         uniforms[...] = np.zeros((), PASS.dtype)
         set_view(uniforms, view, canvas, weights)
@@ -80,8 +82,9 @@ class DrawCalls:
         self._pass_buffer.update(0, uniforms)
         self._pass_buffer.use(0)
         self._upload_mover_poses(view)
-        # Each reflection reverses the winding order of the faces.
-        GL.glFrontFace(GL.GL_CW if view.depth % 2 else GL.GL_CCW)
+        # Each reflection reverses the winding order of the faces; the depth of a view is its number of reflections.
+        is_mirror_image = view.depth % 2 == 1
+        GL.glFrontFace(GL.GL_CW if is_mirror_image else GL.GL_CCW)
         bind(LIGHT_UNIT, self._light)
 
     def _upload_mover_poses(self, view: PinholeView) -> None:

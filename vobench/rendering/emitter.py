@@ -21,7 +21,7 @@ from vobench.rendering.geometry import (
     sample_points,
     tangents,
 )
-from vobench.rendering.shadow_kernels import aim_at_area
+from vobench.rendering.shadow_kernels import CURVE_BITS, aim_at_area, aim_at_triangles
 from vobench.rendering.solid_angle import Rectangle, SeenRectangle, SolidAngle, rectangle
 from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
@@ -167,16 +167,6 @@ class Panel(Emitter):
         return aim
 
 
-def _from_area(intensity_cd: np.float32, vectors_m: Floats, along_normal: Floats) -> Floats:
-    """Illuminance (P,) square to vectors (P, 3) to a Lambertian emitter, by their lengths along its normal (P,)."""
-    squared_m2 = np.maximum(np.einsum("ij,ij->i", vectors_m, vectors_m), np.float32(1e-9))
-    ahead = np.maximum(-along_normal, 0)
-    return np.asarray(intensity_cd * ahead / (squared_m2 * np.sqrt(squared_m2)))
-
-
-CURVE_BITS = 10
-
-
 @dataclass(frozen=True, slots=True, eq=False)
 class MeshPanel(Emitter):
     """A lamp of any shape, whose triangles (K, 3, 3) shine only to their front; near ones are near in their order."""
@@ -192,21 +182,16 @@ class MeshPanel(Emitter):
 
     def towards(self, texels: Texels) -> Aim:
         """Places on triangles in proportion to their areas."""
-        area_m2 = areas_m2(self.corners_m)
-        normals = face_normals(self.corners_m).astype(np.float32)
-        ends = np.cumsum(area_m2) / area_m2.sum()
-        intensity_cd = np.float32(self.light.luminance_cd_m2 * area_m2.sum())  # straight ahead
+        normals = face_normals(self.corners_m)
+        lifted_m = self.corners_m + RAY_OFFSET_M * normals[:, None]
+        ends_m2 = np.cumsum(areas_m2(self.corners_m))
+        mesh = (lifted_m, normals, ends_m2, float(self.light.luminance_cd_m2))
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            # strata of the square are such of the mesh
-            along_curve = _interleaved(np.stack([a, b], -1))
-            rest = b * 2**CURVE_BITS % 1
-            triangle = np.searchsorted(ends, along_curve, side="right")
-            normal = normals[np.minimum(triangle, len(ends) - 1)]
-            places_m = sample_points(self.corners_m, along_curve, rest) + RAY_OFFSET_M * normal
-            vectors_m = places_m.astype(np.float32) - texels.points_m
-            along_normal = np.einsum("ij,ij->i", vectors_m, normal)
-            return vectors_m, _from_area(intensity_cd, vectors_m, along_normal)
+            vectors_m = np.empty((len(texels), 3), np.float32)
+            strength = np.empty(len(texels), np.float32)
+            aim_at_triangles(texels.points_m, *mesh, a, b, vectors_m, strength)
+            return vectors_m, strength
 
         return aim
 

@@ -1,7 +1,7 @@
 """Adaptive gathering, with more rays where indirect light is noisy, and smoothing of light from far surfels."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -86,16 +86,19 @@ class Rounds:
         self._middles = middles
         self._side = side
         halves = []
+        hits = []
         for half in (0, 1):
 
             def half_done(share: float, half: int = half) -> None:
                 if done:
                     done((half + share) / 2)
 
-            halves.append(gatherer.sample(middles, side=side, turn=half, done=half_done))
+            sample = gatherer.sample(middles, side=side, turn=half, done=half_done)
+            hits.append(gatherer.hits(sample))
+            halves.append(replace(sample, texels=sample.texels[:0]))  # they are counted, and take memory
         self._halves = halves
         self.escaped = (halves[0].escaped + halves[1].escaped) / 2
-        self.hits = gatherer.hits(halves[0]) + gatherer.hits(halves[1])
+        self.hits = hits[0] + hits[1]
 
     def table(self) -> "LinearOperator":
         """The table (S, S) of the first round, which maps the radiosity of surfels to the light that they receive."""

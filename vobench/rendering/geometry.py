@@ -33,7 +33,10 @@ FLAT_M = 1e-3
 
 def take(table: T, rows: Rows | Mask | slice) -> T:
     """The same rows of all the arrays that a dataclass has."""
-    return type(table)(*(getattr(table, field.name)[rows] for field in fields(table)))  # type: ignore[arg-type]
+    columns = [getattr(table, field.name) for field in fields(table)]  # type: ignore[arg-type]
+    if isinstance(rows, np.ndarray) and rows.dtype != bool:
+        return type(table)(*(column.take(rows, axis=0) for column in columns))  # three times as fast as an index
+    return type(table)(*(column[rows] for column in columns))
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ import scipy
 
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas
-from vobench.rendering.blend_kernels import TURNED, count_weights, write_weights
+from vobench.rendering.blend_kernels import TURNED, Blending, count_weights, write_weights
 from vobench.rendering.direct_light import EvenPattern
 from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, face_materials, take
@@ -134,18 +134,27 @@ def blend(
     is_hidden = chunked(hidden, len(surfel)).reshape(neighbours.shape)
     is_hidden = is_hidden & (neighbours != np.arange(len(groups))[:, None])
     is_hidden &= ~is_hidden.all(1, keepdims=True)
-    inputs = (points.points_m, points.normals, groups.of, neighbours, is_hidden, middles_m, normals, groups.step_m)
+    blending = Blending(
+        points_m=points.points_m,
+        point_normals=points.normals,
+        surfel_of_point=groups.of,
+        neighbours=neighbours,
+        is_hidden=is_hidden,
+        middles_m=middles_m,
+        normals=normals,
+        step_m=groups.step_m,
+    )
 
     texel_count = layout.source.size
     starts = np.zeros(texel_count + 1, np.int32)
-    in_chunks(lambda part: count_weights(layout.source[part], *inputs, starts[1:][part]), texel_count)
+    in_chunks(lambda part: count_weights(layout.source[part], blending, starts[1:][part]), texel_count)
     np.cumsum(starts, out=starts)
     columns = np.empty(starts[-1], np.int32)
     values = np.empty(starts[-1], np.float32)
 
     def write(part: slice) -> None:
         entries = slice(starts[part.start], starts[part.stop])
-        write_weights(layout.source[part], *inputs, columns[entries], values[entries])
+        write_weights(layout.source[part], blending, columns[entries], values[entries])
 
     in_chunks(write, texel_count)
     return scipy.sparse.csr_matrix((values, columns, starts), (texel_count, len(groups)))

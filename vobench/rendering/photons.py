@@ -44,6 +44,7 @@ class Reflectors:
     ) -> None:
         self._gatherer = gatherer
         visibility = gatherer.visibility
+        self.visibility = visibility
         self._is_pane = visibility.is_pane
         faces = visibility.faces
         mirrored = self._mirrored(points.face, np.full(len(points), TYPICAL_COSINE))
@@ -188,7 +189,7 @@ class Reflectors:
 
         `weight` (P,) is the reciprocal of the expected number of photons from each place.
         """
-        visibility = self._gatherer.visibility
+        visibility = self.visibility
         response = self._gatherer.response
         points = self._texels(place, number[:4])
         flux_m2 = (self._area_m2[place] * weight).astype(np.float32)

@@ -164,6 +164,64 @@ def aim_at_area(
         strength[point] = intensity_cd * max(ahead_m, 0.0) / (squared_m2 * math.sqrt(squared_m2))
 
 
+CURVE_BITS = 10  # of each of two numbers, which together name a place along a Z-shaped curve
+CURVE_CELLS = 1 << CURVE_BITS
+
+
+@compiled
+def along_curve_of(a: float, b: float) -> float:
+    """A number in [0, 1) whose bits are by turns those of a and of b in [0, 1)."""
+    first = int(a * CURVE_CELLS)
+    second = int(b * CURVE_CELLS)
+    place = 0
+    for bit in range(CURVE_BITS - 1, -1, -1):
+        place = 4 * place + 2 * ((first >> bit) & 1) + ((second >> bit) & 1)
+    return place / (CURVE_CELLS * CURVE_CELLS)
+
+
+@compiled
+def aim_at_triangles(
+    points_m: Floats,
+    corners_m: Floats,
+    normals: Floats,
+    ends_m2: Floats,
+    luminance_cd_m2: float,
+    a: Floats,
+    b: Floats,
+    vectors_m: Floats,
+    strength: Floats,
+) -> None:
+    """Write vectors (P, 3) to places on triangles (K, 3, 3), and the illuminance (P,) square to them.
+
+    The triangles shine to the side of their normals (K, 3). `ends_m2` (K,) are sums of the areas up to each, so that
+    places are spread evenly over all of them. Strata of the unit square of `a` and `b` (P,) are such of the mesh if
+    near triangles are near to one another in their order.
+    """
+    whole_m2 = ends_m2[-1]
+    intensity_cd = luminance_cd_m2 * whole_m2  # straight ahead
+    for point in range(len(points_m)):
+        sample_m2 = along_curve_of(a[point], b[point]) * whole_m2
+        triangle = min(np.searchsorted(ends_m2, sample_m2, side="right"), len(ends_m2) - 1)
+        start_m2 = ends_m2[triangle - 1] if triangle > 0 else 0.0
+        within = (sample_m2 - start_m2) / max(ends_m2[triangle] - start_m2, 1e-30)
+        share = math.sqrt(min(max(within, 0.0), 1.0))
+        fine = np.float64(b[point]) * CURVE_CELLS
+        aside = share * (fine - math.floor(fine))
+        ahead_m = 0.0
+        squared_m2 = 0.0
+        for axis in range(3):
+            first_m = corners_m[triangle, 0, axis]
+            second_m = corners_m[triangle, 1, axis]
+            third_m = corners_m[triangle, 2, axis]
+            place_m = first_m + share * (second_m - first_m) + aside * (third_m - second_m)
+            step_m = place_m - points_m[point, axis]
+            vectors_m[point, axis] = step_m
+            ahead_m -= step_m * normals[triangle, axis]
+            squared_m2 += step_m * step_m
+        squared_m2 = max(squared_m2, 1e-9)
+        strength[point] = intensity_cd * max(ahead_m, 0.0) / (squared_m2 * math.sqrt(squared_m2))
+
+
 @compiled
 def ahead_of(points_m: Floats, normals: Floats, rows: Rows, centre_m: Floats, radius_m: float, chosen: Mask) -> None:
     """Write which of the points at rows (N,) have any of a ball before them."""
@@ -176,26 +234,39 @@ def ahead_of(points_m: Floats, normals: Floats, rows: Rows, centre_m: Floats, ra
 
 
 @compiled
-def meet_boxes(origins_m: Floats, segments_m: Floats, boxes_m: Floats, is_met: Mask) -> None:
-    """Write which segments (R, 3) from origins meet any of the boxes (K, 2, 3), given by lower and upper corners."""
+def meet_boxes(origins_m: Floats, segments_m: Floats, around_m: Floats, boxes_m: Floats, is_met: Mask) -> None:
+    """Write which segments (R, 3) from origins meet any of the boxes (K, 2, 3), given by lower and upper corners.
+
+    `around_m` (2, 3) is a box around all of them.
+    """
     for ray in range(len(origins_m)):
         is_met[ray] = False
+        if not _meets_box(origins_m[ray], segments_m[ray], around_m):
+            continue
         for box in range(len(boxes_m)):
-            enters = np.float32(0)
-            leaves = ONE
-            for axis in range(3):
-                start_m = origins_m[ray, axis]
-                step_m = segments_m[ray, axis]
-                low_m = boxes_m[box, 0, axis] - start_m
-                high_m = boxes_m[box, 1, axis] - start_m
-                if step_m == 0:
-                    if low_m > 0 or high_m < 0:
-                        leaves = np.float32(-1)
-                    continue
-                first = low_m / step_m
-                second = high_m / step_m
-                enters = max(enters, min(first, second))
-                leaves = min(leaves, max(first, second))
-            if enters <= leaves:
+            if _meets_box(origins_m[ray], segments_m[ray], boxes_m[box]):
                 is_met[ray] = True
                 break
+
+
+@compiled
+def _meets_box(origin_m: Floats, segment_m: Floats, box_m: Floats) -> bool:
+    """Whether a segment (3,) from an origin (3,) meets a box (2, 3)."""
+    enters = np.float32(0)
+    leaves = ONE
+    for axis in range(3):
+        start_m = origin_m[axis]
+        step_m = segment_m[axis]
+        low_m = box_m[0, axis] - start_m
+        high_m = box_m[1, axis] - start_m
+        if step_m == 0:
+            if low_m > 0 or high_m < 0:
+                return False
+            continue
+        first = low_m / step_m
+        second = high_m / step_m
+        enters = max(enters, min(first, second))
+        leaves = min(leaves, max(first, second))
+        if enters > leaves:
+            return False
+    return True

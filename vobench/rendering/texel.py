@@ -83,20 +83,21 @@ def texels(
         is_inside = chunked(lambda part: _sees_only_backs(points.take(part), visibility), len(points))
         is_inside = is_inside | _touches_other_face(points, visibility)
     is_outside = ~is_inside
-    outside = points.take(is_outside)
+    points = points.take(is_outside)
     layout, in_plane = texel_layout(
         index,
         beside,
         is_outside,
-        points_m=outside.points_m,
-        planes=outside.planes,
+        points_m=points.points_m,
+        normals=points.normals,
+        planes=points.planes,
         atlas=atlas,
         owner=owner,
         visibility=visibility,
     )
-    outside.step_u_m[~in_plane[:2].all(0)] = 0
-    outside.step_v_m[~in_plane[2:].all(0)] = 0
-    return outside, layout
+    points.step_u_m[~in_plane[:2].all(0)] = 0
+    points.step_v_m[~in_plane[2:].all(0)] = 0
+    return points, layout
 
 
 def texel_areas_m2(

@@ -13,6 +13,9 @@ from vobench.rendering.thread_pool import chunked
 from vobench.rendering.visibility import Visibility
 
 STRAIGHT = np.cos(np.deg2rad(1.5))  # between texels that lie in one plane
+CREASE = np.cos(
+    np.deg2rad(30)
+)  # between the normals of texels, across which light is neither smoothed nor interpolated
 BLURS = 2
 WIDEST_M = 0.22  # between points of a grid; light changes over such distances
 STRIDES = (4, 2)  # of the grids of texels at which light is computed first
@@ -25,6 +28,7 @@ class TexelLayout:
     source (H·W,) is the point that each texel takes its value from, P for none: texels beside a face are read by
     interpolation, and those inside things have the light of the nearest of their chart, so that no darkness reaches
     out. neighbours (4, P) are the points left, right, above and below in the same chart, the point itself for none.
+    Texels on both sides of a crease, as on top and side of a board, count as being in two charts.
     grids (N, P): which points are on the grid of each of STRIDES; the last points of rows and columns of a chart are.
     """
 
@@ -101,6 +105,7 @@ def texel_layout(
     is_valid: Mask,
     *,
     points_m: Floats,
+    normals: Floats,
     planes: Floats,
     atlas: Atlas,
     owner: Owners,
@@ -108,7 +113,8 @@ def texel_layout(
 ) -> tuple[TexelLayout, Mask]:
     """The layout of the valid ones (P,) among points (A,), and which of their neighbours (4, P) lie in one plane.
 
-    index (A,), beside (4, A) and is_valid (A,) are of all points; points_m and planes (P, 3) of the valid ones.
+    index (A,), beside (4, A) and is_valid (A,) are of all points; points_m, normals of the shape and planes (P, 3) of
+    the valid ones.
     """
     count = len(points_m)
     new_index = np.where(is_valid, np.cumsum(is_valid) - 1, -1)
@@ -119,6 +125,9 @@ def texel_layout(
     valid_beside = new_index[beside[:, is_valid]]
     itself = np.arange(count)
     valid_beside = np.where(valid_beside < 0, itself, valid_beside).astype(np.int32)
+    for side in valid_beside:
+        is_beyond_crease = np.einsum("ij,ij->i", normals[side], normals) < CREASE
+        side[is_beyond_crease] = itself[is_beyond_crease]
     in_plane = _in_plane(points_m, planes, valid_beside, visibility)
     grids = _grids(index[is_valid], points_m, valid_beside, atlas.width)
     return TexelLayout(atlas.height, atlas.width, source, valid_beside, grids), in_plane

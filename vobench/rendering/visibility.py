@@ -57,6 +57,7 @@ class Visibility:
         self._glass = RayCaster(faces, rows[is_pane])
         self._has_panes = bool(is_pane.any())
         self._pane_boxes = _boxes(faces, rows[is_pane])
+        self._around_panes = _around(self._pane_boxes)
         self.is_pane = np.zeros(len(faces), bool)
         self.is_pane[rows[is_pane]] = True
         self.is_static = np.zeros(len(faces), bool)
@@ -97,7 +98,7 @@ class Visibility:
         is_near = np.empty(len(origins_m), bool)
         origins = np.ascontiguousarray(origins_m, np.float32)
         segments = np.ascontiguousarray(segments_m, np.float32)
-        meet_boxes(origins, segments, self._pane_boxes, is_near)
+        meet_boxes(origins, segments, self._around_panes, self._pane_boxes, is_near)
         return np.flatnonzero(is_near)
 
     def clear(self, origins_m: Floats, segments_m: Floats) -> Mask:
@@ -191,8 +192,15 @@ def _boxes(faces: Triangles, rows: Indices) -> Floats:
     rounded_m = np.round(boxes_m, 3).reshape(-1, 6)
     boxes_m = np.unique(rounded_m, axis=0).reshape(-1, 2, 3)
     if len(boxes_m) > MOST_BOXES:
-        boxes_m = np.stack([boxes_m[:, 0].min(0), boxes_m[:, 1].max(0)])[None]
+        boxes_m = _around(boxes_m)[None]
     return boxes_m.astype(np.float32)
+
+
+def _around(boxes_m: Floats) -> Floats:
+    """The box (2, 3) around boxes (K, 2, 3); one that no segment meets if there are none."""
+    if not len(boxes_m):
+        return np.full((2, 3), FAR_M, np.float32)
+    return np.stack([boxes_m[:, 0].min(0), boxes_m[:, 1].max(0)])
 
 
 def _by_face(

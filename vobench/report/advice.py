@@ -34,7 +34,7 @@ def _seconds_per_place(plan: Plan, typical_s: Mapping[str, float], *, jobs: int,
 
     Estimators run one after the other unless the suite shares time.
     """
-    trials = len(plan.simulated) * len(plan.estimator_entries) * plan.suite.repeats
+    trials = len(plan.simulated) * len(plan.estimator_entries)
     scenes = {case.variant["scene"] for case in plan.simulated}
     tasks = {"sequence": len(plan.simulated), **dict.fromkeys(STAGES_PER_TRIAL, trials)}
     if any(case.rendering.needs_bake for case in plan.simulated):

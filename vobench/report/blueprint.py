@@ -43,7 +43,8 @@ STATUS_SHARE_PER_ESTIMATOR = 0.4
 PLOT_TABS_SHARE = 2.0
 PICTURE_SHARE = 3.0
 SUMMARY_SHARE = 2.6
-COLUMN_SHARES = [3, 2]
+PATHS_COLUMN_SHARE = 3.0
+PICTURES_COLUMN_SHARE = 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -69,7 +70,7 @@ def layout(truth_m: Array, estimates_m: Array, options: LayoutOptions) -> rrb.Bl
     views: rrb.Container = rrb.Horizontal(
         _paths_column(truth_m, estimates_m, options),
         _pictures_column(options.labels),
-        column_shares=COLUMN_SHARES,
+        column_shares=[PATHS_COLUMN_SHARE, PICTURES_COLUMN_SHARE],
     )
     if options.channels:
         truth_tabs = [_truth_tab(side, options.channels) for side in ("left", "right")]
@@ -107,7 +108,8 @@ def _paths_column(truth_m: Array, estimates_m: Array, options: LayoutOptions) ->
 def _pictures_column(labels: Sequence[str]) -> rrb.Vertical:
     """The pictures with tracks, with the scores below them."""
     pictures = [_left_picture(label, labels) for label in labels]
-    if len(labels) == 1:
+    has_room_for_right = len(labels) == 1  # tracks are in the left pictures, of which each estimator has one
+    if has_room_for_right:
         pictures.append(rrb.Spatial2DView(origin=TRUTH_RIGHT, name="Right"))
     summaries = [
         rrb.TextDocumentView(origin=EstimatorEntities(label).summary, name=f"Score of {label}") for label in labels

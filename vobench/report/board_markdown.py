@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from vobench.report.board_metric import METRICS
-from vobench.report.board_table import DEFAULT_METRIC, LEGEND, cell_notes, matrix, origin, remarks, totals
+from vobench.report.board_table import DEFAULT_METRIC, LEGEND, board_notes, matrix, origin, totals
 from vobench.report.leaderboard import Board
 from vobench.report.markdown_table import escaped, markdown_table
 
@@ -19,8 +19,7 @@ def markdown(board: Board, metric: str = DEFAULT_METRIC) -> str:
         rows = [_escaped_row(row) for row in table]
         lines += [f"## Totals: {escaped(scope)}", "", *markdown_table(rows, words=2), ""]
 
-    sentences = [*remarks(board), *cell_notes(board)]
-    lines += [f"- {escaped(sentence)}" for sentence in sentences]
+    lines += [f"- {escaped(sentence)}" for sentence in board_notes(board)]
     lines += ["", LEGEND.replace("~", "\\~"), ""]
     for sentence in (board.visible, origin(board)):
         if sentence:

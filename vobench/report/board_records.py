@@ -9,7 +9,7 @@ from vobench.report.board_table import remarks
 from vobench.report.cell import Cell
 from vobench.report.leaderboard import Board
 from vobench.report.total import Total
-from vobench.runner.folder import NO_SEQUENCE
+from vobench.runner.folder import NO_SEQUENCE, TRUTH_COPY
 from vobench.spreadsheet import cell
 
 if TYPE_CHECKING:
@@ -87,6 +87,7 @@ def _cell_record(cell: Cell) -> Record:
         "status": cell.status,
         "reason": cell.reason,
         "saw": cell.saw,
+        "equals_truth": TRUTH_COPY in cell.claims,
         "drift_mm": cell.drift_mm,
         "scale_gap": cell.scale_gap,
         "consistency": cell.consistency,

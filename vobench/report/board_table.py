@@ -25,7 +25,15 @@ LEGEND = (
     "marked; the median over cases. × best: error relative to the first-ranked estimator where both survive, with its "
     "95 % interval for other places and drives of this kind. Lost: failed trials. Estimators are ordered by the score "
     "(1 is perfect), in which a failed trial loses at least 1/2. Ranks in brackets: their 95 % interval. Decided: "
-    "against the estimator above, by a t test over places (2 %, Holm). Baselines and oracles have no rank."
+    "against the estimator above, by a t test over places (2 %, Holm). Baselines, oracles and estimates that equal the "
+    "truth have no rank."
+)
+
+
+# The same for a terminal.
+SHORT_LEGEND = (
+    "* best of its case; ~ not decided against it. × best: error relative to the first, where both survive. "
+    "◆ nothing better is cheaper. leaderboard.html explains the rest."
 )
 
 
@@ -210,15 +218,20 @@ def _total_row(total: Total, headings: Sequence[str]) -> list[str]:
     return [COLUMNS[heading](total) for heading in headings]
 
 
+def board_notes(board: Board) -> list[str]:
+    """All sentences below the tables of a board, the most important first."""
+    unbroken = [curve.sentence for curve in board.curves if curve.breaks_at is None]
+    return [*remarks(board), *cell_notes(board), *unbroken]
+
+
 def remarks(board: Board) -> list[str]:
     """Sentences on the totals: what they cover, who breaks down where, and how undecided orders could be decided."""
     breaking = [curve.sentence for curve in board.curves if curve.breaks_at is not None]
-    others = [curve.sentence for curve in board.curves if curve.breaks_at is None]
     undecided = []
     for above, total in zip(board.totals, board.totals[1:], strict=False):
         if total.decided_above is False and total.smallest_ratio is not None:
             undecided.append(_undecided(above, total))
-    return [*board.remarks, *breaking, *undecided, *others]
+    return [*board.remarks, *breaking, *undecided]
 
 
 def _undecided(above: Total, total: Total) -> str:

@@ -31,6 +31,7 @@ def case_facts(folder: RunFolder, case: str) -> CaseFacts:
         drive_seed=_drive_seed(content),
         lighting=_lighting(content),
         noise_seed=_whole_number(content.get("seed")),
+        repeat_of=str(content.get("repeat_of") or ""),
         truth_noise=_truth_noise(truth_noise),
         truth_noise_m=truth_noise.get("position_m", 0.0),
     )

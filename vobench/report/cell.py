@@ -1,6 +1,6 @@
 """A cell of a board: all trials of one estimator on one case."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, nan
 from statistics import fmean, median
@@ -9,7 +9,7 @@ from vobench.metric import ranking
 from vobench.report.board_metric import FAIL_RATIO, METRICS, MM_PER_M, PERCENT, lost_aware
 from vobench.report.frame_statistics import EstimatorStatistics
 from vobench.runner.consistency import CovarianceConsistency
-from vobench.runner.folder import STATUSES, SURVIVED, TrialScore, seen_by, value_of
+from vobench.runner.folder import NOT_DETERMINISTIC, STATUSES, SURVIVED, TrialScore, seen_by, value_of
 
 ONLY_ITS_OWN = "only its own files"
 LEAST_ERROR_M = 1e-3
@@ -20,6 +20,7 @@ LOSS_OF_ERROR = 0.5 / FAIL_RATIO  # the loss of a survivor whose error is this s
 class CaseFacts:
     """Facts from the file of a case: its calibration group, scenario and severity, place and drive, and truth noise.
 
+    `repeat_of` names the case that this one repeats with new noise; it is empty for that case itself.
     `place` and `drive` are empty if they are unknown; a drive is told apart from others by its text.
     `place_seed` is that of a generator's place, and `drive_seed` that of a body that wanders. `lighting` is the name of
     the lighting, and `noise_seed` the seed of noise and of all else that the simulation draws.
@@ -35,6 +36,7 @@ class CaseFacts:
     drive_seed: int | None = None
     lighting: str = ""
     noise_seed: int | None = None
+    repeat_of: str = ""
     truth_noise: str = ""
     truth_noise_m: float = 0.0
 
@@ -92,6 +94,30 @@ class Cell:
         return median(known), min(known), max(known)
 
 
+def trials_by_cell(
+    trials: Iterable[TrialScore], facts: Mapping[str, CaseFacts]
+) -> dict[tuple[str, str], list[TrialScore]]:
+    """The trials of each cell, by its case and estimator, in order of their names and of the repeats.
+
+    The repeats of a case with new noise are in the cell of the first one. Equal answers of a deterministic estimator to
+    one sequence count once.
+    """
+    groups: dict[tuple[str, str], list[TrialScore]] = {}
+    for trial in sorted(trials, key=lambda trial: (trial.repeat, trial.case)):
+        case = facts.get(trial.case, CaseFacts()).repeat_of or trial.case
+        members = groups.setdefault((case, trial.estimator), [])
+        if not any(_is_equal_answer(trial, member) for member in members):
+            members.append(trial)
+    return dict(sorted(groups.items()))
+
+
+def _is_equal_answer(one: TrialScore, other: TrialScore) -> bool:
+    """Whether two trials of a deterministic estimator are on the same sequence and have the same score."""
+    if one.case != other.case or NOT_DETERMINISTIC in one.claims:
+        return False
+    return (one.status, one.score) == (other.status, other.score)
+
+
 def make_cell(trials: Sequence[TrialScore], answered: EstimatorStatistics, facts: CaseFacts) -> Cell:
     """The cell of the trials of one estimator on one case."""
     survivors = [trial for trial in trials if trial.status in SURVIVED]
@@ -101,7 +127,7 @@ def make_cell(trials: Sequence[TrialScore], answered: EstimatorStatistics, facts
     saw = {seen_by(trial) or ONLY_ITS_OWN for trial in trials}
     consistency = _median_consistency(survivors)
     return Cell(
-        case=most_severe.case,
+        case=facts.repeat_of or most_severe.case,
         estimator=most_severe.estimator,
         facts=facts,
         failures=tuple(trial.status not in SURVIVED for trial in trials),

@@ -19,6 +19,7 @@ from vobench.metric.significance import ROUNDING, PairedDifference, holm, paired
 from vobench.report.cell import Cell
 from vobench.report.leaderboard import Board
 from vobench.runner.environment import differences
+from vobench.runner.folder import NOT_DETERMINISTIC
 
 SAME = "same"
 ALIKE = "alike"  # differs by less than the limit
@@ -36,7 +37,6 @@ MOST_NAMED = 3  # estimators and cases in a message
 LIMIT = 1.05  # ratio of losses of a deterministic estimator beyond which it is better or worse
 MACHINE_LIMIT = 3.0  # the same if the machine changed: processors alone change single cells by up to 2.6 times
 MIN_CASES = 4  # for a test over cases
-NOT_DETERMINISTIC = "not deterministic"
 
 CellKey = tuple[str, str]
 
@@ -74,7 +74,7 @@ class CellPair:
 
     @property
     def is_deterministic(self) -> bool:
-        """Whether the estimator states that it is deterministic, in both runs."""
+        """Whether the estimator states that it is deterministic in both runs, and no repeat refutes it."""
         return NOT_DETERMINISTIC not in (*self.old.claims, *self.new.claims)
 
     @property
@@ -258,9 +258,11 @@ class _Judge:
     def _of_deterministic_cell(self, pair: CellPair, ratio: float | None) -> str:
         if pair.is_same:
             return SAME
-        if pair.old.failed < pair.new.failed:
+        old_share = pair.old.failed / pair.old.trials
+        new_share = pair.new.failed / pair.new.trials
+        if old_share < new_share:
             return FAILS
-        if pair.old.failed > pair.new.failed:
+        if old_share > new_share:
             return MENDED
         return self._of_ratio(ratio)
 

@@ -1,39 +1,60 @@
 """Whether estimators that state that they are deterministic gave the same answer to the same sequence."""
 
-from collections import Counter
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from vobench.errors import counted
-from vobench.report.compare import NOT_DETERMINISTIC
 from vobench.runner.estimate import ESTIMATE
-from vobench.runner.folder import FINISHED_TRIAL, RunFolder, TrialScore
+from vobench.runner.folder import FINISHED_TRIAL, NOT_DETERMINISTIC, RunFolder, TrialScore
 
 
-def determinism_remarks(folder: RunFolder, scores: Sequence[TrialScore]) -> list[str]:
-    """Sentences on the repeats of deterministic estimators; nothing for a run without repeats.
+@dataclass(frozen=True, slots=True)
+class RepeatedAnswers:
+    """The answers of an estimator that states that it is deterministic to sequences that it was given repeatedly.
 
-    A statement of determinism is believed once two answers to one sequence were equal in every byte. Such repeats say
-    nothing more than one trial does.
+    `differing` are the cases of `cases` on which not all answers are equal in every byte.
     """
-    compared = Counter[str]()  # the number of cases with repeats, by estimator
-    differing = Counter[str]()
+
+    estimator: str
+    cases: tuple[str, ...]
+    differing: tuple[str, ...]
+
+    @property
+    def are_equal(self) -> bool:
+        """Whether the statement is believed."""
+        return not self.differing
+
+
+def repeated_answers(folder: RunFolder, scores: Sequence[TrialScore]) -> list[RepeatedAnswers]:
+    """The repeated answers of each deterministic estimator in a run, by name; none in a run without repeats."""
+    cases_of: dict[str, list[str]] = {}
+    differing_of: dict[str, list[str]] = {}
     for trials in _repeats(scores):
         estimator = trials[0].estimator
+        case = trials[0].case
         answers = {_answer(folder, trial) for trial in trials}
-        compared[estimator] += 1
-        differing[estimator] += len(answers) > 1
+        cases_of.setdefault(estimator, []).append(case)
+        if len(answers) > 1:
+            differing_of.setdefault(estimator, []).append(case)
+    found = []
+    for estimator, cases in sorted(cases_of.items()):
+        found.append(RepeatedAnswers(estimator, tuple(cases), tuple(differing_of.get(estimator, ()))))
+    return found
 
+
+def determinism_remarks(repeated: Sequence[RepeatedAnswers]) -> list[str]:
+    """One sentence for each estimator that is not believed to be deterministic, and one for all that are."""
     sentences = []
-    equal = [estimator for estimator in sorted(compared) if not differing[estimator]]
+    equal = [answers.estimator for answers in repeated if answers.are_equal]
     if equal:
-        names = ", ".join(equal)
-        sentences.append(
-            f"Repeats of {names} are equal in every byte and count once; noise_seeds draws new noise instead"
-        )
-    for estimator in sorted(compared):
-        if differing[estimator]:
-            cases = f"{differing[estimator]} of {counted(compared[estimator], 'case')}"
-            sentences.append(f"{estimator} states that it is deterministic, but its repeats differ in {cases}")
+        verb = "is" if len(equal) == 1 else "are"
+        sentences.append(f"Deterministic by two answers that are equal in every byte {verb} {', '.join(equal)}")
+    for answers in repeated:
+        if not answers.are_equal:
+            cases = ", ".join(answers.differing)
+            sentences.append(
+                f"{answers.estimator} states that it is deterministic, but gave different answers to {cases}; "
+                "it counts as not deterministic"
+            )
     return sentences
 
 

@@ -1,15 +1,17 @@
 """Divisions of a board: the estimators and cases that are ranked together."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from vobench.metric.truth_copy import FLOOR_M, FLOOR_RAD
 from vobench.report.cell import Cell
-from vobench.runner.folder import ORACLE, TrialScore
+from vobench.runner.folder import ORACLE, TRUTH_COPY, TrialScore
 from vobench.runner.score import NO_SCALE
 
 BASELINE = "baseline"
-UNRANKED = (BASELINE, ORACLE)  # claims of estimators that are shown beside a ranking, not in it
+UNRANKED = (BASELINE, ORACLE, TRUTH_COPY)  # claims of estimators that are shown beside a ranking, not in it
 METRIC = "SE(3)"
+MICRO = 1e6  # micrometres in a metre, microradians in a radian
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -37,8 +39,37 @@ class Division:
 
 
 def is_ranked(of_estimator: Cell | TrialScore) -> bool:
-    """Whether the estimator of a cell or trial has a rank: a baseline or an oracle has none."""
+    """Whether the estimator of a cell or trial has a rank: a baseline, an oracle or a truth copy has none."""
     return not set(of_estimator.claims) & set(UNRANKED)
+
+
+def with_truth_copies(trials: Sequence[TrialScore]) -> list[TrialScore]:
+    """The same trials, with TRUTH_COPY as a claim of all trials of an estimator that has it in one of them."""
+    copies = {trial.estimator for trial in trials if TRUTH_COPY in trial.claims}
+    marked = []
+    for trial in trials:
+        if trial.estimator in copies and TRUTH_COPY not in trial.claims:
+            claims = (*trial.claims, TRUTH_COPY)
+            marked.append(trial.model_copy(update={"claims": claims}))
+        else:
+            marked.append(trial)
+    return marked
+
+
+def truth_copy_remarks(trials: Iterable[TrialScore]) -> list[str]:
+    """One sentence for each estimator that is not ranked because its estimate equals the truth, with its first case."""
+    cases_of: dict[str, list[str]] = {}
+    for trial in trials:
+        if TRUTH_COPY in trial.claims:
+            cases_of.setdefault(trial.estimator, []).append(trial.case)
+    sentences = []
+    for estimator, cases in sorted(cases_of.items()):
+        first = min(cases)
+        sentences.append(
+            f"{estimator} is not ranked: on {first}, its motion equals the ground truth to rounding "
+            f"({FLOOR_M * MICRO:.0f} µm and {FLOOR_RAD * MICRO:.0f} µrad a frame), which cannot be measured"
+        )
+    return sentences
 
 
 def divisions(cells: Sequence[Cell]) -> dict[Division, list[Cell]]:

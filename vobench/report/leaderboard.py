@@ -1,18 +1,24 @@
 """The leaderboard: scores as one table of cells, case × estimator, with totals, breakdown curves and remarks."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import groupby
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 from vobench.report.board_metric import METRICS
 from vobench.report.breakdown import BreakdownCurve, breakdown_curves
-from vobench.report.cell import CaseFacts, Cell, make_cell
-from vobench.report.division import divisions
+from vobench.report.cell import CaseFacts, Cell, make_cell, trials_by_cell
+from vobench.report.division import divisions, truth_copy_remarks, with_truth_copies
 from vobench.report.frame_statistics import Answered, EstimatorStatistics
 from vobench.report.pair_sentence import named_pairs
 from vobench.report.total import Total, rank_division
 from vobench.runner.environment import Environment
-from vobench.runner.folder import TrialScore, UnavailableCases, unavailable_cases, visible_to, with_sequence
+from vobench.runner.folder import (
+    NOT_DETERMINISTIC,
+    TrialScore,
+    UnavailableCases,
+    unavailable_cases,
+    visible_to,
+    with_sequence,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,18 +74,25 @@ def make_board(
     title: str = "",
     environment: Environment | None = None,
     remarks: Sequence[str] = (),
+    refuted: Collection[str] = (),
     until_ratio: float | None = None,
 ) -> Board:
     """The board of trials; `answered` is by case and estimator, `facts` by case, and entries may be missing in both.
 
-    `remarks` are further ones, which come first. `until_ratio` is given if units were drawn until each pair was decided
-    or alike within this ratio: tests and intervals are then such that hold whenever one stops.
+    `remarks` are further ones, which come first. `refuted` are the estimators that state that they are deterministic,
+    but gave different answers to one sequence; their cells state that they are not deterministic. `until_ratio` is
+    given if units were drawn until each pair was decided or alike within this ratio: tests and intervals are then such
+    that hold whenever one stops.
     """
     scores = list(scores)
     unmade = unavailable_cases(scores)
     trials = list(with_sequence(scores))
-    cells = make_cells(trials, answered, facts or {})
-    all_remarks = [*remarks, *_unmade_remark(unmade, cases=len({score.case for score in scores}))]
+    cells = [_corrected(cell, refuted) for cell in make_cells(trials, answered, facts or {})]
+    all_remarks = [
+        *remarks,
+        *truth_copy_remarks(trials),
+        *_unmade_remark(unmade, cases=len({score.case for score in scores})),
+    ]
 
     totals, division_remarks = _rank(cells, is_sequential=until_ratio is not None)
     all_remarks += _until_remarks(cells, until_ratio)
@@ -116,17 +129,20 @@ def _rank(cells: Sequence[Cell], *, is_sequential: bool) -> tuple[list[Total], l
     return totals, sentences
 
 
+def _corrected(cell: Cell, refuted: Collection[str]) -> Cell:
+    """The cell, which states that its estimator is not deterministic if it is one of those refuted."""
+    if cell.estimator not in refuted:
+        return cell
+    return replace(cell, claims=(*cell.claims, NOT_DETERMINISTIC))
+
+
 def make_cells(trials: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts]) -> list[Cell]:
-    """One cell for each case and estimator, in order of their names."""
-
-    def cell_key(trial: TrialScore) -> tuple[str, str]:
-        return trial.case, trial.estimator
-
-    ordered = sorted(trials, key=lambda trial: (*cell_key(trial), trial.repeat))
+    """One cell for each case and estimator, in order of their names. A truth copy is one in all of its cells."""
+    marked_trials = with_truth_copies(list(trials))
     cells = []
-    for (case, estimator), members in groupby(ordered, key=cell_key):
+    for (case, estimator), members in trials_by_cell(marked_trials, facts).items():
         statistics = answered.get((case, estimator), EstimatorStatistics())
-        cells.append(make_cell(list(members), statistics, facts.get(case, CaseFacts())))
+        cells.append(make_cell(members, statistics, facts.get(case, facts.get(members[0].case, CaseFacts()))))
     return cells
 
 

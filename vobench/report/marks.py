@@ -11,6 +11,7 @@ from vobench.metric.repeat_test import MIN_TRIALS, worse_than_best
 from vobench.report.board_metric import COSTS, METRICS
 from vobench.report.cell import Cell
 from vobench.report.leaderboard import Board
+from vobench.runner.folder import TRUTH_COPY
 
 BEST = "*"
 NOT_DECIDED = "~"
@@ -56,11 +57,15 @@ def _marks_of_case(cells: Sequence[Cell], metric: str) -> dict[str, str]:
 
 
 def _losses_by_estimator(cells: Sequence[Cell], metric: str) -> dict[str, Array]:
-    """The values of trials (N,) by estimator, lower is better; without stationary cells and those without a value."""
+    """The values of trials (N,) by estimator, lower is better.
+
+    Stationary cells, truth copies and cells without a value are left out.
+    """
     sign = -1.0 if METRICS[metric].higher_is_better else 1.0
     losses = {}
     for cell in cells:
         values = [sign * value for value in cell.values[metric] if value is not None]
-        if values and cell.drift_mm is None:
+        is_compared = cell.drift_mm is None and TRUTH_COPY not in cell.claims
+        if values and is_compared:
             losses[cell.estimator] = np.array(values)
     return losses

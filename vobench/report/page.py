@@ -3,17 +3,18 @@
 import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import groupby
 from pathlib import Path
 from statistics import fmean
 from typing import Any
 
 from vobench import stop
+from vobench.errors import printable
 from vobench.report import board_table, leaderboard
 from vobench.report.board_formats import FORMATS
 from vobench.report.board_metric import METRICS
 from vobench.report.case_facts import case_facts, design_remarks
-from vobench.report.determinism import determinism_remarks
+from vobench.report.cell import CaseFacts, trials_by_cell
+from vobench.report.determinism import determinism_remarks, repeated_answers
 from vobench.report.frame_statistics import Answered, EstimatorStatistics, summarize_frames
 from vobench.report.json_file import read_object
 from vobench.report.leaderboard import Board
@@ -49,8 +50,8 @@ def run_board(folder: RunFolder, scores: list[TrialScore]) -> Board:
 
 
 def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> Board:
-    cases = {score.case for score in scores}
-    facts = {case: case_facts(folder, case) for case in cases}
+    facts = _facts(folder, scores)
+    repeated = repeated_answers(folder, scores)
     title = folder.path.resolve().parent.name
     return leaderboard.make_board(
         scores,
@@ -60,10 +61,17 @@ def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> B
         environment=read_environment(folder),
         remarks=[
             *design_remarks(facts.values(), base_seed=_base_seed(folder)),
-            *determinism_remarks(folder, scores),
+            *determinism_remarks(repeated),
         ],
+        refuted=[answers.estimator for answers in repeated if not answers.are_equal],
         until_ratio=recorded_ratio(folder),
     )
+
+
+def _facts(folder: RunFolder, scores: Sequence[TrialScore]) -> dict[str, CaseFacts]:
+    """The facts of the cases of trials, by name."""
+    cases = dict.fromkeys(score.case for score in scores)
+    return {case: case_facts(folder, case) for case in cases}
 
 
 def _base_seed(folder: RunFolder) -> int:
@@ -90,8 +98,7 @@ def write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
         text = FORMATS[suffix](repeatable, board_table.DEFAULT_METRIC)
         (folder.path / f"{STEM}.{suffix}").write_text(text, encoding="utf-8")
 
-    facts = {cell.case: cell.facts for cell in repeatable.cells}
-    (folder.path / TRIALS).write_text(trial_csv(scores, facts), encoding="utf-8")
+    (folder.path / TRIALS).write_text(trial_csv(scores, _facts(folder, scores)), encoding="utf-8")
 
     with new_table(folder.path / TIMES, COST_COLUMNS) as table:
         for cell in cells:
@@ -114,14 +121,10 @@ def _undated(board: Board) -> Board:
 
 def _cell_frames(folder: RunFolder, scores: list[TrialScore]) -> Iterator[CellFrames]:
     """The statistics and costs of each case and estimator; only the frames of one cell are in memory."""
-
-    def cell_key(trial: TrialScore) -> tuple[str, str]:
-        return trial.case, trial.estimator
-
-    ordered = sorted(with_sequence(scores), key=cell_key)
-    for (case, estimator), trials in groupby(ordered, key=cell_key):
+    by_cell = trials_by_cell(with_sequence(scores), _facts(folder, scores))
+    for (case, estimator), trials in by_cell.items():
         stop.check()
-        frames = [read_frames(folder.estimate(case, estimator, trial.repeat)) for trial in trials]
+        frames = [read_frames(folder.estimate(trial.case, estimator, trial.repeat)) for trial in trials]
         rows = [row for trial_rows in frames for row in trial_rows]
         yield CellFrames(case, estimator, summarize_frames(frames), _costs(rows))
 
@@ -166,7 +169,7 @@ def board_page(folder: RunFolder, scores: list[TrialScore], board: Board, beside
         named=board_table.named,
         claims={cell.estimator: cell.claims for cell in board.cells},
         totals=board_table.totals(board),
-        remarks=board_table.remarks(board),
+        remarks=[printable(note) for note in board_table.board_notes(board)],
         legend=board_table.LEGEND,
         data=_script_json(data),
     )

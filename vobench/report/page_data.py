@@ -14,7 +14,8 @@ from vobench import stop
 from vobench.geometry.se3 import Array
 from vobench.report.board_metric import COSTS, METRICS
 from vobench.report.board_table import ShownCell
-from vobench.report.cell import Cell
+from vobench.report.case_facts import case_facts
+from vobench.report.cell import Cell, trials_by_cell
 from vobench.report.cell_notes import notes
 from vobench.report.frame_moment import FrameMoment, worst_moments
 from vobench.report.leaderboard import Board
@@ -97,7 +98,7 @@ def _totals(board: Board) -> list[JsonObject]:
 
 
 class _Details:
-    """What a page shows of its worst cells, by 'row|column', and the true paths of their cases, by row."""
+    """What a page shows of its worst cells, by 'row|column', and the true paths of the trials shown, by case."""
 
     def __init__(self, folder: RunFolder, board: Board, thumbnails: Thumbnails, beside: Path) -> None:
         self.by_cell: JsonObject = {}
@@ -111,22 +112,20 @@ class _Details:
         """Add the MOST_DETAILS worst cells, case by case."""
         row_of = {case: row for row, case in enumerate(self._board.cases)}
         column_of = {name: column for column, name in enumerate(self._board.estimators)}
-        trials_of: dict[tuple[str, str], list[TrialScore]] = {}
-        for score in with_sequence(scores):
-            trials_of.setdefault((score.case, score.estimator), []).append(score)
+        facts = {score.case: case_facts(self._folder, score.case) for score in scores}
+        trials_of = trials_by_cell(with_sequence(scores), facts)
 
         worst_first = sorted(self._board.cells, key=_by_failures_and_loss)
         for cell in sorted(worst_first[:MOST_DETAILS], key=lambda cell: row_of[cell.case]):
             stop.check()
-            row = str(row_of[cell.case])
-            self._add_truth(row, cell.case)
             trial = _worst_trial(trials_of[cell.case, cell.estimator], cell.losses)
-            self.by_cell[f"{row}|{column_of[cell.estimator]}"] = self._detail(cell, trial)
+            self._add_truth(trial.case)
+            self.by_cell[f"{row_of[cell.case]}|{column_of[cell.estimator]}"] = self._detail(cell, trial)
 
-    def _add_truth(self, row: str, case: str) -> None:
+    def _add_truth(self, case: str) -> None:
         truth = self._folder.case(case) / GROUND_TRUTH
-        if row not in self.truth_by_case and truth.is_file():
-            self.truth_by_case[row] = path_points(read_tum(truth).positions_m[:, :2])
+        if case not in self.truth_by_case and truth.is_file():
+            self.truth_by_case[case] = path_points(read_tum(truth).positions_m[:, :2])
 
     def _detail(self, cell: Cell, trial: TrialScore) -> JsonObject:
         """The error of a trial over time, its path, its worst moments and its files."""
@@ -139,15 +138,16 @@ class _Details:
         path_m = _aligned_path(place, trial)
         link = quote(os.path.relpath(place, self._beside))
         return {
+            "case": trial.case,
             "trial": trial.repeat,
             "notes": notes(cell),
             "t": [round(float(t_s[index] - t_s[0]), 3) for index in drawn],
             "e": [_error_mm(errors_m[index]) for index in drawn],
             "path": path_points(path_m),
             "pathe": _errors_along_path(errors_m, len(path_m)),
-            "thumbs": self._moments(cell.case, worst_moments(frames, errors_m)),
+            "thumbs": self._moments(trial.case, worst_moments(frames, errors_m)),
             "files": [[name, f"{link}/{name}"] for name in FILES if (place / name).is_file()],
-            "view": ["--case", cell.case, "--estimator", cell.estimator],
+            "view": ["--case", trial.case, "--estimator", trial.estimator],
         }
 
     def _moments(self, case: str, moments: Sequence[FrameMoment]) -> list[JsonObject]:
@@ -171,11 +171,11 @@ def _by_failures_and_loss(cell: Cell) -> tuple[float, float]:
 
 
 def _worst_trial(trials: Sequence[TrialScore], losses: Sequence[float]) -> TrialScore:
-    """The trial with the largest loss, of those that failed if there are any; `losses` are by repeat."""
-    ordered = sorted(trials, key=lambda trial: trial.repeat)
-    loss_of = {trial.repeat: loss for trial, loss in zip(ordered, losses, strict=True)}
-    failed = [trial for trial in trials if trial.status not in SURVIVED]
-    return max(failed or trials, key=lambda trial: np.nan_to_num(loss_of[trial.repeat]))
+    """The trial with the largest loss, of those that failed if there are any; `losses` are in the order of trials."""
+    with_losses = list(zip(trials, np.nan_to_num(losses), strict=True))
+    failed = [(trial, loss) for trial, loss in with_losses if trial.status not in SURVIVED]
+    worst, _ = max(failed or with_losses, key=lambda pair: pair[1])
+    return worst
 
 
 def _aligned_path(place: Path, trial: TrialScore) -> Array:

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf
 
 from vobench.metric.ranking import DECIDED
 from vobench.metric.sequential import PairState, PairVerdict, pair_verdicts
@@ -26,14 +25,27 @@ class NamedPair:
     second: str
     known: PairVerdict
 
+    def as_dict(self) -> dict[str, str | float | int]:
+        """The pair as a row of a table."""
+        low, high = self.known.interval
+        return {
+            "first": self.first,
+            "second": self.second,
+            "ratio": self.known.loss_ratio,
+            "low": low,
+            "high": high,
+            "places": self.known.units,
+            "verdict": PHRASES[self.known.verdict].format(ratio=self.known.ratio),
+        }
+
     @property
     def sentence(self) -> str:
         """What is known of the pair, with the interval of the ratio of losses, at all times."""
-        if self.known.difference.units == 0:
+        if self.known.units == 0:
             return f"{self.second} and {self.first}: no unit has both"
         low, high = self.known.interval
         ratio = f"{self.known.loss_ratio:.3g}"
-        interval = f"[{low:.3g}, {high:.3g}]" if high < inf else "(too few units for an interval)"
+        interval = f"[{low:.3g}, {high:.3g}]" if self.known.is_stated else "(too few units for an interval)"
         phrase = PHRASES[self.known.verdict].format(ratio=self.known.ratio)
         return f"{self.second} has {ratio} × {self.first}'s loss {interval}: {phrase}"
 
@@ -54,12 +66,12 @@ def named_pairs(cells: Sequence[Cell], *, ratio: float) -> list[NamedPair]:
 
 def _better_first(names: Sequence[str], known: PairVerdict) -> NamedPair:
     """The pair with the estimator of smaller loss first."""
-    if known.difference.mean >= 0:
+    if known.loss_ratio >= 1:
         return NamedPair(names[known.first], names[known.second], known)
     swapped = replace(
         known,
         first=known.second,
         second=known.first,
-        difference=replace(known.difference, mean=-known.difference.mean),
+        differences=tuple(-difference for difference in known.differences),
     )
     return NamedPair(names[known.second], names[known.first], swapped)

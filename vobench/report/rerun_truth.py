@@ -82,19 +82,19 @@ def _columns(channel: str, values: NDArray[np.generic]) -> Any:
         classes = values.astype(np.uint16)
         class_format = _format(classes, rr.ChannelDatatype.U16)
         return rr.SegmentationImage.columns(buffer=[_bytes(classes)], format=[class_format])
-    colors = picture(channel, values)
-    color_format = _format(colors, rr.ChannelDatatype.U8, rr.ColorModel.RGB)
-    return rr.Image.columns(buffer=[_bytes(colors)], format=[color_format])
+    colours = picture(channel, values)
+    colour_format = _format(colours, rr.ChannelDatatype.U8, rr.ColorModel.RGB)
+    return rr.Image.columns(buffer=[_bytes(colours)], format=[colour_format])
 
 
 def _format(
     values: NDArray[np.generic],
     datatype: rr.ChannelDatatype,
-    colors: rr.ColorModel | None = None,
+    colour_model: rr.ColorModel | None = None,
 ) -> rr.components.ImageFormat:
     """The size and the type of the pixels of an image (H, W) or (H, W, 3)."""
     height_px, width_px = values.shape[:2]
-    return rr.components.ImageFormat(width_px, height_px, color_model=colors, channel_datatype=datatype)
+    return rr.components.ImageFormat(width_px, height_px, color_model=colour_model, channel_datatype=datatype)
 
 
 def _bytes(values: NDArray[np.generic]) -> NDArray[np.uint8]:
@@ -120,5 +120,5 @@ def _named_ids(channel: str, names: tuple[str, ...]) -> list[rr.AnnotationInfo]:
     """The name of each id, and its colour in pictures of the channel."""
     ids = np.arange(len(names), dtype=np.uint16)
     one_row = ids[None]  # (1, N), a picture with one pixel for each id
-    colors = picture(channel, one_row)[0].tolist()
-    return [rr.AnnotationInfo(index, names[index], tuple(color)) for index, color in enumerate(colors)]
+    colours = picture(channel, one_row)[0].tolist()
+    return [rr.AnnotationInfo(index, names[index], tuple(colour)) for index, colour in enumerate(colours)]

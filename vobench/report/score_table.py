@@ -1,7 +1,8 @@
 """Scores of files as tables: what `vobench score` prints, as headings and rows, CSV or Markdown."""
 
+import re
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from vobench.metric.score import Score
 from vobench.report.markdown_table import markdown_table
@@ -9,27 +10,49 @@ from vobench.spreadsheet import cell
 
 COLUMNS = ("n", "rmse", "mean", "median", "std", "min", "max", "sse", "p95", "p99")
 SHOWN = ("n", "rmse", "mean", "median", "std", "min", "max", "p95", "p99")
-WORDS = ("metric", "unit", "sequence")  # headings of columns that hold words
-MOST_METRICS = 6  # in one table of sequences
+WORDS = ("metric", "unit", "sequence", "estimate")  # headings of columns that hold words
+MOST_METRICS = 6  # in one table of sequences or estimates
 POOLED = "pooled"
+POSE_COUNT = re.compile(r"; n=[^;\]]+")  # in the id of a metric
 Content = dict[str, Any]
 Row = list[str]
 Table = tuple[Row, list[Row]]
 
 
+class Several(NamedTuple):
+    """Where the scores of several files stand in the content, and the heading of the column of their names."""
+
+    key: str
+    heading: str
+
+
+SEQUENCES = Several("sequences", "sequence")
+ESTIMATES = Several("estimates", "estimate")
+
+
+def _several(content: Content) -> Several | None:
+    """What the scores are of: sequences, or estimates of one ground truth; None if there is only one score."""
+    for several in (SEQUENCES, ESTIMATES):
+        if several.key in content:
+            return several
+    return None
+
+
 def as_csv(content: Content, *, per_length: bool) -> str:
-    """All statistics of every metric, one row each; with the name of the sequence in front if there are several."""
+    """All statistics of every metric, one row each; with the name of the file in front if there are several."""
     import pandas as pd
 
+    several = _several(content)
+    heading = several.heading if several else ""
     rows = []
     for name, part in _named_parts(content):
         metrics = [*part["metrics"], *(part["per_length"] if per_length else [])]
-        rows += [{"sequence": cell(name), **metric} for metric in metrics]
+        rows += [{heading: cell(name), **metric} for metric in metrics]
     columns = ["name", "unit", *COLUMNS, "id"]
     if per_length:
         columns.insert(2, "length_m")
-    if "sequences" in content:
-        columns.insert(0, "sequence")
+    if several:
+        columns.insert(0, heading)
     # Objects stay as they are: a column with a gap would otherwise turn whole numbers into floats.
     table = pd.DataFrame(rows, columns=columns, dtype=object)
     text: str = table.to_csv(index=False, lineterminator="\n")
@@ -37,11 +60,14 @@ def as_csv(content: Content, *, per_length: bool) -> str:
 
 
 def _named_parts(content: Content) -> list[tuple[str, Content]]:
-    """The scores by sequence, and those of all sequences pooled; or the only score without a name."""
-    if "sequences" not in content:
+    """The scores by estimate, and those of all sequences pooled; or the only score without a name."""
+    several = _several(content)
+    if several is None:
         return [("", content)]
-    named = [(part["est"], part) for part in content["sequences"]]
-    return [*named, (POOLED, content[POOLED])]
+    named = [(part["est"], part) for part in content[several.key]]
+    if POOLED in content:
+        named.append((POOLED, content[POOLED]))
+    return named
 
 
 def as_markdown(content: Content, scored: Sequence[Score], *, per_length: bool) -> str:
@@ -57,17 +83,22 @@ def as_markdown(content: Content, scored: Sequence[Score], *, per_length: bool) 
 
 
 def tables(content: Content, *, per_length: bool) -> list[Table]:
-    """Headings and rows of each table: the metrics, or the sequences and all of them pooled; then the lengths."""
-    metric_tables = _sequence_tables(content) if "sequences" in content else [_metric_table(content)]
+    """Headings and rows of each table: the metrics, or a row per sequence or estimate; then the lengths.
+
+    Lengths are those of all sequences pooled, or of each estimate.
+    """
+    several = _several(content)
+    metric_tables = _side_by_side(content, several.heading) if several else [_metric_table(content)]
     if not per_length:
         return metric_tables
-    return [*metric_tables, _length_table(_whole(content))]
+    return [*metric_tables, _length_table(content)]
 
 
-def _whole(content: Content) -> Content:
-    """The score of all sequences pooled, or the only score."""
-    whole: Content = content.get(POOLED, content)
-    return whole
+def _wholes(content: Content) -> list[tuple[str, Content]]:
+    """The scores of whole files, with their names: all sequences pooled, each estimate, or the only score."""
+    if POOLED in content:
+        return [("", content[POOLED])]
+    return _named_parts(content)
 
 
 def _metric_table(content: Content) -> Table:
@@ -76,9 +107,19 @@ def _metric_table(content: Content) -> Table:
 
 
 def _length_table(content: Content) -> Table:
-    """The metrics by length of path."""
-    rows = [_length_row(metric) for metric in content["per_length"]]
-    return ["metric", "unit", "length m", *SHOWN], rows
+    """The metrics by length of path; of several estimates, those of one length stand together."""
+    headings = ["metric", "unit", "length m", *SHOWN]
+    wholes = _wholes(content)
+    if len(wholes) == 1:
+        _, whole = wholes[0]
+        return headings, [_length_row(metric) for metric in whole["per_length"]]
+
+    rows_of_length = dict[tuple[str, float], list[Row]]()
+    for name, whole in wholes:
+        for metric in whole["per_length"]:
+            rows = rows_of_length.setdefault((metric["name"], metric["length_m"]), [])
+            rows.append([name, *_length_row(metric)])
+    return [ESTIMATES.heading, *headings], [row for rows in rows_of_length.values() for row in rows]
 
 
 def _length_row(metric: Content) -> Row:
@@ -86,19 +127,22 @@ def _length_row(metric: Content) -> Row:
     return [metric["name"], metric["unit"], length, *_statistics(metric)]
 
 
-def _sequence_tables(content: Content) -> list[Table]:
-    """One row per sequence and one for all of them, with the statistic of each metric that is usually quoted."""
+def _side_by_side(content: Content, heading: str) -> list[Table]:
+    """One row per sequence or estimate, with the statistic of each metric that is usually quoted.
+
+    Sequences have one more row for all of them.
+    """
     parts = [part for _, part in _named_parts(content)]
     metrics = [metric for part in parts for metric in part["metrics"]]
     heading_of = {metric["name"]: _heading(metric) for metric in metrics}
     names = list(heading_of)
-    sequence_tables = []
+    found = []
     for first in range(0, len(names), MOST_METRICS):
         shown = names[first : first + MOST_METRICS]
-        rows = [_sequence_row(name, part, shown) for name, part in _named_parts(content)]
+        rows = [_quoted_row(name, part, shown) for name, part in _named_parts(content)]
         headings = [heading_of[name] for name in shown]
-        sequence_tables.append((["sequence", "coverage", *headings], rows))
-    return sequence_tables
+        found.append(([heading, "coverage", *headings], rows))
+    return found
 
 
 def _heading(metric: Content) -> str:
@@ -107,10 +151,10 @@ def _heading(metric: Content) -> str:
     return f"{metric['name']} {_quoted(metric)}{unit}"
 
 
-def _sequence_row(sequence: str, part: Content, metrics: Sequence[str]) -> Row:
+def _quoted_row(name: str, part: Content, metrics: Sequence[str]) -> Row:
     value_of = {metric["name"]: f"{metric[_quoted(metric)]:.6g}" for metric in part["metrics"]}
     coverage = f"{part['coverage']:.3f}" if "coverage" in part else ""
-    return [sequence, coverage, *(value_of.get(name, "") for name in metrics)]
+    return [name, coverage, *(value_of.get(metric, "") for metric in metrics)]
 
 
 def _quoted(metric: Content) -> str:
@@ -123,25 +167,27 @@ def _statistics(metric: Content) -> Row:
 
 
 def ids(content: Content) -> list[str]:
-    """How each metric was computed."""
-    return [metric["id"] for metric in _whole(content)["metrics"]]
+    """How each metric was computed. Of several estimates, the number of poses is left out, which differs."""
+    found = [metric["id"] for _, whole in _wholes(content) for metric in whole["metrics"]]
+    if _several(content) is ESTIMATES:
+        found = [POSE_COUNT.sub("", identity) for identity in found]
+    return list(dict.fromkeys(found))
 
 
 def warnings(content: Content) -> list[str]:
-    """The warnings of each score, with the name of its sequence if there are several."""
-    if "sequences" not in content:
-        return list(content["warnings"])
+    """The warnings of each score, with the name of its estimate if there are several."""
     sentences = []
-    for part in content["sequences"]:
-        sentences += [f"{part['est']}: {warning}" for warning in part["warnings"]]
-    return [*sentences, *content[POOLED]["warnings"]]
+    for name, part in _named_parts(content):
+        prefix = "" if name in ("", POOLED) else f"{name}: "
+        sentences += [f"{prefix}{warning}" for warning in part["warnings"]]
+    return sentences
 
 
 def summaries(content: Content, scored: Sequence[Score]) -> list[str]:
-    """Coverage and survival of each sequence, and the consistency of its covariances if it has any."""
-    is_several = "sequences" in content
-    parts = content["sequences"] if is_several else [content]
-    names = [f"{part['est']}: " if is_several else "" for part in parts]
+    """Coverage and survival of each estimate, and the consistency of its covariances if it has any."""
+    several = _several(content)
+    parts = content[several.key] if several else [content]
+    names = [f"{part['est']}: " if several else "" for part in parts]
     sentences = [f"{name}{_summary(score)}" for name, score in zip(names, scored, strict=True)]
     for name, part in zip(names, parts, strict=True):
         consistency = part.get("consistency")

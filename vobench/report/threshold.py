@@ -72,13 +72,16 @@ class Threshold:
             yield from self._broken_by_value(estimator, failures[estimator])
 
     def _broken_by_costs(self, trials: Sequence[TrialScore], board: Board) -> Iterator[str]:
-        for case, estimator in dict.fromkeys((trial.case, trial.estimator) for trial in trials):
-            cell = board.cell(case, estimator)
-            spread = cell.spread(self.metric) if cell else None
+        estimators = {trial.estimator for trial in trials}
+        for cell in board.cells:
+            if cell.estimator not in estimators:
+                continue
+            name = f"{cell.estimator} on {cell.case}"
+            spread = cell.spread(self.metric)
             if spread is None:
-                yield f"{estimator} on {case}: no {self} was measured"
+                yield f"{name}: no {self} was measured"
             else:
-                yield from self._broken_by_value(f"{estimator} on {case}", spread[0])
+                yield from self._broken_by_value(name, spread[0])
 
     def _broken_by_value(self, name: str, value: float) -> Iterator[str]:
         if COMPARISONS[self.comparison](value, self.value):

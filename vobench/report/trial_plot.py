@@ -9,6 +9,8 @@ from vobench.report.scored_case import ScoredCase
 
 WIDTH_INCHES = 9.0
 HEIGHT_INCHES = 3.6
+PLOT_WIDTHS = (1, 1.25)  # relative widths of the paths, which are about square, and of the errors over time
+TITLE_X = 0.01  # the title's left edge, as a share of the figure's width
 
 
 def plot_case(case: ScoredCase) -> Figure:
@@ -17,8 +19,8 @@ def plot_case(case: ScoredCase) -> Figure:
     An estimate that cannot be scored appears only in the legend.
     """
     with new_figure(WIDTH_INCHES, HEIGHT_INCHES) as figure:
-        path_axes, error_axes = figure.subplots(1, 2, width_ratios=[1, 1.25])
-        figure.suptitle(case.name, fontweight="bold", x=0.01, ha="left")
+        path_axes, error_axes = figure.subplots(1, 2, width_ratios=PLOT_WIDTHS)
+        figure.suptitle(case.name, fontweight="bold", x=TITLE_X, ha="left")
         draw_paths(path_axes, case)
         path_axes.legend(loc="best")
         draw_position_errors(error_axes, case)

@@ -23,6 +23,7 @@ from vobench.runner.store import write_json
 from vobench.suite.draw import joined
 from vobench.suite.plan import Plan
 
+Say = Callable[[str], object]
 MOST_UNITS = 10_000
 SECONDS_PER_MINUTE = 60
 UNITS_OF_TIME = {"s": 1, "min": 60, "h": 3600}
@@ -93,7 +94,7 @@ def run_until_decided(
     finish: PlanRunner,
     ratio: float,
     budget_s: float,
-    tell: Callable[[str], object] = lambda _: None,
+    tell: Say = lambda _: None,
     clock_s: Callable[[], float] = time.monotonic,
 ) -> UntilDecided:
     """Run draws of a suite until each pair of estimators is decided or alike within `ratio`, or the budget is used up.

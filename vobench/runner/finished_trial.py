@@ -75,7 +75,7 @@ def _find(path: Path) -> tuple[RunFolder, TrialScore]:
         return RunFolder(path.parents[LEVELS_TO_RUN - 1]), read_score(path / SCORE)
 
     parts = path.parts
-    repeat = 0
+    repeat: int | None = None
     if path.name.isdigit():
         repeat = int(path.name)
         parts = parts[:-1]
@@ -87,10 +87,12 @@ def _find(path: Path) -> tuple[RunFolder, TrialScore]:
     scores = folder.scores()
     _require_in_run("case", case, {score.case for score in scores}, folder)
     _require_in_run("estimator", estimator, {score.estimator for score in scores}, folder)
-    for score in scores:
-        if (score.case, score.estimator, score.repeat) == (case, estimator, repeat):
+    for score in sorted(scores, key=lambda score: score.repeat):
+        is_selected = repeat in (None, score.repeat)
+        if is_selected and (score.case, score.estimator) == (case, estimator):
             return folder, score
-    raise InputError(f"there is no repeat {repeat} of {estimator} on {case} in the run {folder.path}")
+    number = "trial" if repeat is None else f"repeat {repeat}"
+    raise InputError(f"there is no {number} of {estimator} on {case} in the run {folder.path}")
 
 
 def _require_in_run(kind: str, name: str, known: set[str], folder: RunFolder) -> None:
@@ -139,7 +141,7 @@ def run_variants(trial: FinishedTrial, cases: Mapping[str, Case], *, name: str, 
 
     `name` is the name of the suite of the new run. Raises SuiteError if one of the cases cannot be simulated.
     """
-    named = tuple(replace(case, name=key) for key, case in cases.items())
+    named = tuple(replace(case, name=key, repeat=0, repeat_of=None) for key, case in cases.items())
     suite = replace(trial.suite, name=name, repeats=1)
     source = YamlFile(trial.folder.path / SUITE, {})
     plan = Plan(suite, named, (), (trial.estimator_entry,), (), source)

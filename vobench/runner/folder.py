@@ -77,8 +77,9 @@ class TrialScore(BaseModel):
     """The status of an estimator on a case and, if there is an estimate, its score.
 
     `drift_m` is the largest distance of the estimate from its start, in a case that stands still; else None.
-    `claims` are the manifest's, such as Sim(3), and `sensors` those that it needs; `consistency` is of the covariances
-    that were stated, and `revised` the score of the poses that came after the last frame, where there were some.
+    `claims` are the manifest's, such as Sim(3), and TRUTH_COPY if the estimate equals the truth. `sensors` are those
+    that the estimator needs. `consistency` is of the covariances that were stated, and `revised` the score of the poses
+    that came after the last frame, where there were some.
     `sandbox` is what the estimator could see; None where none was started, and in runs of an older vobench.
     """
 
@@ -174,6 +175,8 @@ def value_of(score: Mapping[str, Any] | None, metric: str, statistic: str) -> fl
 
 ONLY_THEIR_OWN = "Estimators saw only their own files."
 ORACLE = "oracle"  # the claim of estimators that are part of vobench and use the ground truth
+NOT_DETERMINISTIC = "not deterministic"  # the claim of estimators whose answers to one sequence may differ
+TRUTH_COPY = "equals the truth"  # not a claim of a manifest: scoring adds it to a trial whose estimate is the truth
 
 
 def visible_to(trials: Iterable[TrialScore]) -> str:

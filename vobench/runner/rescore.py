@@ -1,7 +1,7 @@
 """Recomputes scores from estimates and ground truths, for results of other people."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isclose
 from pathlib import Path
@@ -22,7 +22,17 @@ from vobench.runner.folder import CASE, SURVIVED, RunFolder, TrialScore, read_tu
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, read_table
 from vobench.runner.ground_truth import scored_truth
 from vobench.runner.motion import body_motion
-from vobench.runner.score import drift_m, scale_of, score_estimate, score_revised, status_of, status_of_handed
+from vobench.runner.score import (
+    MOTION_SENSORS,
+    drift_m,
+    judged_claims,
+    scale_of,
+    score_estimate,
+    score_revised,
+    senses_exactly,
+    status_of,
+    status_of_handed,
+)
 from vobench.runner.simulate import frames_of
 from vobench.suite.case import Case
 from vobench.suite.yaml_file import checked
@@ -128,12 +138,22 @@ def _rescored(folder: RunFolder, stated: TrialScore) -> Rescored:
             "path_m": float(gt.distances_m()[-1]),
             "score": _as_json(scored),
             "drift_m": drift_m(est, gt, scored),
+            "claims": judged_claims(
+                stated.claims, est, gt, is_exactly_sensed=_is_exactly_sensed(folder.case(stated.case), stated.sensors)
+            ),
             "consistency": _consistency(trial, gt, est, scored, rows),
             "revised": _as_json(score_revised(trial, gt, stated.claims)),
         }
     )
     difference = _difference(stated.model_dump(mode="json"), computed.model_dump(mode="json"))
     return Rescored(computed, difference or _frame_difference(rows, scored))
+
+
+def _is_exactly_sensed(place: Path, sensors: Sequence[str]) -> bool:
+    """Whether the sensors of an estimator measure the case in a folder exactly; False if the case cannot be read."""
+    if not set(sensors) & set(MOTION_SENSORS):
+        return False
+    return senses_exactly(_case(place / CASE), sensors)
 
 
 def _why_not_scored(stated: TrialScore, truth: Path, estimate: Path) -> str:

@@ -11,17 +11,19 @@ from vobench.geometry import se3
 from vobench.metric.definitions import DEFINITIONS
 from vobench.metric.score import Score, score
 from vobench.metric.settings import ScoreSettings
+from vobench.metric.truth_copy import FLOOR_M, is_truth_copy
 from vobench.runner.consistency import trial_consistency
 from vobench.runner.estimate import DROPPED, ESTIMATE, FINISHED, REVISED, EstimatorOutcome, read_outcome
-from vobench.runner.folder import SCORE, SURVIVED, TrialScore, TrialStatus, read_tum
+from vobench.runner.folder import ORACLE, SCORE, SURVIVED, TRUTH_COPY, TrialScore, TrialStatus, read_tum
 from vobench.runner.frames import ANSWERS, EXPOSURES, GROUND_TRUTH, read_table, write_frames
 from vobench.runner.ground_truth import scored_truth
 from vobench.runner.store import write_json
+from vobench.suite.case import Case
 from vobench.trajectory.trajectory import Trajectory
 from vobench.trajectory.tum import parse_tum
 
 if TYPE_CHECKING:
-    from vobench.suite.plan import Trial
+    from vobench.suite.plan import AnyCase, Trial
 
 # The truth against which a trial is scored has one pose for each frame.
 SETTINGS = ScoreSettings(coverage_of="frames")
@@ -34,6 +36,8 @@ NO_SCALE_SETTINGS = replace(SETTINGS, alignment="sim3", full=True)
 STILL_M = 2e-3
 STILL_RAD = np.deg2rad(0.2)
 LEAST_DIVERGED_M = 1e-3
+MOTION_SENSORS = ("encoders", "imu")
+EXACT_TICK = 3.5  # in floors; with 1 - (1 - 1 / 3.5)² = 0.49 of the steps within the floor
 
 
 def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) -> None:
@@ -50,6 +54,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
     status, reason = status_of(outcome, scored, gt)
     if dropped and outcome.kind == FINISHED:
         status, reason = status_of_handed(est, gt, claims, dropped)
+    is_exactly_sensed = senses_exactly(trial.case, trial.estimator_entry.manifest.needs)
     score = TrialScore(
         case=trial.case.name,
         variant=trial.case.variant,
@@ -62,7 +67,7 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         path_m=float(gt.distances_m()[-1]),
         score=scored.as_dict() if scored else None,
         drift_m=drift_m(est, gt, scored),
-        claims=claims,
+        claims=judged_claims(claims, est, gt, is_exactly_sensed=is_exactly_sensed),
         sensors=trial.estimator_entry.manifest.needs,
         consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale_of(scored)),
         revised=_revised_score(estimate, gt, claims),
@@ -70,6 +75,39 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
     )
     write_json(folder / SCORE, score.model_dump(mode="json"))
     write_frames(sequence, estimate, scored, folder)
+
+
+def senses_exactly(case: "AnyCase | None", sensors: Sequence[str]) -> bool:
+    """Whether sensors other than cameras measure the motion of a case so well that it can be integrated to rounding.
+
+    That is so for an IMU without noise, and for wheels with ticks so short that half of the steps, whose errors are
+    differences of two roundings, are within the floor of a truth copy. It is False for recordings.
+    """
+    if not isinstance(case, Case) or not set(sensors) & set(MOTION_SENSORS):
+        return False
+    imu = case.rig.imu
+    wheels = case.build_rig().wheels
+    has_exact_imu = imu is not None and imu.gyro.noise == 0 and imu.accel.noise == 0
+    has_exact_wheels = False
+    if wheels is not None:
+        tick_m = 2 * np.pi * wheels.radius_m / wheels.ticks_per_revolution
+        has_exact_wheels = tick_m < EXACT_TICK * FLOOR_M
+    return ("imu" in sensors and has_exact_imu) or ("encoders" in sensors and has_exact_wheels)
+
+
+def judged_claims(
+    claims: Sequence[str], est: Trajectory, gt: Trajectory, *, is_exactly_sensed: bool
+) -> tuple[str, ...]:
+    """The claims of a manifest, and TRUTH_COPY if the estimate is the truth and nothing has measured it so well.
+
+    Oracles, which use the truth openly, have a claim of their own.
+    """
+    manifest_claims = tuple(claim for claim in claims if claim != TRUTH_COPY)
+    if ORACLE in claims or is_exactly_sensed:
+        return manifest_claims
+    if not is_truth_copy(gt, est, has_scale=NO_SCALE not in claims):
+        return manifest_claims
+    return (*manifest_claims, TRUTH_COPY)
 
 
 def _revised_score(estimate: Path, gt: Trajectory, claims: Sequence[str]) -> dict[str, Any] | None:

@@ -1,4 +1,4 @@
-"""Scores trajectory files: one pair of ground truth and estimate, or several pairs separately and pooled."""
+"""Scores trajectory files: estimates of one ground truth side by side, or several sequences separately and pooled."""
 
 import shlex
 from collections.abc import Iterator, Sequence
@@ -66,7 +66,11 @@ class ScoredPair:
 
 @dataclass(frozen=True, slots=True)
 class ScoredFiles:
-    """The scores of pairs of files and, for several pairs, the pooled score of all errors."""
+    """The scores of pairs of files.
+
+    If the pairs are sequences of one estimator, `pool` is the score of all their errors together. If they are several
+    estimates of one ground truth, it is None.
+    """
 
     pairs: tuple[ScoredPair, ...]
     pool: Pooled | None = None
@@ -78,8 +82,11 @@ class ScoredFiles:
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, as `vobench score --json` prints them."""
-        if self.pool is None:
+        if len(self.pairs) == 1:
             return self.pairs[0].as_dict()
+        if self.pool is None:
+            estimates = [{"est": str(scored.pair.est.path), **scored.as_dict()} for scored in self.pairs]
+            return {"gt": str(self.pairs[0].pair.gt.path), "estimates": estimates}
         sequences = []
         for scored in self.pairs:
             files = {"gt": str(scored.pair.gt.path), "est": str(scored.pair.est.path)}
@@ -92,8 +99,13 @@ class ScoredFiles:
         return {"sequences": sequences, "pooled": together}
 
     def to_frame(self) -> "DataFrame":
-        """A pandas table with one row per sequence and metric, then one per metric of all sequences together."""
-        return data_frame({"sequence": sequence, **metric.as_dict()} for sequence, metric in self._metrics())
+        """A pandas table with one row per estimate and metric, then one per metric of all sequences together.
+
+        The first column is `sequence`, or `estimate` if all estimates are of one ground truth.
+        """
+        is_comparison = len(self.pairs) > 1 and self.pool is None
+        heading = "estimate" if is_comparison else "sequence"
+        return data_frame({heading: name, **metric.as_dict()} for name, metric in self._metrics())
 
     def _metrics(self) -> Iterator[tuple[str, MetricResult]]:
         """All metrics, with the names of their estimates."""
@@ -113,10 +125,11 @@ class ScoredFiles:
 
 
 def score_files(
-    pairs: Sequence[FilePair], *, settings: ScoreSettings = DEFAULTS, times: Sequence[Path] = ()
+    pairs: Sequence[FilePair], *, settings: ScoreSettings = DEFAULTS, times: Sequence[Path] = (), pool: bool = True
 ) -> ScoredFiles:
-    """Score estimates against ground truth. For several pairs, all errors are also pooled.
+    """Score estimates against ground truth.
 
+    Several pairs are sequences whose errors are also pooled; with `pool=False` they are estimates to be compared.
     With `settings.full`, installed metrics are measured too. `times` are files of stamps for files without (KITTI).
 
     Raises:
@@ -127,8 +140,8 @@ def score_files(
         raise InputError("there should be one pair of files or more, got none")
     metrics = all_metrics() if settings.full else tuple(DEFINITIONS.values())
     scored = tuple(_score_pair(pair, settings, times, metrics) for pair in pairs)
-    pool = pooled([each.score for each in scored]) if len(scored) > 1 else None
-    found = ScoredFiles(scored, pool)
+    is_pooled = pool and len(scored) > 1
+    found = ScoredFiles(scored, pooled([each.score for each in scored]) if is_pooled else None)
     found.require_finite()
     return found
 

@@ -29,6 +29,8 @@ UNSIMULATED: dict[str, Any] = {
     "variant": True,
     "scenario": True,
     "severity": True,
+    "repeat": True,
+    "repeat_of": True,
     "truth_noise": True,
     "scene": {"summary"},
     "trajectory": {"file", "times", "recorded_hz", "axes"},

@@ -81,7 +81,6 @@ def _is_below(path: str, folders: Iterable[str]) -> bool:
 
 def _search(top: str, skipped: Collection[str]) -> Iterator[Path]:
     """The files and folders with ground truth below a folder. Raises EstimatorFailure if it is too large."""
-    pattern = _truth_pattern()
     to_search = [top]
     count = 0
     while to_search:
@@ -94,19 +93,33 @@ def _search(top: str, skipped: Collection[str]) -> Iterator[Path]:
                 f"it may read a folder with more than {MOST_ENTRIES} files, too many to be searched for ground truth; "
                 f"use a smaller one: {top}",
             )
-        names = {entry.name for entry in entries}
-        is_result = names >= OF_RUN or names >= OF_STORE
+        is_result = _is_result(entries)
         if is_result and folder != top:
             yield Path(folder)
             continue
-
-        parent = os.path.basename(folder)
         for entry in entries:
-            is_telling = is_result and entry.name in TELLING
-            if is_telling or pattern.fullmatch(f"{parent}/{entry.name}") or _is_bundle(entry):
+            if _holds_truth(entry, os.path.basename(folder), is_in_result=is_result):
                 yield Path(entry.path)
-            elif entry.is_dir(follow_symlinks=False) and entry.name not in INSTALLED and entry.path not in skipped:
+            elif _is_searched(entry, skipped):
                 to_search.append(entry.path)
+
+
+def _is_result(entries: Iterable["os.DirEntry[str]"]) -> bool:
+    """Whether a folder with these entries is a run or a cache."""
+    names = {entry.name for entry in entries}
+    return names >= OF_RUN or names >= OF_STORE
+
+
+def _holds_truth(entry: "os.DirEntry[str]", parent: str, *, is_in_result: bool) -> bool:
+    """Whether a file or a folder holds ground truth, by its name, the name of its folder, or what a bundle contains."""
+    if is_in_result and entry.name in TELLING:
+        return True
+    return bool(_truth_pattern().fullmatch(f"{parent}/{entry.name}")) or _is_bundle(entry)
+
+
+def _is_searched(entry: "os.DirEntry[str]", skipped: Collection[str]) -> bool:
+    """Whether an entry is a folder to search: not a link, not of installed packages, and not skipped."""
+    return entry.is_dir(follow_symlinks=False) and entry.name not in INSTALLED and entry.path not in skipped
 
 
 def _entries(folder: str) -> list["os.DirEntry[str]"]:

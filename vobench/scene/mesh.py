@@ -1,4 +1,4 @@
-"""Creates, transforms and joins meshes, which are instances of `trimesh.Trimesh`.
+"""Creates, transforms and joins meshes.
 
 A mesh is a `trimesh.Trimesh` that was created with process=False, which preserves the order of its vertices.
 

@@ -12,8 +12,8 @@ from vobench.sensor.response import FULL_SCALE_DN, Grey
 from vobench.setting import NonNegative, Positive, settings
 
 MS_PER_S = 1e3
-# A smaller error of the exposure (natural logarithm) is not corrected, so that noise and flicker do not change it. The
-# value is an assumption.
+# An error of the exposure (natural logarithm) below this is not corrected, so that noise and flicker do not change the
+# exposure. The value is an assumption.
 DEAD_BAND = 0.02
 
 
@@ -106,9 +106,12 @@ def _exposure_of_level(loop: AutoExposure, level_s: float) -> Exposure:
 
 
 def _black_share(linear_of_grey: Array) -> float:
-    """The largest signal that can look black, as a share of full scale: half of that of the first grey value above."""
-    first_positive = float(linear_of_grey[linear_of_grey > 0][0])
-    return first_positive / 2
+    """The largest signal that can look black, as a share of full scale.
+
+    It is half of the signal at the smallest grey value whose signal is positive.
+    """
+    positive_shares = linear_of_grey[linear_of_grey > 0]
+    return float(positive_shares[0]) / 2
 
 
 def _brightness(loop: AutoExposure, grey: Grey, linear_of_grey: Array) -> float:

@@ -1,5 +1,6 @@
 """A camera's image sensor after EMVA 1288: photons to electrons to 8-bit values, grey or in colour. Pure."""
 
+import math
 from dataclasses import asdict, dataclass, replace
 from typing import Annotated, Literal
 
@@ -221,7 +222,8 @@ class CameraSettings:
     it is, rgb interpolates it. White light gives each of them the same grey value.
 
     The aperture is set for `exposure_ms`: then, and without gain, radiance 1 comes to 200 grey values;
-    `exposure_gain` multiplies that light, and each step of `exposure_compensation_ev` doubles it. `readout_ms` of a rolling shutter is height × line delay.
+    `exposure_gain` multiplies that light, and each step of `exposure_compensation_ev` doubles it.
+    `readout_ms` of a rolling shutter is height × line delay.
     `vignetting` 1 is cos⁴θ (the exponent is 4 · vignetting), cut off by the lens's rims at `vignetting_cutoff_deg`;
     `blur_sigma_px` is a Gaussian's, `defocus_px` the diameter of the disc that a point out of focus makes,
     `dirt` the mean share of light that dirt on the front lens keeps from its way, `flare` the share that lens and
@@ -284,7 +286,7 @@ class CameraSettings:
     @property
     def compensation(self) -> float:
         """The factor on the light that exposure_compensation_ev states."""
-        return 2.0**self.exposure_compensation_ev
+        return math.exp2(self.exposure_compensation_ev)
 
     @property
     def white_e(self) -> float:

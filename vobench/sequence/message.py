@@ -14,9 +14,16 @@ from vobench.sequence.topic import BODY, IMU, IMU_FRAME, LEFT_IMAGE, ODOMETRY, T
 from vobench.trajectory.nanoseconds import NS_PER_S
 
 END_OF_STAMPS_NS = 2**31 * NS_PER_S  # ROS counts seconds in 31 bits
-# The rules of sensor_msgs/Imu: a covariance of zeros is unknown; if its first element is -1, the message lacks
-# the quantity.
-UNKNOWN_COVARIANCE = -1.0
+# The covariances of a message that are not plain variances:
+#
+#   of a quantity that is ...    first element    other elements
+#   known without errors         0                0
+#   not estimated                NOT_ESTIMATED    0
+#
+# The second row is the rule of sensor_msgs/Imu.
+NOT_ESTIMATED = -1.0
+ROTATION_ELEMENTS = 9  # of the covariance (3, 3) of a rotation
+POSE_ELEMENTS = 36  # of the covariance (6, 6) of a pose or a twist
 
 
 def split_stamp(t_ns: int) -> tuple[int, int]:
@@ -113,7 +120,7 @@ def imu_message(
         t_ns,
         IMU_FRAME,
         orientation=no_rotation,
-        orientation_covariance=_unknown_covariance(9),
+        orientation_covariance=_not_estimated(ROTATION_ELEMENTS),
         angular_velocity=vector_message(gyro_radps),
         angular_velocity_covariance=np.eye(3).ravel() * gyro_variance,
         linear_acceleration=vector_message(accel_mps2),
@@ -121,10 +128,10 @@ def imu_message(
     )
 
 
-def _unknown_covariance(size: int) -> Array:
-    """The covariance (size,) of a quantity that the message does not estimate."""
-    covariance = np.zeros(size)
-    covariance[0] = UNKNOWN_COVARIANCE
+def _not_estimated(element_count: int) -> Array:
+    """The covariance (element_count,) of a quantity that the message does not estimate."""
+    covariance = np.zeros(element_count)
+    covariance[0] = NOT_ESTIMATED
     return covariance
 
 
@@ -156,17 +163,17 @@ def _exact_pose_message(T_world_body: Array) -> Any:
         position=position,
         orientation=_quaternion_message(T_world_body[:3, :3]),
     )
-    return new_message("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=np.zeros(36))
+    return new_message("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=np.zeros(POSE_ELEMENTS))
 
 
 def _twist_message(twist_body: ArrayLike | None) -> Any:
     """The geometry_msgs/TwistWithCovariance of an exact or unknown twist."""
     linear_mps = np.zeros(3)
     angular_radps = np.zeros(3)
-    covariance = _unknown_covariance(36)
+    covariance = _not_estimated(POSE_ELEMENTS)
     if twist_body is not None:
         linear_mps, angular_radps = np.asarray(twist_body, float).reshape(2, 3)
-        covariance = np.zeros(36)
+        covariance = np.zeros(POSE_ELEMENTS)
     twist = new_message(
         "geometry_msgs/msg/Twist",
         linear=vector_message(linear_mps),

@@ -21,7 +21,7 @@ from vobench.sequence.bag import Bag
 from vobench.sequence.calibration import read_rig
 from vobench.sequence.cdr import parse_picture
 from vobench.sequence.mcap_file import parsing, part_of
-from vobench.sequence.message import UNKNOWN_COVARIANCE, PoseFields, pose_fields, poses_from_fields, stamp_ns
+from vobench.sequence.message import NOT_ESTIMATED, PoseFields, pose_fields, poses_from_fields, stamp_ns
 from vobench.sequence.picture import MONO, Image, decode
 from vobench.sequence.pixel_truth import names_from_json, pixel_truth_topics, truth_topic, truth_values
 from vobench.sequence.topic import (
@@ -271,7 +271,7 @@ def has_truth(folder: Path) -> bool:
 def read_twist(folder: Path) -> Array | None:
     """The true twist (N, 6) at the poses of `read_truth`, m/s then rad/s, in body axes; None where it is not known."""
     _, rows = _table(_truth_bag(folder), ODOMETRY, _twist_fields, 7)
-    is_unknown = rows[:, 6] == UNKNOWN_COVARIANCE
+    is_unknown = rows[:, 6] == NOT_ESTIMATED
     if not len(rows) or is_unknown.any():
         return None
     return rows[:, :6].copy()

@@ -16,7 +16,7 @@ from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_spec import EXACT, Rendering, TruthNoise, Window
 from vobench.suite.trajectory import TrajectorySpec
 
-NOISE_SEED_STEP = 1_000_000  # between the seeds of two draws of noise; far above the seeds that users choose
+REPEAT_SEED_STEP = 1_000_000  # between the seeds of two repeats; far above the seeds that users choose
 CALIBRATION_STREAM = 7_301  # an arbitrary number that separates calibration errors from a seed's other random streams
 
 
@@ -24,8 +24,8 @@ CALIBRATION_STREAM = 7_301  # an arbitrary number that separates calibration err
 class Case:
     """One sequence to simulate, with all settings that determine it.
 
-    `name` is unique within the suite and valid as the name of a folder, for example office-dim. It joins those names
-    of `variant` that are not the same in the whole suite.
+    `name` is unique within the suite and valid as the name of a folder, for example office-dim. It consists of the
+    names in `variant`, without those of the axes on which all cases of the suite are equal.
     `variant` maps each axis to the name of the scene, lighting, rig, trajectory or camera.
     `replayed` is the text of the replayed trajectory in TUM format, None for a trajectory that is generated.
     `truth` lists the channels of per-pixel ground truth to record, such as depth.
@@ -33,6 +33,7 @@ class Case:
     `frames` (first, end) is the range of frames that the sequence contains, without `end`; None means all frames.
     `seed` is the seed of the suite.
     `scenario` and `severity` are set only for a case of a scenario.
+    `repeat` counts the draws of noise from 0, and `repeat_of` is the name of the first one, None for that one itself.
     """
 
     name: str
@@ -50,10 +51,12 @@ class Case:
     seed: int
     scenario: str | None = None
     severity: int | None = None
+    repeat: int = 0
+    repeat_of: str | None = None
 
     def build_scene(self) -> Scene:
         """The scene with this case's lighting."""
-        from vobench.suite.scene_build import build
+        from vobench.suite.scene_build import build  # slow to import, and most commands build no scene
 
         return build(self.scene, self.lighting)
 
@@ -75,15 +78,19 @@ class Case:
         return true_rig(nominal_rig, error)
 
 
-def with_noise_seeds(cases: Iterable[Case], count: int) -> Iterator[Case]:
+def with_repeats(cases: Iterable[Case], count: int) -> Iterator[Case]:
     """Each case `count` times, with different noise: of the sensors, of wheel slip, and of calibration errors.
 
-    The first copy is the case itself. The others have the same scene and trajectory and other seeds, and the number
-    of the copy is appended to their names, as in office-noise2. A leaderboard averages over the copies of a case
-    before it computes confidence intervals.
+    The first one is the case itself. The others have the same scene and trajectory and other seeds, and the number of
+    the repeat is appended to their names, as in office-repeat2. On a board they are one cell for each estimator.
     """
     for case in cases:
         yield case
-        for number in range(1, count):
-            name = f"{case.name}-noise{number + 1}"
-            yield replace(case, name=name, seed=case.seed + number * NOISE_SEED_STEP)
+        for repeat in range(1, count):
+            yield replace(
+                case,
+                name=f"{case.name}-repeat{repeat + 1}",
+                seed=case.seed + repeat * REPEAT_SEED_STEP,
+                repeat=repeat,
+                repeat_of=case.name,
+            )

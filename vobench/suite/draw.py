@@ -72,5 +72,8 @@ def joined(plans: Sequence[Plan]) -> Plan:
         for case in plan.simulated:
             name = f"{case.name}-draw{number}" if case.name in taken else case.name
             taken.add(name)
-            cases.append(replace(case, name=name))
+            repeat_of = case.repeat_of
+            if repeat_of is not None and name != case.name:
+                repeat_of = f"{repeat_of}-draw{number}"
+            cases.append(replace(case, name=name, repeat_of=repeat_of))
     return replace(plans[0], simulated=tuple(cases))

@@ -1,4 +1,7 @@
-"""Finds the free space on the floor of a scene by ray casting: the largest free circle, and a path in it."""
+"""Finds the free space on the floor or the ground of a scene by ray casting: the largest free circle, and a path in it.
+
+Most places have a level floor. Outdoors the ground may be uneven: then its height is found in every cell of the map.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -22,6 +25,13 @@ Mask = NDArray[np.bool_]
 LEVEL = 0.99  # cosine of the steepest level face
 FLOOR_STEP_M = 0.02
 FLOOR_SHARE = 0.4  # the smallest area of the floor, relative to the largest level area at any height
+
+# The ground is uneven if so small a share of the largest thing that faces up is at any one height.
+UNEVEN_SHARE = 0.2
+GENTLE = 0.97  # cosine of the steepest ground on which a body moves, 14 degrees
+GROUND_STEP_M = 0.06  # from the ground up to what lies on it and is no obstacle, such as a path
+GROUND_AREA_SHARE = 0.05  # of the largest uneven thing, which another one has to have to belong to the ground
+GROUND_EXTENT_SHARE = 0.3  # of its extent in plan, likewise: a tree may have many level leaves
 
 # The map of the floor, and the height of a body.
 CELL_M = 0.1
@@ -54,17 +64,28 @@ class FreeCircle:
 
 @dataclass(frozen=True, slots=True)
 class FloorMap:
-    """A grid on the floor: cell centres x (W,) and y (H,), and which cells (H, W) are free."""
+    """A grid on the floor: cell centres x (W,) and y (H,), and which cells (H, W) are free.
+
+    ground_m: the height (H, W) of uneven ground; None for a level floor, which is at floor_m.
+    """
 
     x_m: Array
     y_m: Array
     free: Mask
     floor_m: float
     cell_m: float
+    ground_m: Array | None = None
 
     def clearance(self) -> Clearance:
         """The distance from every cell to the nearest one that is not free."""
-        return Clearance(float(self.x_m[0]), float(self.y_m[0]), self.floor_m, self.cell_m, self._distances_m())
+        return Clearance(
+            x_m=float(self.x_m[0]),
+            y_m=float(self.y_m[0]),
+            floor_m=self.floor_m,
+            cell_m=self.cell_m,
+            distance_m=self._distances_m(),
+            ground_m=self.ground_m,
+        )
 
     def _distances_m(self) -> Array:
         """Distances (H, W) from the centres of free cells to the border of the nearest cell that is not free."""
@@ -76,13 +97,22 @@ class FloorMap:
         return distances_m
 
     def largest_circle(self) -> FreeCircle | None:
-        """The largest circle around the centre of a cell that contains free cells only."""
+        """The largest circle around the centre of a cell that contains free cells only.
+
+        On uneven ground, its floor is the highest ground in it, so that nothing on a level path is below the ground.
+        """
         distances_m = self._distances_m()
         row, column = np.unravel_index(distances_m.argmax(), distances_m.shape)
         radius_m = float(distances_m[row, column])
         if radius_m <= 0:
             return None
-        return FreeCircle(float(self.x_m[column]), float(self.y_m[row]), self.floor_m, radius_m)
+        x_m = float(self.x_m[column])
+        y_m = float(self.y_m[row])
+        floor_m = self.floor_m
+        if self.ground_m is not None:
+            distance_m = np.hypot(self.x_m - x_m, self.y_m[:, None] - y_m)
+            floor_m = float(self.ground_m[distance_m <= min(radius_m, MOST_RADIUS_M)].max())
+        return FreeCircle(x_m, y_m, floor_m, radius_m)
 
 
 def largest_free_circle(faces: Triangles, caster: RayCaster) -> FreeCircle | None:
@@ -95,7 +125,10 @@ def largest_free_circle(faces: Triangles, caster: RayCaster) -> FreeCircle | Non
 
 
 def floor_map(faces: Triangles, caster: RayCaster, *, body_m: float = BODY_M) -> FloorMap | None:
-    """The map of the floor for a body of some height; None if the scene has no level face."""
+    """The map of the floor or ground for a body of some height; None if the scene has neither."""
+    is_ground = _uneven_ground(faces)
+    if is_ground.any():
+        return _ground_map(faces, caster, is_ground, body_m=body_m)
     is_level = _is_level(faces)
     if not is_level.any():
         return None
@@ -121,8 +154,84 @@ def floor_map(faces: Triangles, caster: RayCaster, *, body_m: float = BODY_M) ->
     meets_floor = np.abs(hits.distance - body_m) < FLOOR_STEP_M
     is_free = meets_floor & (faces.plane[hits.face, 2] > 0)
     heights_m = [height_m for height_m in WALL_HEIGHTS_M if height_m <= body_m]
-    is_free[is_free] = _away_from_walls(centres_m[is_free], floor_m, cell_m, faces, caster, heights_m=heights_m)
+    floors_m = np.full(int(is_free.sum()), floor_m)
+    is_free[is_free] = _away_from_walls(centres_m[is_free], floors_m, cell_m, faces, caster, heights_m=heights_m)
     return FloorMap(x_m, y_m, is_free.reshape(len(y_m), len(x_m)), floor_m, cell_m)
+
+
+def _uneven_ground(faces: Triangles) -> Mask:
+    """Whether each face belongs to uneven ground; all False if the ground is level.
+
+    The ground is the stationary thing with the largest area that faces up and is gentle, and others like it.
+    """
+    is_gentle = (faces.plane[:, 2] > GENTLE) & (faces.mover < 0) & (faces.thing >= 0)
+    things = faces.thing[is_gentle]
+    if not len(things):
+        return is_gentle
+    area_m2 = areas_m2(faces.corners_m[is_gentle])
+    height_steps = _height_steps(faces.corners_m[is_gentle])
+
+    area_of_thing_m2 = np.bincount(things, area_m2)
+    largest = int(area_of_thing_m2.argmax())
+    if not _is_uneven(height_steps[things == largest], area_m2[things == largest]):
+        return np.zeros(len(faces.thing), bool)
+    ground = []
+    corners_m = faces.corners_m[is_gentle]
+    least_extent_m = GROUND_EXTENT_SHARE * _extent_m(corners_m[things == largest])
+    for thing in np.flatnonzero(area_of_thing_m2 > GROUND_AREA_SHARE * area_of_thing_m2[largest]).tolist():
+        is_of_thing = things == thing
+        is_wide = _extent_m(corners_m[is_of_thing]) > least_extent_m
+        if is_wide and _is_uneven(height_steps[is_of_thing], area_m2[is_of_thing]):
+            ground.append(thing)
+    is_ground: Mask = is_gentle & np.isin(faces.thing, ground)
+    return is_ground
+
+
+def _extent_m(corners_m: Array) -> float:
+    """The longer side of the box in plan around faces (F, 3, 3)."""
+    points_m = corners_m.reshape(-1, 3)[:, :2]
+    return float((points_m.max(0) - points_m.min(0)).max())
+
+
+def _is_uneven(height_steps: NDArray[np.int_], area_m2: Array) -> bool:
+    """Whether no height step has a large share of the area (F,) of faces."""
+    by_height_m2 = np.bincount(height_steps - height_steps.min(), area_m2)
+    return bool(by_height_m2.max() < UNEVEN_SHARE * by_height_m2.sum())
+
+
+def _ground_map(faces: Triangles, caster: RayCaster, is_ground: Mask, *, body_m: float) -> FloorMap | None:
+    """The map of uneven ground, which consists of some of the faces (F,)."""
+    ground_corners_m = faces.corners_m[is_ground].reshape(-1, 3)
+    low_m = ground_corners_m.min(0)[:2]
+    high_m = ground_corners_m.max(0)[:2]
+    cell_m = max(CELL_M, float((high_m - low_m).max()) / MOST_CELLS)
+    x_m = np.arange(low_m[0] + cell_m / 2, high_m[0], cell_m)
+    y_m = np.arange(low_m[1] + cell_m / 2, high_m[1], cell_m)
+    centres_m = np.stack(np.meshgrid(x_m, y_m), -1).reshape(-1, 2)  # (H * W, 2)
+
+    ground_caster = RayCaster(faces, np.flatnonzero(is_ground))
+    top_m = float(ground_corners_m[:, 2].max()) + 1.0
+    to_ground = ground_caster.hits(at_height(centres_m, top_m), downward_directions(len(centres_m)))
+    has_ground = to_ground.face >= 0
+    if not has_ground.any():
+        return None
+    heights_m = np.where(has_ground, top_m - to_ground.distance, 0.0)
+
+    # A cell is free if a ray down from the height of a body meets the ground first, and if no wall is near.
+    starts_m = np.column_stack([centres_m, heights_m + body_m])
+    hits = caster.hits(starts_m, downward_directions(len(starts_m)))
+    is_free = has_ground & (np.abs(hits.distance - body_m) < GROUND_STEP_M)
+    wall_heights_m = [height_m for height_m in WALL_HEIGHTS_M if height_m <= body_m]
+    is_free[is_free] = _away_from_walls(
+        centres_m[is_free], heights_m[is_free], cell_m, faces, caster, heights_m=wall_heights_m
+    )
+    shape = (len(y_m), len(x_m))
+    # Cells without ground get the height of the nearest one that has some, so that heights can be interpolated.
+    nearest = scipy.ndimage.distance_transform_edt(
+        ~has_ground.reshape(shape), return_distances=False, return_indices=True
+    )
+    ground_m = heights_m.reshape(shape)[tuple(nearest)]
+    return FloorMap(x_m, y_m, is_free.reshape(shape), float(np.median(heights_m[has_ground])), cell_m, ground_m)
 
 
 def floor_height_m(faces: Triangles) -> float | None:
@@ -164,7 +273,7 @@ def at_height(places_m: Array, z_m: float) -> Array:
 
 def _away_from_walls(
     centres_m: Array,
-    floor_m: float,
+    floors_m: Array,
     cell_m: float,
     faces: Triangles,
     caster: RayCaster,
@@ -173,11 +282,12 @@ def _away_from_walls(
 ) -> Mask:
     """Whether each cell (N, 2) has no wall within the width of a cell at some heights, and is not inside of a thing.
 
-    A point is inside of a thing if rays to all four sides hit the backs of faces.
+    floors_m (N,) are the heights of the floor there. A point is inside of a thing if rays to all four sides hit the
+    backs of faces.
     """
     is_clear = np.ones(len(centres_m), bool)
     for height_m in heights_m:
-        starts_m = at_height(centres_m, floor_m + height_m)
+        starts_m = np.column_stack([centres_m, floors_m + height_m])
         is_inside = np.ones(len(centres_m), bool)
         for direction in SIDES:
             hits = caster.hits(starts_m, np.tile(direction, (len(starts_m), 1)))

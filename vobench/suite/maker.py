@@ -27,7 +27,8 @@ from vobench.suite.maker_message import decode
 from vobench.suite.maker_worker import ERROR_FILE, GENERATE, MAKE, SCENE_FILE, call
 from vobench.suite.scene_code import sources
 
-LIMITS = Limits(trial_s=600.0, threads=os.cpu_count() or 1)
+LIMITS = Limits(trial_s=600.0, threads=os.cpu_count() or 1)  # a large margin: built-in places take seconds
+# -P keeps the current folder out of the module search path, so that no file there can replace a module of vobench.
 WORKER = (sys.executable, "-P", "-m", "vobench.suite.maker_worker")
 MAX_SCENE_BYTES = 2 << 30  # so that a hostile maker cannot exhaust the memory
 MAX_ERROR_BYTES = 1 << 16

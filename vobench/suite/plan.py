@@ -34,7 +34,7 @@ class Trial:
 
 @dataclass(frozen=True, slots=True)
 class Plan:
-    """The cases, the estimators and the number of repeats of a suite. Every combination is a trial.
+    """The cases and the estimators of a suite. Every combination is a trial, and some are two: see `trials`.
 
     `found` lists the scenes, scenarios and estimators that the names in the suite refer to.
     `source` is the file of the suite.
@@ -55,21 +55,43 @@ class Plan:
         return *self.simulated, *self.recorded
 
     def trials(self, case: AnyCase) -> list[Trial]:
-        """Every trial on one case."""
-        repeats = range(self.suite.repeats)
-        return [Trial(case, entry, repeat, self.hidden) for entry in self.estimator_entries for repeat in repeats]
+        """Every trial on one case.
+
+        The repeats of a simulated case are cases of their own, with new noise. A recording is always the same, so only
+        an estimator that is not deterministic is repeated on it. A suite with repeats runs each deterministic estimator
+        twice on one case or recording, which tests whether it is deterministic.
+        """
+        trials = list[Trial]()
+        for entry in self.estimator_entries:
+            for repeat in self._repeats(case, entry):
+                trials.append(Trial(case, entry, repeat, self.hidden))
+        return trials
+
+    def _repeats(self, case: AnyCase, entry: EstimatorEntry) -> range:
+        """The numbers of the trials of an estimator on a case."""
+        is_deterministic = entry.manifest.deterministic
+        first = 0
+        count = 1
+        if isinstance(case, Case):
+            first = case.repeat
+        elif not is_deterministic:
+            count = self.suite.repeats
+        if is_deterministic and self.suite.repeats > 1 and case.name == self.cases[0].name:
+            count = 2
+        return range(first, first + count)
 
     def only(self, cases: Collection[str], scenes: Collection[str]) -> "Plan":
         """The plan with only the cases whose name matches one of `cases`, and whose scene matches one of `scenes`.
 
-        Both are collections of globs. An empty collection selects everything. Raises UnknownNameError for a glob
-        without a match.
+        Both are collections of globs. An empty collection selects everything. The name of a case selects its repeats,
+        too. Raises UnknownNameError for a glob without a match.
         """
         _require_matches("case", cases, (case.name for case in self.cases))
         _require_matches("scene", scenes, (_scene_name(case) for case in self.cases))
 
         def is_selected(case: AnyCase) -> bool:
-            return _matches_any(case.name, cases) and _matches_any(_scene_name(case), scenes)
+            is_named = _matches_any(case.name, cases) or _matches_any(_first_name(case), cases)
+            return is_named and _matches_any(_scene_name(case), scenes)
 
         simulated = tuple(filter(is_selected, self.simulated))
         recorded = tuple(filter(is_selected, self.recorded))
@@ -89,6 +111,11 @@ class Plan:
 
 def _scene_name(case: AnyCase) -> str:
     return case.variant.get("scene", "")
+
+
+def _first_name(case: AnyCase) -> str:
+    """The name of the case that this one repeats, or else its own name."""
+    return (isinstance(case, Case) and case.repeat_of) or case.name
 
 
 def _matches_any(name: str, patterns: Collection[str]) -> bool:

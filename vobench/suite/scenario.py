@@ -84,8 +84,14 @@ class Scenario:
     def variant_names(self, severity: int, scene: str) -> dict[str, str]:
         """The name of the variant on each axis, as in `Case.variant`; `scene` is the name of the scene.
 
-        It is the name of the scenario, followed by the severity if this severity changes the axis. Severity 3 of a
-        scenario `dim` that only dims the lamps has the lighting "dim.3" and the rig "dim".
+        At severity 3 of a scenario `dim` in the scene `office`, the names are:
+
+        | axis         | if severity 3 changes it | otherwise |
+        |--------------|--------------------------|-----------|
+        | scene        | office.dim.3             | office    |
+        | lighting ... | dim.3                    | dim       |
+
+        If a scene is changed equally by all severities, its name is office.dim.
         """
         names = {axis: self._with_severity(self.name, severity, key=axis) for axis in AXES}
         return {**names, "scene": self._scene_name(severity, scene)}

@@ -9,7 +9,7 @@ from typing import Any
 from vobench.errors import SuiteError
 from vobench.setting import hints
 from vobench.suite import catalog, yaml_file
-from vobench.suite.case import with_noise_seeds
+from vobench.suite.case import with_repeats
 from vobench.suite.estimator_entry import EstimatorEntryReader
 from vobench.suite.lookup import Lookup
 from vobench.suite.plan import Plan
@@ -67,8 +67,8 @@ def _plan(suite: Suite, mistakes: Mistakes, only_estimators: tuple[str, ...]) ->
 
     mistakes.require_none()
     axis_cases = [axis_reader.case(variant, axes, replayed) for variant in variants]
-    simulated = tuple(with_noise_seeds((*axis_cases, *scenario_cases), suite.noise_seeds))
-    with mistakes.at("noise_seeds"):
+    simulated = tuple(with_repeats((*axis_cases, *scenario_cases), suite.repeats))
+    with mistakes.at("repeats"):
         _require_distinct([case.name for case in simulated])
     mistakes.require_none()
     return Plan(suite, simulated, recorded, estimator_entries, tuple(lookup.entries), mistakes.source)

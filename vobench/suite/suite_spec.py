@@ -114,11 +114,11 @@ class Suite:
 
     The cases are every combination of scene, lighting, rig, trajectory and camera, every recording of `source`, and
     each of `scenarios` at the severities it is listed with. Each axis names its variants; change one axis to change
-    one factor. Each case is simulated with `noise_seeds` draws of all noise, and each estimator runs `repeats` times on
-    each. Without rigs, a stereo pair looks ahead; without trajectories, the body drives a circle in the free
-    space of each scene. A suite of recordings or scenarios alone has no axes. Scenarios are repeated for each of
-    `calibrations` that lists their severity. With `frames`, only the frames from the first number up to, not
-    including, the second are rendered. Keys that the file omits are those of the suite that it includes.
+    one factor. Each simulated case is repeated `repeats` times, with new noise and another seed of the estimator each
+    time. Without rigs, a stereo pair looks ahead; without trajectories, the body drives a circle in the free space of
+    each scene. A suite of recordings or scenarios alone has no axes. Scenarios are repeated for each of `calibrations`
+    that lists their severity. With `frames`, only the frames from the first number up to, not including, the second
+    are rendered. Keys that the file omits are those of the suite that it includes.
     """
 
     include: str | None = None
@@ -127,7 +127,6 @@ class Suite:
     seed: Annotated[int, Ge(0)] = 0
     base_seed: Annotated[int, Ge(0), Le(LARGEST_BASE_SEED)] = 0
     repeats: Annotated[int, Ge(1), Le(100)] = 1
-    noise_seeds: Annotated[int, Ge(1), Le(100)] = 1
     source: Annotated[tuple[Source, ...], SOURCES] = ()
     scenarios: Annotated[dict[str, Severities], MinLen(1)] | None = None
     spread: Spread | None = None

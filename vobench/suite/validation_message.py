@@ -118,18 +118,24 @@ def _other_kinds_message(details: ErrorDetails, schema: Schema, source: YamlFile
     if it probably lacks a unit, as `power` does, which stands for `power_lm`.
     """
     loc = pydantic_location(details)
-    lacks_unit = any(known_key.startswith(f"{loc[-1]}_") for known_key in _known_keys(details, schema))
-    if len(loc) < 2 or lacks_unit:
+    if len(loc) < 2 or _probably_lacks_unit(details, schema):
         return None
     *section_loc, kind, key = loc
     section = _schema_place(schema, tuple(section_loc))
+    is_section_of_kinds = str(kind) in _references_by_kind(section.schema)
     kinds_with_key = _kinds_with_key(schema, section.schema, key)
-    if str(kind) not in _references_by_kind(section.schema) or not kinds_with_key:
+    if not is_section_of_kinds or not kinds_with_key:
         return None
 
     is_kind_written = source.place((*section.key_path, "kind")).value is not None
     this_kind = f"this is {kind}" if is_kind_written else f"the kind is {kind} by default"
     return f"belongs to {', '.join(kinds_with_key)}; {this_kind}"
+
+
+def _probably_lacks_unit(details: ErrorDetails, schema: Schema) -> bool:
+    """Whether an unknown key is the beginning of a known key, as `power` is of `power_lm`."""
+    unknown_key = pydantic_location(details)[-1]
+    return any(known_key.startswith(f"{unknown_key}_") for known_key in _known_keys(details, schema))
 
 
 def _kinds_with_key(schema: Schema, section: Schema, key: int | str) -> list[str]:

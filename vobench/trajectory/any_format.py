@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vobench.errors import TrajectoryError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
@@ -11,12 +14,14 @@ from vobench.trajectory.increasing_column import increasing_rows
 from vobench.trajectory.kitti import KITTI_COLUMNS, NUMBERED_COLUMNS, frame_numbers, matrix_poses
 from vobench.trajectory.quaternion_columns import QuaternionOrder, rotations
 from vobench.trajectory.stamp_text import StampUnit, unchecked_stamps_ns
+from vobench.trajectory.tartanair import TARTANAIR_COLUMNS
 from vobench.trajectory.text_table import TextTable, content_lines, read_table
 from vobench.trajectory.trajectory import Stamps
 from vobench.trajectory.tum import TUM_COLUMNS
 
+FrameNumbers = NDArray[np.int64]
+
 LFS_POINTER = "version https://git-lfs.github.com/spec/"
-TARTANAIR_COLUMNS = ("x", "y", "z", "qx", "qy", "qz", "qw")
 FORMATS_WITHOUT_COMMAS = (TUM_COLUMNS, KITTI_COLUMNS, NUMBERED_COLUMNS, TARTANAIR_COLUMNS)
 COLUMNS_BY_COUNT = {len(columns): columns for columns in FORMATS_WITHOUT_COMMAS}
 KNOWN_FORMATS = (
@@ -35,7 +40,7 @@ class ParsedTrajectory:
     `unit` is the unit in which the stamps were read.
     `format_unit` is the default unit of the format.
     `order` is the order in which quaternions were read, None for a format without quaternions.
-    `frames` (N,) are the frame numbers, if the file has them instead of stamps.
+    `frames` (N,) are the frame numbers, from 0, if the file has them instead of stamps.
     `notes` are sentences about rows that were left out.
     """
 
@@ -44,7 +49,7 @@ class ParsedTrajectory:
     unit: StampUnit | None = None
     format_unit: StampUnit | None = None
     order: QuaternionOrder | None = None
-    frames: Stamps | None = None
+    frames: FrameNumbers | None = None
     notes: tuple[str, ...] = ()
 
     def stamped_by(self, frames_ns: Stamps) -> Stamps | None:
@@ -82,13 +87,13 @@ def parse_any(
 
     columns = COLUMNS_BY_COUNT[len(first_row.split())]
     table = read_table(content_lines(text), name=name, columns=columns)
-    if columns is TUM_COLUMNS:
+    if columns == TUM_COLUMNS:
         return _parse_stamped(table, unit=unit, format_unit="s", order=order or "xyzw")
-    if columns is TARTANAIR_COLUMNS:
+    if columns == TARTANAIR_COLUMNS:
         return _parse_unstamped(table, order or "xyzw")
-    if columns is NUMBERED_COLUMNS:
+    if columns == NUMBERED_COLUMNS:
         return _parse_numbered_matrices(table)
-    return ParsedTrajectory(t_ns=None, T=matrix_poses(table))
+    return _parse_matrices(table)
 
 
 def _first_row(text: str, name: str) -> str:
@@ -137,6 +142,11 @@ def _parse_unstamped(table: TextTable, order: QuaternionOrder) -> ParsedTrajecto
     R = rotations(table, table.values[:, 3:], order)
     T = se3.transform(R, table.values[:, :3])
     return ParsedTrajectory(t_ns=None, T=T, order=order)
+
+
+def _parse_matrices(table: TextTable) -> ParsedTrajectory:
+    """The poses of rows with a matrix, as in KITTI."""
+    return ParsedTrajectory(t_ns=None, T=matrix_poses(table))
 
 
 def _parse_numbered_matrices(table: TextTable) -> ParsedTrajectory:

@@ -1,0 +1,296 @@
+"""The plans of parks by seed: hills, a pond, a loop of paths with links and exits, and what is near them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.spatial import cKDTree
+
+from vobench.asset.picture import Rng
+from vobench.asset.site import Area
+from vobench.geometry.se3 import Array
+
+STEP_M = 0.25  # between points of a path
+STEEPEST = 0.17  # the sum of the slopes of all waves of the ground
+RIM_SHARE = 0.2  # of half the extent, in which the ground rises towards the border
+SHORE_M = 0.14  # of the water's edge below the ground around the pond
+WADING_M = 0.25  # depth of water in which a piece may stand
+POND_CLEAR_M = 2.6  # between the middle of a path and the water
+LINK_TRIES = 12
+NEAR_BORDER_M = 3.5
+
+
+@dataclass(frozen=True, slots=True)
+class Pond:
+    """A pond whose shore is a star-shaped curve around a centre (2,).
+
+    radius_m: the mean radius. lobes (K, 3): number of waves, amplitude relative to the radius, and phase of each.
+    depth_m: below the ground around.
+    """
+
+    center_m: Array
+    radius_m: float
+    lobes: Array
+    depth_m: float
+
+    def shore_m(self, bearing_rad: Array) -> Array:
+        """The distance (...) of the shore from the centre at bearings (...)."""
+        factor = np.ones_like(bearing_rad)
+        for waves, amplitude, phase_rad in self.lobes.tolist():
+            factor = factor + amplitude * np.cos(waves * bearing_rad + phase_rad)
+        return self.radius_m * factor
+
+    def share(self, points_m: Array) -> Array:
+        """The distance (N,) of points (N, 2) from the centre relative to that of the shore."""
+        to_point = points_m - self.center_m
+        bearing_rad = np.arctan2(to_point[:, 1], to_point[:, 0])
+        share: Array = np.linalg.norm(to_point, axis=1) / self.shore_m(bearing_rad)
+        return share
+
+
+@dataclass(frozen=True, slots=True)
+class ParkGround:
+    """The ground of a park: plane waves, a hollow for a pond, and a rim that rises towards the border.
+
+    waves (K, 4): amplitude in m, wave vector in rad/m along x and y, and phase. level_m: the height of the ground
+    around the pond.
+    """
+
+    half_m: tuple[float, float]
+    waves: Array
+    rim_m: float
+    pond: Pond | None
+    level_m: float
+
+    @property
+    def water_m(self) -> float:
+        """The height of the water."""
+        return self.level_m - SHORE_M
+
+    def surface_m(self, points_m: Array) -> Array:
+        """The height (N,) of the ground at points (N, 2), also below water."""
+        height_m: Array = np.zeros(len(points_m))
+        for amplitude_m, along_x, along_y, phase_rad in self.waves.tolist():
+            height_m = height_m + amplitude_m * np.sin(points_m @ [along_x, along_y] + phase_rad)
+        edge = np.max(np.abs(points_m) / self.half_m, axis=1)
+        height_m = height_m + self.rim_m * np.clip((edge - 1 + RIM_SHARE) / RIM_SHARE, 0, 1) ** 2
+        if self.pond is None:
+            return height_m
+        share = self.pond.share(points_m)
+        is_dry = _smooth_step((share - 1.1) / 0.9)
+        hollow = _smooth_step((1.15 - share) / 0.6)
+        shaped_m: Array = self.level_m + is_dry * (height_m - self.level_m) - self.pond.depth_m * hollow
+        return shaped_m
+
+    def heights_m(self, points_m: Array) -> Array:
+        """The height (N,) of the ground at points (N, 2); NaN where the water is too deep to stand."""
+        height_m = self.surface_m(points_m)
+        if self.pond is None:
+            return height_m
+        is_deep = (height_m < self.water_m - WADING_M) & (self.pond.share(points_m) < 1.3)
+        return np.where(is_deep, np.nan, height_m)
+
+    def at(self, x_m: float, y_m: float) -> float:
+        """The height of the ground at a point."""
+        return float(self.surface_m(np.array([[x_m, y_m]]))[0])
+
+
+def _smooth_step(t: Array) -> Array:
+    """A step from 0 to 1 for t from 0 to 1, twice smooth."""
+    t = np.clip(t, 0, 1)
+    return t**3 * (10 - 15 * t + 6 * t**2)
+
+
+@dataclass(frozen=True, slots=True)
+class Path:
+    """A path: points (N, 2), STEP_M apart, and its width (N,) there."""
+
+    points_m: Array
+    widths_m: Array
+
+    @property
+    def directions(self) -> Array:
+        """Unit vectors (N, 2) ahead."""
+        ahead = np.gradient(self.points_m, axis=0)
+        is_closed = np.allclose(self.points_m[0], self.points_m[-1])
+        if is_closed:
+            ahead[[0, -1]] = self.points_m[1] - self.points_m[-2]
+        directions: Array = ahead / np.linalg.norm(ahead, axis=1, keepdims=True)
+        return directions
+
+    @property
+    def left(self) -> Array:
+        """Unit vectors (N, 2) to the left."""
+        directions = self.directions
+        return np.stack([-directions[:, 1], directions[:, 0]], axis=1)
+
+    @property
+    def length_m(self) -> float:
+        """The length."""
+        return STEP_M * (len(self.points_m) - 1)
+
+    def areas(self, ground: ParkGround) -> list[Area]:
+        """Convex areas, a metre long, that cover the path."""
+        half = self.widths_m[:, None] / 2 * self.left
+        left = self.points_m + half
+        right = self.points_m - half
+        every = round(1.0 / STEP_M)
+        found = []
+        for start in range(0, len(self.points_m) - 1, every):
+            end = min(start + every, len(self.points_m) - 1)
+            corners_m = np.stack([right[start], right[end], left[end], left[start]])
+            found.append(Area(corners_m, ground.at(*self.points_m[start].tolist())))
+        return found
+
+
+@dataclass(frozen=True, slots=True)
+class ParkPlan:
+    """The plan of a park. The first path is the loop; links cross it, and exits lead to the border."""
+
+    half_m: tuple[float, float]
+    ground: ParkGround
+    paths: tuple[Path, ...]
+
+    @property
+    def loop(self) -> Path:
+        """The loop."""
+        return self.paths[0]
+
+    def path_tree(self) -> cKDTree:
+        """The points of all paths, for the distance to the nearest path."""
+        return cKDTree(np.concatenate([path.points_m for path in self.paths]))
+
+
+def park_plan(rng: Rng) -> ParkPlan:
+    """The plan of a park."""
+    half_m = (float(rng.uniform(24, 36)), float(rng.uniform(19, 27)))
+    loop_m = _loop(rng, half_m)
+    pond = _pond(rng, loop_m, half_m) if rng.random() < 0.72 else None
+    ground = _ground(rng, half_m, pond)
+    width_m = float(rng.uniform(1.9, 3.0))
+    paths = [_path(rng, loop_m, width_m)]
+    for _ in range(int(rng.integers(0, 3))):
+        link_m = _link(rng, paths, pond)
+        if link_m is not None:
+            paths.append(_path(rng, link_m, float(rng.uniform(1.5, 2.1))))
+    first_deg = float(rng.uniform(0, 360))
+    for number in range(int(rng.integers(1, 4))):
+        bearing_rad = np.deg2rad(first_deg + 120 * number + float(rng.uniform(-30, 30)))
+        exit_m = _exit(paths[0], half_m, float(bearing_rad))
+        if pond is None or pond.share(exit_m).min() > 1.5:
+            paths.append(_path(rng, exit_m, float(rng.uniform(1.6, 2.4))))
+    return ParkPlan(half_m, ground, tuple(paths))
+
+
+def _resampled(points_m: Array) -> Array:
+    """Points about STEP_M apart along a polyline."""
+    along_m = np.concatenate([[0], np.cumsum(np.linalg.norm(np.diff(points_m, axis=0), axis=1))])
+    stops_m = np.linspace(0, along_m[-1], int(along_m[-1] / STEP_M) + 1)
+    return np.stack([np.interp(stops_m, along_m, axis) for axis in points_m.T], axis=1)
+
+
+def _loop(rng: Rng, half_m: tuple[float, float]) -> Array:
+    """A closed curve (N, 2) around the middle of the park."""
+    corners = int(rng.integers(6, 11))
+    bearings_rad = 2 * np.pi * (np.arange(corners) + rng.uniform(-0.22, 0.22, corners)) / corners
+    bearings_rad += rng.uniform(0, 2 * np.pi)
+    shares = rng.uniform(0.5, 0.78, corners)
+    points_m = shares[:, None] * np.array(half_m) * np.stack([np.cos(bearings_rad), np.sin(bearings_rad)], axis=1)
+    closed_m = np.concatenate([points_m, points_m[:1]])
+    curve = CubicSpline(np.linspace(0, 1, corners + 1), closed_m, bc_type="periodic")
+    return _resampled(curve(np.linspace(0, 1, 2000)))
+
+
+def _pond(rng: Rng, loop_m: Array, half_m: tuple[float, float]) -> Pond | None:
+    """The largest of some ponds that keep clear of the loop and of the border; None if there is no room for one."""
+    best = None
+    most_m = float(rng.uniform(3.5, 8.5))
+    for _ in range(30):
+        center_m = rng.uniform(-0.62, 0.62, 2) * half_m
+        to_loop_m = float(np.linalg.norm(loop_m - center_m, axis=1).min())
+        to_border_m = float((np.array(half_m) - np.abs(center_m)).min())
+        room_m = min(to_loop_m - POND_CLEAR_M, to_border_m - NEAR_BORDER_M - 3)
+        radius_m = min(room_m / 1.3, most_m)
+        if radius_m > 2.4 and (best is None or radius_m > best.radius_m):
+            lobes = np.array(
+                [[waves, rng.uniform(0.02, 0.24 / waves), rng.uniform(0, 2 * np.pi)] for waves in (2, 3, 4)]
+            )
+            best = Pond(center_m, radius_m, lobes, float(rng.uniform(0.7, 1.1)))
+    return best
+
+
+def _ground(rng: Rng, half_m: tuple[float, float], pond: Pond | None) -> ParkGround:
+    """Hills of some waves, from flat lawns to slopes of a sixth."""
+    count = 5
+    lengths_m = rng.uniform(16, 55, count)
+    bearings_rad = rng.uniform(0, 2 * np.pi, count)
+    wave_numbers = 2 * np.pi / lengths_m
+    weights = rng.uniform(0.3, 1.0, count)
+    slope = float(rng.uniform(0.4, 1.0)) * STEEPEST
+    amplitudes_m = weights * slope / float(weights @ wave_numbers)
+    waves = np.stack(
+        [
+            amplitudes_m,
+            wave_numbers * np.cos(bearings_rad),
+            wave_numbers * np.sin(bearings_rad),
+            rng.uniform(0, 2 * np.pi, count),
+        ],
+        axis=1,
+    )
+    rim_m = float(rng.uniform(0.8, 2.4))
+    bare = ParkGround(half_m, waves, rim_m, None, 0.0)
+    if pond is None:
+        return bare
+    return ParkGround(half_m, waves, rim_m, pond, bare.at(*pond.center_m.tolist()))
+
+
+def _path(rng: Rng, points_m: Array, width_m: float) -> Path:
+    """A path of a width that changes a little, and is the same at both ends."""
+    turn_rad = np.linspace(0, 2 * np.pi, len(points_m))
+    length_m = STEP_M * len(points_m)
+    phases_rad = rng.uniform(0, 2 * np.pi, 2)
+    slow = np.sin(round(length_m / 7) * turn_rad + phases_rad[0])
+    fast = np.sin(round(length_m / 2.7) * turn_rad + phases_rad[1])
+    wobble_m = 0.1 * slow + 0.06 * fast
+    return Path(points_m, width_m + wobble_m)
+
+
+def _link(rng: Rng, paths: Sequence[Path], pond: Pond | None) -> Array | None:
+    """A curve (N, 2) from one place of the loop to another one, clear of the pond; None if none is found."""
+    loop_m = paths[0].points_m
+    count = len(loop_m)
+    for _ in range(LINK_TRIES):
+        first = int(rng.integers(count))
+        last = (first + int(rng.uniform(0.35, 0.65) * count)) % count
+        start_m = loop_m[first]
+        end_m = loop_m[last]
+        sideways = np.array([end_m[1] - start_m[1], start_m[0] - end_m[0]])
+        middle_m = (start_m + end_m) / 2 + float(rng.uniform(-0.22, 0.22)) * sideways
+        curve = CubicSpline([0, 0.5, 1], np.stack([start_m, middle_m, end_m]))
+        link_m = _resampled(curve(np.linspace(0, 1, 600)))
+        is_dry = pond is None or _is_clear(pond, link_m)
+        # A link leaves the loop, and does not run beside another path.
+        inner_m = link_m[len(link_m) // 5 : -len(link_m) // 5]
+        others_m = np.concatenate([path.points_m for path in paths])
+        to_others_m = cKDTree(others_m).query(inner_m)[0]
+        crosses = len(paths) > 1
+        if is_dry and (to_others_m.min() > 3.0 or (crosses and np.median(to_others_m) > 4.0)):
+            return link_m
+    return None
+
+
+def _is_clear(pond: Pond, points_m: Array) -> bool:
+    """Whether points (N, 2) keep clear of a pond."""
+    return bool(((pond.share(points_m) - 1) * 0.8 * pond.radius_m).min() > POND_CLEAR_M - 1.0)
+
+
+def _exit(loop: Path, half_m: tuple[float, float], bearing_rad: float) -> Array:
+    """A curve (N, 2) from the loop to the border, and a little beyond."""
+    outward = np.array([np.cos(bearing_rad), np.sin(bearing_rad)])
+    border_m = outward / np.max(np.abs(outward) / half_m) * 1.03
+    start = int(np.argmin(np.linalg.norm(loop.points_m - 0.72 * border_m, axis=1)))
+    start_m = loop.points_m[start]
+    middle_m = 0.5 * (start_m + border_m) + 0.08 * np.array([border_m[1] - start_m[1], start_m[0] - border_m[0]])
+    curve = CubicSpline([0, 0.5, 1], np.stack([start_m, middle_m, border_m]))
+    return _resampled(curve(np.linspace(0, 1, 300)))

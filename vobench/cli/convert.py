@@ -1,0 +1,101 @@
+"""vobench convert."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vobench.cli import terminal
+from vobench.cli.option import Json, option_group, with_option_groups
+from vobench.cli.trajectory_option import Topic
+from vobench.errors import counted
+from vobench.runner.convert_trajectory import TrajectoryEdit, convert_trajectories
+from vobench.runner.trajectory_pair import TrajectorySource
+from vobench.trajectory.nanoseconds import NS_PER_S
+
+MOST_S = 9e9  # seconds that fit into stamps of 64 bits in nanoseconds
+
+
+@option_group
+class ReadingOptions:
+    """How the files are read."""
+
+    topic: Topic = None
+    read_as: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--as",
+            help="s|ms|us|ns, xyzw|wxyz, inverse, rotations:inverse, axes:z,-x,-y, positions:y,x,z or "
+            "mount:x,y,z,qx,qy,qz,qw; can be repeated.",
+        ),
+    ] = None
+    times: Annotated[
+        list[Path] | None,
+        typer.Option(help="A file with stamps in seconds, one a line, for forms without stamps; can be repeated."),
+    ] = None
+
+    def source(self, path: Path) -> TrajectorySource:
+        """A file and how it is read."""
+        return TrajectorySource(path, self.topic, tuple(self.read_as or ()))
+
+
+@option_group
+class EditOptions:
+    """What becomes of the poses."""
+
+    t_offset: Annotated[float, typer.Option(min=-MOST_S, max=MOST_S, help="Seconds added to all stamps.")] = 0.0
+    t_start: Annotated[
+        float | None, typer.Option(min=-MOST_S, max=MOST_S, help="The first stamp that is kept, in seconds.")
+    ] = None
+    t_end: Annotated[
+        float | None, typer.Option(min=-MOST_S, max=MOST_S, help="The last stamp that is kept, in seconds.")
+    ] = None
+    downsample: Annotated[int | None, typer.Option(min=2, help="Keep at most this many poses, evenly.")] = None
+
+    @property
+    def edit(self) -> TrajectoryEdit:
+        """The options, with stamps in nanoseconds."""
+        return TrajectoryEdit(
+            offset_ns=round(self.t_offset * NS_PER_S),
+            first_ns=_nanoseconds(self.t_start),
+            last_ns=_nanoseconds(self.t_end),
+            count=self.downsample,
+        )
+
+
+def _nanoseconds(time_s: float | None) -> int | None:
+    return None if time_s is None else round(time_s * NS_PER_S)
+
+
+@with_option_groups
+def convert_command(
+    files: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="FILE...",
+            help="Trajectories: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, detected from content, or the folder of "
+            "a sequence. Several are merged in order of time.",
+        ),
+    ],
+    *,
+    out: Annotated[Path, typer.Option("--out", "-o", help="The file to write; it must not exist.")],
+    form: Annotated[str, typer.Option(help="The format to write: tum, kitti, euroc or tartanair.")] = "tum",
+    reading: ReadingOptions,
+    editing: EditOptions,
+    json: Json = False,
+) -> None:
+    """Convert trajectory files between formats, frames, axes and units of time, and merge them."""
+    converted = convert_trajectories(
+        [reading.source(file) for file in files],
+        out,
+        form,
+        times=reading.times or (),
+        edit=editing.edit,
+    )
+    if json:
+        written = [str(file) for file in converted.files]
+        terminal.print_json({"files": written, "poses": converted.pose_count, "notes": converted.notes})
+        return
+    for note in converted.notes:
+        print(f"- {note}")
+    print(f"{counted(converted.pose_count, 'pose')} (form: {form}): {out}")

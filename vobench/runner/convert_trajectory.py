@@ -1,0 +1,63 @@
+"""Converts trajectory files of any format: their poses can be merged, shifted in time and reduced."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from vobench.dataset.export import export_trajectory
+from vobench.errors import counted
+from vobench.runner.trajectory_pair import TrajectorySource, read_one
+from vobench.trajectory.part import between, downsampled, merged, shifted
+
+
+@dataclass(frozen=True, slots=True)
+class TrajectoryEdit:
+    """How a trajectory is changed, in this order: its stamps are shifted, it is cut, and it is downsampled.
+
+    `first_ns` and `last_ns` are stamps after the shift. None means no limit.
+    """
+
+    offset_ns: int = 0
+    first_ns: int | None = None
+    last_ns: int | None = None
+    count: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ConvertedTrajectory:
+    """The files that were written, the number of poses in them, and notes on what was left out."""
+
+    files: tuple[Path, ...]
+    pose_count: int
+    notes: tuple[str, ...]
+
+
+def convert_trajectories(
+    sources: Sequence[TrajectorySource],
+    out: Path,
+    form: str,
+    *,
+    times: Sequence[Path] = (),
+    edit: TrajectoryEdit = TrajectoryEdit(),
+) -> ConvertedTrajectory:
+    """Write the poses of one or more files as one file of another format.
+
+    Several files are merged in order of time. `times` are files of stamps for files without (KITTI, TartanAir).
+
+    Raises:
+        InputError: a file cannot be read or exists, the format is unknown, or no pose is left.
+    """
+    parts = [read_one(source, times=times).trajectory for source in sources]
+    whole = merged(parts)
+    trajectory = shifted(whole.trajectory, edit.offset_ns)
+    trajectory = between(trajectory, edit.first_ns, edit.last_ns)
+    if edit.count is not None:
+        trajectory = downsampled(trajectory, edit.count)
+    files = export_trajectory(trajectory, out, form)
+
+    notes = list[str]()
+    if whole.repeated:
+        notes.append(f"{counted(whole.repeated, 'pose')} left out, whose stamps an earlier file has, too.")
+    stamp_files = [file for file in files if file != out]
+    notes += [f"Poses in this format have no stamps; the stamps are in {file.name}." for file in stamp_files]
+    return ConvertedTrajectory(files, len(trajectory), tuple(notes))
