@@ -7,8 +7,8 @@ from vobench.analysis import path_placement
 from vobench.analysis.path_placement import (
     CELLS,
     RAYS_PER_CELL,
-    _Surroundings,
     _Start,
+    _Surroundings,
     _view_rays,
     cell_disparities,
     levelled,
