@@ -1,13 +1,13 @@
 """The settings of trajectories on wheels: the start, the wheels of each robot, and what a mover may be."""
 
-import math
+from math import inf
 
 import numpy as np
 import pytest
 
 from vobench.errors import SettingError
 from vobench.geometry.rig import PIONEER_WHEELS
-from vobench.motion.pioneer import THETAS
+from vobench.motion.pioneer import THETAS, AccelerationLimits
 from vobench.motion.wheeled import CAR_WHEELS, KEYS_WITHOUT_CONTROLLER, PIONEER_KEYS, Wheeled
 
 
@@ -28,19 +28,14 @@ def test_without_motors_the_dynamics_are_those_of_the_named_robot() -> None:
 
 
 def test_without_limits_accelerations_are_unlimited() -> None:
-    limits = Wheeled(max_accel_mps2=2.0).limits
-    assert math.inf in vars_of(limits)
-    assert 2.0 in vars_of(limits)
+    assert Wheeled().limits == AccelerationLimits(inf, inf)
+    assert Wheeled(max_accel_mps2=2.0).limits == AccelerationLimits(2.0, inf)
 
 
-def vars_of(limits: object) -> list[float]:
-    """The values of the fields of a dataclass with slots."""
-    return [getattr(limits, name) for name in type(limits).__slots__]
-
-
-def test_a_mover_that_does_not_exist_is_refused_with_the_ones_that_do() -> None:
-    with pytest.raises(SettingError, match="pioneer, unicycle, ackermann"):
+def test_a_mover_that_does_not_exist_is_refused() -> None:
+    with pytest.raises(SettingError) as refusal:
         Wheeled(mover="hovercraft")  # type: ignore[arg-type]
+    assert "hovercraft" in str(refusal.value)
 
 
 def test_only_the_controller_is_missing_where_speeds_are_given() -> None:
