@@ -17,8 +17,8 @@ import numpy as np
 
 from vobench.geometry.rig import PIONEER_WHEELS
 from vobench.motion.drive import Drive, drive
+from vobench.motion.encoder import ENCODERS, ticks
 from vobench.motion.slip import SLIP_STREAMS, SLIPS
-from vobench.motion.wheeled import ENCODERS, ticks
 from vobench.sensor.imu import IMUS, STREAMS, ImuSettings, measure
 
 # One thread: what a core can do. Set before numpy is loaded.

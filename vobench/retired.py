@@ -58,9 +58,9 @@ MOVED = {
         "twist": "vobench.plugin.twist",
     },
     "vobench.sensor.encoder": {
-        "ENCODERS": "vobench.motion.wheeled.ENCODERS",
-        "EncoderErrors": "vobench.motion.wheeled.EncoderErrors",
-        "ticks": "vobench.motion.wheeled.ticks",
+        "ENCODERS": "vobench.motion.encoder.ENCODERS",
+        "EncoderErrors": "vobench.motion.encoder.EncoderErrors",
+        "ticks": "vobench.motion.encoder.ticks",
     },
     "vobench.dataset.convert": {"convert": "vobench.dataset.sequence.convert"},
     "vobench.dataset.read": {

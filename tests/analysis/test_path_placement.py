@@ -7,13 +7,13 @@ from vobench.analysis import path_placement
 from vobench.analysis.path_placement import (
     CELLS,
     RAYS_PER_CELL,
-    _Place,
     _Start,
+    _Surroundings,
     _view_rays,
     cell_disparities,
     levelled,
     place_path,
-    stretch_disparities,
+    segment_disparities,
 )
 from vobench.analysis.stereo_fit import StereoFit, Uncertain
 from vobench.analysis.stereo_matches import Matches
@@ -89,7 +89,7 @@ def test_a_path_lies_free_and_its_disparities_agree():
 def test_where_a_path_was_is_found_by_its_disparities_along_the_way():
     scene = hall()
     there = se3.transform(se3.rotation_z(0.4), (-2.5, 0.6, 1.2)) @ straight(4.0)
-    wanted = stretch_disparities(RayCaster(triangles(scene, t_ns=0)), there, PAIR, 1.0, 4)
+    wanted = segment_disparities(RayCaster(triangles(scene, t_ns=0)), there, PAIR, 1.0, 4)
     found = place_path(scene, straight(4.0), PAIR, wanted)
     ends = (found.T_place_world @ straight(4.0))[[0, -1], :2, 3] / found.scale
     assert found.misfit < 0.05
@@ -225,7 +225,7 @@ def test_disparities_of_a_wall_follow_from_its_distance_in_every_cell_and_with_t
     caster = RayCaster(triangles(hall(), t_ns=0))
     pose = se3.transform(np.eye(3), (2.0, 0.0, 1.5)) @ looking(pitch_deg=0, position_m=(0, 0, 0))
     for scale in (1.0, 2.0):
-        found = stretch_disparities(caster, pose[None], PAIR, scale, 1)
+        found = segment_disparities(caster, pose[None], PAIR, scale, 1)
         assert found.shape == (1, 3, 3)
         assert found == pytest.approx(150 * 0.2 / (2.0 * scale), rel=1e-5)  # the wall at x = 4 fills the view
 
@@ -235,10 +235,10 @@ def test_each_stretch_is_seen_from_its_middle_and_cells_are_rows_then_columns() 
     path = straight(3.0, count=40)
     path[:, :3, 3] += [-3.0, 0.0, 1.0]
     path[:, 1, 3] = 1.5  # nearer to the left wall
-    found = stretch_disparities(caster, path, PAIR, 1.0, 2)
+    found = segment_disparities(caster, path, PAIR, 1.0, 2)
     middles = [path[10], path[30]]
     for stretch, pose in enumerate(middles):
-        np.testing.assert_allclose(found[stretch], stretch_disparities(caster, pose[None], PAIR, 1.0, 1)[0])
+        np.testing.assert_allclose(found[stretch], segment_disparities(caster, pose[None], PAIR, 1.0, 1)[0])
     assert found[0, 1, 0] > found[0, 1, 2]  # left is nearer than right
     assert found[0, 2, 1] > found[0, 0, 1]  # the floor is nearer than the ceiling, from 1 m above it
 
@@ -246,15 +246,15 @@ def test_each_stretch_is_seen_from_its_middle_and_cells_are_rows_then_columns() 
 def test_where_nothing_is_seen_disparities_are_those_of_far_points() -> None:
     caster = RayCaster(triangles(hall(), t_ns=0))
     outside = se3.transform(np.eye(3), (10.0, 0.0, 1.5)) @ looking(pitch_deg=0, position_m=(0, 0, 0))
-    assert (stretch_disparities(caster, outside[None], PAIR, 1.0, 1) == 0.3).all()
+    assert (segment_disparities(caster, outside[None], PAIR, 1.0, 1) == 0.3).all()
 
 
 # --- The place ---
 
 
 @pytest.fixture(scope="module")
-def place() -> _Place:
-    return _Place.of(hall())
+def place() -> _Surroundings:
+    return _Surroundings.of(hall())
 
 
 def start(**changes) -> _Start:
@@ -262,7 +262,7 @@ def start(**changes) -> _Start:
 
 
 @pytest.mark.parametrize("scale", [1.0, 2.0])
-def test_a_path_starts_at_its_start_in_its_direction_and_at_its_height(place: _Place, scale: float) -> None:
+def test_a_path_starts_at_its_start_in_its_direction_and_at_its_height(place: _Surroundings, scale: float) -> None:
     path = se3.transform(se3.rotation_z(0.2), (7.0, 8.0, 9.0)) @ straight(1.0)
     T = place.free_pose(path, start(scale=scale, heading_rad=0.3))
     first, second = (T @ se3.transform(path[:, :3, :3], path[:, :3, 3] / scale))[[0, -1]]
@@ -271,7 +271,7 @@ def test_a_path_starts_at_its_start_in_its_direction_and_at_its_height(place: _P
     np.testing.assert_allclose(direction, np.array([np.cos(0.5), np.sin(0.5), 0]) / scale, atol=1e-6)
 
 
-def test_a_path_that_descends_starts_so_high_that_its_lowest_point_is_at_the_height(place: _Place) -> None:
+def test_a_path_that_descends_starts_so_high_that_its_lowest_point_is_at_the_height(place: _Surroundings) -> None:
     path = straight(1.0)
     path[:, 2, 3] = np.linspace(0, -0.6, len(path))
     T = place.free_pose(path, start(height_m=0.8))
@@ -295,12 +295,12 @@ def test_a_path_that_descends_starts_so_high_that_its_lowest_point_is_at_the_hei
         ({"xy_m": np.array([5.0, 0.5])}, False),  # without a floor
     ],
 )
-def test_a_path_is_free_at_0_3_m_from_everything(place: _Place, changes, is_free) -> None:
+def test_a_path_is_free_at_0_3_m_from_everything(place: _Surroundings, changes, is_free) -> None:
     assert (place.free_pose(straight(1.0), start(**changes)) is not None) == is_free
 
 
 def test_inside_of_an_object_nothing_is_free() -> None:
-    blocked = _Place.of(hall(pillar=True))
+    blocked = _Surroundings.of(hall(pillar=True))
     assert blocked._ground_m(np.array([-3.4, 0.0])) == pytest.approx(0, abs=1e-6)
     assert blocked._ground_m(np.array([0.0, 0.0])) is not None
     assert blocked.free_pose(straight(0.5), start(xy_m=np.array([0.0, 0.0]))) is None
@@ -308,7 +308,7 @@ def test_inside_of_an_object_nothing_is_free() -> None:
     assert blocked._is_free(np.array([[-3.4, 0.0, 1.0], [-3.4, 0.5, 1.0]]), 0.3)
 
 
-def test_the_extent_is_that_of_the_walls_and_starts_are_drawn_all_over_it(place: _Place) -> None:
+def test_the_extent_is_that_of_the_walls_and_starts_are_drawn_all_over_it(place: _Surroundings) -> None:
     np.testing.assert_allclose([place.low_m, place.high_m], [[-4, -3, 0], [4, 3, 3]], atol=1e-9)
     rng = np.random.default_rng(0)
     starts = [place.any_start(rng) for _ in range(3000)]
@@ -357,7 +357,7 @@ def test_the_placement_is_in_the_scale_of_the_recording() -> None:
     assert ((in_place_m > low_m + 0.29) & (in_place_m < high_m - 0.29)).all()
 
 
-def test_every_face_counts_the_first_one_too(place: _Place) -> None:
+def test_every_face_counts_the_first_one_too(place: _Surroundings) -> None:
     near_first = np.array([[-3.8, -2.0, 2.4], [-3.7, -2.0, 2.4]])  # the first triangle is that part of the wall
     hits = place.caster.hits(near_first[:1], np.array([[-1.0, 0.0, 0.0]]))
     assert hits.face.tolist() == [0]

@@ -13,6 +13,7 @@ from vobench.geometry.se3 import Array
 from vobench.rendering import shadow_cells
 from vobench.rendering.lamp import Lamp
 from vobench.rendering.occlusion import Occluders
+from vobench.rendering.receiver_plane import large_planes
 from vobench.rendering.truth import CameraShot, TruthCaster
 from vobench.scene.light import AreaLight, Light, PointLight, SpotLight, Sun
 from vobench.scene.material import Material
@@ -70,8 +71,8 @@ def test_shadows_with_known_cells_are_those_of_a_ray_for_every_pixel_and_lamp(
     times_ns = (0, 500_000_000)
     expected = [shadow(by_rays, t_ns) for t_ns in times_ns]
 
-    monkeypatch.setattr(shadow_cells, "WORTH_PIXELS", 1)
-    monkeypatch.setattr(shadow_cells, "WORTH_PIXELS_PER_CELL", 0)
+    monkeypatch.setattr(shadow_cells, "MIN_PIXELS", 1)
+    monkeypatch.setattr(shadow_cells, "MIN_PIXELS_PER_CELL", 0)
     caster = TruthCaster(scene)
     np.testing.assert_array_equal(shadow(caster), expected[0])
     decided_cells = []
@@ -99,7 +100,7 @@ def floor_cells(lamp: Lamp, *things: Rectangle) -> tuple[Array, shadow_cells.Sha
     corners_m = np.concatenate([thing.mesh.triangles for thing in (floor(), *things)])
     normals = np.tile([0.0, 0, 1], (len(corners_m), 1))
     on_floor = np.arange(len(corners_m)) < 2
-    [plane], _ = shadow_cells.large_planes(corners_m, normals, on_floor, 1e-4)
+    [plane], _ = large_planes(corners_m, normals, on_floor, 1e-4)
     cells = shadow_cells.shadow_cells(plane, (lamp,), Occluders(corners_m, np.ones(len(corners_m), bool)))
     row, column = np.divmod(np.arange(plane.height * plane.width), plane.width)
     middles_m = plane.origin_m + plane.cell_m * (

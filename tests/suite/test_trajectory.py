@@ -10,8 +10,9 @@ from pydantic import TypeAdapter
 
 from vobench.errors import SuiteError
 from vobench.geometry import se3
+from vobench.motion.encoder import ENCODERS
 from vobench.motion.motor import MotorConstants, theta_of
-from vobench.motion.wheeled import ENCODERS, Wheeled
+from vobench.motion.wheeled import Wheeled
 from vobench.setting import hints
 from vobench.suite.suite import read_plan
 from vobench.suite.trajectory import KINDS, TrajectorySpec

@@ -26,8 +26,8 @@ CONDITIONS: dict[str, tuple[str, str]] = {
     "gloss": ("%", "pixels on glossy coats"),
     "shadow_edge": ("%", "pixels at the edge of a shadow"),
     "moving": ("%", "pixels on moving objects"),
-    "burnt": ("%", "pixels at 254 or more"),
-    "black": ("%", "pixels at 2 or less"),
+    "burnt": ("%", f"pixels at {SATURATED_DN} or more"),
+    "black": ("%", f"pixels at {BLACK_DN} or less"),
     "faintness": ("", "inverse contrast of the textures in view, before the camera's exposure"),
     "depth": ("m", "median distance"),
     "disparity": ("px", "median disparity between the two cameras"),
@@ -59,6 +59,7 @@ RESPONSE_GAMMA = 2.2  # of grey values over the linear signal, approximately
 SIGMA_PER_DEFOCUS = 0.25  # standard deviation of a disc over its diameter
 SIGMA_PER_SMEAR = 12**-0.5  # standard deviation of a uniform smear over its length
 DB_PER_STOP = 20 * np.log10(2)
+ONLY_STEP_NS = 1.0  # of a single frame, which has no motion to divide by it
 
 Exposures = Mapping[int, tuple[float, float]]  # exposure time in s and gain in dB, by time stamp
 
@@ -74,38 +75,59 @@ def conditions(
     `gt` is the trajectory of the left camera with a pose for each frame.
     """
     observer = _SceneObserver(case)
-    steps_ns = np.diff(gt.t_ns)
-    usual_step_ns = float(np.median(steps_ns)) if len(steps_ns) else 1.0
+    steps_ns = _steps_to_next_ns(gt)
+    usual_step_ns = float(np.median(np.diff(gt.t_ns))) if len(gt) > 1 else ONLY_STEP_NS
+    inverse_steps = _inverse_steps(gt)
+    nominal_exposure = (case.camera.exposure_ms / 1e3, case.camera.gain_db)
 
     rows: list[dict[str, float]] = []
-    previous = None
-    for frame, T_world_left, index in zip(frames, gt.T_world_frame, range(len(gt)), strict=False):
-        next_index = min(index + 1, len(gt) - 1)
-        next_shot = CameraShot(gt.T_world_frame[next_index], int(gt.t_ns[next_index]))
-        of_scene = observer.conditions(CameraShot(T_world_left, frame.t_ns), next_shot)
+    previous: _FrameState | None = None
+    for index, frame in zip(range(len(gt)), frames, strict=False):  # the last frames may have no pose
+        shot = CameraShot(gt.T_world_frame[index], frame.t_ns)
+        scene_values = observer.conditions(shot, _next_shot(gt, index))
 
-        nominal_exposure = (case.camera.exposure_ms / 1e3, case.camera.gain_db)
+        mean_dn = _mean_dn(frame)
         exposure_s, gain_db = exposures.get(frame.t_ns, nominal_exposure)
-        step_ns = float(steps_ns[min(index, len(steps_ns) - 1)]) if len(steps_ns) else usual_step_ns
-        of_camera = _camera_conditions(
+        camera_values = _camera_conditions(
             case,
-            speed_pxps=of_scene["flow"] / (step_ns / 1e9),
-            mean_dn=_mean_dn(frame),
+            speed_pxps=scene_values["flow"] / (float(steps_ns[index]) / 1e9),
+            mean_dn=mean_dn,
             exposure_s=exposure_s,
             gain_db=gain_db,
         )
 
-        exposure_stops = float(np.log2(exposure_s) + gain_db / DB_PER_STOP)
-        of_frame = {"darkness": 1 / max(_mean_dn(frame), MIN_MEAN_DN), "since_start": float(index)}
-        current = _FrameState(exposure_stops, _brightness_stops(frame.left), T_world_left, frame.t_ns)
-        changes = _changes(previous or current, current, usual_step_ns)
-        rows.append({**of_scene, **_image_conditions(frame), **of_camera, **of_frame, **changes})
+        current = _FrameState(
+            exposure_stops=float(np.log2(exposure_s) + gain_db / DB_PER_STOP),
+            brightness_stops=_brightness_stops(frame.left),
+            T_world_left=gt.T_world_frame[index],
+            t_ns=frame.t_ns,
+        )
+        if previous is None:
+            previous = current  # so that the first frame has no changes
+        change_values = _changes(previous, current, usual_step_ns)
         previous = current
 
-    short_steps = _inverse_steps(gt)
-    for row, inverse_step in zip(rows, short_steps.tolist(), strict=False):
-        row["short_steps"] = inverse_step
+        frame_values = {
+            "darkness": 1 / max(mean_dn, MIN_MEAN_DN),
+            "short_steps": float(inverse_steps[index]),
+            "since_start": float(index),
+        }
+        rows.append({**scene_values, **_image_conditions(frame), **camera_values, **change_values, **frame_values})
     return {name: _column(rows, name) for name in CONDITIONS}
+
+
+def _next_shot(gt: Trajectory, index: int) -> CameraShot:
+    """The shot of the next frame; for the last frame, its own."""
+    next_index = min(index + 1, len(gt) - 1)
+    return CameraShot(gt.T_world_frame[next_index], int(gt.t_ns[next_index]))
+
+
+def _steps_to_next_ns(gt: Trajectory) -> Array:
+    """The time (N,) in ns until the next frame; the last frame has that of the frame before."""
+    steps_ns = np.diff(gt.t_ns)
+    if not len(steps_ns):
+        return np.full(len(gt), ONLY_STEP_NS)
+    return np.append(steps_ns, steps_ns[-1]).astype(float)
 
 
 def _inverse_steps(gt: Trajectory) -> Array:
@@ -180,6 +202,7 @@ class _SceneObserver:
         """The conditions that follow from geometry and materials, with the flow to a later shot."""
         channels = ("depth", "flow", "material", "mirror", "shadow", "moving")
         truth = self._caster.frame(cast("Camera", self._camera), now, channels, later=later)
+        # A TruthFrame has None for channels that were not requested.
         assert truth.depth is not None
         assert truth.flow is not None
         flow_px = np.linalg.norm(truth.flow, axis=-1) * self._camera.step
@@ -201,9 +224,13 @@ class _SceneObserver:
 
     def _pixel_shares(self, truth: TruthFrame) -> dict[str, float]:
         """The shares of pixels with certain properties, and the faintness of the texture in the image."""
-        material = cast("Any", truth.material)
-        mirror = cast("Any", truth.mirror)
-        shadow = cast("Any", truth.shadow)
+        assert truth.material is not None
+        assert truth.mirror is not None
+        assert truth.shadow is not None
+        assert truth.moving is not None
+        material = truth.material
+        mirror = truth.mirror
+        shadow = truth.shadow
         is_coated = self._is_coated[material]
         is_edge = np.zeros(shadow.shape, bool)
         is_edge[:, 1:] |= shadow[:, 1:] != shadow[:, :-1]
@@ -213,7 +240,7 @@ class _SceneObserver:
             "gloss": float((mirror & is_coated).mean()),
             "shadow_edge": float(is_edge.mean()),
             "faintness": 1 / (MIN_CONTRAST + self._mean_contrast(material)),
-            "moving": float(cast("Any", truth.moving).mean()),
+            "moving": float(truth.moving.mean()),
         }
 
     def _mean_contrast(self, material: NDArray[np.uint16]) -> float:
@@ -320,16 +347,22 @@ def _camera_conditions(
     }
 
 
+MIN_SIGNAL_STEP = 1e-9  # of the full well; avoids a division by zero where the response is flat
+
+
 def chip_noise_dn(chip: CameraSensor, grey_dn: float, *, gain_db: float = 0.0) -> float:
     """The temporal noise of a chip at a grey value. Source: EMVA 1288, release 3.1, eq. 10."""
     amplification = 10 ** (gain_db / 20)
     neighbours_dn = np.array([grey_dn - 1, grey_dn + 1])
-    below, above = np.clip(neighbours_dn, 0, FULL_SCALE_DN) / FULL_SCALE_DN
-    low, high = chip.curve.decode(np.array([below, above]))
-    electrons = (low + high) / 2 * chip.full_well_e / amplification
+    grey_low, grey_high = np.clip(neighbours_dn, 0, FULL_SCALE_DN) / FULL_SCALE_DN
+    # The signals that these grey values encode, as shares of the full well.
+    signal_low, signal_high = chip.curve.decode(np.array([grey_low, grey_high]))
+    electrons = (signal_low + signal_high) / 2 * chip.full_well_e / amplification
     shot_variance_e = chip.shot_noise * electrons
     sigma_e = np.sqrt(chip.read_noise_e**2 + shot_variance_e)
-    slope_dn = (above - below) * FULL_SCALE_DN / max(high - low, 1e-9)  # grey values per full well
+    grey_step_dn = (grey_high - grey_low) * FULL_SCALE_DN
+    signal_step = max(signal_high - signal_low, MIN_SIGNAL_STEP)
+    slope_dn = grey_step_dn / signal_step  # grey values per full well
     return float(slope_dn * sigma_e * amplification / chip.full_well_e)
 
 

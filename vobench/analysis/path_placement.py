@@ -24,24 +24,30 @@ MIN_DISPARITY_PX = 0.3  # points that are further away count as infinitely far
 def cell_disparities(fit: StereoFit, pair: StereoPair) -> Array:
     """The median disparity (V, 3, 3) in px of a recording's matches, by rows and columns of the left view.
 
-    V are the parts of the path that were matched. NaN for a cell with too few matches.
+    V is the number of segments of the path in which matches were found. NaN for a cell with too few matches.
     """
     matches = fit.matches
     offset_px = 0.0
     if fit.offset_px and fit.offset_px.is_plain:
         offset_px = fit.offset_px.value
     camera = pair.left.camera
-    homogeneous = np.c_[matches.place, np.ones(len(matches.place))]
-    right_uv = homogeneous @ pair.K.T
-    column = _cell(right_uv[:, 0] + matches.disparity_px, camera.width_px)
-    row = _cell(right_uv[:, 1], camera.height_px)
 
-    stretches = int(matches.window.max()) + 1
-    medians_px = np.full((stretches, CELLS, CELLS), np.nan)
-    for stretch, cell_row, cell_column in np.ndindex(medians_px.shape):
-        is_in_cell = (matches.window == stretch) & (row == cell_row) & (column == cell_column)
+    # Matches have normalised coordinates in the right view. Rectified views show a point in the same row, and the left
+    # view shows it further right by the disparity.
+    homogeneous = np.c_[matches.place, np.ones(len(matches.place))]
+    right_px = homogeneous @ pair.K.T
+    left_column_px = right_px[:, 0] + matches.disparity_px
+    column = _cell(left_column_px, camera.width_px)
+    row = _cell(right_px[:, 1], camera.height_px)
+
+    segment_of_match = matches.window
+    segments = int(segment_of_match.max()) + 1
+    medians_px = np.full((segments, CELLS, CELLS), np.nan)
+    for segment, cell_row, cell_column in np.ndindex(medians_px.shape):
+        is_in_cell = (segment_of_match == segment) & (row == cell_row) & (column == cell_column)
         if is_in_cell.sum() >= MIN_MATCHES_IN_CELL:
-            medians_px[stretch, cell_row, cell_column] = np.median(matches.disparity_px[is_in_cell]) - offset_px
+            median_px = np.median(matches.disparity_px[is_in_cell])
+            medians_px[segment, cell_row, cell_column] = median_px - offset_px
     return np.asarray(np.maximum(medians_px, MIN_DISPARITY_PX), float)
 
 
@@ -85,7 +91,12 @@ def _scaled_down(T: Array, scale: float) -> Array:
     return se3.transform(T[:, :3, :3], T[:, :3, 3] / scale)
 
 
-# --- The search for a place ---
+def _scaled_up(T: Array, scale: float) -> Array:
+    """A pose (4, 4) with its position multiplied by a scale."""
+    return se3.transform(T[:3, :3], T[:3, 3] * scale)
+
+
+# --- The search for a placement ---
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,6 +120,13 @@ CLEARANCE_M = 0.3
 WAYPOINTS = 40
 EXTENT_QUANTILE = 0.01  # of the corners of faces: a few far ones do not extend the place
 
+UP = np.array([[0.0, 0.0, 1.0]])
+DOWN = -UP
+LEVEL_COSINE = 0.9  # a face is level if the cosine of the angle between its normal and the vertical is larger
+MAX_LAYERS = 4  # faces below a point that are examined
+BEYOND_FACE_M = 1e-3
+ABOVE_PLACE_M = 1.0
+
 # The numbers of draws anywhere in the place, and then closer and closer to the best one.
 DRAWS = 6000
 NEAR_DRAWS = 1500
@@ -120,7 +138,10 @@ SCALE_COST = 0.05  # misfit that is worth a factor e of the scale
 
 @dataclass(frozen=True, slots=True)
 class _Start:
-    """A candidate for the start of a path: its height above the ground, heading, and position (2,)."""
+    """A candidate for the start of a path: its height above the ground, heading, and position (2,).
+
+    `scale` enlarges the scene. The height is in the enlarged scene, the position in the scene as it is.
+    """
 
     scale: float
     height_m: float
@@ -157,30 +178,27 @@ def place_path(
 ) -> Placement:
     """Place a path (N, 4, 4) of the left camera into a scene so that disparities agree and the path is free.
 
-    `wanted_px` (V, 3, 3) are the disparities of V parts of the path. Raises InputError if no free path is found.
+    `wanted_px` (V, 3, 3) are the disparities in V segments of the path. Raises InputError if no free path is found.
     """
-    place = _Place.of(scene)
+    surroundings = _Surroundings.of(scene)
     path = _thinned(T_world_left, WAYPOINTS)
     rng = np.random.default_rng(seed)
     best: _Best | None = None
     tried = 0
     for draw in range(DRAWS + NEAR_DRAWS):
-        if draw < DRAWS or best is None:
-            start = place.any_start(rng)
-        else:
-            start = best.start.near(LAST_SHARE ** ((draw - DRAWS) / NEAR_DRAWS), rng)
-
-        T_place_world = place.free_pose(path, start)
-        if T_place_world is None:
+        start = _draw_start(draw, surroundings, best, rng)
+        T_scene_world = surroundings.free_pose(path, start)
+        if T_scene_world is None:
             continue
         tried += 1
-        path_in_place = T_place_world @ _scaled_down(path, start.scale)
-        seen_px = stretch_disparities(place.caster, path_in_place, pair, start.scale, len(wanted_px))
+
+        path_in_scene = T_scene_world @ _scaled_down(path, start.scale)
+        seen_px = segment_disparities(surroundings.caster, path_in_scene, pair, start.scale, len(wanted_px))
         misfit = float(np.nanmean(np.abs(np.log(seen_px / wanted_px))))
         cost = misfit + SCALE_COST * abs(np.log(start.scale))
         if best is None or cost < best.cost:
-            T_place_world[:3, 3] *= start.scale
-            best = _Best(cost, start, Placement(T_place_world, start.scale, misfit, 0))
+            T_place_world = _scaled_up(T_scene_world, start.scale)
+            best = _Best(cost, start, Placement(T_place_world, start.scale, misfit, tried=0))
 
     if best is None:
         steps_m = np.diff(T_world_left[:, :3, 3], axis=0)
@@ -191,12 +209,12 @@ def place_path(
     return replace(best.placement, tried=tried)
 
 
-UP = np.array([[0.0, 0.0, 1.0]])
-DOWN = -UP
-LEVEL_COSINE = 0.9  # of the angle between a face's normal and the vertical, at least
-MAX_LAYERS = 4  # faces below a point that are examined
-BEYOND_FACE_M = 1e-3
-ABOVE_PLACE_M = 1.0
+def _draw_start(draw: int, surroundings: "_Surroundings", best: _Best | None, rng: np.random.Generator) -> _Start:
+    """The candidate of a draw: first anywhere, then at a decreasing distance from the best one."""
+    if draw < DRAWS or best is None:
+        return surroundings.any_start(rng)
+    progress = (draw - DRAWS) / NEAR_DRAWS
+    return best.start.near(LAST_SHARE**progress, rng)
 
 
 def _directions_around() -> Array:
@@ -212,8 +230,8 @@ DIRECTIONS_AROUND = _directions_around()
 
 
 @dataclass(frozen=True, slots=True)
-class _Place:
-    """A scene that a path is placed into: its ray caster, normals of faces (F, 3), and extent (3,)."""
+class _Surroundings:
+    """The scene that a path is placed into: its ray caster, normals of faces (F, 3), and extent (3,)."""
 
     caster: RayCaster
     normals: Array
@@ -221,7 +239,7 @@ class _Place:
     high_m: Array
 
     @classmethod
-    def of(cls, scene: Scene) -> "_Place":
+    def of(cls, scene: Scene) -> "_Surroundings":
         faces = triangles(scene, t_ns=0)
         corners_m = faces.corners_m.reshape(-1, 3)
         low_m = np.quantile(corners_m, EXTENT_QUANTILE, axis=0)
@@ -239,21 +257,25 @@ class _Place:
         )
 
     def free_pose(self, path: Array, start: _Start) -> Array | None:
-        """The pose T_place_world (4, 4) that moves a path to a start, in the place's scale; None if it is not free."""
+        """The pose T_scene_world (4, 4) that moves a path, scaled down, to a start; None if it is not free there."""
         height_m = start.height_m / start.scale
         ground_m = self._ground_m(start.xy_m)
         if ground_m is None or not self._is_open_above(start.xy_m, ground_m, height_m):
             return None
 
-        first_m = path[0, :3, 3]
-        lowest_m = float((path[:, 2, 3] - first_m[2]).min())
-        first_height_m = (start.height_m - min(lowest_m, 0.0)) / start.scale
-        T_place_world = se3.transform(se3.rotation_z(start.heading_rad), np.zeros(3))
-        rotated_first_m = T_place_world[:3, :3] @ first_m / start.scale
-        T_place_world[:3, 3] = [*start.xy_m, ground_m + first_height_m] - rotated_first_m
+        # The lowest pose of the path is at the height of the start; the first pose may be higher.
+        first_position_m = path[0, :3, 3]
+        lowest_offset_m = float((path[:, 2, 3] - first_position_m[2]).min())
+        first_height_m = (start.height_m - min(lowest_offset_m, 0.0)) / start.scale
 
-        positions_m = (T_place_world @ _scaled_down(path, start.scale))[:, :3, 3]
-        return T_place_world if self._is_free(positions_m, CLEARANCE_M / start.scale) else None
+        rotation = se3.rotation_z(start.heading_rad)
+        rotated_first_m = rotation @ first_position_m / start.scale
+        first_in_scene_m = np.array([*start.xy_m, ground_m + first_height_m])
+        T_scene_world = se3.transform(rotation, first_in_scene_m - rotated_first_m)
+
+        positions_m = (T_scene_world @ _scaled_down(path, start.scale))[:, :3, 3]
+        is_free = self._is_free(positions_m, CLEARANCE_M / start.scale)
+        return T_scene_world if is_free else None
 
     def _ground_m(self, xy_m: Array) -> float | None:
         """The height of the lowest level face below a position; None if there is none."""
@@ -297,22 +319,24 @@ class _Place:
         return not np.any(is_hit & is_behind & is_upward)
 
 
+# --- Disparities in a scene ---
+
 RAYS_PER_CELL = 7  # along each axis
 
 
-def stretch_disparities(
+def segment_disparities(
     caster: RayCaster,
-    T_place_left: Array,
+    T_scene_left: Array,
     pair: StereoPair,
     scale: float,
-    stretches: int,
+    segments: int,
 ) -> Array:
-    """The median disparity (V, 3, 3) in px by rows and columns of the left view, at the middle of each stretch.
+    """The median disparity (V, 3, 3) in px by rows and columns of the left view, at the middle of each segment.
 
-    `T_place_left` (N, 4, 4) is the path in the place, and `scale` multiplies the distances in it.
+    `T_scene_left` (N, 4, 4) is the path in the scene, and `scale` multiplies the distances in it.
     """
-    middles = (np.arange(stretches) + 0.5) * len(T_place_left) / stretches
-    views = T_place_left[middles.astype(int)]
+    middles = (np.arange(segments) + 0.5) * len(T_scene_left) / segments
+    views = T_scene_left[middles.astype(int)]
     rays = _view_rays(pair)  # (R, 3), in the axes of the left camera
     origins_m = np.repeat(views[:, :3, 3], len(rays), axis=0)
     directions = np.concatenate([rays @ T[:3, :3].T for T in views])

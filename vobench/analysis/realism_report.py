@@ -8,7 +8,7 @@ from vobench.analysis.realism import STATISTICS, Realism, Statistic, measure, pa
 from vobench.analysis.stereo_fit import StereoFit, Uncertain
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.runner.data_frame import data_frame
-from vobench.runner.recording import NOTHING_MORE, read_recording
+from vobench.runner.recording import DEFAULT_OPTIONS, read_recording
 
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
@@ -63,7 +63,7 @@ def measure_realism(
     *,
     against: Path | None = None,
     form: str | None = None,
-    options: ReadOptions = NOTHING_MORE,
+    options: ReadOptions = DEFAULT_OPTIONS,
 ) -> RealismReport:
     """Measure how realistic the images of a recording are.
 

@@ -28,7 +28,7 @@ from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.key import cache_folder
 from vobench.runner.motion import body_motion
 from vobench.runner.plan_runner import PlanRunner
-from vobench.runner.recording import NOTHING_MORE, read_recording, sequence_path
+from vobench.runner.recording import DEFAULT_OPTIONS, read_recording, sequence_path
 from vobench.runner.score import NO_SCALE
 from vobench.runner.store import SILENT, Progress
 from vobench.runner.task import bake_task, perform
@@ -143,7 +143,7 @@ def write_twin_suite(
     place: str = "office",
     estimators: Sequence[str] = (),
     form: str | None = None,
-    options: ReadOptions = NOTHING_MORE,
+    options: ReadOptions = DEFAULT_OPTIONS,
     progress: Progress = SILENT,
 ) -> TwinSuite:
     """Write the suite of a recording and of its repetition in a simulated place.
@@ -221,7 +221,7 @@ def make_twin(
     place: str = "office",
     estimators: Sequence[str] = (),
     form: str | None = None,
-    options: ReadOptions = NOTHING_MORE,
+    options: ReadOptions = DEFAULT_OPTIONS,
     progress: Progress = SILENT,
 ) -> TwinReport:
     """Repeat a recording in simulation, run the same estimators on both, and compare.

@@ -23,7 +23,11 @@ ImuFile = Annotated[Path | None, typer.Option("--imu", help="Kalibr's imu.yaml."
 class RecordingOptions:
     """How a recording is read."""
 
-    form: Annotated[str | None, typer.Option(help="The form, if it should not be detected from the content")] = None
+    # FormCommand appends the names of the forms to this help.
+    form: Annotated[
+        str | None,
+        typer.Option(help="The form of the recording, such as a dataset layout; by default detected from the content"),
+    ] = None
     calibration: Annotated[
         Path | None, typer.Option(help="Kalibr's camchain.yaml, if the layout has no calibration.")
     ] = None
@@ -38,7 +42,13 @@ class RecordingOptions:
 
     def read_options(self, imu: Path | None = None) -> ReadOptions:
         """The same options for readers of recordings. Raises UnknownNameError."""
-        return ReadOptions(self.calibration, imu, self.truth, self.rate, topics=parse_topics(self.topic))
+        return ReadOptions(
+            calibration=self.calibration,
+            imu=imu,
+            truth=self.truth,
+            rate_hz=self.rate,
+            topics=parse_topics(self.topic),
+        )
 
 
 def parse_topics(entries: list[str] | None) -> Topics:
@@ -58,8 +68,9 @@ class FormCommand(TyperCommand):
 
     def format_help(self, ctx: Any, formatter: Any) -> None:
         """Write the help with the names of the forms."""
-        known = writable() if self.name == "export" else layouts()
-        forms = ", ".join(known)
+        # `vobench export` writes a recording; all other commands with --form read one.
+        is_writing = self.name == "export"
+        forms = ", ".join(writable() if is_writing else layouts())
         for option in self.params:
             if option.name == "form" and isinstance(option, TyperOption):
                 option.help = f"{option.help}: {forms}."

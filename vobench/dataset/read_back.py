@@ -13,6 +13,7 @@ PIXEL_TOLERANCE = 1e-6
 POSE_TOLERANCE = 1e-9  # for positions in m and elements of rotation matrices
 DEPTHS_M = (0.3, 1.0, 5.0, 30.0, 1000.0)
 GRID = 9  # the number of points across and down a picture
+# What was read back is compared by `is_close = difference < tolerance`. This is false also for NaN and infinity.
 
 
 def known_points(camera: Camera) -> Array:
@@ -67,20 +68,25 @@ def _largest_distance(expected_px: Array, actual_px: Array) -> float:
     return float(distances_px.max())
 
 
-def check_rig(what: str, expected: Rig, actual: Rig) -> None:
-    """Raise SequenceError unless the rig that was read back projects known points like the original rig."""
+def check_rig(name: str, expected: Rig, actual: Rig) -> None:
+    """Raise SequenceError unless the rig that was read back projects known points like the original rig.
+
+    `name` says in the message what was read back.
+    """
     distance_px = pixel_difference(expected, actual)
-    if not distance_px < PIXEL_TOLERANCE:
+    is_close = distance_px < PIXEL_TOLERANCE
+    if not is_close:
         raise SequenceError(
-            f"{what} differs from what was exported: known points are projected up to {distance_px:.3g} px "
+            f"{name} differs from what was exported: known points are projected up to {distance_px:.3g} px "
             f"from their places, and less than {PIXEL_TOLERANCE:g} px would be right"
         )
     if expected.imu is None or actual.imu is None:
         return
     difference = _pose_difference(_T_left_imu(expected, expected.imu), _T_left_imu(actual, actual.imu))
-    if not difference < POSE_TOLERANCE:
+    is_close = difference < POSE_TOLERANCE
+    if not is_close:
         raise SequenceError(
-            f"{what} puts the IMU {difference:.3g} from its place, and less than {POSE_TOLERANCE:g} would be right"
+            f"{name} puts the IMU {difference:.3g} from its place, and less than {POSE_TOLERANCE:g} would be right"
         )
 
 
@@ -88,14 +94,18 @@ def _T_left_imu(rig: Rig, imu: ImuCalibration) -> Array:
     return se3.inverse(rig.T_body_left) @ imu.T_body_imu
 
 
-def check_path(what: str, expected: Trajectory, actual: Trajectory) -> None:
-    """Raise SequenceError unless the trajectory that was read back has the original stamps and poses."""
+def check_path(name: str, expected: Trajectory, actual: Trajectory) -> None:
+    """Raise SequenceError unless the trajectory that was read back has the original stamps and poses.
+
+    `name` says in the message what was read back.
+    """
     if not np.array_equal(expected.t_ns, actual.t_ns):
-        raise SequenceError(f"{what} has other stamps than were exported: {_stamp_difference(expected, actual)}")
+        raise SequenceError(f"{name} has other stamps than were exported: {_stamp_difference(expected, actual)}")
     difference = _pose_difference(expected.T_world_frame, actual.T_world_frame)
-    if not difference < POSE_TOLERANCE:
+    is_close = difference < POSE_TOLERANCE
+    if not is_close:
         raise SequenceError(
-            f"{what} has poses that differ by {difference:.3g} from those exported, "
+            f"{name} has poses that differ by {difference:.3g} from those exported, "
             f"and less than {POSE_TOLERANCE:g} would be right"
         )
 
@@ -105,7 +115,8 @@ def _pose_difference(expected: Array, actual: Array) -> float:
 
 
 def _stamp_difference(expected: Trajectory, actual: Trajectory) -> str:
+    """The number of poses if it differs, as in "19 of 20 poses"; otherwise the first stamp that differs."""
     if len(expected) != len(actual):
-        return f"{len(actual)} of {len(expected)}"
+        return f"{len(actual)} of {len(expected)} poses"
     first = int(np.flatnonzero(expected.t_ns != actual.t_ns)[0])
     return f"pose {first} is at {actual.t_ns[first]} ns and not at {expected.t_ns[first]} ns"

@@ -1,7 +1,6 @@
 """Motions between poses, and the errors of motions and poses in translation and rotation."""
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -78,7 +77,12 @@ def errors_between(T_gt: Array, T_est: Array, first: Index, last: Index) -> Pose
     `first` and `last` (N,) are the indices of the two poses of each pair.
     Source: Sturm et al. (2012), section V-A: (Q_i⁻¹ Q_j)⁻¹ (P_i⁻¹ P_j).
     """
-    block_errors = partial(_errors_of_pairs, _pose_columns(T_gt), _pose_columns(T_est), first, last)
+    gt = _pose_columns(T_gt)
+    est = _pose_columns(T_est)
+
+    def block_errors(block: slice) -> PoseErrors:
+        return _errors_of_pairs(gt, est, first[block], last[block])
+
     return in_blocks(len(first), block_errors)
 
 
@@ -92,28 +96,26 @@ def _pose_columns(T: Array) -> Array:
     return np.ascontiguousarray(np.moveaxis(upper_rows, 0, -1))
 
 
-def _errors_of_pairs(gt: Array, est: Array, first: Index, last: Index, block: slice) -> PoseErrors:
-    """The `_relative_errors` of the motions between a block of pairs of poses, given as arrays (3, 4, K)."""
-    first = first[block]
-    last = last[block]
-    gt_motions = _relative_poses(gt.take(first, axis=-1), gt.take(last, axis=-1))
-    est_motions = _relative_poses(est.take(first, axis=-1), est.take(last, axis=-1))
+def _errors_of_pairs(gt: Array, est: Array, first: Index, last: Index) -> PoseErrors:
+    """The errors of the motions between pairs of poses of two trajectories (3, 4, K)."""
+    gt_motions = _motions_of_columns(gt.take(first, axis=-1), gt.take(last, axis=-1))
+    est_motions = _motions_of_columns(est.take(first, axis=-1), est.take(last, axis=-1))
     return _relative_errors(gt_motions, est_motions)
 
 
-def _relative_poses(first: Array, last: Array) -> Array:
-    """Poses `last` in the frames of `first`, all (3, 4, N)."""
+def _motions_of_columns(first: Array, last: Array) -> Array:
+    """The motions from poses `first` to poses `last`, all (3, 4, N)."""
     R_first = first[:, :3]
     R_last = last[:, :3]
     offset = last[:, 3] - first[:, 3]
-    R = np.einsum("kin,kjn->ijn", R_first, R_last)
-    t = np.einsum("kin,kn->in", R_first, offset)
+    R = np.einsum("kin,kjn->ijn", R_first, R_last)  # R_first.T @ R_last
+    t = np.einsum("kin,kn->in", R_first, offset)  # R_first.T @ offset
     return np.concatenate([R, t[:, None]], axis=1)
 
 
 def _relative_errors(gt: Array, est: Array) -> PoseErrors:
     """The errors of poses `est` relative to `gt`, both (3, 4, N)."""
-    E = _relative_poses(gt, est)
+    E = _motions_of_columns(gt, est)
     t = E[:, 3]
     length = np.sqrt(np.einsum("in,in->n", t, t))
     return PoseErrors(length, _angle_of_columns_rad(E[:, :3]))
@@ -121,9 +123,9 @@ def _relative_errors(gt: Array, est: Array) -> PoseErrors:
 
 def _angle_of_columns_rad(R: Array) -> Array:
     """The `angle_rad` (N,) of rotations (3, 3, N)."""
-    correction = -0.5 * np.einsum("kin,kjn->ijn", R, R)
+    correction = -0.5 * np.einsum("kin,kjn->ijn", R, R)  # -0.5 R.T @ R
     correction[range(3), range(3)] += 1.5
-    R_orthonormal = np.einsum("ikn,kjn->ijn", R, correction)
+    R_orthonormal = np.einsum("ikn,kjn->ijn", R, correction)  # R @ correction
 
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R_orthonormal
     scaled_axis = np.stack([zy - yz, xz - zx, yx - xy])  # (3, N), the axis of rotation times twice the sine

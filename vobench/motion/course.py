@@ -15,7 +15,16 @@ from vobench.geometry.rig import WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import cross_2d
 from vobench.motion.pioneer import wheel_speeds
-from vobench.motion.wheeled import MOVER_KEYS, UNLED_KEYS, Acceleration, Length, Mover, Pause, Speed, Wheeled
+from vobench.motion.wheeled import (
+    KEYS_WITHOUT_CONTROLLER,
+    MOVER_KEYS,
+    Acceleration,
+    Length,
+    Mover,
+    Pause,
+    Speed,
+    Wheeled,
+)
 from vobench.setting import MOST_POINTS
 from vobench.trajectory.kinematics import (
     CurveMotion,
@@ -382,7 +391,7 @@ class PureRotation(Wheeled):
     The Pioneer does it without feedback: its controller holds the point h, not the axle.
     """
 
-    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {"pioneer": UNLED_KEYS, "unicycle": ()}
+    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {"pioneer": KEYS_WITHOUT_CONTROLLER, "unicycle": ()}
 
     kind: Literal["pure_rotation"] = "pure_rotation"
     angle_deg: Annotated[float, Ge(-36_000), Le(36_000)]
@@ -410,7 +419,7 @@ class Reverse(Wheeled):
     The Pioneer does it without feedback: led backwards by a point ahead of its axle it would turn round.
     """
 
-    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {**MOVER_KEYS, "pioneer": UNLED_KEYS}
+    mover_keys: ClassVar[Mapping[Mover, tuple[str, ...]]] = {**MOVER_KEYS, "pioneer": KEYS_WITHOUT_CONTROLLER}
 
     kind: Literal["reverse"] = "reverse"
     length_m: Length

@@ -1,4 +1,4 @@
-"""Settings of all trajectories on wheels: the robot, its start, the floor, the control; and wheel encoders."""
+"""Settings of all trajectories on wheels: the robot, its start, the floor, and the control."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -7,7 +7,6 @@ from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
-from numpy.typing import NDArray
 
 from vobench.errors import SettingError
 from vobench.geometry.rig import PIONEER_WHEELS, Mount, WheelGeometry
@@ -47,8 +46,8 @@ MOVER_KEYS: dict[Mover, tuple[str, ...]] = {
     "unicycle": (),
     "ackermann": ("car",),
 }
-# A Pioneer whose speeds are given beforehand has no controller.
-UNLED_KEYS = tuple(key for key in PIONEER_KEYS if key != "controller")
+# A Pioneer that follows given speeds needs no controller.
+KEYS_WITHOUT_CONTROLLER = tuple(key for key in PIONEER_KEYS if key != "controller")
 # The wheels of each car that are not steered. The large car's are those of a Passat (205/55 R16); those of the small
 # one, and the resolution of both encoders, are engineering choices.
 CAR_WHEELS = {
@@ -94,8 +93,9 @@ class Wheeled:
     @property
     def T_world_start(self) -> Array:
         """The pose (4, 4) at the start."""
-        x_m, y_m, heading_rad = np.array(self.start, float)[:, None]
-        T_world_start: Array = level(x_m, y_m, heading_rad)[0]
+        x_m, y_m, heading_rad = np.array(self.start, float)[:, None]  # (1,) each, since `level` creates (M, 4, 4)
+        poses: Array = level(x_m, y_m, heading_rad)
+        T_world_start: Array = poses[0]
         return T_world_start
 
     @property
@@ -109,61 +109,15 @@ class Wheeled:
 
     @property
     def theta(self) -> Theta:
-        """The Pioneer's parameters: of its motors by (12)-(17), or as fitted."""
+        """The parameters of the Pioneer's dynamics: computed from `motors` if given, otherwise those of `robot`.
+
+        `theta` and the equations are those of the paper, see docs/paper.md; `motor.theta_of` has (12) to (17).
+        """
         return theta_of(self.motors) if self.motors else THETAS[self.robot]
 
     @property
     def limits(self) -> AccelerationLimits:
         """The limits of the drive train."""
-        speed_mps2 = self.max_accel_mps2 or inf
-        turn_radps2 = self.max_turn_accel_radps2 or inf
-        return AccelerationLimits(speed_mps2, turn_radps2)
-
-
-Fraction = Annotated[float, Ge(-0.2), Le(0.2)]
-
-
-@settings()
-class EncoderErrors:
-    """The relative errors of the nominal wheels: true = nominal (1 + error).
-
-    The robot has the true wheels, the odometry uses the nominal geometry. So a larger left wheel turns less
-    and the estimate bends left, and with a larger track every turn is overestimated.
-    Source: Borenstein and Feng (1996), who name these as the two dominant systematic errors.
-    """
-
-    radius_left: Fraction = 0.0
-    radius_right: Fraction = 0.0
-    track: Fraction = 0.0
-
-
-ENCODERS = {
-    "exact": EncoderErrors(),
-    "nominal": EncoderErrors(radius_left=0.0015, radius_right=-0.0015, track=0.005),
-}
-
-
-def true_rims(rim_rad: Array, errors: EncoderErrors) -> Array:
-    """Angles (M, 2) of the true wheels on a motion that turns nominal wheels by rim_rad (M, 2), left and right.
-
-    The track changes the distance that each wheel travels in a turn: half the difference of the two. The
-    radius changes how far a wheel turns over its distance. This is exact without slip; with slip, it misses
-    the product of slip ratio and track error, some 1e-5.
-    """
-    left_rad, right_rad = rim_rad.T
-    mean = rim_rad.mean(1)
-    half_turn = (right_rad - left_rad) / 2 * (1 + errors.track)
-    left = (mean - half_turn) / (1 + errors.radius_left)
-    right = (mean + half_turn) / (1 + errors.radius_right)
-    return np.stack([left, right], -1)
-
-
-def ticks(
-    rim_rad: Array,
-    wheels: WheelGeometry,
-    errors: EncoderErrors = ENCODERS["exact"],
-) -> NDArray[np.int64]:
-    """Counts (M, 2) since angle zero, left and right: whole ticks passed, rounded down also when rolling back."""
-    rims_rad = true_rims(rim_rad, errors)
-    exact_ticks = rims_rad * wheels.ticks_per_revolution / (2 * np.pi)
-    return np.floor(exact_ticks).astype(np.int64)
+        linear_mps2 = self.max_accel_mps2 or inf
+        angular_radps2 = self.max_turn_accel_radps2 or inf
+        return AccelerationLimits(linear_mps2, angular_radps2)

@@ -14,7 +14,7 @@ from vobench.rendering.view import Box, PinholeView
 from vobench.scene.weld import WELD_M
 
 Indices = NDArray[np.int64]
-Runs = dict[int, list[tuple[int, int]]]
+TriangleRuns = dict[int, list[tuple[int, int]]]  # for each batch, runs (first, count) of its indices
 
 RECENT = 32  # views whose clusters are known: what the light is computed for is drawn next
 MARGIN_PX = 1  # samples lie up to half a pixel from the middle
@@ -48,9 +48,9 @@ class CullingSet:
         self._radius_m = np.linalg.norm(size_m, axis=1) / 2
         movers = np.unique(clusters.mover).tolist()
         self._of_movers = {mover: np.flatnonzero(clusters.mover == mover) for mover in movers}
-        self._recent: OrderedDict[Hashable, Runs] = OrderedDict()
+        self._recent: OrderedDict[Hashable, TriangleRuns] = OrderedDict()
 
-    def visible(self, view: PinholeView, box: Box) -> Runs:
+    def visible(self, view: PinholeView, box: Box) -> TriangleRuns:
         """By batch the runs (first, count) of indices that can touch a box of a picture; no others can."""
         poses = np.array(view.T_world_movers).tobytes()
         mirror = view.mirror.key if view.mirror else ()
@@ -62,7 +62,7 @@ class CullingSet:
             self._recent.popitem(last=False)
         return self._recent[key]
 
-    def _visible(self, view: PinholeView, box: Box) -> Runs:
+    def _visible(self, view: PinholeView, box: Box) -> TriangleRuns:
         clusters = self._clusters
         is_visible = np.zeros(len(clusters.batch), bool)
         world_planes = bounds(view, box)
@@ -88,7 +88,7 @@ class CullingSet:
         limit_m = self._clusters.sine[members] * distance_m
         return np.asarray(nearest_m < limit_m + WELD_M)
 
-    def _runs(self, members: Indices) -> Runs:
+    def _runs(self, members: Indices) -> TriangleRuns:
         """The indices of clusters (K,), those of neighbours joined."""
         clusters = self._clusters
         batch = clusters.batch[members]
@@ -99,7 +99,7 @@ class CullingSet:
             return {}
         first = clusters.first[members[begins]]
         count = np.add.reduceat(clusters.count[members], begins)
-        runs: Runs = {}
+        runs: TriangleRuns = {}
         batches = batch[begins].tolist()
         for index, *run in zip(batches, first.tolist(), count.tolist(), strict=True):
             runs.setdefault(index, []).append((run[0], run[1]))

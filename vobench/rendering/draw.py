@@ -7,7 +7,7 @@ from OpenGL import GL
 
 from vobench.geometry import se3
 from vobench.rendering.batch import Batch, Geometry
-from vobench.rendering.culling import CullingSet, Runs
+from vobench.rendering.culling import CullingSet, TriangleRuns
 from vobench.rendering.draw_call import LAYERS_UNIT, DrawCalls
 from vobench.rendering.opengl import Canvas, FlatTarget, PanoramaTexture, bind
 from vobench.rendering.planar_mirror import PlanarMirror
@@ -116,7 +116,7 @@ class BatchDraw:
     def _draw_unmirrored(
         self,
         batches: Sequence[Batch],
-        visible: Runs,
+        visible: TriangleRuns,
         view: PinholeView,
         canvas: Canvas,
         *defines: ShaderDefine,
@@ -131,7 +131,7 @@ class BatchDraw:
                 probe_defines = [ShaderDefine.HAS_PROBE] if shows_probe else []
                 self._calls.draw_surface(batch, visible, view, canvas, frozenset([*probe_defines, *defines]))
 
-    def _boxes(self, view: PinholeView, visible: Runs) -> dict[int, Box]:
+    def _boxes(self, view: PinholeView, visible: TriangleRuns) -> dict[int, Box]:
         """Mirrors whose mirroring side is seen, all or those of which something is visible: boxes in the picture.
 
         If there are more mirrors than are drawn, the selection must be the same for every part of a picture.
@@ -157,7 +157,7 @@ class BatchDraw:
                 boxes[mirror.index] = box
         return boxes
 
-    def _is_visible(self, mirror: PlanarMirror, visible: Runs) -> bool:
+    def _is_visible(self, mirror: PlanarMirror, visible: TriangleRuns) -> bool:
         return any(batch.index in visible for batch in self._batches_of[mirror.index])
 
     def _followed(
@@ -191,7 +191,7 @@ class BatchDraw:
         target: RenderTarget,
         *,
         box: Box,
-        visible: Runs,
+        visible: TriangleRuns,
         part: Box | None,
     ) -> None:
         """Draw what lies in one plane, with what it mirrors in a part of the picture, or with what the probe shows."""

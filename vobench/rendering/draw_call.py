@@ -9,9 +9,17 @@ from OpenGL import GL
 from vobench.rendering.background import PanoramaSky, StandardSky
 from vobench.rendering.batch import Batch, Geometry
 from vobench.rendering.batch_texture import BatchTextures, batch_textures
-from vobench.rendering.culling import Runs
+from vobench.rendering.culling import TriangleRuns
 from vobench.rendering.gl_state import blending, disabled, set_initial_state, strictly_nearer, without_depth_writes
-from vobench.rendering.opengl import Blocks, Canvas, Elements, FlatTarget, PanoramaTexture, ShaderProgram, bind
+from vobench.rendering.opengl import (
+    Canvas,
+    FlatTarget,
+    IndexedMesh,
+    PanoramaTexture,
+    ShaderProgram,
+    UniformBuffer,
+    bind,
+)
 from vobench.rendering.probe import Probe
 from vobench.rendering.render_target import RenderTarget
 from vobench.rendering.shader_define import NO_DEFINES, Defines, ShaderDefine
@@ -27,6 +35,8 @@ LAYERS_UNIT = GL.GL_TEXTURE0 + 2
 EMISSION_UNIT = GL.GL_TEXTURE0 + 3
 PROBE_UNIT = GL.GL_TEXTURE0 + 4
 PANORAMA_UNIT = GL.GL_TEXTURE0 + 5
+
+MONO_DEFINES: Defines = frozenset({ShaderDefine.IS_MONO})
 
 
 class DrawCalls:
@@ -51,14 +61,14 @@ class DrawCalls:
         self._textures = batch_textures(geometry.batches)
         self.shader_defines = list(map(_shader_defines, self._batches, self._textures))
 
-        self._elements = Elements(geometry.vertices, geometry.indices)
+        self._mesh = IndexedMesh(geometry.vertices, geometry.indices)
         self._empty_vertex_array = GL.glGenVertexArrays(1)
         self._pass_uniforms = np.zeros((), PASS.dtype)
-        self._pass_buffer = Blocks(PASS.binding, self._pass_uniforms[None])
+        self._pass_buffer = UniformBuffer(PASS.binding, self._pass_uniforms[None])
         self._batch_uniforms = np.zeros(len(self._batches), BATCH.dtype)
         for batch, textures in zip(self._batches, self._textures, strict=True):
             set_batch(self._batch_uniforms[batch.index], batch, textures.body)
-        self._batch_buffer = Blocks(BATCH.binding, self._batch_uniforms)
+        self._batch_buffer = UniformBuffer(BATCH.binding, self._batch_uniforms)
         self._uploaded_poses = b""  # the bytes of the mover poses that the buffer of the batches holds
         set_initial_state()
 
@@ -74,7 +84,7 @@ class DrawCalls:
         `weights` are the shares of red, green and blue in the luminance of a mono canvas.
         """
         uniforms = self._pass_uniforms
-        uniforms[...] = np.zeros((), PASS.dtype)
+        uniforms[...] = np.zeros((), PASS.dtype)  # reset: values of the last view must not remain
         set_view(uniforms, view, canvas, weights)
         if probe:
             set_probe(uniforms, view, probe)
@@ -105,7 +115,7 @@ class DrawCalls:
     def draw_surface(
         self,
         batch: Batch,
-        visible: Runs,
+        visible: TriangleRuns,
         view: PinholeView,
         canvas: Canvas,
         defines: Defines = NO_DEFINES,
@@ -128,13 +138,15 @@ class DrawCalls:
         if textures.emission:
             bind(EMISSION_UNIT, textures.emission.id)
 
+        # Whether a batch is a pane follows from its material. The rims of holes are drawn by a second call for the same
+        # batch, with another define.
         runs = visible.get(batch.index, ())
         if batch.is_pane:
             self._draw_pane(runs, canvas.layers, is_grey=ShaderDefine.IS_GREY in batch_defines)
         elif ShaderDefine.IS_RIM in defines:
             self._draw_rim(runs, canvas.layers)
         else:
-            self._elements.draw(runs, canvas.layers)
+            self._mesh.draw(runs, canvas.layers)
 
     def draw_background(self, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
         """Draw the sum of all skies in the pixels without a surface."""
@@ -174,17 +186,21 @@ class DrawCalls:
         box: Box,
         share: float,
     ) -> None:
-        """Add the mean of a target's samples, multiplied by `share`, to the pixels of `total` inside a box."""
+        """Add the mean of a target's samples, multiplied by `share`, to the pixels of `total` inside a box.
+
+        If `total` has one channel and the samples are in colour, their luminance is added.
+        """
         total.begin(box)
         canvas = target.canvas
         bind(LAYERS_UNIT, canvas.colour, GL.GL_TEXTURE_2D_ARRAY)
-        is_colour_to_mono = total.channels == 1 and not canvas.is_mono
-        channel_weights = target.weights if is_colour_to_mono else np.ones(3)
-        defines = frozenset({ShaderDefine.IS_MONO}) if is_colour_to_mono else NO_DEFINES
-        self._program("fullscreen", "mean", defines).use(
-            count=canvas.layers,
-            weight=share / canvas.layers * np.array([*channel_weights, 0.0]),
-        )
+        if total.channels == 1 and not canvas.is_mono:
+            channel_weights = target.weights
+            defines = MONO_DEFINES  # here: the shader adds the three weighted channels up
+        else:
+            channel_weights = np.ones(3)
+            defines = NO_DEFINES
+        sample_weights = share / canvas.layers * np.array([*channel_weights, 0.0])
+        self._program("fullscreen", "mean", defines).use(count=canvas.layers, weight=sample_weights)
         with blending(GL.GL_ONE, GL.GL_ONE), disabled(GL.GL_DEPTH_TEST):
             self._cover(layers=1)
 
@@ -207,7 +223,7 @@ class DrawCalls:
         """
         transmittance = GL.GL_SRC_ALPHA if is_grey else GL.GL_SRC1_COLOR
         with disabled(GL.GL_CULL_FACE), without_depth_writes(), blending(GL.GL_ONE, transmittance):
-            self._elements.draw(runs, layers)
+            self._mesh.draw(runs, layers)
 
     def _draw_rim(self, runs: Sequence[tuple[int, int]], layers: int) -> None:
         """Blend the partly transparent rims of holes over the surfaces behind them.
@@ -216,11 +232,12 @@ class DrawCalls:
         """
         opacity_blending = blending(GL.GL_SRC_ALPHA, GL.GL_ONE_MINUS_SRC_ALPHA)
         with without_depth_writes(), strictly_nearer(), opacity_blending:
-            self._elements.draw(runs, layers)
+            self._mesh.draw(runs, layers)
 
 
 def _canvas_defines(canvas: Canvas) -> Defines:
-    return frozenset({ShaderDefine.IS_MONO}) if canvas.is_mono else NO_DEFINES
+    """The preprocessor names for shaders that draw on a canvas."""
+    return MONO_DEFINES if canvas.is_mono else NO_DEFINES
 
 
 def _shader_defines(batch: Batch, textures: BatchTextures) -> Defines:

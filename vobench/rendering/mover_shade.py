@@ -15,7 +15,7 @@ from vobench.rendering.batch import morton
 from vobench.rendering.culling import bounds
 from vobench.rendering.geometry import BoundingSphere
 from vobench.rendering.mover_light import MoverLight, MoverLightAt, SampledEmitter, may_shade
-from vobench.rendering.opengl import Blocks, ShaderProgram, bind
+from vobench.rendering.opengl import ShaderProgram, UniformBuffer, bind
 from vobench.rendering.texel_owner import Owners, owners
 from vobench.rendering.uniform_block import MOST_SPHERES, SHADE
 from vobench.rendering.view import Box, PinholeView
@@ -294,7 +294,7 @@ class ShadedLight:
         self._show = ShaderProgram("shade", "shade", ["IS_MOVER"])
         self._give = ShaderProgram("shade", "shade", ["IS_GIVEN"])
         self._atlas = _ShadowAtlas()
-        self._block = Blocks(SHADE.binding, np.zeros(max(len(sampled), 1), SHADE.dtype))
+        self._block = UniformBuffer(SHADE.binding, np.zeros(max(len(sampled), 1), SHADE.dtype))
         self._site_buffers = [self._site_vertices(sites) for sites in self._site_sets]
         self._site_arrays = [GL.glGenVertexArrays(1) for _ in sampled]
         self._layers = [GL.glGenBuffers(1) for _ in sampled]

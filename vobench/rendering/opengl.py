@@ -121,7 +121,7 @@ FLOAT_BYTES = 4
 INDEX_BYTES = 4
 
 
-class Elements:
+class IndexedMesh:
     """Vertices (V, 10) and indices (N,) of a `Geometry` in OpenGL's memory."""
 
     def __init__(self, vertices: Floats, indices: NDArray[np.uint32]) -> None:
@@ -145,14 +145,15 @@ class Elements:
             GL.glDrawElementsInstanced(GL.GL_TRIANGLES, count, GL.GL_UNSIGNED_INT, start, copies)
 
 
-class Blocks:
-    """Values (B,) of a uniform block's type that shaders read one at a time."""
+class UniformBuffer:
+    """A buffer with several values (B,) of a uniform block. Shaders read the one that is in use."""
 
     def __init__(self, binding: int, values: NDArray[np.void]) -> None:
         self._binding = binding
         self._size = values.dtype.itemsize
         alignment = int(GL.glGetIntegerv(GL.GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT))
-        self._stride = -(-self._size // alignment) * alignment
+        units = -(-self._size // alignment)  # rounded up
+        self._stride = units * alignment
         self._buffer = GL.glGenBuffers(1)
         GL.glBindBuffer(GL.GL_UNIFORM_BUFFER, self._buffer)
         GL.glBufferData(GL.GL_UNIFORM_BUFFER, self._stride * len(values), None, GL.GL_DYNAMIC_DRAW)

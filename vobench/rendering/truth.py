@@ -15,7 +15,8 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Indices, Mask, Pixels, Rows
 from vobench.rendering.lamp import Lamp, LampGroup, lamp_groups, lamps_on
 from vobench.rendering.occlusion import Bodies, dot
-from vobench.rendering.shadow_cells import KnownShadows, large_planes
+from vobench.rendering.receiver_plane import large_planes
+from vobench.rendering.shadow_cells import KnownShadows
 from vobench.rendering.shot import CameraShot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene

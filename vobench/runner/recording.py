@@ -7,11 +7,11 @@ from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.runner.folder import SEQUENCE
 
-NOTHING_MORE = ReadOptions()  # the recording contains everything that is needed
+DEFAULT_OPTIONS = ReadOptions()  # without further files: the recording contains everything that is needed
 
 
-def read_recording(path: Path, *, form: str | None = None, options: ReadOptions = NOTHING_MORE) -> Recording:
-    """Read the recording at a path, or the sequence of a case of a run. `form` is recognised unless it is given.
+def read_recording(path: Path, *, form: str | None = None, options: ReadOptions = DEFAULT_OPTIONS) -> Recording:
+    """Read the recording at a path, or the sequence of a case of a run. `form` is detected if it is None.
 
     Raises InputError if it cannot be read, or if the sequence of a case is no longer in the cache.
     """

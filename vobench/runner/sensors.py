@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from vobench.geometry.rig import Side
+from vobench.motion.encoder import ENCODERS, ticks
 from vobench.motion.wander import Wander
-from vobench.motion.wheeled import ENCODERS, Wheeled, ticks
+from vobench.motion.wheeled import Wheeled
 from vobench.rendering.shot import CameraShot
 from vobench.rendering.truth import TruthCaster
 from vobench.runner.motion import BodyMotion, generator

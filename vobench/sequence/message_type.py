@@ -54,7 +54,7 @@ def _known_types() -> Typestore:
     return types
 
 
-TYPES = _known_types()
+TYPES = _known_types()  # created on import: every reader and writer of a sequence needs it
 
 
 def new_message(type_name: str, **fields: Any) -> Any:

@@ -73,8 +73,14 @@ class Scenario:
     @property
     def varied_rig_keys(self) -> set[str]:
         """The keys of the rig that differ between severities."""
-        rigs = [setup.rig for setup in self.setups]
-        return {each.name for each in fields(RigSettings) if any(_differs(rig, rigs[0], each.name) for rig in rigs)}
+        base_rig = self.setups[0].rig
+        varied_keys = set()
+        for rig_field in fields(RigSettings):
+            key = rig_field.name
+            base_value = getattr(base_rig, key)
+            if any(getattr(setup.rig, key) != base_value for setup in self.setups):
+                varied_keys.add(key)
+        return varied_keys
 
     def _is_changed_by_any_severity(self, key: str) -> bool:
         """Whether a key of the setup differs from that of severity 0 at another severity."""
@@ -91,25 +97,27 @@ class Scenario:
         | scene        | office.dim.3             | office    |
         | lighting ... | dim.3                    | dim       |
 
-        If a scene is changed equally by all severities, its name is office.dim.
+        The second row is that of all axes except for the scene. A scene that all severities change in the same way has
+        the name office.dim, since it differs from the scene office, but not between severities.
         """
-        names = {axis: self._with_severity(self.name, severity, key=axis) for axis in AXES}
-        return {**names, "scene": self._scene_name(severity, scene)}
+        names = {}
+        for axis in AXES:
+            if axis == "scene":
+                names[axis] = self._scene_name(severity, scene)
+            else:
+                names[axis] = self.name + self._severity_suffix(severity, key=axis)
+        return names
 
     def _scene_name(self, severity: int, scene: str) -> str:
         """The name of the scene; with changes, it is followed by the name of the scenario, as in office.dim.3."""
         if not self.setups[severity].scene_changes:
             return scene
-        return self._with_severity(f"{scene}.{self.name}", severity, key="scene_changes")
+        return f"{scene}.{self.name}" + self._severity_suffix(severity, key="scene_changes")
 
-    def _with_severity(self, name: str, severity: int, *, key: str) -> str:
-        """The name, followed by the severity if it changes this key of the setup."""
-        is_unchanged = getattr(self.setups[severity], key) == getattr(self.setups[0], key)
-        return name if is_unchanged else f"{name}.{severity}"
-
-
-def _differs(rig: RigSettings, base: RigSettings, key: str) -> bool:
-    return bool(getattr(rig, key) != getattr(base, key))
+    def _severity_suffix(self, severity: int, *, key: str) -> str:
+        """The end of a name: the severity, as in ".3", if it changes this key of the setup; otherwise empty."""
+        is_changed = getattr(self.setups[severity], key) != getattr(self.setups[0], key)
+        return f".{severity}" if is_changed else ""
 
 
 def read_scenario(path: Path, replaced: Mapping[str, Any] = MappingProxyType({})) -> Scenario:

@@ -35,14 +35,14 @@ class Source:
     rate_hz: Positive | None = None
     topics: dict[Annotated[str, OneOf("topic", TOPICS)], str] = field(default_factory=dict)
 
-    def placed(self, path: Path, folder: Path) -> "Source":
-        """The source of one recording, with absolute paths."""
+    def placed(self, path: Path, name: str, folder: Path) -> "Source":
+        """The source of one recording, with its name and absolute paths. Relative paths start at `folder`."""
         files = dict[str, Any]()
         for key in FILE_KEYS:
-            written = getattr(self, key)
-            if written:
-                files[key] = str(_absolute(written, folder))
-        return replace(self, path=str(path), name=self.name or case_name(path), **files)
+            written_path = getattr(self, key)
+            if written_path:
+                files[key] = str(_absolute(written_path, folder))
+        return replace(self, path=str(path), name=name, **files)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -59,23 +59,28 @@ class RecordedCase:
 
 
 def as_sources(value: Any) -> Any:
-    """The value as a list of sources. A path stands for a source without other keys."""
+    """The full form of the key `source`: a tuple with the mapping of each source, still to be checked.
+
+    The key may be one source or a list of them. A path stands for a source without other keys: "a.bag" becomes
+    ({"path": "a.bag"},).
+    """
     entries = value if isinstance(value, tuple | list) else (value,)
     return tuple({"path": entry} if isinstance(entry, str) else entry for entry in entries)
 
 
-SOURCES = ShortForm(as_sources, {"anyOf": [{"type": "string"}, {"type": "object"}]})
+SHORT_SOURCE_SCHEMA = {"anyOf": [{"type": "string"}, {"type": "object"}]}
+SOURCES = ShortForm(as_sources, SHORT_SOURCE_SCHEMA)  # for the annotation of a suite's key
 
 
-def recorded_cases(spec: Source, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:
+def recorded_cases(source: Source, folder: Path, *, entry: int = 0) -> Iterator[RecordedCase]:
     """The cases of one source. Relative paths start at `folder`. Raises SuiteError if there is no such recording."""
-    paths = _recording_paths(spec.path, folder)
-    if spec.name and len(paths) > 1:
-        raise SuiteError(f"{len(paths)} recordings match '{spec.path}', so one name '{spec.name}' is not enough")
+    paths = _recording_paths(source.path, folder)
+    if source.name and len(paths) > 1:
+        raise SuiteError(f"{len(paths)} recordings match '{source.path}', so one name '{source.name}' is not enough")
     for path in paths:
-        source = spec.placed(path, folder)
         name = source.name or case_name(path)
-        yield RecordedCase(name=name, variant={"source": name}, source=source, entry=entry)
+        placed_source = source.placed(path, name, folder)
+        yield RecordedCase(name=name, variant={"source": name}, source=placed_source, entry=entry)
 
 
 def case_name(path: Path) -> str:
@@ -88,11 +93,11 @@ def case_name(path: Path) -> str:
     return re.sub(r"[^a-z0-9_.]+", "_", stem.lower()).strip("_.") or "recording"
 
 
-def _recording_paths(written: str, folder: Path) -> list[Path]:
-    """The paths that a suite's path or pattern refers to. Raises SuiteError if there are none."""
-    absolute = _absolute(written, folder)
-    if GLOB.search(written):
-        paths = _matches(written, folder)
+def _recording_paths(pattern: str, folder: Path) -> list[Path]:
+    """The paths that match a path or pattern as written in a suite. Raises SuiteError if there are none."""
+    absolute = _absolute(pattern, folder)
+    if GLOB.search(pattern):
+        paths = _matches(pattern, folder)
         if not paths:
             raise SuiteError(f"no folder or file matches {absolute}")
         return paths
@@ -101,26 +106,26 @@ def _recording_paths(written: str, folder: Path) -> list[Path]:
     return [absolute]
 
 
-def _matches(written: str, folder: Path) -> list[Path]:
+def _matches(pattern: str, folder: Path) -> list[Path]:
     """The paths that match a pattern, sorted. `**` does not follow links.
 
     Raises SuiteError if there are too many, or if the pattern is not valid.
     """
-    parts = _absolute(written, folder).parts
+    parts = _absolute(pattern, folder).parts
     first_glob = next(index for index, part in enumerate(parts) if GLOB.search(part))
     base = Path(*parts[:first_glob])
     pattern_parts = parts[first_glob:]
     try:
-        matches = [*_visible_matches(base, pattern_parts, written)]
+        matches = [*_visible_matches(base, pattern_parts, pattern)]
     except RecursionError:
-        raise SuiteError(f"'{written}' cannot be searched for (folders are nested too deep)") from None
+        raise SuiteError(f"'{pattern}' cannot be searched for (folders are nested too deep)") from None
     except (OSError, ValueError) as error:
-        raise SuiteError(f"'{written}' cannot be searched for ({error})") from None
-    only_folders = written.endswith("/")
+        raise SuiteError(f"'{pattern}' cannot be searched for ({error})") from None
+    only_folders = pattern.endswith("/")
     return sorted(path for path in matches if path.is_dir() or not only_folders)
 
 
-def _visible_matches(base: Path, pattern_parts: tuple[str, ...], written: str) -> Iterator[Path]:
+def _visible_matches(base: Path, pattern_parts: tuple[str, ...], pattern: str) -> Iterator[Path]:
     """The matches below a folder. Hidden ones match only a pattern that begins with a dot. Raises SuiteError."""
     shows_hidden = _is_hidden(pattern_parts)
     count = 0
@@ -129,7 +134,7 @@ def _visible_matches(base: Path, pattern_parts: tuple[str, ...], written: str) -
             continue
         count += 1
         if count > MOST_MATCHES:
-            raise SuiteError(f"more than {MOST_MATCHES} files and folders match '{written}'")
+            raise SuiteError(f"more than {MOST_MATCHES} files and folders match '{pattern}'")
         yield path
 
 

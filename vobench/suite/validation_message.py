@@ -1,7 +1,11 @@
 """Turns pydantic's validation errors into messages for the authors of YAML files.
 
-Pydantic's location of an error (`loc`) is not yet a place in the file, because it also names kinds of sections. The
-schema distinguishes these from keys (`_schema_place`). The keys are the `key_path`, from which the file finds the line.
+Pydantic says where an error is by a location, `loc`. It has more parts than the path of keys in the file, `key_path`:
+
+    loc       ("lamps", 0, "point", "size_m")     the key size_m of the first lamp, which is of the kind `point`
+    key_path  ("lamps", 0, "size_m")              its keys in the file, from which the file finds the line
+
+`_schema_place` turns one into the other. It follows the schema, which distinguishes keys from kinds of sections.
 """
 
 from collections.abc import Collection, Iterator
@@ -123,8 +127,10 @@ def _other_kinds_message(details: ErrorDetails, schema: Schema, source: YamlFile
     *section_loc, kind, key = loc
     section = _schema_place(schema, tuple(section_loc))
     is_section_of_kinds = str(kind) in _references_by_kind(section.schema)
+    if not is_section_of_kinds:
+        return None
     kinds_with_key = _kinds_with_key(schema, section.schema, key)
-    if not is_section_of_kinds or not kinds_with_key:
+    if not kinds_with_key:
         return None
 
     is_kind_written = source.place((*section.key_path, "kind")).value is not None
@@ -161,13 +167,13 @@ class _SchemaPlace(NamedTuple):
 
 
 def _schema_place(schema: Schema, loc: PydanticLocation) -> _SchemaPlace:
-    """Follow one of pydantic's locations through a schema.
+    """The place in the file that one of pydantic's locations stands for.
 
-    Two kinds of its parts are not keys of the file: the kind of a section, and "[key]", which says that a key is wrong
-    instead of its value.
+    Two kinds of parts of a location are not keys of the file: the kind of a section, and "[key]", which says that a key
+    is wrong instead of its value. They are left out of the path of keys.
     """
     key_path: Keys = ()
-    section = _without_alternatives(schema, schema)
+    section = _without_alternatives(schema, section=schema)
     for part in loc:
         if part == "[key]":
             continue
@@ -196,10 +202,17 @@ def _value_schema(section: Schema) -> Schema | None:
 
 
 def _without_alternatives(schema: Schema, section: Schema) -> Schema:
-    """The first alternative of a section, which is its full form; the others are null or the name of a preset."""
-    while "anyOf" in section or "$ref" in section:
-        section = _resolve(schema, section["$ref"]) if "$ref" in section else section["anyOf"][0]
-    return section
+    """The full form of a section: references are followed, and of alternatives, the first is used.
+
+    The other alternatives are null or the name of a preset. References point into the definitions of `schema`.
+    """
+    while True:
+        if "$ref" in section:
+            section = _resolve(schema, section["$ref"])
+        elif "anyOf" in section:
+            section = section["anyOf"][0]
+        else:
+            return section
 
 
 def _resolve(schema: Schema, reference: str) -> Schema:

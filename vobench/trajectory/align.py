@@ -110,9 +110,17 @@ def align(
 ) -> Alignment:
     """The alignment of matched poses (K, 4, 4), fitted to the first `first_n` of them or to all.
 
-    se3, sim3, yaw (a rotation about z) and scale (sim3's, without its motion) fit the positions, origin the
-    first pose. If the positions do not determine the rotation, it is as near as possible to the one that aligns
-    the first orientations, so that no score depends on the estimate's own frame.
+    | kind   | what is fitted                                              | to             |
+    |--------|-------------------------------------------------------------|----------------|
+    | none   | nothing                                                     |                |
+    | origin | rotation and translation                                    | the first pose |
+    | se3    | rotation and translation                                    | the positions  |
+    | sim3   | rotation, translation and scale                             | the positions  |
+    | scale  | as for sim3, but only the scale is applied                  | the positions  |
+    | yaw    | a rotation about z, and translation                         | the positions  |
+
+    If the positions do not determine the rotation, it is as near as possible to the one that aligns the first
+    orientations, so that no score depends on the estimate's own frame.
     Raises AlignmentError without pairs, or for positions too large to square.
     """
     if kind == "none":
@@ -120,10 +128,12 @@ def align(
     T_est = T_est[:first_n]
     T_gt = T_gt[:first_n]
     _require_pairs(T_est, T_gt)
+
     T_origin = T_gt[0] @ se3.inverse(T_est[0])
     R_origin = T_origin[:3, :3]
     if kind == "origin":
         return Alignment(kind, R_origin, T_origin[:3, 3], 1.0, ())
+
     est_m = T_est[:, :3, 3]
     gt_m = T_gt[:, :3, 3]
     if kind == "yaw":
@@ -151,10 +161,13 @@ def align_positions(
     _require_pairs(est_m, gt_m)
     centred = _Centred.of_positions(est_m, gt_m)
     shape = _shape(centred)
-    # The scale alone does not need the true roll.
-    is_rotation_free = kind == "scale" and shape is _Shape.LINE
+    # If only the scale is wanted, the rotation is not returned, so that its roll may be any. The full rotation is then
+    # used also for a line: it correlates the paths best, and the scale is the least-squares one.
+    fitted_shape = shape
+    if kind == "scale" and shape is _Shape.LINE:
+        fitted_shape = _Shape.FULL
     covariance = _covariance(centred.gt, centred.est)
-    rotation = _rotation(covariance, _Shape.FULL if is_rotation_free else shape, toward)
+    rotation = _rotation(covariance, fitted_shape, toward)
 
     scale = 1.0
     if kind != "se3" and shape is not _Shape.POINT:
@@ -216,14 +229,19 @@ def rotation_between(from_direction: ArrayLike, to_direction: ArrayLike) -> Arra
     """
     a = np.asarray(from_direction, float) / np.linalg.norm(from_direction)
     b = np.asarray(to_direction, float) / np.linalg.norm(to_direction)
-    axis = np.cross(a, b)
-    angle = np.arctan2(np.linalg.norm(axis), a @ b)
-    if np.linalg.norm(axis) < UNCORRELATED:
-        axis = IDENTITY[np.argmin(np.abs(a))]
-    axis = axis - (axis @ a) * a
-    K = np.cross(IDENTITY, axis / np.linalg.norm(axis))
-    versine = 1 - np.cos(angle)
-    rotation: Array = IDENTITY + np.sin(angle) * K + versine * K @ K
+    normal = np.cross(a, b)
+    sine = np.linalg.norm(normal)
+    angle_rad = np.arctan2(sine, a @ b)
+
+    are_parallel = sine < UNCORRELATED
+    approximate_axis = IDENTITY[np.argmin(np.abs(a))] if are_parallel else normal
+    perpendicular = approximate_axis - (approximate_axis @ a) * a
+    axis = perpendicular / np.linalg.norm(perpendicular)
+
+    # Row i is the cross product of the coordinate axis i and the axis of rotation.
+    cross_matrix = np.cross(IDENTITY, axis)
+    versine = 1 - np.cos(angle_rad)
+    rotation: Array = IDENTITY + np.sin(angle_rad) * cross_matrix + versine * cross_matrix @ cross_matrix
     return rotation
 
 
@@ -274,28 +292,30 @@ def _is_line(path: Array) -> bool:
     return bool(variances[1] <= NEGLIGIBLE**2 * variances[2])
 
 
-def _is_roll_uncertain(x: Array, y: Array) -> bool:
+def _is_roll_uncertain(est: Array, gt: Array) -> bool:
     """Whether the lateral motions of two centred paths (K, 3), one nearly straight, correlate too little for the roll.
 
-    After the best roll, lateral motions with correlation r leave it uncertain by √((1 - r²) / (r² n)).
+    If lateral motions correlate by r, the best roll has the standard deviation √((1 - r²) / (r² n)) for n degrees of
+    freedom.
     """
-    x_variances, x_axes = np.linalg.eigh(_covariance(x, x))
-    y_variances, y_axes = np.linalg.eigh(_covariance(y, y))
-    x_straightness = x_variances[1] / x_variances[2]
-    y_straightness = y_variances[1] / y_variances[2]
-    if min(x_straightness, y_straightness) > NEARLY_STRAIGHT**2:
+    est_variances, est_axes = np.linalg.eigh(_covariance(est, est))
+    gt_variances, gt_axes = np.linalg.eigh(_covariance(gt, gt))
+    est_straightness = est_variances[1] / est_variances[2]
+    gt_straightness = gt_variances[1] / gt_variances[2]
+    if min(est_straightness, gt_straightness) > NEARLY_STRAIGHT**2:
         return False
 
     # The lateral motions are complex numbers. A roll is a factor, and a reflection a conjugation.
-    x_lateral = (x @ x_axes[:, :2]) @ [1, 1j]
-    y_lateral = (y @ y_axes[:, :2]) @ [1, 1j]
-    power = float(np.linalg.norm(x_lateral) * np.linalg.norm(y_lateral))
-    rotated = abs(np.vdot(x_lateral, y_lateral))
-    reflected = abs(np.vdot(x_lateral, y_lateral.conj()))
+    est_lateral = (est @ est_axes[:, :2]) @ [1, 1j]
+    gt_lateral = (gt @ gt_axes[:, :2]) @ [1, 1j]
+    power = float(np.linalg.norm(est_lateral) * np.linalg.norm(gt_lateral))
+    rotated = abs(np.vdot(est_lateral, gt_lateral))
+    reflected = abs(np.vdot(est_lateral, gt_lateral.conj()))
     r = min(max(rotated, reflected) / power, 1.0)
 
     # The number of measured values minus that of fitted ones, which are two means, a roll, and two angles of direction.
-    degrees_of_freedom = max(2 * len(x) - 5, 1)
+    degrees_of_freedom = max(2 * len(est) - 5, 1)
+    # The standard deviation is compared in squares, and multiplied by r² n, since r may be zero.
     return bool(1 - r**2 > r**2 * degrees_of_freedom * MAX_ROLL_STD_RAD**2)
 
 
