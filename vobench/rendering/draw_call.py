@@ -197,7 +197,7 @@ class DrawCalls:
             channel_weights = target.weights
             defines = MONO_DEFINES  # here: the shader adds the three weighted channels up
         else:
-            channel_weights = np.ones(3)
+            channel_weights = (1.0, 1.0, 1.0)
             defines = NO_DEFINES
         sample_weights = share / canvas.layers * np.array([*channel_weights, 0.0])
         self._program("fullscreen", "mean", defines).use(count=canvas.layers, weight=sample_weights)

@@ -170,12 +170,12 @@ class _CellRanges(NamedTuple):
     """The first column and row, and the numbers of columns and rows, (T, 2) each, of rectangles of cells."""
 
     first: Rows
-    count: Rows
+    sizes: Rows
 
     @property
     def cell_counts(self) -> Rows:
         """The number of cells (T,) of each rectangle."""
-        return np.asarray(self.count.prod(1))
+        return np.asarray(self.sizes.prod(1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -253,7 +253,7 @@ class _Shadows:
         shadow = np.repeat(np.arange(len(counts)), counts)  # (cells of all shadows,)
         first_in_list = np.cumsum(counts) - counts
         index_in_box = np.arange(len(shadow)) - first_in_list[shadow]
-        row_in_box, column_in_box = np.divmod(index_in_box, ranges.count[shadow, 0])
+        row_in_box, column_in_box = np.divmod(index_in_box, ranges.sizes[shadow, 0])
         row = row_in_box + ranges.first[shadow, 1]
         column = column_in_box + ranges.first[shadow, 0]
 
@@ -271,7 +271,7 @@ class _Shadows:
         ranges = self.cell_ranges(plane)
         for shadow in range(len(self.margin_m)):
             first_column, first_row = ranges.first[shadow].tolist()
-            column_count, row_count = ranges.count[shadow].tolist()
+            column_count, row_count = ranges.sizes[shadow].tolist()
             columns = np.arange(first_column, first_column + column_count)
             rows = np.arange(first_row, first_row + row_count)
             u_m = (columns + 0.5) * plane.cell_m
