@@ -81,6 +81,7 @@ def test_nothing_stands_in_deep_water(parks: dict[int, Site]) -> None:
             assert np.isfinite(ground.heights_m(footprint(piece).corners_m)).all()
 
 
+@pytest.mark.slow
 def test_seeds_differ_in_paths_trees_and_what_is_built() -> None:
     parks = [park.generated_park(seed, "overcast") for seed in range(20, 26)]
     assert len({site.area_m2 for site in parks}) == len(parks)

@@ -20,6 +20,7 @@ def test_a_run_until_decided_ends_with_all_units_in_one_run_and_what_it_cost(vob
     assert "Units were drawn until each pair was decided or alike within 10 ×" in again.out
 
 
+@pytest.mark.slow
 def test_a_run_out_of_budget_says_how_to_go_on(vobench, drawn):
     said = vobench("run", "drawn", "--until", "decided", "--budget", "0.01s")
     assert said.code == 0, said.err

@@ -179,6 +179,7 @@ def deepen(place, depth):
     os.chdir(before)
 
 
+@pytest.mark.slow
 def test_three_thousand_nested_folders_are_removed(folder):
     place, descriptor = folder
     deepen(place, 3000)

@@ -58,6 +58,7 @@ def test_cells_trials_and_frames_have_a_row_each(ran):
     assert per_trial.to_dict() == dict(zip(run.trials["estimator"], run.trials["frames"], strict=True))
 
 
+@pytest.mark.slow
 def test_until_decided_ends_with_what_is_known_of_each_pair(drawn, capsys):
     run = vobench.run("drawn", until="decided", ratio=10, budget="20min", jobs=1, quiet=True)
     assert capsys.readouterr().out == ""

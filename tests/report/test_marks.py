@@ -54,7 +54,7 @@ def test_a_failed_trial_is_the_worst_of_all(scored):
 def test_a_copy_of_the_truth_is_not_the_best_of_a_case(scored):
     copy = scored("copy", ate_m=1e-12, claims=(TRUTH_COPY,))
     made = make_board([scored("a", ate_m=0.02), copy, scored("b", ate_m=0.03)], {})
-    assert marks(made, "ate") == {("down", "a"): "*~"}
+    assert marks(made, "ate") == {("down", "a"): "*"}
 
 
 def test_one_estimator_alone_and_costs_have_no_mark(scored):
