@@ -52,8 +52,8 @@ def test_each_seed_has_a_picture_of_its_own_and_the_same_seed_the_same(cell, tmp
 
 
 def test_a_scene_without_a_generator_and_an_unknown_one_are_refused(tmp_path):
-    with pytest.raises(SuiteError, match="'room' has no generator"):
-        save_place_sheet("room", tmp_path / "it.png", seeds=2)
+    with pytest.raises(SuiteError, match="'hall' has no generator"):
+        save_place_sheet("hall", tmp_path / "it.png", seeds=2)
     with pytest.raises(UnknownNameError, match="no scene named 'flatt'"):
         save_place_sheet("flatt", tmp_path / "it.png", seeds=2)
     assert not (tmp_path / "it.png").exists()
