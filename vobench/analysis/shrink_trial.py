@@ -1,7 +1,7 @@
 """Finds the shortest part of a failed trial that still fails in the same way, and writes it as a suite."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -22,7 +22,7 @@ from vobench.runner.store import SILENT, Progress
 from vobench.suite.case import Case
 from vobench.suite.case_file import write_case
 from vobench.suite.suite_spec import Window
-from vobench.trajectory.trajectory import Trajectory
+from vobench.trajectory.part import between
 
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
@@ -239,11 +239,6 @@ def _first_without_pose_ns(trial: FinishedTrial, paths: TrialPaths) -> int:
 
 def _part(paths: TrialPaths, *, first_ns: int, last_ns: int) -> TrialPaths:
     """The poses of both paths from one stamp to another, including both."""
-    gt = _between(paths.gt, first_ns, last_ns)
-    est = _between(paths.est, first_ns, last_ns)
+    gt = between(paths.gt, first_ns, last_ns)
+    est = between(paths.est, first_ns, last_ns)
     return TrialPaths(gt, est, paths.scale)
-
-
-def _between(path: Trajectory, first_ns: int, last_ns: int) -> Trajectory:
-    is_inside = (path.t_ns >= first_ns) & (path.t_ns <= last_ns)
-    return replace(path, t_ns=path.t_ns[is_inside], T_world_frame=path.T_world_frame[is_inside])

@@ -42,6 +42,19 @@ def lamp_colour(temperature_k: float) -> Rgb:
     return unit_luminance((red, green, blue))
 
 
+def level_daylight(
+    rng: Rng,
+    direction_rng: Rng,
+    lighting: str,
+    *,
+    kinds: tuple[str, ...],
+    distance_m: tuple[float, float],
+) -> Daylight:
+    """The daylight of a place at ground level, on which the sun shines from any side."""
+    towards_deg = float(direction_rng.uniform(0, 360))
+    return daylight(rng, lighting, towards_deg=towards_deg, height_m=0.0, kinds=kinds, distance_m=distance_m)
+
+
 def daylight(
     rng: Rng,
     lighting: str,

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from vobench.asset import branching_tree, furniture, household, meadow, outdoors, picture
-from vobench.asset.daylight import Daylight, daylight, lamp_colour
+from vobench.asset.daylight import Daylight, lamp_colour, level_daylight
 from vobench.asset.furniture import Part, coated, matt, put, stood, wood
 from vobench.asset.park_plan import STEP_M, ParkGround, ParkPlan, Path, park_plan
 from vobench.asset.picture import NAVY, Rng, one_of
@@ -49,11 +49,10 @@ def generated_park(seed: int, lighting: str) -> Site:
     planting = _Planting(plan, seed)
     pieces = planting.pieces()
     built += planting.growth(pieces)
-    outside = daylight(
+    outside = level_daylight(
         np.random.default_rng([seed, 4]),
+        np.random.default_rng([seed, 5]),
         lighting,
-        towards_deg=float(np.random.default_rng([seed, 5]).uniform(0, 360)),
-        height_m=0.0,
         kinds=PANORAMAS,
         distance_m=PANORAMA_M,
     )

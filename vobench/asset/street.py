@@ -6,7 +6,7 @@ import numpy as np
 from PIL import Image, ImageDraw
 
 from vobench.asset import branching_tree, facade, furniture, outdoors, picture, vehicle
-from vobench.asset.daylight import Daylight, daylight, lamp_colour
+from vobench.asset.daylight import Daylight, lamp_colour, level_daylight
 from vobench.asset.facade import House
 from vobench.asset.furniture import STEEL, Part, matt, put
 from vobench.asset.picture import NAVY, Rng, one_of
@@ -67,11 +67,10 @@ def generated_street(seed: int, lighting: str) -> Site:
     ground = list(_ground(np.random.default_rng([seed, 2]), plan))
     furnishing = _Furnishing(plan, seed, np.random.default_rng([seed, 3]))
     pieces = furnishing.pieces()
-    outside = daylight(
+    outside = level_daylight(
         np.random.default_rng([seed, 4]),
+        np.random.default_rng([seed, 5]),
         lighting,
-        towards_deg=float(np.random.default_rng([seed, 5]).uniform(0, 360)),
-        height_m=0.0,
         kinds=PANORAMAS,
         distance_m=PANORAMA_M,
     )

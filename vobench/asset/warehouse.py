@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vobench.asset import fitting, furniture, outdoors, picture, storage
-from vobench.asset.daylight import daylight, lamp_colour
+from vobench.asset.daylight import lamp_colour, level_daylight
 from vobench.asset.furniture import STEEL, WHITE, Part, coated, matt, put, stood
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.room import OUTWARD, Opening, Wall, shell
@@ -133,11 +133,10 @@ def generated_warehouse(seed: int, lighting: str) -> Site:
     built += list(_racks(plan))
     loads = list(_loads(plan, seed))
     pieces = _without_overlaps([*loads, *_furniture(plan, np.random.default_rng([seed, 2]))], plan)
-    outside = daylight(
+    outside = level_daylight(
         np.random.default_rng([seed, 3]),
+        np.random.default_rng([seed, 4]),
         lighting,
-        towards_deg=float(np.random.default_rng([seed, 4]).uniform(0, 360)),
-        height_m=0.0,
         kinds=PANORAMAS,
         distance_m=(40.0, 70.0),
     )

@@ -7,7 +7,7 @@ import typer
 
 from vobench.cli import terminal
 from vobench.cli.option import Json, option_group, with_option_groups
-from vobench.cli.trajectory_option import Topic
+from vobench.cli.trajectory_option import CONVENTIONS_HELP, Topic
 from vobench.errors import counted
 from vobench.runner.convert_trajectory import TrajectoryEdit, convert_trajectories
 from vobench.runner.trajectory_pair import TrajectorySource
@@ -21,14 +21,7 @@ class ReadingOptions:
     """How the files are read."""
 
     topic: Topic = None
-    read_as: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--as",
-            help="s|ms|us|ns, xyzw|wxyz, inverse, rotations:inverse, axes:z,-x,-y, positions:y,x,z or "
-            "mount:x,y,z,qx,qy,qz,qw; can be repeated.",
-        ),
-    ] = None
+    read_as: Annotated[list[str] | None, typer.Option("--as", help=CONVENTIONS_HELP)] = None
     times: Annotated[
         list[Path] | None,
         typer.Option(help="A file with stamps in seconds, one a line, for forms without stamps; can be repeated."),

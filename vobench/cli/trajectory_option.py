@@ -19,13 +19,11 @@ EstimatePath = Annotated[
     ),
 ]
 Topic = Annotated[str | None, typer.Option(help="The topic of the poses, or /tf:parent.child.")]
-Conventions = Annotated[
-    list[str] | None,
-    typer.Option(
-        help="s|ms|us|ns, xyzw|wxyz, inverse, rotations:inverse, axes:z,-x,-y, positions:y,x,z or "
-        "mount:x,y,z,qx,qy,qz,qw; can be repeated."
-    ),
-]
+CONVENTIONS_HELP = (
+    "s|ms|us|ns, xyzw|wxyz, inverse, rotations:inverse, axes:z,-x,-y, positions:y,x,z or mount:x,y,z,qx,qy,qz,qw; "
+    "can be repeated."
+)
+Conventions = Annotated[list[str] | None, typer.Option(help=CONVENTIONS_HELP)]
 
 
 @option_group

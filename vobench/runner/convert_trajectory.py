@@ -5,8 +5,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vobench.dataset.export import export_trajectory
-from vobench.errors import counted
+from vobench.errors import TrajectoryError, counted
 from vobench.runner.trajectory_pair import TrajectorySource, read_one
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.part import between, downsampled, merged, shifted
 
 
@@ -49,8 +50,11 @@ def convert_trajectories(
     """
     parts = [read_one(source, times=times).trajectory for source in sources]
     whole = merged(parts)
-    trajectory = shifted(whole.trajectory, edit.offset_ns)
-    trajectory = between(trajectory, edit.first_ns, edit.last_ns)
+    moved = shifted(whole.trajectory, edit.offset_ns)
+    trajectory = between(moved, edit.first_ns, edit.last_ns)
+    if not len(trajectory):
+        t_s = moved.t_ns / NS_PER_S
+        raise TrajectoryError(f"no pose is left; the stamps are from {t_s[0]:.9f} s to {t_s[-1]:.9f} s")
     if edit.count is not None:
         trajectory = downsampled(trajectory, edit.count)
     files = export_trajectory(trajectory, out, form)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vobench.errors import TrajectoryError
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 
@@ -18,18 +17,12 @@ class Merged:
 
 
 def between(trajectory: Trajectory, first_ns: int | None, last_ns: int | None) -> Trajectory:
-    """The poses from one stamp to another, both included; None for no limit.
-
-    Raises TrajectoryError if there is none.
-    """
+    """The poses from one stamp to another, both included; None for no limit. There may be none."""
     is_inside = np.ones(len(trajectory), dtype=bool)
     if first_ns is not None:
         is_inside &= trajectory.t_ns >= first_ns
     if last_ns is not None:
         is_inside &= trajectory.t_ns <= last_ns
-    if not is_inside.any():
-        t_s = trajectory.t_ns / 1e9
-        raise TrajectoryError(f"no pose is left; the stamps are from {t_s[0]:.9f} s to {t_s[-1]:.9f} s")
     return Trajectory(trajectory.t_ns[is_inside], trajectory.T_world_frame[is_inside])
 
 
