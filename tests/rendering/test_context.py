@@ -25,8 +25,8 @@ def refusal() -> str:
     return sentence
 
 
-def test_gpus_come_before_the_cpu_whatever_the_order_of_the_list() -> None:
-    assert ordered([CPU, GPU, SECOND_GPU], "") == [GPU, SECOND_GPU, CPU]
+def test_the_cpu_comes_before_gpus_whatever_the_order_of_the_list() -> None:
+    assert ordered([GPU, SECOND_GPU, CPU], "") == [CPU, GPU, SECOND_GPU]
 
 
 @pytest.mark.parametrize(

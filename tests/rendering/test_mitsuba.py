@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.errors import MissingDependencyError
+from vobench.errors import MissingDependencyError, SettingError
 from vobench.rendering import mitsuba
 
 
@@ -67,3 +67,16 @@ def test_a_process_that_dies_of_its_library_is_told_by_its_signal(monkeypatch):
 def test_a_process_that_ends_without_a_word_is_told_by_its_code(monkeypatch):
     monkeypatch.setattr(mitsuba, "PROBE", "raise SystemExit(3)")
     assert mitsuba.failure(Path(os.devnull)) == "died with 3"
+
+
+def test_the_environment_chooses_the_variant(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv(mitsuba.VARIANT_VARIABLE, raising=False)
+    assert mitsuba.wanted_variant() == mitsuba.CPU_VARIANT
+    monkeypatch.setenv(mitsuba.VARIANT_VARIABLE, "cuda_ad_rgb")
+    assert mitsuba.wanted_variant() == mitsuba.GPU_VARIANT
+
+
+def test_another_variant_is_refused_with_those_that_are_possible(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(mitsuba.VARIANT_VARIABLE, "scalar_rgb")
+    with pytest.raises(SettingError, match="should be llvm_ad_rgb or cuda_ad_rgb, got 'scalar_rgb'"):
+        mitsuba.wanted_variant()

@@ -4,9 +4,12 @@ import json
 
 import numpy as np
 import pytest
+from OpenGL import GL
 
 from vobench.errors import MissingDependencyError
 from vobench.rendering import self_test
+from vobench.rendering.draw_call import DrawCalls
+from vobench.rendering.gl_state import disabled
 
 
 def test_a_machine_that_draws_rightly_passes() -> None:
@@ -47,3 +50,14 @@ def test_what_is_missing_is_printed_as_an_error(monkeypatch: pytest.MonkeyPatch,
     monkeypatch.setattr(self_test, "check_drawing", refuse)
     self_test.main()
     assert json.loads(capsys.readouterr().out) == {"error": "cannot draw; run: something"}
+
+
+def test_a_driver_that_draws_panes_over_what_hides_them_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    draw_pane = DrawCalls._draw_pane
+
+    def without_depth_test(self: DrawCalls, *arguments: object, **options: object) -> None:
+        with disabled(GL.GL_DEPTH_TEST):
+            draw_pane(self, *arguments, **options)
+
+    monkeypatch.setattr(DrawCalls, "_draw_pane", without_depth_test)
+    assert not self_test.check_drawing().well

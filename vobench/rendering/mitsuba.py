@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from vobench import stop
-from vobench.errors import MissingDependencyError
+from vobench.errors import MissingDependencyError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Pixels
 from vobench.rendering.cutout import is_opaque
@@ -28,7 +28,9 @@ from vobench.scene.triangles import Triangles
 from vobench.temporary import temporary_folder
 
 VARIABLE = "DRJIT_LIBLLVM_PATH"
-VARIANT = "llvm_ad_rgb"
+VARIANT_VARIABLE = "VOBENCH_MITSUBA_VARIANT"
+CPU_VARIANT = "llvm_ad_rgb"
+GPU_VARIANT = "cuda_ad_rgb"  # needs an NVIDIA driver with OptiX, and no libLLVM
 OLDEST_MAJOR = 15  # Dr.Jit refuses older ones; 15 and 16 cannot compile for some processors
 FOLDERS = ("usr/lib/*-linux-gnu", "usr/lib64", "usr/lib", "usr/lib/llvm*/lib", "usr/local/lib")
 LLVM_REMEDY = "apt-get update && apt-get install -y libllvm19"
@@ -39,7 +41,7 @@ MOST_CHARACTERS = 200  # of a reason in a message
 # Renders for real: a library that loads may still abort when the first kernel is compiled.
 PROBE = f"""
 import mitsuba as mi
-mi.set_variant("{VARIANT}")
+mi.set_variant("{CPU_VARIANT}")
 sphere = {{"type": "sphere", "bsdf": {{"type": "roughplastic"}}}}
 sensor = {{"type": "perspective", "to_world": mi.ScalarTransform4f().translate([0, 0, -5])}}
 parts = {{"sphere": sphere, "sensor": sensor, "sky": {{"type": "constant"}}, "integrator": {{"type": "path"}}}}
@@ -51,15 +53,31 @@ assert 0.5 < mean < 1.5, mean
 
 @cache
 def prepare() -> None:
-    """Make `import mitsuba` safe in this process, and set its variant.
+    """Make `import mitsuba` safe in this process, and set its variant: VOBENCH_MITSUBA_VARIANT, or the processor's.
 
-    Raises MissingDependencyError where Mitsuba or a libLLVM that works is missing.
+    Raises SettingError for another variant than these two; MissingDependencyError where Mitsuba, or for the processor
+    a libLLVM that works, is missing.
     """
-    os.environ[VARIABLE] = str(working_library())
+    variant = wanted_variant()
+    if variant == CPU_VARIANT:
+        os.environ[VARIABLE] = str(working_library())
+    elif find_spec("mitsuba") is None:
+        raise MissingDependencyError(f"path tracing needs Mitsuba; run: {MITSUBA_REMEDY}")
     import mitsuba as mi
 
-    mi.set_variant(VARIANT)
+    mi.set_variant(variant)
     mi.set_log_level(mi.LogLevel.Error)
+
+
+def wanted_variant() -> str:
+    """The variant of Mitsuba that the environment asks for; the processor's where it asks for none.
+
+    Raises SettingError for a variant other than CPU_VARIANT and GPU_VARIANT.
+    """
+    variant = os.environ.get(VARIANT_VARIABLE) or CPU_VARIANT
+    if variant not in (CPU_VARIANT, GPU_VARIANT):
+        raise SettingError(f"{VARIANT_VARIABLE} should be {CPU_VARIANT} or {GPU_VARIANT}, got {variant!r}")
+    return variant
 
 
 def working_library() -> Path:

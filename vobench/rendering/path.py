@@ -2,6 +2,7 @@
 
 import zlib
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -247,6 +248,15 @@ class PathRenderer:
         if weights is None:
             return picture
         return np.asarray(picture @ np.asarray(weights, np.float32))
+
+    def with_seed(self, seed: int) -> "PathRenderer":
+        """The same renderer with other noise; the two share Mitsuba's copy of the scene.
+
+        Two copies in one process are refused by OptiX, which the variant for GPUs uses.
+        """
+        other = copy(self)
+        other._seed = seed
+        return other
 
     def close(self) -> None:
         """Give back Mitsuba's copy of the scene."""
