@@ -15,7 +15,7 @@ from vobench.suite.yaml_file import json_schema
 
 TABLE = re.compile(r"<!-- keys of (\w+) -->\n\n((?:\|.*\n)+)")
 ZEROS = re.compile(r"\.0(?![0-9])")
-HEAD = "| key | takes | default | says |\n|---|---|---|---|\n"
+HEAD = "| key | values | default | meaning |\n|---|---|---|---|\n"
 BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "maximum": "≤"}
 
 
@@ -71,7 +71,7 @@ def _rows(table: str) -> dict[str, str]:
 
 def _row(key: str, section: dict[str, Any], said: str) -> str:
     part = section["properties"][key]
-    default = _value(part["default"]) if "default" in part else "as said"
+    default = _value(part["default"]) if "default" in part else "described"
     if key in section.get("required", ()):
         default = ""
     unit = unit_of(key)
