@@ -20,7 +20,7 @@ from vobench.rendering.path import PathRenderer
 from vobench.rendering.renderer import View, single_instant
 from vobench.scene.light import AreaLight, Dimmer, Flicker, PointLight, Sky, SpotLight, Sun, Switched
 from vobench.scene.material import LUMINANCE, Material, Picture, fresnel, linear, pane_reflectance, under_coat
-from vobench.scene.mesh import as_arrays, quad, two_sided
+from vobench.scene.mesh import as_arrays, as_mesh, quad, two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
 from vobench.scene.triangles import Thing
 
@@ -443,6 +443,6 @@ def test_smooth_normals_shade_and_flat_faces_hide(trace):
     sun = Sun("sun", 1000.0, (0.0,), (0.0,), (90.0,))
     level = as_arrays(quad([-4, -4, 0], 8 * X, 8 * Y))
     shaded = replace(level, normals=np.tile(tilted, (4, 1)))
-    floor = Thing("floor", shaded.mesh(), "floor")
+    floor = Thing("floor", as_mesh(shaded), "floor")
     scene = Scene("f", (floor,), {"floor": Material(colour=(0.5,) * 3)}, (sun,))
     assert trace(scene).mean() == pytest.approx(0.5 * 1000 / np.pi * tilted[2], rel=0.01)
