@@ -45,8 +45,8 @@ def test_lamps_shine_at_night_only_and_stand_there_by_day() -> None:
     (lamps,) = [light for light in by_night.lights if isinstance(light, AreaLight)]
     posts = [piece for piece in by_night.pieces if piece.name.startswith("lamp_")]
     assert lamps.power_lm == pytest.approx(park.LAMP_LM * len(posts))
-    assert "globes" in [built.name for built in by_day.built]
-    assert "globes" not in [built.name for built in by_night.built]
+    assert "globes" in [structure.name for structure in by_day.structures]
+    assert "globes" not in [structure.name for structure in by_night.structures]
     sky_lx = [
         sum(light.illuminance_lx for light in site.lights if isinstance(light, Sky)) for site in (by_day, by_night)
     ]

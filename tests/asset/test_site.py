@@ -46,9 +46,9 @@ def test_the_first_of_overlapping_areas_counts() -> None:
 
 def test_pieces_meet_only_at_the_same_height() -> None:
     one = footprint(box("one", 0.0))
-    assert one.meets(footprint(box("beside", 0.9)), 0.01) == pytest.approx(0.1)
-    assert one.meets(footprint(box("on top", 0.0, z_m=1.0)), 0.01) == 0
-    assert one.meets(footprint(box("apart", 1.2)), 0.01) == 0
+    assert one.overlap_depth_m(footprint(box("beside", 0.9)), 0.01) == pytest.approx(0.1)
+    assert one.overlap_depth_m(footprint(box("on top", 0.0, z_m=1.0)), 0.01) == 0
+    assert one.overlap_depth_m(footprint(box("apart", 1.2)), 0.01) == 0
 
 
 def test_what_is_above_a_body_is_in_nobodys_way() -> None:

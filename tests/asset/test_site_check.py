@@ -19,7 +19,7 @@ def box(name: str, x_m: float, y_m: float = 0.0, z_m: float = 0.0, width_m: floa
 
 def site(*pieces: SitePiece) -> Site:
     return Site(
-        built=(),
+        structures=(),
         pieces=pieces,
         lights=(Sky("sky", 10000.0),),
         ground=LevelAreas((ROAD,)),

@@ -11,7 +11,7 @@ from vobench.asset.furniture import Part, coated, matt, put, stood, wood
 from vobench.asset.park_plan import STEP_M, ParkGround, ParkPlan, Path, park_plan
 from vobench.asset.picture import NAVY, Rng, one_of
 from vobench.asset.shape import at, block_arrays, card_arrays, lathe, sheet_arrays, tube_arrays
-from vobench.asset.site import Built, Footprint, Site, SitePiece, footprint
+from vobench.asset.site import Footprint, Site, SitePiece, Structure, footprint
 from vobench.asset.street import asphalt
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Light
@@ -45,10 +45,10 @@ def generated_park(seed: int, lighting: str) -> Site:
     # Each choice has a random generator of its own, so that a change of one leaves the others as they are.
     plan = park_plan(np.random.default_rng([seed, 0]))
     look = np.random.default_rng([seed, 1])
-    built = [*_paths(look, plan), *_lawn(look, plan), *_water(look, plan)]
+    structures = [*_paths(look, plan), *_lawn(look, plan), *_water(look, plan)]
     planting = _Planting(plan, seed)
     pieces = planting.pieces()
-    built += planting.growth(pieces)
+    structures += planting.growth(pieces)
     outside = level_daylight(
         np.random.default_rng([seed, 4]),
         np.random.default_rng([seed, 5]),
@@ -60,7 +60,7 @@ def generated_park(seed: int, lighting: str) -> Site:
     loop = plan.loop
     stations = np.arange(0, len(loop.points_m) - 1, round(STATION_M / STEP_M))
     return Site(
-        built=(*built, *_globes(bulbs, outside)),
+        structures=(*structures, *_globes(bulbs, outside)),
         pieces=tuple(pieces),
         lights=(*_lamps(bulbs, outside), *outside.lights),
         ground=plan.ground,
@@ -73,14 +73,14 @@ def generated_park(seed: int, lighting: str) -> Site:
 # --- The ground ---
 
 
-def _paths(rng: Rng, plan: ParkPlan) -> Iterator[Built]:
+def _paths(rng: Rng, plan: ParkPlan) -> Iterator[Structure]:
     """Strips with edges that sink into the ground. The loop is of another material than the rest in some parks."""
     main = _surface(rng)
     other = main if rng.random() < 0.6 else _surface(rng)
     for number, path in enumerate(plan.paths):
         # Later paths lie a little lower, so that no two surfaces coincide where they cross.
         mesh = _strip(path, plan.ground, lower_m=0.008 * number)
-        yield Built(f"path_{number}", (Part(mesh, other if number else main),), PATH_SPACING_M)
+        yield Structure(f"path_{number}", (Part(mesh, other if number else main),), PATH_SPACING_M)
 
 
 def _surface(rng: Rng) -> Material:
@@ -108,7 +108,7 @@ def _strip(path: Path, ground: ParkGround, *, lower_m: float) -> MeshArrays:
     return replace(strip, uv=strip.vertices_m[:, :2])
 
 
-def _lawn(rng: Rng, plan: ParkPlan) -> Iterator[Built]:
+def _lawn(rng: Rng, plan: ParkPlan) -> Iterator[Structure]:
     """The ground as grass in three tints, near the paths and far from them."""
     x_m, y_m = plan.half_m
     grid_x, grid_y = np.meshgrid(np.arange(-x_m, x_m + CELL_M, CELL_M), np.arange(-y_m, y_m + CELL_M, CELL_M))
@@ -128,7 +128,7 @@ def _lawn(rng: Rng, plan: ParkPlan) -> Iterator[Built]:
     looks = [matt(colour, grass) for colour in tints]
     for name, mask, spacing_m in (("near", is_near, NEAR_SPACING_M), ("far", ~is_near, FAR_SPACING_M)):
         parts = [Part(_faces_of(mesh, (kind == index) & mask), looks[index]) for index in range(3)]
-        yield Built(f"grass_{name}", tuple(part for part in parts if len(part.arrays.faces)), spacing_m)
+        yield Structure(f"grass_{name}", tuple(part for part in parts if len(part.arrays.faces)), spacing_m)
 
 
 def _ground_mesh(ground: ParkGround, grid_x: Array, grid_y: Array) -> MeshArrays:
@@ -145,7 +145,7 @@ def _faces_of(mesh: MeshArrays, is_wanted: Array) -> MeshArrays:
     return MeshArrays(mesh.vertices_m[used], index.reshape(-1, 3), mesh.uv[used], mesh.normals[used])
 
 
-def _water(rng: Rng, plan: ParkPlan) -> Iterator[Built]:
+def _water(rng: Rng, plan: ParkPlan) -> Iterator[Structure]:
     """Still water, whose edge is below the ground around it."""
     pond = plan.ground.pond
     if pond is None:
@@ -160,7 +160,7 @@ def _water(rng: Rng, plan: ParkPlan) -> Iterator[Built]:
     mesh = replace(mesh, normals=np.tile([0.0, 0.0, 1.0], (len(mesh.vertices_m), 1)), uv=mesh.vertices_m[:, :2])
     tint = one_of(rng, "#1c241c", "#232a22", "#1a2426")
     look = replace(coated(tint), eta=1.33, roughness=0.0)
-    yield Built("pond", (Part(mesh, look),), FAR_SPACING_M)
+    yield Structure("pond", (Part(mesh, look),), FAR_SPACING_M)
 
 
 # --- What grows and stands ---
@@ -197,7 +197,7 @@ class _Planting:
             place = footprint(piece)
             is_dry = not np.isnan(self.plan.ground.heights_m(place.corners_m)).any()
             leaves_room = all(_leaves_room(piece, place, path) for path in self.plan.paths)
-            if is_dry and leaves_room and all(place.meets(other, CLOSE_M) == 0 for other in taken):
+            if is_dry and leaves_room and all(place.overlap_depth_m(other, CLOSE_M) == 0 for other in taken):
                 kept.append(piece)
                 taken.append(place)
         return kept
@@ -350,7 +350,7 @@ class _Planting:
             parts = outdoors.rock(rng, size_m=float(0.25 + np.minimum(rng.exponential(0.22), 1.0)))
             yield self._standing("rock", parts, x_m, y_m, yaw_deg=0.0, spacing_m=PIECE_SPACING_M)
 
-    def growth(self, pieces: Sequence[SitePiece]) -> Iterator[Built]:
+    def growth(self, pieces: Sequence[SitePiece]) -> Iterator[Structure]:
         """Tufts of long grass beside the paths and at the shore, and flowers in beds."""
         rng = np.random.default_rng([self.seed, 3])
         x_m, y_m = self.plan.half_m
@@ -366,10 +366,10 @@ class _Planting:
         is_grass = (rng.random(len(places_m)) < chance) & (to_edge_m > 0.06)
         tint = one_of(rng, "#f4f6e0", "#fff0c4", "#e6f0d0")
         grass = meadow.cut_out(tint, meadow.blades(int(rng.integers(3))))
-        yield Built("tufts", (meadow.tufts(rng, self._on_ground(places_m[is_grass]), (0.1, 0.28), grass),), 0.5)
+        yield Structure("tufts", (meadow.tufts(rng, self._on_ground(places_m[is_grass]), (0.1, 0.28), grass),), 0.5)
         yield from self._beds(rng, pieces)
 
-    def _beds(self, rng: Rng, pieces: Sequence[SitePiece]) -> Iterator[Built]:
+    def _beds(self, rng: Rng, pieces: Sequence[SitePiece]) -> Iterator[Structure]:
         """Beds of flowers of one colour each."""
         standing = [footprint(piece).corners_m.mean(axis=0) for piece in pieces]
         for number, (x_m, y_m) in enumerate(self._spots(int(rng.integers(0, 5)), clear_m=2.6, apart_m=6.0, reach=0.8)):
@@ -383,7 +383,7 @@ class _Planting:
             offsets_m = distances_m[:, None] * np.stack([np.cos(bearings_rad), np.sin(bearings_rad)], axis=1)
             look = meadow.cut_out("#ffffff", meadow.flowers(int(rng.integers(len(meadow.FLOWER_INKS)))))
             feet_m = self._on_ground(np.array([x_m, y_m]) + offsets_m)
-            yield Built(f"bed_{number}", (meadow.tufts(rng, feet_m, (0.18, 0.34), look),), 0.3)
+            yield Structure(f"bed_{number}", (meadow.tufts(rng, feet_m, (0.18, 0.34), look),), 0.3)
 
     def _on_ground(self, places_m: Array) -> Array:
         """Places (N, 2) with the height of the ground, (N, 3)."""
@@ -503,7 +503,9 @@ def _lamps(bulbs: Sequence[MeshArrays], outside: Daylight) -> list[Light]:
     return [AreaLight("lamps", mesh, LAMP_LM * len(bulbs), colour=lamp_colour(3000))]
 
 
-def _globes(bulbs: Sequence[MeshArrays], outside: Daylight) -> Iterator[Built]:
+def _globes(bulbs: Sequence[MeshArrays], outside: Daylight) -> Iterator[Structure]:
     """The globes of the lamps while they are off."""
     if bulbs and not _is_dark(outside):
-        yield Built("globes", (Part(joined_arrays(list(bulbs)), coated("#e6e4dc", roughness=0.2)),), PIECE_SPACING_M)
+        yield Structure(
+            "globes", (Part(joined_arrays(list(bulbs)), coated("#e6e4dc", roughness=0.2)),), PIECE_SPACING_M
+        )

@@ -19,7 +19,7 @@ LEAST_EDGE_M = 1e-9  # shorter edges of polygons have no direction
 
 
 @dataclass(frozen=True, slots=True)
-class Built:
+class Structure:
     """A part of the ground or of a building.
 
     `parts` are in the frame of the place.
@@ -62,7 +62,7 @@ class Footprint:
     low_m: float
     high_m: float
 
-    def meets(self, other: "Footprint", tolerance_m: float) -> float:
+    def overlap_depth_m(self, other: "Footprint", tolerance_m: float) -> float:
         """The depth by which two pieces overlap, if it is more than a tolerance; 0 otherwise."""
         is_above = self.low_m + tolerance_m >= other.high_m
         is_below = self.high_m <= other.low_m + tolerance_m
@@ -138,7 +138,7 @@ class Site:
     `blocked` are footprints (4, 2) of racks, which pieces may enter and bodies may not.
     """
 
-    built: tuple[Built, ...]
+    structures: tuple[Structure, ...]
     pieces: tuple[SitePiece, ...]
     lights: tuple[Light, ...]
     ground: Terrain
@@ -155,7 +155,7 @@ class Site:
 
     def place(self) -> GeneratedPlace:
         """The things, materials and lights of the site."""
-        groups: list[Built | SitePiece] = [*self.built, *self.pieces]
+        groups: list[Structure | SitePiece] = [*self.structures, *self.pieces]
         instances: list[Instance] = [(group.name, group.parts) for group in groups]
         unspaced, materials = things(instances)
         spacing_m = {group.name: group.spacing_m for group in groups}

@@ -6,7 +6,7 @@ from itertools import combinations
 import numpy as np
 import scipy
 
-from vobench.asset.site import Built, Footprint, Site, SitePiece, footprint, overlap_m
+from vobench.asset.site import Footprint, Site, SitePiece, Structure, footprint, overlap_m
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Sky, Sun
 
@@ -30,7 +30,7 @@ def complaints(site: Site) -> list[str]:
 
 def face_count(site: Site) -> int:
     """The number of faces of a site, with its lamps."""
-    groups: list[Built | SitePiece] = [*site.built, *site.pieces]
+    groups: list[Structure | SitePiece] = [*site.structures, *site.pieces]
     faces = sum(len(part.arrays.faces) for group in groups for part in group.parts)
     return faces + sum(len(light.mesh.faces) for light in site.lights if isinstance(light, AreaLight))
 
@@ -38,7 +38,7 @@ def face_count(site: Site) -> int:
 def _overlaps(site: Site, footprints: Mapping[str, Footprint]) -> Iterator[str]:
     """Pieces that enter one another or a wall."""
     for (one, first), (other, second) in combinations(footprints.items(), 2):
-        depth_m = first.meets(second, OVERLAP_M)
+        depth_m = first.overlap_depth_m(second, OVERLAP_M)
         if depth_m:
             yield f"{one} and {other} overlap by {depth_m:.2f} m"
     for name, standing in footprints.items():

@@ -11,7 +11,7 @@ from vobench.asset.facade import House
 from vobench.asset.furniture import STEEL, Part, matt, put
 from vobench.asset.picture import NAVY, Rng, one_of
 from vobench.asset.shape import at, block_arrays, card_arrays, lathe, tube
-from vobench.asset.site import Area, Built, Footprint, LevelAreas, Site, SitePiece, footprint, overlap_m
+from vobench.asset.site import Area, Footprint, LevelAreas, Site, SitePiece, Structure, footprint, overlap_m
 from vobench.asset.street_plan import (
     KERB_M,
     LEFT,
@@ -74,12 +74,12 @@ def generated_street(seed: int, lighting: str) -> Site:
         kinds=PANORAMAS,
         distance_m=PANORAMA_M,
     )
-    built = [*ground, *(part for house in houses for part in house.built)]
+    structures = [*ground, *(part for house in houses for part in house.structures)]
     arms = [furnishing.arms[piece.name] for piece in pieces if piece.name in furnishing.arms]
     lights = _lights(houses, arms, outside, np.random.default_rng([seed, 6]))
     roads = plan.roads
     return Site(
-        built=tuple(built),
+        structures=tuple(structures),
         pieces=tuple(pieces),
         lights=(*lights, *outside.lights),
         ground=LevelAreas((*roads, *plan.pavements)),
@@ -100,10 +100,10 @@ class _PlacedHouse:
         frame = lot.frame
         T = at(frame.x_m, frame.y_m, yaw=frame.heading_deg)
         spacing_m = FAR_SPACING_M if lot.is_far else NEAR_SPACING_M
-        self.built = [Built(name, tuple(part.moved(T) for part in house.parts), spacing_m)]
+        self.structures = [Structure(name, tuple(part.moved(T) for part in house.parts), spacing_m)]
         if house.shop_parts:
             inside = tuple(part.moved(T) for part in house.shop_parts)
-            self.built.append(Built(f"{name}_shop", inside, SHOP_SPACING_M))
+            self.structures.append(Structure(f"{name}_shop", inside, SHOP_SPACING_M))
         self.shop_lamps = [lamp.moved(T) for lamp in house.shop_lamps]
         self.windows = [window.moved(T) for window in house.windows]
 
@@ -140,7 +140,7 @@ def asphalt(seed: int = 0, px: int = 2048, tile_m: float = 10.0) -> Picture:
     return Picture(np.clip(np.asarray(image) * grain, 0, 255).astype(np.uint8), tile_m)
 
 
-def _ground(rng: Rng, plan: StreetPlan) -> Iterator[Built]:
+def _ground(rng: Rng, plan: StreetPlan) -> Iterator[Structure]:
     """Roads, pavements, kerbs, and what is painted on the roads or let into them."""
     tint = one_of(rng, "#ffffff", "#e6e6ea", "#fff8f0", "#d6d6d8")
     road = matt(tint, asphalt(int(rng.integers(3))))
@@ -152,12 +152,12 @@ def _ground(rng: Rng, plan: StreetPlan) -> Iterator[Built]:
     paving = matt(one_of(rng, "#f2eee6", "#d9d6d0", "#e6d2c4", "#c9ccd0"), slabs)
     stone = matt("#b9b5ab", picture.ground("concrete", 4))
     line = matt("#d2d1ca", picture.ground("concrete", 6))
-    yield Built("road", (Part(_flat(plan.roads, plan), road),), GROUND_SPACING_M)
-    yield Built("pavement", (Part(_flat(plan.pavements, plan), paving),), GROUND_SPACING_M)
+    yield Structure("road", (Part(_flat(plan.roads, plan), road),), GROUND_SPACING_M)
+    yield Structure("pavement", (Part(_flat(plan.pavements, plan), paving),), GROUND_SPACING_M)
     kerbs = [_kerb(kerb.start_m, kerb.end_m) for kerb in plan.kerbs]
-    yield Built("kerb", (Part(joined_arrays(kerbs), stone),), GROUND_SPACING_M)
-    yield Built("lines", (Part(joined_arrays(list(_lines(rng, plan))), line),), GROUND_SPACING_M)
-    yield Built("lids", (Part(joined_arrays(list(_lids(rng, plan))), matt("#4a4b4b")),), GROUND_SPACING_M)
+    yield Structure("kerb", (Part(joined_arrays(kerbs), stone),), GROUND_SPACING_M)
+    yield Structure("lines", (Part(joined_arrays(list(_lines(rng, plan))), line),), GROUND_SPACING_M)
+    yield Structure("lids", (Part(joined_arrays(list(_lids(rng, plan))), matt("#4a4b4b")),), GROUND_SPACING_M)
 
 
 def _flat(areas: Sequence[Area], plan: StreetPlan) -> MeshArrays:
@@ -266,7 +266,7 @@ class _Furnishing:
         walls = [lot.corners_m for lot in self.plan.lots]
         for piece in pieces:
             place = footprint(piece)
-            is_free = all(place.meets(other, CLOSE_M) == 0 for other in taken)
+            is_free = all(place.overlap_depth_m(other, CLOSE_M) == 0 for other in taken)
             if is_free and all(overlap_m(place.corners_m, wall) < CLOSE_M for wall in walls):
                 kept.append(piece)
                 taken.append(place)

@@ -11,7 +11,7 @@ from vobench.asset.furniture import STEEL, WHITE, Part, coated, matt, put, stood
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.room import OUTWARD, Opening, Wall, shell
 from vobench.asset.shape import at, block_arrays, card_arrays, extrusion
-from vobench.asset.site import Area, Built, Footprint, LevelAreas, Site, SitePiece, footprint
+from vobench.asset.site import Area, Footprint, LevelAreas, Site, SitePiece, Structure, footprint
 from vobench.asset.storage import Rack
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
@@ -129,8 +129,8 @@ def generated_warehouse(seed: int, lighting: str) -> Site:
     rng = np.random.default_rng([seed, 1])
     windows = _windows(rng, plan)
     trays, lamps = _lamps(rng, plan)
-    built = [*_shell(rng, plan, windows), *_steelwork(rng, plan, trays), _markings(rng, plan)]
-    built += list(_racks(plan))
+    structures = [*_shell(rng, plan, windows), *_steelwork(rng, plan, trays), _markings(rng, plan)]
+    structures += list(_racks(plan))
     loads = list(_loads(plan, seed))
     pieces = _without_overlaps([*loads, *_furniture(plan, np.random.default_rng([seed, 2]))], plan)
     outside = level_daylight(
@@ -145,7 +145,7 @@ def generated_warehouse(seed: int, lighting: str) -> Site:
     ends = [plan.rows_x_m - plan.rack.length_m / 2 - 0.2, plan.docks_x_m + CROSS_M / 2]
     stations = [[end, aisle] for aisle in plan.aisles_y_m for end in ends]
     return Site(
-        built=tuple(built),
+        structures=tuple(structures),
         pieces=tuple(pieces),
         lights=(*lamps, *outside.lights),
         ground=LevelAreas((floor,)),
@@ -192,7 +192,7 @@ def _windows(rng: Rng, plan: HallPlan) -> list[Opening]:
     return found
 
 
-def _shell(rng: Rng, plan: HallPlan, windows: list[Opening]) -> Iterator[Built]:
+def _shell(rng: Rng, plan: HallPlan, windows: list[Opening]) -> Iterator[Structure]:
     """Floor, walls, ceiling and windows."""
     seed = int(rng.integers(4))
     albedo = float(rng.uniform(0.26, 0.42))
@@ -212,10 +212,10 @@ def _shell(rng: Rng, plan: HallPlan, windows: list[Opening]) -> Iterator[Built]:
     ceiling = matt(one_of(rng, "#b8bdbf", "#d0d2d0", "#9aa0a4"), picture.ground("plaster", 1, 512, 2.0))
     walls: dict[Wall, Material] = {**dict.fromkeys(OUTWARD, wall), "west": ends}
     for name, parts in shell(plan.size_m, windows, floor=floor, ceiling=ceiling, walls=walls):
-        yield Built(name, tuple(parts), SHELL_SPACING_M)
+        yield Structure(name, tuple(parts), SHELL_SPACING_M)
 
 
-def _steelwork(rng: Rng, plan: HallPlan, trays: list[Part]) -> Iterator[Built]:
+def _steelwork(rng: Rng, plan: HallPlan, trays: list[Part]) -> Iterator[Structure]:
     """Columns at the walls, beams and purlins below the roof, and the trays of lamps."""
     x, y = plan.half_m
     high_m = plan.size_m[2]
@@ -229,17 +229,17 @@ def _steelwork(rng: Rng, plan: HallPlan, trays: list[Part]) -> Iterator[Built]:
     purlins_y = np.arange(-y + 1.0, y - 0.5, 2.0).tolist()
     steel = [beam.moved(at(along, y, high_m - 0.2, roll=90)) for along in beams_x]
     steel += [purlin.moved(at(0, across, high_m - 0.08)) for across in purlins_y]
-    yield Built("steelwork", (Part(joined_arrays(steel), paint), *trays), RACK_SPACING_M)
+    yield Structure("steelwork", (Part(joined_arrays(steel), paint), *trays), RACK_SPACING_M)
     pipe = fitting.pipe(rng, length_m=2 * x - 1, radius_m=0.05, colour="#a5251d")
     T = at(0, y, high_m - 1.6, yaw=-90)
-    yield Built("sprinkler", tuple(part.moved(T) for part in pipe), RACK_SPACING_M)
+    yield Structure("sprinkler", tuple(part.moved(T) for part in pipe), RACK_SPACING_M)
     docks = int(rng.integers(1, 3))
     for number in range(docks):
         across = (number - (docks - 1) / 2) * 5.2 + float(rng.uniform(-0.3, 0.3))
         if abs(across) + 2.6 < y:
             door = storage.roller_door(rng, int(rng.integers(1, 20)))
             parts = tuple(part.moved(at(x, across, 0, yaw=180)) for part in door)
-            yield Built(f"dock_{number}", parts, RACK_SPACING_M)
+            yield Structure(f"dock_{number}", parts, RACK_SPACING_M)
 
 
 def _lamps(rng: Rng, plan: HallPlan) -> tuple[list[Part], list[Light]]:
@@ -270,7 +270,7 @@ def _lamps(rng: Rng, plan: HallPlan) -> tuple[list[Part], list[Light]]:
     return trays, lights
 
 
-def _markings(rng: Rng, plan: HallPlan) -> Built:
+def _markings(rng: Rng, plan: HallPlan) -> Structure:
     """Lines along the aisles, a zebra and tyre marks on the floor."""
     x, y = plan.half_m
     x0 = plan.rows_x_m - plan.rack.length_m / 2
@@ -293,7 +293,9 @@ def _markings(rng: Rng, plan: HallPlan) -> Built:
             marks += [
                 _strip(start, end, offset + side * 0.42, float(rng.uniform(0.02, 0.07)), 0.0015) for side in (-1, 1)
             ]
-    return Built("markings", (Part(joined_arrays(lines), paint), Part(joined_arrays(marks), rubber)), SHELL_SPACING_M)
+    return Structure(
+        "markings", (Part(joined_arrays(lines), paint), Part(joined_arrays(marks), rubber)), SHELL_SPACING_M
+    )
 
 
 def _strip(x0: float, x1: float, y: float, width_m: float, z_m: float = 0.003) -> MeshArrays:
@@ -307,7 +309,7 @@ def _strip_across(x: float, y0: float, y1: float, width_m: float) -> MeshArrays:
 # --- Racks and goods ---
 
 
-def _racks(plan: HallPlan) -> Iterator[Built]:
+def _racks(plan: HallPlan) -> Iterator[Structure]:
     """The steel of all rows that have racks, and the labels of the bays."""
     rack = plan.rack
     for row, y in enumerate(plan.rows_y_m):
@@ -318,7 +320,7 @@ def _racks(plan: HallPlan) -> Iterator[Built]:
             run = Rack(last - first, rack.bay_m, rack.depth_m, rack.levels_m, rack.upright, rack.beam)
             middle_m = plan.rows_x_m + (rack.bay_x_m(first) + rack.bay_x_m(last - 1)) / 2
             parts += [part.moved(at(middle_m, y)) for part in run.parts()]
-        yield Built(f"rack_{row}", tuple(parts), RACK_SPACING_M)
+        yield Structure(f"rack_{row}", tuple(parts), RACK_SPACING_M)
         labels = []
         for bay in range(0, rack.bays, 2):
             if bay != plan.gap_bay:
@@ -327,7 +329,7 @@ def _racks(plan: HallPlan) -> Iterator[Built]:
                 z = rack.levels_m[0] - 0.06
                 reach_m = rack.depth_m / 2 + 0.028
                 labels += [put(card_arrays((0.2, 0.1)), plate, x, y + s * reach_m, z, yaw=s * 90.0) for s in (-1, 1)]
-        yield Built(f"label_{row}", tuple(labels), RACK_SPACING_M)
+        yield Structure(f"label_{row}", tuple(labels), RACK_SPACING_M)
 
 
 def _runs(plan: HallPlan) -> Iterator[tuple[int, int]]:
@@ -437,7 +439,7 @@ def _without_overlaps(pieces: list[SitePiece], plan: HallPlan) -> list[SitePiece
         is_inside = bool((np.abs(place.corners_m) < [x, y]).all())
         is_load = piece.name.startswith("load_")
         leaves_way = is_load or bool(place.corners_m[:, 0].min() > plan.docks_x_m + CROSS_M)
-        if is_inside and leaves_way and all(place.meets(other, CLOSE_M) == 0 for other in taken):
+        if is_inside and leaves_way and all(place.overlap_depth_m(other, CLOSE_M) == 0 for other in taken):
             kept.append(piece)
             taken.append(place)
     return kept
