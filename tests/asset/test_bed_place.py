@@ -1,7 +1,7 @@
 """Bedside tables stand beside the head of their bed."""
 
 from tests.asset.flats import SEEDS, flat
-from vobench.asset.room_layout import corners_of
+from vobench.asset.placed_piece import vertices_of
 
 
 def test_bedside_tables_touch_the_wall_at_the_head_of_a_bed_on_both_sides_at_most_once() -> None:
@@ -13,8 +13,8 @@ def test_bedside_tables_touch_the_wall_at_the_head_of_a_bed_on_both_sides_at_mos
                 continue
             count += 1
             (bed,) = (piece for piece in interior.pieces if piece.room == table.room and ".bed_" in piece.name)
-            bed_m = corners_of(bed.parts)[:, :2]
-            table_m = corners_of(table.parts)[:, :2]
+            bed_m = vertices_of(bed.parts)[:, :2]
+            table_m = vertices_of(table.parts)[:, :2]
             gap_m = [
                 max(bed_m[:, axis].min() - table_m[:, axis].max(), table_m[:, axis].min() - bed_m[:, axis].max())
                 for axis in (0, 1)

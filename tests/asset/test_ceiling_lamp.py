@@ -3,7 +3,7 @@
 import numpy as np
 
 from tests.asset.flats import SEEDS, flat
-from vobench.asset.room_layout import corners_of
+from vobench.asset.placed_piece import vertices_of
 
 
 def test_a_pendant_hangs_over_the_middle_of_every_dining_table() -> None:
@@ -13,10 +13,10 @@ def test_a_pendant_hangs_over_the_middle_of_every_dining_table() -> None:
         for table in interior.pieces:
             if ".dining_table_1" not in table.name:
                 continue
-            corners_m = corners_of(table.parts)
+            corners_m = vertices_of(table.parts)
             middle_m = (corners_m.min(axis=0) + corners_m.max(axis=0))[:2] / 2
             shades_m = [
-                corners_of(piece.parts)
+                vertices_of(piece.parts)
                 for piece in interior.pieces
                 if piece.room == table.room and ".pendant_" in piece.name
             ]
@@ -37,4 +37,4 @@ def test_every_room_has_a_lamp_at_its_ceiling_which_touches_it() -> None:
             ]
             assert lamps, room.name
             for lamp in lamps:
-                assert abs(corners_of(lamp.parts)[:, 2].max() - interior.plan.height_m) < 1e-6
+                assert abs(vertices_of(lamp.parts)[:, 2].max() - interior.plan.height_m) < 1e-6

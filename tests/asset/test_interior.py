@@ -3,7 +3,7 @@
 from vobench.asset import furniture
 from vobench.asset.furniture import WHITE
 from vobench.asset.interior import without_excess
-from vobench.asset.room_layout import FLOOR, PlacedPiece
+from vobench.asset.placed_piece import FLOOR, PlacedPiece
 
 
 def test_optional_pieces_are_left_out_until_the_faces_are_few_enough() -> None:

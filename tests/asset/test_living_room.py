@@ -1,51 +1,8 @@
-"""The sofa faces the television, with the coffee table between them."""
-
-import numpy as np
+"""Living rooms have what the rest of the home lacks."""
 
 from tests.asset.flats import SEEDS, flat
-from vobench.asset.room_layout import PlacedPiece, corners_of
-
-
-def middle_m(piece: PlacedPiece) -> np.ndarray:
-    corners_m = corners_of(piece.parts)[:, :2]
-    return (corners_m.min(axis=0) + corners_m.max(axis=0)) / 2
-
-
-def living_room_pieces(seed: int) -> dict[str, PlacedPiece]:
-    """The first piece of each kind in the living room of a flat."""
-    interior = flat(seed)
-    living = {room.name for room in interior.plan.rooms if room.use == "living"}
-    return {
-        piece.name.split(".")[1].removesuffix("_1"): piece
-        for piece in interior.pieces
-        if piece.room in living and piece.name.endswith("_1")
-    }
-
-
-def test_the_sofa_is_opposite_the_television_at_a_distance_to_watch_it() -> None:
-    count = 0
-    for seed in SEEDS:
-        pieces = living_room_pieces(seed)
-        if {"television", "sofa"} <= set(pieces):
-            apart_m = np.abs(middle_m(pieces["sofa"]) - middle_m(pieces["television"]))
-            assert apart_m.min() < 0.1, "they are on one line"
-            assert 1.8 < apart_m.max() < 4.6
-            count += 1
-    assert count >= len(SEEDS) // 2
-
-
-def test_the_coffee_table_is_between_them() -> None:
-    count = 0
-    for seed in SEEDS:
-        pieces = living_room_pieces(seed)
-        if "coffee_table" in pieces:
-            sofa_m = middle_m(pieces["sofa"])
-            television_m = middle_m(pieces["television"])
-            to_table_m = middle_m(pieces["coffee_table"]) - television_m
-            share = to_table_m @ (sofa_m - television_m) / np.sum((sofa_m - television_m) ** 2)
-            assert 0.2 < share < 0.8
-            count += 1
-    assert count >= 2
+from tests.asset.rooms import home, kinds, room_layout
+from vobench.asset.living_room import furnish_living_room
 
 
 def test_a_flat_without_bedrooms_has_its_bed_in_the_living_room() -> None:
@@ -56,3 +13,15 @@ def test_a_flat_without_bedrooms_has_its_bed_in_the_living_room() -> None:
         beds = [piece for piece in interior.pieces if ".bed_" in piece.name and piece.room in living]
         if has_bedroom:
             assert beds == []
+
+
+def test_a_large_living_room_of_a_home_without_bedrooms_has_a_bed_and_a_dining_table() -> None:
+    layout = room_layout("living", size_m=6.0)
+    furnish_living_room(layout, home())
+    assert {"sofa", "bed", "dining_table", "shelf", "plant"} <= set(kinds(layout))
+
+
+def test_a_small_living_room_has_no_dining_table() -> None:
+    layout = room_layout("living", size_m=4.0)
+    furnish_living_room(layout, home())
+    assert "dining_table" not in kinds(layout)

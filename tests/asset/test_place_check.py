@@ -8,7 +8,7 @@ import pytest
 from vobench.asset import home, place_check
 from vobench.asset.furniture import WHITE, stood
 from vobench.asset.interior import Interior
-from vobench.asset.room_layout import FLOOR, PlacedPiece
+from vobench.asset.placed_piece import FLOOR, PlacedPiece
 from vobench.asset.shape import at
 from vobench.scene.light import AreaLight
 
@@ -86,8 +86,8 @@ def test_too_many_faces_are_reported_and_lamps_count(flat: Interior) -> None:
 
 
 def test_a_chair_may_stand_under_its_table_but_its_back_may_not(flat: Interior) -> None:
-    chair = next(piece for piece in flat.pieces if piece.beside)
-    table = next(piece for piece in flat.pieces if piece.name == chair.beside[0])
+    chair = next(piece for piece in flat.pieces if piece.may_overlap)
+    table = next(piece for piece in flat.pieces if piece.name == chair.may_overlap[0])
     table_middle = np.mean([part.arrays.vertices_m.mean(axis=0) for part in table.parts], axis=0)
     chair_middle = np.mean([part.arrays.vertices_m.mean(axis=0) for part in chair.parts], axis=0)
     x_m, y_m, _ = (table_middle - chair_middle).tolist()

@@ -6,8 +6,9 @@ import pytest
 from tests.asset.floor_plans import HALL, PLAN, STUDY
 from vobench.asset.floor_plan import Room
 from vobench.asset.furniture import WHITE
+from vobench.asset.placed_piece import vertices_of
 from vobench.asset.room_fitting import ENTRANCE_MARGIN_M, door_fittings, skirtings
-from vobench.asset.room_layout import CASING_M, RoomLayout, corners_of
+from vobench.asset.room_layout import CASING_M, RoomLayout
 
 
 def layout(room: Room) -> RoomLayout:
@@ -18,7 +19,7 @@ def length_m(room: Room) -> float:
     """The length of all skirting boards of a room."""
     furnished = layout(room)
     skirtings(furnished)
-    extents_m = [np.ptp(corners_of(piece.parts), axis=0) for piece in furnished.placed]
+    extents_m = [np.ptp(vertices_of(piece.parts), axis=0) for piece in furnished.placed]
     return float(sum(max(extent_m[0], extent_m[1]) for extent_m in extents_m))
 
 
@@ -45,7 +46,7 @@ def test_each_door_has_a_lining_and_a_leaf_in_the_room_that_it_opens_into_and_th
 def test_an_open_leaf_stands_in_the_room_at_its_hinge() -> None:
     layouts = {room.name: layout(room) for room in PLAN.rooms}
     door_fittings(PLAN, layouts, WHITE, panels=False)
-    leaf = corners_of(layouts["study_1"].placed[1].parts)
+    leaf = vertices_of(layouts["study_1"].placed[1].parts)
     door = PLAN.passages[0].rect
     assert leaf[:, 1].min() >= STUDY.rect.y0 - 0.1
     assert np.ptp(leaf[:, 1]) > 0.8

@@ -2,16 +2,20 @@
 
 import numpy as np
 
-from vobench.asset import furnishing, household
+from vobench.asset import household
 from vobench.asset.daylight import lamp_colour
+from vobench.asset.furniture import Part
+from vobench.asset.kitchen_place import middle_of_free_floor
 from vobench.asset.palette import Style
-from vobench.asset.picture import one_of
-from vobench.asset.room_layout import CEILING, RoomLayout, corners_of
+from vobench.asset.picture import Rng, one_of
+from vobench.asset.placed_piece import CEILING, vertices_of
+from vobench.asset.room_layout import RoomLayout
 from vobench.scene.mesh import quad
 
 TABLE_PENDANT_LM = 800.0
 TABLE_PENDANT_M = 1.55  # the height of its lower edge
 ROOM_PENDANT_M = 2.05
+PENDANT_SECTIONS = 22  # of the shade around its axis; household.pendant has 36 by default
 NEAR_M = 0.7  # a pendant over a table that is no farther from the middle of the room is its only lamp
 
 
@@ -19,7 +23,7 @@ def add_ceiling_lamps(layout: RoomLayout, style: Style, *, is_on: bool) -> None:
     """Add a pendant over the dining table, and a lamp near the middle of the ceiling."""
     rng = layout.rng
     power_lm = float(np.clip(150 * layout.room.rect.area_m2, 1000, 4200)) * float(rng.uniform(0.85, 1.2))
-    middle_m = furnishing.middle_of_floor(layout)
+    middle_m = middle_of_free_floor(layout)
     table_m = _middle_of_dining_table(layout)
     if table_m is not None:
         _add_pendant(layout, style, table_m, low_m=TABLE_PENDANT_M, power_lm=TABLE_PENDANT_LM, is_on=is_on)
@@ -38,8 +42,8 @@ def _middle_of_dining_table(layout: RoomLayout) -> tuple[float, float] | None:
     """The middle (x, y) of the dining table; None if there is none."""
     for piece in layout.placed:
         if ".dining_table_" in piece.name:
-            corners_m = corners_of(piece.parts)
-            x_m, y_m, _ = ((corners_m.min(axis=0) + corners_m.max(axis=0)) / 2).tolist()
+            vertices_m = vertices_of(piece.parts)
+            x_m, y_m, _ = ((vertices_m.min(axis=0) + vertices_m.max(axis=0)) / 2).tolist()
             return x_m, y_m
     return None
 
@@ -65,7 +69,7 @@ def _add_flat_lamp(
     half_m = 0.45 * width_m
     square = quad((x_m - half_m, y_m - half_m, low_m), (0, 2 * half_m, 0), (2 * half_m, 0, 0))
     face = household.diffuser(x_m, y_m, low_m, 2 * half_m) if is_round else square
-    layout.lamp("lamp", face, power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
+    layout.add_lamp("lamp", face, power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
 
 
 def _add_pendant(
@@ -77,7 +81,7 @@ def _add_pendant(
     width_m = float(rng.choice([0.36, 0.46, 0.56]))
     layout.add(
         "pendant",
-        furnishing.pendant,
+        _pendant,
         xy_m,
         ceiling_m,
         support=CEILING,
@@ -86,4 +90,9 @@ def _add_pendant(
         wide_m=width_m,
     )
     disc = household.diffuser(*xy_m, low_m + 0.035, 0.94 * width_m)
-    layout.lamp("lamp", disc, power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
+    layout.add_lamp("lamp", disc, power_lm, is_on=is_on, colour=lamp_colour(style.lamp_k))
+
+
+def _pendant(rng: Rng, drop_m: float, colour: str, wide_m: float) -> list[Part]:
+    """A pendant lamp, like that of `household`, with fewer faces."""
+    return household.pendant(rng, drop_m, colour, wide_m, sections=PENDANT_SECTIONS)

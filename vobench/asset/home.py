@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from vobench.asset import floor_plan, furnishing
+from vobench.asset import floor_plan
 from vobench.asset.ceiling_lamp import add_ceiling_lamps
 from vobench.asset.daylight import Daylight, daylight
 from vobench.asset.floor_plan import SIDES, FloorPlan, Room, Side
@@ -16,6 +16,9 @@ from vobench.asset.palette import Style, home_style
 from vobench.asset.picture import Rng
 from vobench.asset.room_fitting import door_fittings, skirtings
 from vobench.asset.room_layout import RoomLayout
+from vobench.asset.small_lamp import light_small_lamps
+from vobench.asset.window_dressing import dress_windows
+from vobench.asset.window_view import outward_deg
 
 PANORAMAS = ("city", "city", "suburb", "country")
 FLOOR_HEIGHTS_M = (1.2, 4.0, 7.0, 10.0, 16.0)  # of the flat above the ground
@@ -54,7 +57,7 @@ def _outside(plan: FloorPlan, rng: Rng, lighting: str) -> Daylight:
     return daylight(
         rng,
         lighting,
-        towards_deg=furnishing.outward_deg(plan, rng),
+        towards_deg=outward_deg(plan, rng),
         height_m=float(rng.choice(FLOOR_HEIGHTS_M)),
         kinds=PANORAMAS,
     )
@@ -66,7 +69,7 @@ def _furnish(
     """Furnish all rooms. The darker it is outside, the more rooms have their lamps on."""
     for layout in layouts.values():
         use = layout.room.use
-        furnishing.dress_windows(layout, style)
+        dress_windows(layout, style)
         FURNISH[use](layout, style)
 
         has_window = any(plan.windows_of(layout.room))
@@ -75,7 +78,7 @@ def _furnish(
         is_always_lit = use == "living" and outside.lamp_share > 0.8
         is_on = is_lit_by_chance or is_always_lit
         add_ceiling_lamps(layout, style, is_on=is_on)
-        furnishing.small_lamps(layout, style, is_on=is_on and bool(lamp_rng.random() < 0.8))
+        light_small_lamps(layout, style, is_on=is_on and bool(lamp_rng.random() < 0.8))
         if use != "bath":
             skirtings(layout)
 

@@ -14,6 +14,7 @@ Habit = Literal["broad", "upright", "tree", "trailing"]
 HABITS: tuple[Habit, ...] = ("broad", "upright", "tree", "trailing")
 REACH = 0.36  # of a plant from its middle, relative to its height
 GOLDEN_ANGLE_DEG = 137.5  # between a leaf and the next one around the stem
+POT_COLOURS = ("", "", "#e6e2d8", "#3a3c3e", "#7f9182", "#46586a", "#c9a271")  # "" is clay
 GREENS = ("#e8f0d8", "#cfe0c0", "#dfe8b8", "#c0d0b8")
 POT_PROFILES = (  # in thousandths of the height: distance from the axis, height
     "0 0, 360 0, 480 920, 520 930, 520 1000, 460 1000, 440 850, 0 860",

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from vobench.asset.floor_plan import FloorPlan
+from vobench.asset.placed_piece import PlacedPiece
 from vobench.asset.room import Instance, things
-from vobench.asset.room_layout import PlacedPiece
 from vobench.scene.generated_place import GeneratedPlace
 from vobench.scene.light import Light
 

@@ -5,7 +5,7 @@ Some have an alcove behind a wide opening, some have pillars, some have windows;
 
 import numpy as np
 
-from vobench.asset import fitting, furnishing, furniture, picture
+from vobench.asset import fitting, furniture, picture
 from vobench.asset.daylight import Daylight, daylight, lamp_colour
 from vobench.asset.floor_plan import (
     DOOR_HIGH_M,
@@ -21,14 +21,29 @@ from vobench.asset.floor_plan import (
     opening_between,
     outer_sides,
 )
+from vobench.asset.furnishing import (
+    add_armchair,
+    add_cartons,
+    add_desk,
+    add_dining_table,
+    add_floor_plant,
+    add_shelf,
+    add_sideboard,
+)
 from vobench.asset.furniture import Part, coated, matt, put, stood, wood
 from vobench.asset.interior import Interior, most_faces, without_excess
 from vobench.asset.interior_shell import RoomFinish, shell
 from vobench.asset.palette import DEEP_PAINTS, PAINTS, WHITES, Style, office_style, plank_floor, plaster, tile_floor
 from vobench.asset.picture import Rng, one_of
+from vobench.asset.placed_piece import CEILING, WALL
 from vobench.asset.room_fitting import door_fittings, skirtings
-from vobench.asset.room_layout import CEILING, GAP_M, WALL, RoomLayout
+from vobench.asset.room_layout import GAP_M, RoomLayout
 from vobench.asset.shape import card
+from vobench.asset.small_lamp import add_floor_lamp
+from vobench.asset.tabletop import add_tabletop_items
+from vobench.asset.wall_decoration import add_sockets, framed_print
+from vobench.asset.window_dressing import dress_windows
+from vobench.asset.window_view import outward_deg
 from vobench.scene.material import Material
 from vobench.scene.mesh import quad
 
@@ -117,7 +132,7 @@ def generated_paper_room(seed: int, lighting: str) -> Interior:
     lamp_rng = np.random.default_rng([seed, 33])
     outside = _outside(plan, np.random.default_rng([seed, 34]), lighting)
     for layout in layouts.values():
-        furnishing.dress_windows(layout, style)
+        dress_windows(layout, style)
         _pillars(layout)
         _furnish(layout, style)
         _lamps(layout, lamp_rng)
@@ -134,7 +149,7 @@ def generated_paper_room(seed: int, lighting: str) -> Interior:
 
 def _outside(plan: FloorPlan, rng: Rng, lighting: str) -> Daylight:
     """The daylight and the view through the windows."""
-    towards_deg = furnishing.outward_deg(plan, rng) if plan.windows else float(rng.uniform(0, 360))
+    towards_deg = outward_deg(plan, rng) if plan.windows else float(rng.uniform(0, 360))
     height_m = float(rng.choice([1.2, 4.0, 8.0]))
     return daylight(rng, lighting, towards_deg=towards_deg, height_m=height_m, kinds=PANORAMAS)
 
@@ -198,16 +213,16 @@ def _pillars(layout: RoomLayout) -> None:
     look = one_of(rng, "raw", "paint")
     paint = plaster(one_of(rng, *WHITES))
     for _ in range(int(rng.integers(1, 3))):
-        spot = layout.open_spot(width_m + 1.6, width_m + 1.6)
+        spot = layout.free_spot_on_floor(width_m + 1.6, width_m + 1.6)
         if spot is None:
             return
-        x_m, y_m = spot.at(0)
-        body = spot.rect(-width_m / 2, width_m / 2, -width_m / 2, width_m / 2)
+        x_m, y_m = spot.point(0)
+        body = spot.rectangle(-width_m / 2, width_m / 2, -width_m / 2, width_m / 2)
         if look == "raw":
             layout.add("pillar", furniture.pillar, (x_m, y_m), width_m=width_m, height_m=height_m)
         else:
             layout.add("pillar", _painted_pillar, (x_m, y_m), width_m=width_m, height_m=height_m, paint=paint)
-        layout.take(body, height_m)
+        layout.floor.occupy(body, height_m)
 
 
 def _painted_pillar(_: Rng, width_m: float, height_m: float, paint: Material) -> list[Part]:
@@ -220,57 +235,57 @@ def _furnish(layout: RoomLayout, style: Style) -> None:
     rng = layout.rng
     area_m2 = layout.room.rect.area_m2
     makers = [
-        lambda: furnishing.desk(layout, style),
-        lambda: furnishing.shelf(layout, style, (1.0, 1.6, 2.2)),
-        lambda: furnishing.shelf(layout, style, (1.0, 1.8, 2.4)),
+        lambda: add_desk(layout, style),
+        lambda: add_shelf(layout, style, (1.0, 1.6, 2.2)),
+        lambda: add_shelf(layout, style, (1.0, 1.8, 2.4)),
         lambda: _workbench(layout),
         lambda: _crate(layout),
         lambda: _crate(layout),
-        lambda: furnishing.cartons(layout),
-        lambda: furnishing.cartons(layout),
-        lambda: furnishing.cartons(layout),
+        lambda: add_cartons(layout),
+        lambda: add_cartons(layout),
+        lambda: add_cartons(layout),
         lambda: _screen(layout),
         lambda: _cabinet(layout),
-        lambda: furnishing.armchair(layout, style),
-        lambda: furnishing.dining_table(layout, style, 4),
-        lambda: furnishing.sideboard(layout, style),
-        lambda: furnishing.floor_plant(layout),
-        lambda: furnishing.floor_plant(layout),
-        lambda: furnishing.floor_lamp(layout),
+        lambda: add_armchair(layout, style),
+        lambda: add_dining_table(layout, style, 4),
+        lambda: add_sideboard(layout, style),
+        lambda: add_floor_plant(layout),
+        lambda: add_floor_plant(layout),
+        lambda: add_floor_lamp(layout),
     ]
     count = int(np.clip(area_m2 / 6.5, 3, 14))
     for index in rng.permutation(len(makers)).tolist()[:count]:
-        if layout.free_share() > LEAST_FREE_SHARE:
+        if layout.floor.free_share() > LEAST_FREE_SHARE:
             makers[index]()
     for _ in range(int(rng.integers(1, 4))):
         _hang_poster(layout, style)
     if rng.random() < 0.6:
-        layout.hang("noticeboard", fitting.noticeboard, (1.3, 1.0), middle_m=1.55, width_m=1.2, height_m=0.9)
+        layout.add_on_wall("noticeboard", fitting.noticeboard, (1.3, 1.0), middle_m=1.55, width_m=1.2, height_m=0.9)
     if rng.random() < 0.5:
         _hang(layout, "whiteboard", "whiteboard", (1.8, 1.0), "#a4a7a6")
     if rng.random() < 0.25:
         _hang(layout, "mirror", "mirror", (0.8, 1.3), picture.INK)
     if rng.random() < 0.5:
         _pipe(layout)
-    furnishing.sockets(layout, 2)
+    add_sockets(layout, 2)
 
 
 def _workbench(layout: RoomLayout) -> None:
     rng = layout.rng
     width_m = float(rng.choice([1.6, 2.0]))
-    bench = layout.stand(
+    bench = layout.add_at_wall(
         "bench", furniture.bench, (0.92, width_m + 0.02, 1.0), back_m=0.46, width_m=width_m, front_m=0.5
     )
     if bench is not None:
         name, spot = bench
         names = ("books", "papers", "mug", "box")
-        furnishing.scatter(layout, name, spot, names, x_m=GAP_M + 0.4, width_m=width_m - 0.3, z_m=0.7)
+        add_tabletop_items(layout, name, spot, names, x_m=GAP_M + 0.4, width_m=width_m - 0.3, z_m=0.7)
 
 
 def _crate(layout: RoomLayout) -> None:
     rng = layout.rng
     size_m = (float(rng.uniform(0.5, 0.9)), float(rng.uniform(0.5, 0.9)), float(rng.uniform(0.5, 1.2)))
-    layout.stand(
+    layout.add_at_wall(
         "crate",
         lambda of_crate: furniture.crate(of_crate, size_m),
         (size_m[0] + 0.04, size_m[1] + 0.04, size_m[2]),
@@ -284,7 +299,7 @@ def _cabinet(layout: RoomLayout) -> None:
     rng = layout.rng
     width_m = float(rng.choice([0.8, 1.0]))
     height_m = float(rng.choice([1.2, 1.9]))
-    layout.stand(
+    layout.add_at_wall(
         "cabinet",
         furniture.cabinet,
         (0.5, width_m + 0.02, height_m),
@@ -300,20 +315,20 @@ def _screen(layout: RoomLayout) -> None:
     """A screen on feet in the middle of the room, with posters on both sides."""
     rng = layout.rng
     width_m = float(rng.uniform(1.4, 2.2))
-    spot = layout.open_spot(0.5, width_m)
+    spot = layout.free_spot_on_floor(0.5, width_m)
     if spot is None:
         return
     seed = int(rng.integers(20))
     layout.add(
         "screen",
         _standing_screen,
-        spot.at(0),
+        spot.point(0),
         yaw_deg=spot.yaw_deg,
         width_m=width_m,
         seed=seed,
         colour=one_of(rng, "#4f6472", "#8a9a7b", "#6b4353", "#c9c4b8"),
     )
-    layout.take(spot.rect(-0.25, 0.25, -width_m / 2, width_m / 2), 1.8)
+    layout.floor.occupy(spot.rectangle(-0.25, 0.25, -width_m / 2, width_m / 2), 1.8)
 
 
 def _standing_screen(_: Rng, width_m: float, seed: int, colour: str) -> list[Part]:
@@ -337,9 +352,9 @@ def _hang_poster(layout: RoomLayout, style: Style) -> None:
     rng = layout.rng
     kind = one_of(rng, "talk", "circles", "hills")
     size_m = (0.84, 1.18) if kind == "talk" else (float(rng.uniform(0.6, 1.3)), float(rng.uniform(0.6, 1.0)))
-    layout.hang(
+    layout.add_on_wall(
         "picture",
-        furnishing.framed_print,
+        framed_print,
         size_m,
         middle_m=1.6,
         style=kind,
@@ -351,7 +366,7 @@ def _hang_poster(layout: RoomLayout, style: Style) -> None:
 
 
 def _hang(layout: RoomLayout, kind: str, style: str, size_m: tuple[float, float], frame: str) -> None:
-    layout.hang(
+    layout.add_on_wall(
         kind,
         fitting.framed,
         (size_m[0] + 0.1, size_m[1] + 0.1),
@@ -374,7 +389,7 @@ def _pipe(layout: RoomLayout) -> None:
     layout.add(
         "pipe",
         fitting.pipe,
-        spot.at(0.0),
+        spot.point(0.0),
         z_m,
         yaw_deg=spot.yaw_deg,
         support=WALL,
@@ -402,7 +417,7 @@ def _lamps(layout: RoomLayout, rng: Rng) -> None:
         layout.add("housing", fitting.lamp_housing, (x_m, y_m), z_m, support=CEILING, size_m=size_m, hang_m=drop_m)
         panel = quad((x_m - size_m[0] / 2, y_m - size_m[1] / 2, z_m), (0, size_m[1], 0), (size_m[0], 0, 0))
         power_lm = total_lm * float(shares[number] / shares.sum())
-        layout.lamp("lamp", panel, power_lm, is_on=True, colour=lamp_colour(temperature_k))
+        layout.add_lamp("lamp", panel, power_lm, is_on=True, colour=lamp_colour(temperature_k))
 
 
 def _lamp_places(
@@ -432,4 +447,4 @@ def _is_clear_of_pillars(layout: RoomLayout, x_m: float, y_m: float, size_m: tup
     half_x = size_m[0] / 2 + 0.1
     half_y = size_m[1] / 2 + 0.1
     lamp = Rect(x_m - half_x, y_m - half_y, x_m + half_x, y_m + half_y)
-    return not any(lamp.overlaps(rect) for rect in layout.tall_bodies(layout.plan.height_m - 0.6))
+    return not any(lamp.overlaps(rect) for rect in layout.floor.footprints_above(layout.plan.height_m - 0.6))

@@ -9,7 +9,7 @@ import scipy
 
 from vobench.asset.floor_plan import Room
 from vobench.asset.interior import Interior
-from vobench.asset.room_layout import CEILING, FLOOR, SHELL, WALL, PlacedPiece
+from vobench.asset.placed_piece import CEILING, FLOOR, SHELL, WALL, PlacedPiece
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Sky, Sun
 
@@ -82,7 +82,7 @@ def _overlaps(boxes: Sequence[_Box]) -> Iterator[str]:
 def _may_overlap(one: _Box, other: _Box) -> bool:
     """Whether one of two pieces stands under the other by intent, and no part of it reaches into it."""
     for inner, outer in ((one, other), (other, one)):
-        if outer.piece.name in inner.piece.beside:
+        if outer.piece.name in inner.piece.may_overlap:
             return not _enters(inner, outer)
     return False
 

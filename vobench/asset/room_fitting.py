@@ -7,7 +7,9 @@ from vobench.asset import doorway, furniture
 from vobench.asset.floor_plan import SIDES, FloorPlan, Passage, Side, along_m
 from vobench.asset.furniture import WHITE, Part
 from vobench.asset.picture import Rng
-from vobench.asset.room_layout import CASING_M, SHELL, RoomLayout, Spot
+from vobench.asset.placed_piece import SHELL
+from vobench.asset.room_layout import CASING_M, RoomLayout
+from vobench.asset.spot import Spot
 from vobench.scene.material import Material
 
 ENTRANCE_MARGIN_M = 0.1  # beside the front door, without a skirting board
@@ -27,7 +29,7 @@ def door_fittings(plan: FloorPlan, layouts: Mapping[str, RoomLayout], material: 
         layout.add(
             "lining",
             lambda _, **size: doorway.lining(**size),
-            spot.at(-wall_m / 2),
+            spot.point(-wall_m / 2),
             yaw_deg=spot.yaw_deg,
             support=SHELL,
             width_m=2 * half_m,
@@ -42,7 +44,7 @@ def door_fittings(plan: FloorPlan, layouts: Mapping[str, RoomLayout], material: 
     layout.add(
         "entrance",
         doorway.entrance,
-        spot.at(0.0),
+        spot.point(0.0),
         yaw_deg=spot.yaw_deg,
         support=SHELL,
         width_m=2 * layout.half_width_m(plan.entrance.rect),
@@ -53,17 +55,17 @@ def door_fittings(plan: FloorPlan, layouts: Mapping[str, RoomLayout], material: 
 
 def _add_leaf(layout: RoomLayout, passage: Passage, spot: Spot, material: Material, *, panels: bool) -> None:
     """A leaf that stands open at a right angle to its wall, or nearly so."""
-    hinge_y = layout.leaf_y(passage, spot)
-    sign = 1 if hinge_y > 0 else -1
-    inner_y = hinge_y - sign * (doorway.LINING_M + doorway.LEAF_M / 2)
+    hinge_y_m = layout.hinge_y_m(passage, spot)
+    sign = 1 if hinge_y_m > 0 else -1
+    inner_y_m = hinge_y_m - sign * (doorway.LINING_M + doorway.LEAF_M / 2)
     swing_deg = layout.rng.uniform(0, 4)
     layout.add(
         "leaf",
         doorway.leaf,
-        spot.at(0.012, inner_y),
+        spot.point(0.012, inner_y_m),
         yaw_deg=spot.yaw_deg - 90 + sign * swing_deg,
         support=SHELL,
-        width_m=2 * (abs(hinge_y) - doorway.LINING_M) - 0.006,
+        width_m=2 * (abs(hinge_y_m) - doorway.LINING_M) - 0.006,
         height_m=passage.head_m - doorway.LINING_M - 0.006,
         material=material,
         has_panels=panels,
@@ -82,7 +84,7 @@ def skirtings(layout: RoomLayout, height_m: float = 0.08) -> None:
                 layout.add(
                     "skirting",
                     _skirting,
-                    spot.at(0),
+                    spot.point(0),
                     yaw_deg=spot.yaw_deg,
                     support=SHELL,
                     length_m=end_m - start_m,
