@@ -5,7 +5,8 @@ import pytest
 
 from vobench.asset.facade import FOUNDATION_M, House, house
 from vobench.asset.fitting import PANE
-from vobench.asset.street_plan import KERB_M, Lot, PlanFrame
+from vobench.asset.plan_frame import PlanFrame
+from vobench.asset.street_plan import KERB_M, Lot
 from vobench.geometry.se3 import Array
 
 LOT = Lot(PlanFrame(0.0, 0.0, 0.0), 9.0, 10.0)

@@ -1,62 +1,26 @@
-"""Plans of streets: lots side by side along the pavements, none in a street or in another, and kerbs at the roads."""
+"""Lots and segments of plans of streets."""
 
 import numpy as np
 import pytest
 
-from vobench.asset.site import has_overlap, overlap_m
-from vobench.asset.street_plan import KERB_M, PlanFrame, StreetPlan, street_plan
-
-SEEDS = range(20)
+from vobench.asset.plan_frame import PlanFrame
+from vobench.asset.street_plan import LEFT, Lot, SideStreet, StreetSegment
 
 
-@pytest.fixture(scope="module")
-def plans() -> list[StreetPlan]:
-    return [street_plan(np.random.default_rng(seed)) for seed in SEEDS]
+def test_the_front_of_a_lot_is_on_x_0_and_its_back_is_skewed() -> None:
+    lot = Lot(PlanFrame(0.0, 0.0, 0.0), 8.0, 10.0, skew_m=(-0.5, 1.0))
+    np.testing.assert_allclose(lot.corners_m, [[0, -4], [0, 4], [-10, 5], [-10, -4.5]], atol=1e-12)
 
 
-def test_a_point_of_a_frame_that_is_turned_left_lies_to_the_left() -> None:
-    np.testing.assert_allclose(PlanFrame(1.0, 2.0, 90.0).point(3.0, 1.0), [0.0, 5.0], atol=1e-12)
-    inner = PlanFrame(1.0, 2.0, 90.0).frame(3.0, 1.0, -90.0)
-    np.testing.assert_allclose(inner.point(1.0, 0.0), [1.0, 5.0], atol=1e-12)
+def test_segments_meet_at_a_bend_on_either_side() -> None:
+    turn_deg = 14.0
+    first = StreetSegment(PlanFrame(0.0, 0.0, 0.0), 30.0, (0.0, turn_deg))
+    second = StreetSegment(PlanFrame(30.0, 0.0, turn_deg), 30.0, (turn_deg, 0.0))
+    for y_m in (-5.0, 5.0):
+        end_m = first.frame.point(first.reach_m(y_m)[1], y_m)
+        start_m = second.frame.point(second.reach_m(y_m)[0], y_m)
+        np.testing.assert_allclose(end_m, start_m, atol=1e-9)
 
 
-def test_no_lot_enters_another_one_or_a_street(plans: list[StreetPlan]) -> None:
-    for plan in plans:
-        lots = [lot.corners_m for lot in plan.lots]
-        assert not has_overlap(lots, 0.021)
-        for area in (*plan.roads, *plan.pavements):
-            assert max(overlap_m(lot, area.corners_m) for lot in lots) < 0.051
-
-
-def test_every_front_is_at_the_edge_of_a_pavement_or_of_a_road(plans: list[StreetPlan]) -> None:
-    for plan in plans:
-        areas = (*plan.roads, *plan.pavements)
-        for lot in plan.lots:
-            before_m = lot.frame.point(0.05, 0.0)[None]
-            behind_m = lot.frame.point(-0.1, 0.0)[None]
-            assert any(area.contains(before_m)[0] for area in areas)
-            assert not any(area.contains(behind_m)[0] for area in areas)
-
-
-def test_a_kerb_has_a_road_on_one_side_and_a_pavement_on_the_other(plans: list[StreetPlan]) -> None:
-    for plan in plans:
-        for kerb in plan.kerbs:
-            middle_m = (kerb.start_m + kerb.end_m) / 2
-            along = (kerb.end_m - kerb.start_m) / np.linalg.norm(kerb.end_m - kerb.start_m)
-            across = 0.05 * np.array([-along[1], along[0]])
-            sides = [middle_m + across, middle_m - across]
-            is_road = [any(area.contains(point[None])[0] for area in plan.roads) for point in sides]
-            is_pavement = [any(area.contains(point[None])[0] for area in plan.pavements) for point in sides]
-            assert sorted(is_road) == sorted(is_pavement) == [False, True]
-            assert is_road != is_pavement
-
-
-def test_pavements_are_a_kerb_above_the_roads(plans: list[StreetPlan]) -> None:
-    assert {area.height_m for plan in plans for area in plan.roads} == {0.0}
-    assert {area.height_m for plan in plans for area in plan.pavements} == {KERB_M}
-
-
-def test_plans_have_bends_side_streets_and_parking_of_all_kinds(plans: list[StreetPlan]) -> None:
-    assert {len(plan.segments) for plan in plans} == {1, 2, 3}
-    assert {len(plan.parking) for plan in plans} == {0, 1, 2}
-    assert {bool(plan.sides) for plan in plans} == {False, True}
+def test_half_a_side_street_is_half_its_road_and_a_pavement() -> None:
+    assert SideStreet(0, 20.0, LEFT, road_m=6.0, pavement_m=2.0).half_m == pytest.approx(5.0)

@@ -10,18 +10,18 @@ from vobench.asset.daylight import Daylight, lamp_colour, level_daylight
 from vobench.asset.facade import House
 from vobench.asset.furniture import STEEL, Part, matt, put
 from vobench.asset.picture import NAVY, Rng, one_of
+from vobench.asset.plan_frame import PlanFrame
 from vobench.asset.shape import at, block_arrays, card_arrays, lathe, tube
 from vobench.asset.site import Area, Footprint, LevelAreas, Site, SitePiece, Structure, footprint, overlap_m
+from vobench.asset.street_layout import street_plan
 from vobench.asset.street_plan import (
     KERB_M,
     LEFT,
     PARKING_M,
+    Footway,
     Lot,
-    PlanFrame,
     StreetPlan,
     StreetSegment,
-    Walk,
-    street_plan,
 )
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Light
@@ -134,8 +134,8 @@ def asphalt(seed: int = 0, px: int = 2048, tile_m: float = 10.0) -> Picture:
         shade = int(rng.uniform(62, 78))
         if rng.random() < 0.55:
             draw.rectangle([x, y, x + w, y + h], fill=(shade, shade, shade + 1), outline=(48, 48, 49), width=4)
-        walk = np.cumsum(rng.normal([7, 0], [6, 9], (40, 2)), axis=0) + np.array([x, y])
-        draw.line([tuple(point) for point in walk.tolist()], fill=(50, 50, 51), width=3)
+        crack_px = np.cumsum(rng.normal([7, 0], [6, 9], (40, 2)), axis=0) + np.array([x, y])
+        draw.line([tuple(point) for point in crack_px.tolist()], fill=(50, 50, 51), width=3)
     grain = 1 + 0.1 * picture.noise(rng, px, 200, 1000, slope=0.0)[..., None]
     return Picture(np.clip(np.asarray(image) * grain, 0, 255).astype(np.uint8), tile_m)
 
@@ -200,7 +200,7 @@ def _lines(rng: Rng, plan: StreetPlan) -> Iterator[MeshArrays]:
     shift_m = sum(-side * PARKING_M / 2 for side in plan.parking)
     pitch_m = float(rng.uniform(4.0, 6.5))
     for index, segment in enumerate(plan.segments):
-        crossing_m = plan.crossing[1] if plan.crossing and plan.crossing[0] == index else None
+        crossing_m = plan.crossing.x_m if plan.crossing and plan.crossing.segment == index else None
         for x in np.arange(3.0, segment.length_m - 4.5, pitch_m).tolist():
             if crossing_m is None or abs(x + 1 - crossing_m) > 4.0:
                 yield _painted(segment, x, x + 2.0, shift_m - 0.06, shift_m + 0.06)
@@ -253,10 +253,10 @@ class _Furnishing:
         found = list(self._cars())
         has_trees = (bool(self.rng.random() < 0.65), bool(self.rng.random() < 0.65))
         tree_m = float(self.rng.uniform(5.5, 8.0))
-        for number, walk in enumerate(self.plan.walks):
-            found += self._kerbside(walk, number, has_trees=has_trees[walk.is_mirrored], tree_m=tree_m)
-        for walk in self.plan.walks:
-            found += self._house_side(walk)
+        for number, footway in enumerate(self.plan.footways):
+            found += self._kerbside(footway, number, has_trees=has_trees[footway.is_mirrored], tree_m=tree_m)
+        for footway in self.plan.footways:
+            found += self._house_side(footway)
         return self._without_overlaps(found)
 
     def _without_overlaps(self, pieces: Sequence[SitePiece]) -> list[SitePiece]:
@@ -300,10 +300,10 @@ class _Furnishing:
     def _is_kept_clear(self, segment: int, side: int, x_m: float) -> bool:
         """Whether a car at x would block the crossing or a side street."""
         crossing = self.plan.crossing
-        at_crossing = crossing is not None and crossing[0] == segment and abs(crossing[1] - x_m) < 6.0
+        at_crossing = crossing is not None and crossing.segment == segment and abs(crossing.x_m - x_m) < 6.0
         at_street = any(
             street.segment == segment and street.side == side and abs(street.x_m - x_m) < street.road_m / 2 + 5
-            for street in self.plan.sides
+            for street in self.plan.side_streets
         )
         return at_crossing or at_street
 
@@ -316,17 +316,17 @@ class _Furnishing:
         yaw_deg = place.heading_deg + against + float(np.clip(rng.normal(0, 0.7), -1.5, 1.5))
         return self._standing("car", parts, place, z_m=0.0, yaw_deg=yaw_deg)
 
-    def _kerbside(self, walk: Walk, number: int, *, has_trees: bool, tree_m: float) -> Iterator[SitePiece]:
+    def _kerbside(self, footway: Footway, number: int, *, has_trees: bool, tree_m: float) -> Iterator[SitePiece]:
         """Lamps, trees, signs, bins, bollards, benches and bicycles along the kerb."""
         rng = self.rng
-        sign = -1 if walk.is_mirrored else 1
+        sign = -1 if footway.is_mirrored else 1
         facing_deg = -90.0 * sign  # towards the road
         lamp_every = 6
-        for slot, x in enumerate(np.arange(1.4, walk.length_m - 1.2, 2.9).tolist()):
-            place = walk.frame.frame(x + float(rng.uniform(-0.25, 0.25)), sign * 0.55)
+        for slot, x in enumerate(np.arange(1.4, footway.length_m - 1.2, 2.9).tolist()):
+            place = footway.frame.frame(x + float(rng.uniform(-0.25, 0.25)), sign * 0.55)
             yaw_deg = place.heading_deg + facing_deg
             choice = float(rng.random())
-            kind_here = self._kind(slot + 3 * number, lamp_every, has_trees, choice, walk.width_m)
+            kind_here = self._kind(slot + 3 * number, lamp_every, has_trees, choice, footway.width_m)
             if kind_here == "":
                 continue
             parts, turn_deg = _kerb_piece(rng, kind_here, tree_m)
@@ -349,20 +349,20 @@ class _Furnishing:
         all_kinds: tuple[str, ...] = (*others, *wide)
         return all_kinds[int(choice * 997) % len(all_kinds)]
 
-    def _house_side(self, walk: Walk) -> Iterator[SitePiece]:
+    def _house_side(self, footway: Footway) -> Iterator[SitePiece]:
         """People in the middle of the pavement, and tubs with plants along the house fronts."""
         rng = self.rng
-        sign = -1 if walk.is_mirrored else 1
+        sign = -1 if footway.is_mirrored else 1
         x = float(rng.uniform(2, 5))
-        while x < walk.length_m - 2:
+        while x < footway.length_m - 2:
             if rng.random() < 0.35:
-                y_m = 1.15 + float(rng.uniform(0, max(walk.width_m - 2.3, 0.02)))
-                place = walk.frame.frame(x, sign * y_m)
+                y_m = 1.15 + float(rng.uniform(0, max(footway.width_m - 2.3, 0.02)))
+                place = footway.frame.frame(x, sign * y_m)
                 yaw_deg = place.heading_deg + float(rng.choice([0.0, 180.0]) + rng.normal(0, 14))
                 height_m = float(rng.uniform(1.55, 1.88))
                 yield self._standing("person", outdoors.person(rng, height_m), place, z_m=KERB_M, yaw_deg=yaw_deg)
-            elif walk.width_m > 2.6 and rng.random() < 0.5:
-                place = walk.frame.frame(x, sign * (walk.width_m - 0.42))
+            elif footway.width_m > 2.6 and rng.random() < 0.5:
+                place = footway.frame.frame(x, sign * (footway.width_m - 0.42))
                 plant = branching_tree.tub_plant(rng, float(rng.uniform(0.8, 1.3)))
                 yield self._standing("plant", plant, place, z_m=KERB_M, yaw_deg=place.heading_deg)
             x += float(rng.uniform(2.6, 7.0))
