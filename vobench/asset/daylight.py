@@ -17,6 +17,20 @@ SEEDS = 1 << 16  # of panoramas
 BLACK_BODIES_K = (2700.0, 3000.0, 4000.0, 5000.0, 6500.0)
 BLACK_BODIES_RGB = ((1.0, 0.43, 0.13), (1.0, 0.48, 0.18), (1.0, 0.65, 0.39), (1.0, 0.78, 0.62), (1.0, 0.93, 1.0))
 NEAR_M = (18.0, 45.0)  # from a window to what is across the street
+LAMP_SHARES = {"day": 0.0, "evening": 0.9, "night": 0.95, "overcast": 0.45}  # of rooms whose lamps are on
+
+# The sun. Its illuminance follows Beer's law by the length of the path of its light, 1 / sine of the elevation.
+SUN_LX = 62000  # of a surface that faces the sun, outside of the atmosphere: half of the real one, for thin haze
+EXTINCTION = 0.22  # optical depth of the atmosphere towards the zenith
+REDNESS_DECAY = 9  # of the redness of sun and sky by the sine of the elevation, chosen by eye
+SUN_SPREAD_DEG = 60  # to either side of what the sun shines at
+HIGH_SUN_DEG = (18, 52)  # elevation by day
+LOW_SUN_DEG = (3.5, 11)  # elevation in the evening
+
+# The sky: illuminance of level ground
+NIGHT_LOG10_LX = (-1.2, 0.4)  # of a town
+OVERCAST_LX = (5000, 15000)
+
 ADAPTED = 0.35  # the share of a lamp's tint that remains after the eye, or white balance, adapted to it
 
 
@@ -76,28 +90,15 @@ def daylight(
     kind = str(rng.choice(kinds))
     seed = int(rng.integers(SEEDS))
     first_m = float(rng.uniform(*distance_m))
-    azimuth_deg = towards_deg + float(rng.uniform(-60, 60))
-    elevation_deg = float(rng.uniform(18, 52))
-    if lighting == "evening":
-        elevation_deg = float(rng.uniform(3.5, 11))
+    azimuth_deg = towards_deg + float(rng.uniform(-SUN_SPREAD_DEG, SUN_SPREAD_DEG))
+    elevation_deg = _elevation_deg(rng, lighting)
     sine = float(np.sin(np.deg2rad(elevation_deg)))
-    sun_lx = 62000 * float(np.exp(-0.22 / sine))  # Beer's law; attenuated by thin haze
-    redness = float(np.exp(-9 * sine))
+    sun_lx = SUN_LX * float(np.exp(-EXTINCTION / sine))
+    redness = float(np.exp(-REDNESS_DECAY * sine))
     sun_colour = unit_luminance((1.0, 0.93 - 0.35 * redness, 0.82 - 0.62 * redness))
-    sky_lx = {
-        "day": 9000 + 9000 * sine,
-        "evening": 150 + 5000 * sine,
-        "night": 10 ** float(rng.uniform(-1.2, 0.4)),
-        "overcast": float(rng.uniform(5000, 15000)),
-    }[lighting]
-    has_sun = lighting in ("day", "evening")
-    if lighting == "night":
-        sky_colour = unit_luminance((0.9, 0.9, 1.1))
-    elif lighting == "overcast":
-        sky_colour = unit_luminance((0.95, 0.98, 1.05))
-    else:
-        sky_colour = unit_luminance((0.72 + 0.2 * redness, 0.84, 1.0))
+    sky_lx = _sky_lx(rng, lighting, sine)
 
+    has_sun = lighting in ("day", "evening")
     around = Surroundings(
         kind=kind,
         seed=seed,
@@ -109,6 +110,35 @@ def daylight(
     sun = Sun("sun", sun_lx, (0.0,), (azimuth_deg,), (elevation_deg,), colour=sun_colour)
     towards = sun.direction(0) if has_sun else np.array([0.0, 0.0, 1.0])
     sky_kind = "overcast" if lighting == "overcast" else "clear"
-    sky = Sky("sky", sky_lx, sky_kind, towards, colour=sky_colour, panorama=around)
-    lamp_share = {"day": 0.0, "evening": 0.9, "night": 0.95, "overcast": 0.45}[lighting]
-    return Daylight((sun, sky) if has_sun else (sky,), lamp_share)
+    sky = Sky("sky", sky_lx, sky_kind, towards, colour=_sky_colour(lighting, redness), panorama=around)
+    return Daylight((sun, sky) if has_sun else (sky,), LAMP_SHARES[lighting])
+
+
+def _elevation_deg(rng: Rng, lighting: str) -> float:
+    """Draw the elevation of the sun. A high sun is drawn for all lightings, so that they share what is drawn later."""
+    elevation_deg = float(rng.uniform(*HIGH_SUN_DEG))
+    if lighting == "evening":
+        elevation_deg = float(rng.uniform(*LOW_SUN_DEG))
+    return elevation_deg
+
+
+def _sky_lx(rng: Rng, lighting: str, sine: float) -> float:
+    """The illuminance of level ground by the sky, by the sine of the elevation of the sun."""
+    night_lx = 10 ** float(rng.uniform(*NIGHT_LOG10_LX))
+    overcast_lx = float(rng.uniform(*OVERCAST_LX))
+    by_lighting = {
+        "day": 9000 + 9000 * sine,
+        "evening": 150 + 5000 * sine,
+        "night": night_lx,
+        "overcast": overcast_lx,
+    }
+    return by_lighting[lighting]
+
+
+def _sky_colour(lighting: str, redness: float) -> Rgb:
+    """The colour of the sky, of luminance 1; `redness` is that of the sun, 0 when high to 1 at the horizon."""
+    if lighting == "night":
+        return unit_luminance((0.9, 0.9, 1.1))
+    if lighting == "overcast":
+        return unit_luminance((0.95, 0.98, 1.05))
+    return unit_luminance((0.72 + 0.2 * redness, 0.84, 1.0))

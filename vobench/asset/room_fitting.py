@@ -17,29 +17,35 @@ LEAST_SKIRTING_M = 0.03  # the length of a skirting board
 
 
 def door_fittings(plan: FloorPlan, layouts: Mapping[str, RoomLayout], material: Material, *, panels: bool) -> None:
-    """Add linings, open leaves and the front door."""
+    """Add the linings and the open leaves of all doors, and the front door."""
     for passage in plan.passages:
-        owner = passage.opens_into or passage.rooms[0]
-        layout = layouts[owner]
-        spot = layout.spot_at_hole(passage.rect)
-        half_m = layout.half_width_m(passage.rect)
-        wall_m = min(passage.rect.width_m, passage.rect.depth_m)
-        if passage.kind != "door":
-            continue
-        layout.add(
-            "lining",
-            lambda _, **size: doorway.lining(**size),
-            spot.point(-wall_m / 2),
-            yaw_deg=spot.yaw_deg,
-            support=SHELL,
-            width_m=2 * half_m,
-            height_m=passage.head_m,
-            wall_m=wall_m,
-            material=material,
-        )
-        if passage.has_leaf:
-            _add_leaf(layout, passage, spot, material, panels=panels)
-    layout = layouts[plan.entrance.room]
+        if passage.kind == "door":
+            owner = passage.opens_into or passage.rooms[0]
+            _add_door(layouts[owner], passage, material, panels=panels)
+    _add_entrance(layouts[plan.entrance.room], plan, material)
+
+
+def _add_door(layout: RoomLayout, passage: Passage, material: Material, *, panels: bool) -> None:
+    """Add the lining of a door and its leaf, if it has one, to the room into which it opens."""
+    spot = layout.spot_at_hole(passage.rect)
+    wall_m = min(passage.rect.width_m, passage.rect.depth_m)  # thickness
+    layout.add(
+        "lining",
+        lambda _, **size: doorway.lining(**size),
+        spot.point(-wall_m / 2),
+        yaw_deg=spot.yaw_deg,
+        support=SHELL,
+        width_m=2 * layout.half_width_m(passage.rect),
+        height_m=passage.head_m,
+        wall_m=wall_m,
+        material=material,
+    )
+    if passage.has_leaf:
+        _add_leaf(layout, passage, spot, material, panels=panels)
+
+
+def _add_entrance(layout: RoomLayout, plan: FloorPlan, material: Material) -> None:
+    """Add the closed front door."""
     spot = layout.spot_at_hole(plan.entrance.rect)
     layout.add(
         "entrance",
