@@ -13,12 +13,13 @@ from vobench.rendering.background import Background, even_sky
 from vobench.rendering.bake import BakedScene
 from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
+from vobench.rendering.gl_texture import LightTexture, PanoramaTexture
 from vobench.rendering.illumination import AmbientLight, Illumination
 from vobench.rendering.mover_shade import ShadedLight
-from vobench.rendering.opengl import CENTRE, HALVES, TURNED, LightTexture, PanoramaTexture
 from vobench.rendering.probe import Probe, glints, room_probe
 from vobench.rendering.render_target import RenderTarget, render_target
 from vobench.rendering.renderer import Radiance, View
+from vobench.rendering.sample_pattern import HALVES, PIXEL_CENTRE, ROTATED_GRID
 from vobench.rendering.view import NO_GLINTS, Box, PinholeView, pinhole_view
 from vobench.rendering.warp import Warp, warp
 from vobench.scene.fog import Fog
@@ -74,9 +75,9 @@ class FrameRenderer:
         frame_count = len(views[0].start_ns)
         # An even number of sub-frames, four or more, share the samples between them at half the cost.
         can_share = frame_count >= HALVED_FRAMES and frame_count % 2 == 0
-        grids = HALVES if can_share else (TURNED,)
+        patterns = HALVES if can_share else (ROTATED_GRID,)
         size_px = (camera.width_px, camera.height_px)
-        targets = [self._target(*size_px, grid, weights) for grid in grids]
+        targets = [self._target(*size_px, pattern, weights) for pattern in patterns]
         total = targets[0].total
         self._expose(targets, camera, views, boxes, total.whole)
         return total.read(total.whole)
@@ -96,14 +97,14 @@ class FrameRenderer:
         away = [T_world_away] * len(self._movers)
 
         def draw(camera: Pinhole, T_world_camera: Array) -> tuple[Radiance, Radiance]:
-            target = self._target(camera.width_px, camera.height_px, TURNED, None)
+            target = self._target(camera.width_px, camera.height_px, ROTATED_GRID, None)
             whole = target.total.whole
             view = pinhole_view(camera, T_world_camera, away, skies, ambient_cd_m2=ambient_cd_m2)
             target.total.clear(whole)
-            target.canvas.clear(whole)
+            target.framebuffer.clear(whole)
             self._draw.draw(view, target, whole)
             self._draw.add(target, target.total, whole, 1.0)
-            return target.total.read(whole), target.canvas.nearness()
+            return target.total.read(whole), target.framebuffer.reversed_depth()
 
         return room_probe(draw, faces.corners_m[faces.mover < 0], ambient_cd_m2)
 
@@ -119,7 +120,7 @@ class FrameRenderer:
             box = face.needed_for(view.rows)
             if box is None:
                 continue
-            target = self._target(face.camera.width_px, face.camera.height_px, CENTRE, weights)
+            target = self._target(face.camera.width_px, face.camera.height_px, PIXEL_CENTRE, weights)
             T_camera_face = se3.transform(face.R_camera_face, np.zeros(3))
             face_view = replace(view, T_world_camera=view.T_world_camera @ T_camera_face)
             self._expose([target], face.camera, [face_view], [box], box)
@@ -143,7 +144,7 @@ class FrameRenderer:
         total.clear(around)
         for index in range(frame_count):
             target = targets[index % len(targets)]
-            target.canvas.clear(around)
+            target.framebuffer.clear(around)
             for view, box in zip(views, boxes, strict=True):
                 self._draw.draw(self._lit_view(camera, view, index, box), target, box)
             self._draw.add(target, total, around, 1 / frame_count)

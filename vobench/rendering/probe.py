@@ -8,7 +8,7 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
-from vobench.rendering.opengl import CubeTexture
+from vobench.rendering.cube_map import PrefilteredCubeMap
 from vobench.rendering.renderer import Radiance
 from vobench.rendering.uniform_block import MOST_GLINTS
 from vobench.rendering.view import NEAR_M
@@ -43,7 +43,7 @@ class Probe:
     normal. ambient_cd_m2 (3,) is the scene's mean luminance in the light that it was drawn in.
     """
 
-    texture: CubeTexture
+    texture: PrefilteredCubeMap
     centre_m: Array
     low_m: Array
     high_m: Array
@@ -54,20 +54,20 @@ class Probe:
 def room_probe(
     draw: Callable[[Pinhole, Array], tuple[Radiance, Radiance]], corners_m: Array, ambient_cd_m2: Array
 ) -> Probe:
-    """The probe of a scene of faces (F, 3, 3): `draw` gives picture (H, W, 3) and nearness (H, W) of a camera."""
+    """The probe of a scene of faces (F, 3, 3): `draw` gives a camera's picture (H, W, 3) and depth buffer (H, W)."""
     centre_m = _free_place(corners_m)
     pictures = []
     wall_distances_m = []
     for right, down, ahead in FACES:
         R_world_camera = np.stack([-right, down, ahead], 1)
-        picture, nearness = draw(CAMERA, se3.transform(R_world_camera, centre_m))
+        picture, reversed_depth = draw(CAMERA, se3.transform(R_world_camera, centre_m))
         pictures.append(picture[:, ::-1])
         farthest_m = float(((corners_m - centre_m) @ ahead).max())
-        distance_m = np.where(nearness > 0, NEAR_M / np.maximum(nearness, 1e-9), farthest_m)
+        distance_m = np.where(reversed_depth > 0, NEAR_M / np.maximum(reversed_depth, 1e-9), farthest_m)
         wall_distances_m.append(np.quantile(distance_m, WALL))
     roughness = [roughness_of(level) for level in range(LEVELS)]
     return Probe(
-        texture=CubeTexture(pictures, FACES, roughness),
+        texture=PrefilteredCubeMap(pictures, FACES, roughness),
         centre_m=centre_m,
         low_m=centre_m - wall_distances_m[1::2],
         high_m=centre_m + wall_distances_m[::2],
