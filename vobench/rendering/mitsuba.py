@@ -19,8 +19,8 @@ from vobench import stop
 from vobench.errors import MissingDependencyError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Pixels
+from vobench.rendering.back_face import back_faces
 from vobench.rendering.cutout import is_opaque
-from vobench.rendering.occlusion import back_faces
 from vobench.scene.light import SUN_RADIUS_RAD, AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Map, Material, Rgb, Texture, linear_texture
 from vobench.scene.scene import Scene, triangles
