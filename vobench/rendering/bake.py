@@ -19,7 +19,7 @@ from vobench.geometry.triangle import areas_m2
 from vobench.rendering import freed_memory
 from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
-from vobench.rendering.direct_light import direct_light, mirror_images
+from vobench.rendering.direct_light import direct_light
 from vobench.rendering.emitter import emitters
 from vobench.rendering.gathering import Rounds, Smoothing
 from vobench.rendering.geometry import are_panes, face_materials
@@ -34,6 +34,7 @@ from vobench.rendering.indirect_light import (
     response,
     surfels,
 )
+from vobench.rendering.mirror_image import mirror_images
 from vobench.rendering.photons import Reflectors
 from vobench.rendering.sun_tiles import FaceParts, sunlit_parts
 from vobench.rendering.texel import Texels, texel_areas_m2, texels

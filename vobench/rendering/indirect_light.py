@@ -11,10 +11,10 @@ import scipy
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.blend_kernels import TURNED, Blending, count_weights, write_weights
-from vobench.rendering.direct_light import EvenPattern
 from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, face_materials, take
 from vobench.rendering.ray_kernels import FACE, Faces, chosen_rays, cosine_rays, end_rays, sorted_by_point
+from vobench.rendering.sobol_pattern import SobolPattern
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.thread_pool import chunked, in_chunks
@@ -89,8 +89,8 @@ def evenly_dithered(middles: Texels, step_m: Floats) -> Texels:
     axis = nearest_axis(middles.planes) // 2
     row = np.where(axis == 0, cell[:, 1], cell[:, 0]) % PATTERN_SIDE
     column = np.where(axis == 2, cell[:, 1], cell[:, 2]) % PATTERN_SIDE
-    pattern = EvenPattern(PATTERN_SIDE, 1, middles.dither[:1])
-    return replace(middles, dither=pattern.dither(row * PATTERN_SIDE + column, middles.dither))
+    pattern = SobolPattern(PATTERN_SIDE, 1, middles.dither[:1])
+    return replace(middles, dither=pattern.offsets(row * PATTERN_SIDE + column, middles.dither))
 
 
 def _grouped(key: Rows, points_m: Floats) -> tuple[Rows, Rows]:
