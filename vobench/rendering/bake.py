@@ -17,26 +17,21 @@ from vobench.errors import RenderError, SettingError
 from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
 from vobench.rendering import freed_memory
+from vobench.rendering.albedo import albedo
 from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
+from vobench.rendering.bounce import bounced
 from vobench.rendering.direct_light import direct_light
 from vobench.rendering.emitter import emitters
+from vobench.rendering.face_response import response
 from vobench.rendering.gathering import Rounds, Smoothing
 from vobench.rendering.geometry import are_panes, face_materials
-from vobench.rendering.indirect_light import (
-    MOST_RAYS,
-    Gatherer,
-    Surfels,
-    albedo,
-    blend,
-    bounced,
-    evenly_dithered,
-    response,
-    surfels,
-)
+from vobench.rendering.indirect_light import MOST_RAYS, Gatherer
 from vobench.rendering.mirror_image import mirror_images
 from vobench.rendering.photons import Reflectors
 from vobench.rendering.sun_tiles import FaceParts, sunlit_parts
+from vobench.rendering.surfel import Surfels, stratified_middles, surfels
+from vobench.rendering.surfel_blend import blend
 from vobench.rendering.texel import Texels, texel_areas_m2, texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.texel_owner import owners
@@ -260,7 +255,7 @@ def bake(
     )
     rays = max(settings.indirect_rays, SKY_RAYS if skies else 0)
     rays_each = min(rays, MOST_RAYS / max(len(groups), 1))
-    middles = evenly_dithered(points.take(groups.middle), groups.step_m)
+    middles = stratified_middles(points.take(groups.middle), groups.step_m)
     rounds = Rounds(
         gatherer,
         middles,

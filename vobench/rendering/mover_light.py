@@ -14,8 +14,9 @@ from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.bake import BakedScene, bodies
 from vobench.rendering.emitter import Emitter, emitters
+from vobench.rendering.face_response import response
 from vobench.rendering.geometry import BoundingSphere, are_panes, sample_points, tangents
-from vobench.rendering.indirect_light import Gatherer, response
+from vobench.rendering.indirect_light import Gatherer
 from vobench.rendering.solid_angle import rectangle
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_owner import Owners
