@@ -10,7 +10,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
 from vobench.rendering.background import Background, even_sky
-from vobench.rendering.bake import BakedScene
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
 from vobench.rendering.gl_texture import LightTexture, PanoramaTexture

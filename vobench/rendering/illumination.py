@@ -8,7 +8,10 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats
-from vobench.rendering.bake import BakedScene, SunTrack, direct_layer, direct_points, static_scene, travelled_rad
+from vobench.rendering.bake import direct_layer, direct_points
+from vobench.rendering.baked_scene import BakedScene, SunTrack
+from vobench.rendering.key_time import travelled_rad
+from vobench.rendering.static_scene import static_scene
 from vobench.scene.light import Light, Steady, Sun
 from vobench.trajectory.nanoseconds import NS_PER_S
 
