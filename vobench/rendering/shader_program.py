@@ -11,7 +11,7 @@ from OpenGL.GL import shaders
 
 from vobench.errors import MissingDependencyError
 from vobench.geometry.se3 import Array
-from vobench.rendering.context import SOFTWARE_REMEDY
+from vobench.rendering.gl_library import SOFTWARE_REMEDY
 from vobench.rendering.uniform_block import BLOCKS
 
 SHADERS = Path(__file__).parent / "shaders"
