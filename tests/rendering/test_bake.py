@@ -17,8 +17,8 @@ from vobench.rendering.bake import (
     BakeSettings,
     bake,
 )
+from vobench.rendering.cosine_sampling import cosine_weighted
 from vobench.rendering.embree import Hits
-from vobench.rendering.emitter import cosine_weighted
 from vobench.rendering.geometry import offset_from_surface
 from vobench.rendering.illumination import Illumination
 from vobench.rendering.texel_owner import owners

@@ -8,7 +8,7 @@ from tests.rendering.rectangles import rectangle
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats
 from vobench.rendering.direct_light import direct_light
-from vobench.rendering.emitter import emitters
+from vobench.rendering.light_emitter import emitters
 from vobench.rendering.shadow_ray import RayGrid, cast_shadow_rays, unshadowed_light
 from vobench.scene.light import Light, Sky, SpotLight, Sun
 from vobench.scene.scene import ceiling_light

@@ -68,7 +68,7 @@ def test_an_image_has_the_width_and_the_unshadowed_light_of_a_lamp_where_the_ima
     width_rad = image.width_rad(points.points_m)
     np.testing.assert_allclose(width_rad * distance_m, width_rad[nearest] * distance_m[nearest], rtol=1e-5)
     lambertian_lx = PANEL.power_lm / np.pi * (centre_m[2] - points.points_m[:, 2]) ** 2 / distance_m**4
-    np.testing.assert_allclose(image.open_light(points), TINT * lambertian_lx, rtol=0.01)
+    np.testing.assert_allclose(image.unshadowed_light(points), TINT * lambertian_lx, rtol=0.01)
 
 
 def test_the_sky_has_no_images() -> None:

@@ -5,7 +5,7 @@ import pytest
 
 from tests.rendering.lit_floor import BULB, PANEL, PANEL_M, X, Y, Z, open_floor
 from tests.rendering.rectangles import rectangle
-from vobench.rendering.emitter import emitters
+from vobench.rendering.light_emitter import emitters
 from vobench.rendering.shadow_ray import RayGrid, cast_shadow_rays, first_sides, reachable, unshadowed_light
 from vobench.rendering.sobol_pattern import SobolPattern
 from vobench.scene.light import Light

@@ -14,11 +14,11 @@ from vobench.rendering.baked_file import load_baked, save_baked
 from vobench.rendering.baked_scene import INDIRECT_RAYS, BakedScene, BakeSettings, Patches, SunTrack
 from vobench.rendering.bounce import bounced
 from vobench.rendering.direct_light import direct_light
-from vobench.rendering.emitter import emitters
 from vobench.rendering.face_response import response
 from vobench.rendering.gathering import Rounds, Smoothing
 from vobench.rendering.indirect_light import MOST_RAYS, Gatherer
 from vobench.rendering.key_time import key_times_ns, moving_suns
+from vobench.rendering.light_emitter import emitters
 from vobench.rendering.mirror_image import mirror_images
 from vobench.rendering.photons import Reflectors
 from vobench.rendering.static_scene import StaticScene, bodies, sampled_faces, static_points

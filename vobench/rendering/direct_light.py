@@ -113,7 +113,7 @@ class Receivers:
         light = np.zeros(len(self.points), np.float32)
         light[visible] = share[visible] * unshadowed_lx
         noisy = visible[is_sampled]
-        if emitter.open_side > 1 and len(noisy):
+        if emitter.least_side > 1 and len(noisy):
             light[noisy] = self.layout.blurred(light)[noisy]
         return light
 

@@ -5,8 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vobench.rendering.array_types import Floats, Mask, Rows
-from vobench.rendering.emitter import Aim, Emitter, Occluder, emitters
+from vobench.rendering.emitter import Aim, Emitter, Occluder
 from vobench.rendering.geometry import RAY_OFFSET_M, BoundingSphere, PlanarPatch, RayCaster, bounding_sphere
+from vobench.rendering.light_emitter import emitters
 from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Light, Sky
@@ -26,9 +27,9 @@ class MirrorImage(Emitter):
     ball: BoundingSphere
 
     @property
-    def open_side(self) -> int:
+    def least_side(self) -> int:
         """As many as of the emitter itself."""
-        return self.emitter.open_side
+        return self.emitter.least_side
 
     @property
     def is_hard(self) -> bool:
@@ -50,11 +51,11 @@ class MirrorImage(Emitter):
 
         return aim
 
-    def open_light(self, texels: Texels) -> Floats:
+    def unshadowed_light(self, texels: Texels) -> Floats:
         """The light of the whole image, as if the mirror had no end."""
-        return np.float32(self.tint) * self.emitter.open_light(self._images(texels))
+        return np.float32(self.tint) * self.emitter.unshadowed_light(self._images(texels))
 
-    def may_light(self, points_m: Floats) -> Mask:
+    def may_reach(self, points_m: Floats) -> Mask:
         """Points (P, 3) in front of the mirror from which its outline may overlap the image, by bounding spheres."""
         outline = bounding_sphere(self.mirror.corners_m)
         to_image_m = self.ball.centre_m - points_m.astype(float)

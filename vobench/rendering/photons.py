@@ -196,7 +196,7 @@ class Reflectors:
 
         # A shadow ray to a random point on the emitter.
         ahead_m = np.einsum("ij,ij->i", emitter.ball.centre_m - points.points_m, points.planes)
-        rows = np.flatnonzero((ahead_m > -emitter.ball.radius_m) & emitter.may_light(points.points_m))
+        rows = np.flatnonzero((ahead_m > -emitter.ball.radius_m) & emitter.may_reach(points.points_m))
         points = points.take(rows)
         vectors_m, strength = emitter.towards(points)(number[4, rows], number[5, rows])
         cosine = points.cosine(vectors_m)

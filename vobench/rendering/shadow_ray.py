@@ -58,7 +58,7 @@ def reachable(emitter: Emitter, points: Texels, rows: Rows) -> Rows:
         ball = emitter.ball
         ahead_of(points.points_m, points.normals, part_rows, ball.centre_m, ball.radius_m, is_ahead)
         part_rows = part_rows[is_ahead]
-        return np.asarray(part_rows[emitter.may_light(points.points_m[part_rows])])
+        return np.asarray(part_rows[emitter.may_reach(points.points_m[part_rows])])
 
     return chunked(reachable_part, len(rows))
 
@@ -143,10 +143,10 @@ def unshadowed_light(
 
     It is computed by a formula if there is one, otherwise sampled at side x side places of the emitter, or more.
     """
-    light = chunked(lambda part: emitter.open_light(points.take(rows[part])), len(rows))
+    light = chunked(lambda part: emitter.unshadowed_light(points.take(rows[part])), len(rows))
     is_sampled = np.isnan(light)
     sampled_rows = rows[is_sampled]
-    sampled_side = max(side, emitter.open_side)
+    sampled_side = max(side, emitter.least_side)
 
     def sample(part: slice) -> Floats:
         return _mean_light(emitter, points.take(sampled_rows[part]), sampled_side)
