@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.mitsuba import STRENGTH, groups, lamp_look, light_key, load, nominal, one_sided
+from vobench.rendering.mitsuba_description import STRENGTH, groups, lamp_look, light_key, load, nominal, one_sided
 from vobench.scene.light import Light, Sky, Sun
 from vobench.scene.scene import Scene, triangles
 
