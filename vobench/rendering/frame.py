@@ -14,9 +14,10 @@ from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
 from vobench.rendering.gl_texture import LightTexture, PanoramaTexture
+from vobench.rendering.glint import glints
 from vobench.rendering.illumination import AmbientLight, Illumination
 from vobench.rendering.mover_shade import ShadedLight
-from vobench.rendering.probe import Probe, glints, room_probe
+from vobench.rendering.probe import Probe, room_probe
 from vobench.rendering.render_target import RenderTarget, render_target
 from vobench.rendering.renderer import Radiance, View
 from vobench.rendering.sample_pattern import HALVES, PIXEL_CENTRE, ROTATED_GRID
