@@ -1,4 +1,4 @@
-"""Pictures of one baked scene: its light brought up to date, its movers put in place, strips and sub-frames added."""
+"""Pictures of a baked scene: for each sub-frame the light map is updated, movers are placed, and views are drawn."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,12 +28,12 @@ from vobench.scene.light import STEADY, Light, Steady
 from vobench.scene.material import Rgb
 from vobench.scene.triangles import Triangles
 
-AWAY_M = 1e6  # where movers are while the probe is drawn
-HALVED_FRAMES = 4  # sub-frames, of which each may have half of the samples
+AWAY_M = 1e6  # the depth below the scene at which movers are while the probe is drawn
+HALVED_FRAMES = 4  # the least number of sub-frames that have half of the samples each
 
 
 class FrameRenderer:
-    """Draws in the context that is current when it is created, and must be current when it is used."""
+    """Renders pictures in the OpenGL context that is current when it is created, and must be when it is used."""
 
     def __init__(self, baked: BakedScene) -> None:
         self._illumination = Illumination(baked)
@@ -58,7 +58,7 @@ class FrameRenderer:
         views: Sequence[View],
         weights: Rgb | None,
     ) -> Radiance:
-        """Luminance of views that tile a picture's rows, each with the same number of sub-frames; see `Renderer`."""
+        """The picture of views that tile its rows and have equal numbers of sub-frames; see `Renderer`."""
         _require_tiling(camera, views)
         if isinstance(camera, Pinhole):
             return self._pinhole_picture(camera, views, weights)
@@ -74,7 +74,7 @@ class FrameRenderer:
     ) -> Radiance:
         boxes = [(0, camera.width_px, view.rows.start, view.rows.stop) for view in views]
         frame_count = len(views[0].start_ns)
-        # An even number of sub-frames, four or more, share the samples between them at half the cost.
+        # Sub-frames alternate between the two halves of the samples, at half the cost, if their number is even.
         can_share = frame_count >= HALVED_FRAMES and frame_count % 2 == 0
         patterns = HALVES if can_share else (ROTATED_GRID,)
         size_px = (camera.width_px, camera.height_px)
@@ -84,7 +84,7 @@ class FrameRenderer:
         return total.read(total.whole)
 
     def _room_probe(self, baked: BakedScene, faces: Triangles) -> Probe:
-        """The probe of the stationary things, with every lamp of variable level at level 1."""
+        """The probe of what is stationary, with lamps of variable level at level 1."""
         lights = tuple(_steady(light) for light in self._lights)
         skies = Background(lights).skies(0, 0)
         if all(isinstance(light.level, Steady) for light in self._lights):
@@ -115,7 +115,7 @@ class FrameRenderer:
         view: View,
         weights: Rgb | None,
     ) -> Radiance:
-        """The rows of a view through a lens, put together of pinhole faces."""
+        """The rows of a view through a lens, resampled from pinhole pictures."""
         atlas = lens.blank(3 if weights is None else 1)
         for face in lens.faces:
             box = face.needed_for(view.rows)
@@ -136,9 +136,9 @@ class FrameRenderer:
         boxes: Sequence[Box],
         around: Box,
     ) -> None:
-        """Draw the mean over sub-frames, on the targets by turns, of all views, each in its box.
+        """Draw the mean over the sub-frames of all views, each view in its box.
 
-        It is in the first target's total, in the box around all boxes.
+        Sub-frames alternate between the targets. The mean is in the total of the first target, inside the box `around`.
         """
         frame_count = len(views[0].start_ns)
         total = targets[0].total
@@ -157,7 +157,7 @@ class FrameRenderer:
         index: int,
         box: Box,
     ) -> PinholeView:
-        """A sub-frame of a view, whose light is then in the texture."""
+        """A sub-frame of a view. The texture of the light map is updated for it."""
         start_ns = int(view.start_ns[index])
         end_ns = int(view.end_ns[index])
         middle_ns = (start_ns + end_ns) / 2
@@ -185,7 +185,7 @@ class FrameRenderer:
         return pinhole
 
     def _in_fog(self, view: PinholeView, fog: Fog, start_ns: int, end_ns: int) -> PinholeView:
-        """A view in fog, which hides the sky."""
+        """A view in fog, whose airlight takes the place of the sky."""
         airlight_cd_m2 = view.ambient_cd_m2
         if fog.airlight == "sky":
             airlight_cd_m2 = self._background.mean_cd_m2(start_ns, end_ns)
@@ -198,12 +198,12 @@ class FrameRenderer:
 
 
 def _steady(light: Light) -> Light:
-    """A light at level 1 if it varies."""
+    """A light at level 1 if its level varies, otherwise as it is."""
     return light if isinstance(light.level, Steady) else replace(light, level=STEADY)
 
 
 def _require_tiling(camera: Camera, views: Sequence[View]) -> None:
-    """Raise ValueError where views leave out rows, overlap, or differ in their number of sub-frames."""
+    """Raise ValueError if views leave out rows, overlap, or have different numbers of sub-frames."""
     edges = sorted((view.rows.start, view.rows.stop) for view in views)
     starts = [start for start, _ in edges]
     ends = [0, *(stop for _, stop in edges)]
