@@ -6,8 +6,9 @@ import numpy as np
 
 from vobench.rendering.array_types import Floats, Mask, Rows
 from vobench.rendering.emitter import Aim, Emitter, Occluder
-from vobench.rendering.geometry import RAY_OFFSET_M, BoundingSphere, PlanarPatch, RayCaster, bounding_sphere
+from vobench.rendering.geometry import RAY_OFFSET_M, BoundingSphere, RayCaster, bounding_sphere
 from vobench.rendering.light_emitter import emitters
+from vobench.rendering.planar_patch import PlanarPatch
 from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Light, Sky

@@ -14,11 +14,11 @@ from vobench.rendering.geometry import (
     FAR_M,
     RAY_OFFSET_M,
     BoundingSphere,
-    PlanarPatch,
     bounding_sphere,
     lengths,
     sample_points,
 )
+from vobench.rendering.planar_patch import PlanarPatch
 from vobench.rendering.solid_angle import Rectangle, SeenRectangle, SolidAngle, rectangle
 from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
