@@ -17,7 +17,7 @@ import numpy as np
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
 from vobench.rendering import mitsuba as llvm
-from vobench.rendering.mitsuba import load
+from vobench.rendering.mitsuba_description import load
 from vobench.rendering.path import PathRenderer
 from vobench.rendering.renderer import single_instant
 from vobench.scene.scene import Scene

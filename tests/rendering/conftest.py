@@ -17,7 +17,7 @@ from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
 from vobench.rendering.atlas import Atlas
-from vobench.rendering.bake import BakedScene, Patches
+from vobench.rendering.baked_scene import BakedScene, Patches
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.rendering.sun_tiles import FaceParts

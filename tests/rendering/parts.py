@@ -4,7 +4,7 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Rows
-from vobench.rendering.bake import BakedScene
+from vobench.rendering.baked_scene import BakedScene
 
 ROUNDING = 1e-6  # of weights, by which a place at the border of a part may be outside
 

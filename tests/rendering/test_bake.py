@@ -1,43 +1,32 @@
 """Baked light obeys photometry: inverse square, cosines, superposition, shadow and conservation of energy."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 
-from tests.rendering.panoramas import waves
 from tests.rendering.parts import light_at
 from tests.rendering.rectangles import Rectangle, box, rectangle, room
 from vobench.asset.texture import Procedural
-from vobench.errors import RenderError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
 from vobench.rendering.bake import (
-    LIGHT,
-    PLACES,
-    SAMPLES,
-    TEXTURES,
     BakedScene,
     BakeSettings,
     bake,
-    load_baked,
-    save_baked,
-    spacings_m,
 )
+from vobench.rendering.cosine_sampling import cosine_weighted
 from vobench.rendering.embree import Hits
-from vobench.rendering.emitter import cosine_weighted
 from vobench.rendering.geometry import offset_from_surface
-from vobench.rendering.illumination import AmbientLight, Illumination
+from vobench.rendering.illumination import Illumination
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.visibility import Visibility
-from vobench.scene.light import AreaLight, Flicker, Light, PointLight, Sky, SpotLight, Sun
-from vobench.scene.material import Material, Picture, fresnel
-from vobench.scene.mesh import flat_shaded, flipped, make_mesh, moved, quad
-from vobench.scene.panorama import PanoramaMap
-from vobench.scene.scene import Scene, ceiling_light, triangles
+from vobench.scene.light import AreaLight, Flicker, Light, PointLight, SpotLight
+from vobench.scene.material import Material, fresnel
+from vobench.scene.mesh import flat_shaded, flipped, make_mesh, moved
+from vobench.scene.scene import Scene, ceiling_light
 from vobench.scene.triangles import Thing
 
 DIRECT = BakeSettings(spacing_m=0.1, light_rays=16, indirect_spacing_m=1.0, indirect_rays=1, bounces=0)
@@ -72,22 +61,6 @@ def test_the_floor_is_read_where_its_samples_are() -> None:
     rectangle_px = baked.atlas.light_px[:2].reshape(-1, 2)
     np.testing.assert_allclose(np.ptp(rectangle_px, axis=0), 40, atol=1e-4)
     np.testing.assert_allclose(rectangle_px % 1, 0.5, atol=1e-4)
-
-
-def test_samples_lie_further_apart_in_a_large_place_where_nothing_is_asked_for() -> None:
-    sides = {"small": 20.0, "asks": 20.0, "large": 200.0}
-    things = [Thing(name, quad((0.0, 0, 0), (a, 0, 0), (0, a, 0)), "grey") for name, a in sides.items()]
-    things[1] = replace(things[1], spacing_m=0.5)
-    place = Scene("place", tuple(things), {"grey": Material()}, ())
-    faces = triangles(place)
-    no_edge = np.zeros(len(faces), bool)
-    spacing_m = spacings_m(place, faces, BakeSettings(), no_edge)
-    samples = (areas_m2(faces.corners_m) / spacing_m**2)[faces.thing != 1].sum()
-    assert samples == pytest.approx(SAMPLES)
-    assert np.unique(spacing_m[faces.thing == 1]) == [0.5]
-    alone = replace(place, things=place.things[:2])
-    spacing_m = spacings_m(alone, triangles(alone), BakeSettings(), no_edge[:4])
-    assert np.unique(spacing_m[:2]) == [BakeSettings().spacing_m]
 
 
 @pytest.mark.parametrize("height_m", [1.0, 2.0, 4.0])
@@ -488,81 +461,3 @@ def test_indirect_light_is_that_of_paths_traced_one_by_one() -> None:
     outside = expected.sum(1) > 1
     for channel in range(3):
         assert seen[outside, channel].mean() == pytest.approx(expected[outside, channel].mean(), rel=0.015)
-
-
-@pytest.fixture(scope="module")
-def baked() -> BakedScene:
-    floor = Material(texture=Procedural("terrazzo", 0.5, 0.5, 1.0, 64, 0), eta=1.5)
-    materials = {"floor": floor, "wall": Material(texture=Procedural("plain", 0.6, 0.0, 1.0, 8, 0))}
-    surfaces = tuple(room((2, 2, 2), floor="floor", wall="wall", ceiling="wall"))[1:]
-    sun = Sun("sun", 1e4, (0.0, 10.0), (0.0, 10.0), (60.0, 70.0))
-    lamp = ceiling_light("lamp", np.array([0, 0, 1.9]), (0.2, 0.2), power_lm=100)
-    settings = BakeSettings(spacing_m=0.5, indirect_spacing_m=1.0, light_rays=1, indirect_rays=4)
-    return bake(Scene("cell", surfaces, materials, (lamp, sun)), settings)
-
-
-def test_what_was_saved_is_what_is_loaded(baked: BakedScene, tmp_path: Path) -> None:
-    save_baked(tmp_path, baked)
-    loaded = load_baked(tmp_path, baked.scene)
-    assert loaded.settings == baked.settings
-    assert maps(loaded) == maps(baked)
-    assert loaded.direct.dtype == baked.direct.dtype
-    assert loaded.light_uv.tobytes() == baked.light_uv.tobytes()
-    assert Illumination(loaded).at(0, 0).tobytes() == Illumination(baked).at(0, 0).tobytes()
-    assert AmbientLight(loaded).cd_m2(loaded.direct[0][..., None]).tolist() == (
-        AmbientLight(baked).cd_m2(baked.direct[0][..., None]).tolist()
-    )
-    (track,), (kept,) = loaded.tracks, baked.tracks
-    assert (track.light, track.times_ns) == (kept.light, kept.times_ns)
-    assert track.bounced.tobytes() == kept.bounced.tobytes()
-
-
-def test_textures_that_were_painted_are_loaded_as_pictures_one_for_all_that_share_it(tmp_path: Path) -> None:
-    shared, glow = Procedural("terrazzo", 0.5, 0.5, 1.0, 64, 0), Procedural("poster", 0.4, 0.5, 2.0, 32, 1)
-    kept = Picture(np.full((2, 2), 0.5, np.float32))
-    made_of = {
-        "spare": Material(texture=shared),
-        "floor": Material(texture=shared, emission_cd_m2=(1.0, 1.0, 1.0), emission_texture=glow),
-        "wall": Material(texture=shared, eta=1.5),
-        "ceiling": Material(texture=kept),
-        "unused": Material(texture=Procedural("wood", 0.4, 0.5, 1.0, 32, 1)),
-    }
-    scene = Scene("cell", tuple(room((2, 2, 2), floor="floor", wall="wall", ceiling="ceiling")), made_of, ())
-    save_baked(tmp_path, bake(scene, BakeSettings(spacing_m=0.5, indirect_rays=0, bounces=0)))
-    loaded = load_baked(tmp_path, scene).scene.materials
-    for name, material in made_of.items():
-        assert isinstance(loaded[name].texture, Picture) == (name != "unused")
-        assert loaded[name].texture.pixels().tobytes() == material.texture.pixels().tobytes()
-    assert loaded["floor"].texture is loaded["wall"].texture
-    assert loaded["floor"].emission_texture.pixels().tobytes() == glow.pixels().tobytes()
-    assert (loaded["floor"].emission_texture.tile_m, loaded["ceiling"].texture) == (2.0, kept)
-
-
-def test_a_panorama_is_saved_with_the_light_and_not_painted_again(tmp_path: Path) -> None:
-    class Painted:
-        count = 0
-
-        def map_under(self, sky: Sky) -> PanoramaMap:
-            self.count += 1
-            return waves()
-
-    painted = Painted()
-    floor = rectangle(np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 1.0, 0]), "grey")
-    scene = Scene("floor", (floor,), {"grey": Material(colour=(0.5,) * 3)}, (Sky("sky", 100.0, panorama=painted),))
-    save_baked(tmp_path, bake(scene, BakeSettings(spacing_m=0.5, indirect_rays=0, bounces=0)))
-    so_far = painted.count
-    (loaded,) = load_baked(tmp_path, scene).scene.lights
-    assert isinstance(loaded, Sky)
-    assert loaded.panorama is not None
-    assert loaded.panorama.map_under(loaded).daylight.tobytes() == waves().daylight.tobytes()
-    assert loaded.panorama.map_under(loaded).lamps.tobytes() == waves().lamps.tobytes()
-    assert painted.count == so_far
-
-
-@pytest.mark.parametrize("name", [LIGHT, PLACES, TEXTURES, "sun.1.npz"])
-@pytest.mark.parametrize("left", [0, 100])
-def test_an_empty_or_torn_file_is_an_error_that_names_the_folder(baked, tmp_path, name, left):
-    save_baked(tmp_path, baked)
-    (tmp_path / name).write_bytes((tmp_path / name).read_bytes()[:left])
-    with pytest.raises(RenderError, match=str(tmp_path)):
-        load_baked(tmp_path, baked.scene)

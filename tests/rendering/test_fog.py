@@ -12,8 +12,8 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.background import Background
 from vobench.rendering.bake import BakedScene
 from vobench.rendering.illumination import AmbientLight
-from vobench.rendering.opengl import TURNED
 from vobench.rendering.renderer import Radiance, single_instant
+from vobench.rendering.sample_pattern import ROTATED_GRID
 from vobench.scene.fog import Fog
 from vobench.scene.light import Sky, Switched
 from vobench.scene.material import LUMINANCE, Material, fresnel
@@ -65,7 +65,7 @@ def cosines(camera: Pinhole) -> Array:
     """The cosine (4, H, W) of the angle to the optical axis at the four samples of each pixel."""
     u, v = np.meshgrid(np.arange(camera.width_px), np.arange(camera.height_px))
     layers = []
-    for right, down in TURNED.points:
+    for right, down in ROTATED_GRID.positions:
         x = (u + right - 0.5 - camera.cx_px) / camera.fx_px
         y = (v + down - 0.5 - camera.cy_px) / camera.fy_px
         layers.append(1 / np.sqrt(x**2 + y**2 + 1))

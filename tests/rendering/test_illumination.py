@@ -9,7 +9,7 @@ from tests.rendering.parts import light_at
 from vobench.asset.shape import block
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
-from vobench.rendering.bake import SUN_STEP_RAD, BakedScene, BakeSettings, bake, key_times_ns
+from vobench.rendering.bake import BakedScene, BakeSettings, bake
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sun, Switched
 from vobench.scene.material import Material
@@ -128,21 +128,6 @@ def test_a_slow_sun_is_traced_anew_only_when_it_has_turned_a_little() -> None:
     light = Illumination(bake(scene(sun, things=window_room()), DIRECT))
     assert light.at(ns(10), ns(10)) is light.at(ns(10.1), ns(10.1))
     assert light.at(ns(10), ns(10)) is not light.at(ns(60), ns(60))
-
-
-@pytest.mark.parametrize(
-    ("azimuths", "elevations"),
-    [((0, 0, 90), (30, 30, 30)), ((0, 0, 0), (30, 30, 30)), ((0, 360), (20, 20)), ((10, 30, 30), (10, 80, 80))],
-    ids=["rests first", "rests", "all around", "rests last"],
-)
-def test_a_suns_light_is_baked_all_along_its_way(azimuths, elevations):
-    times = tuple(np.linspace(5.0, 25.0, len(azimuths)).tolist())
-    sun = Sun("sun", 1e4, times, azimuths, elevations)
-    keys = key_times_ns(sun)
-    assert (keys[0], keys[-1]) == (5 * NS_PER_S, 25 * NS_PER_S)
-    assert (np.diff(keys) > 0).all()
-    ways = np.array([sun.direction(t) for t in keys])
-    assert np.arccos(np.clip((ways[1:] * ways[:-1]).sum(1), -1, 1)).max() <= SUN_STEP_RAD * (1 + 1e-9)
 
 
 def test_a_sun_that_rests_first_lights_as_one_that_stands_there():

@@ -1,95 +1,89 @@
-"""Bounces are a geometric series, surfels weigh their points, and faces give back no more than they get."""
-
-from itertools import pairwise
+"""Rays from points find the surroundings in the shares that geometry gives, and photons bring all their flux."""
 
 import numpy as np
 import pytest
-from scipy.sparse import csr_matrix
 
-from vobench.geometry.se3 import Array
-from vobench.rendering.indirect_light import Response, Surfels, bounced
+from tests.rendering.gathered_room import gathered_room
+from tests.rendering.rectangles import rectangle, room
+from vobench.rendering.indirect_light import Photons, turned
+from vobench.scene.light import Sky
 
-RNG = np.random.default_rng(0)
-
-
-def cavity(count: int, openness: float) -> csr_matrix:
-    """Surfels that see one another by random shares, each of which adds up to 1 less an opening."""
-    table = RNG.random((count, count))
-    table *= (1 - openness) / table.sum(1, keepdims=True)
-    return csr_matrix(table.astype(np.float32))
+X, Y, Z = np.eye(3)
+CLOSED = gathered_room(room((2, 2, 2), floor="grey", wall="grey", ceiling="grey"), spacing_m=0.1, step_m=0.5)
 
 
-def first(lights: int, count: int) -> Array:
-    return np.zeros((lights, count), np.float32)
+def test_in_a_closed_room_all_rays_of_a_point_end_at_surfels() -> None:
+    gathered = CLOSED.gatherer.gather(CLOSED.middles, rays=64)
+    np.testing.assert_allclose(gathered.table.sum(1), 1, rtol=1e-4)
+    assert (gathered.escaped == 0).all()
+    assert gathered.hits.sum() == 64 * len(CLOSED.middles)
 
 
-@pytest.mark.parametrize("openness", [0.0, 0.3])
-def test_even_light_in_a_cavity_adds_up_to_the_geometric_series(openness: float) -> None:
-    seen_shares = cavity(12, openness)
-    albedo = 0.5
-    reflectance = np.full((12, 3), albedo, np.float32)
-    light = bounced(np.ones((1, 12, 3), np.float32), reflectance, seen_shares, first(1, 12), bounces=64)
-    seen = 1 - openness
-    np.testing.assert_allclose(light, seen / (1 - seen * albedo), rtol=2e-3)
+def test_the_floor_sees_the_ceiling_by_the_view_factor_of_a_cube() -> None:
+    sample = CLOSED.gatherer.sample(CLOSED.middles, side=16)
+    table = (sample.near + sample.far).toarray()
+    is_floor = CLOSED.thing_of_surfel == 0
+    is_ceiling = CLOSED.thing_of_surfel == 1
+    view_factor = table[np.ix_(is_floor, is_ceiling)].sum(1).mean()
+    assert view_factor == pytest.approx(0.19982, abs=0.02)  # of opposite faces of a cube; surfels differ in area
+    assert table[np.ix_(is_floor, is_floor)].max() == 0
 
 
-def test_bounces_agree_with_the_linear_system() -> None:
-    seen_shares = cavity(20, 0.1)
-    reflectance = RNG.uniform(0.1, 0.7, (20, 3)).astype(np.float32)
-    sent = RNG.random((2, 20, 3)).astype(np.float32)
-    light = bounced(sent, reflectance, seen_shares, first(2, 20), bounces=64)
-    table = seen_shares.toarray()
-    for lamp in range(2):
-        for channel in range(3):
-            system = np.eye(20) - table @ np.diag(reflectance[:, channel])
-            expected = np.linalg.solve(system, table @ sent[lamp, :, channel])
-            np.testing.assert_allclose(light[lamp, :, channel], expected, rtol=1e-2)
+def test_near_and_far_light_add_up_to_what_the_table_gives() -> None:
+    radiosity = np.random.default_rng(0).random((len(CLOSED.groups), 2)).astype(np.float32)
+    sample = CLOSED.gatherer.sample(CLOSED.middles, side=4, turn=3)
+    near, far, _ = CLOSED.gatherer.light(CLOSED.middles, radiosity, side=4, turn=3)
+    np.testing.assert_allclose(near, sample.near @ radiosity, rtol=1e-5)
+    np.testing.assert_allclose(far, sample.far @ radiosity, rtol=1e-5)
+    assert near.sum() > 0
+    assert far.sum() > 0
 
 
-def test_no_bounce_is_dark_one_is_what_is_seen_and_each_more_adds_light() -> None:
-    seen_shares = cavity(8, 0.2)
-    reflectance = np.full((8, 1), 0.6, np.float32)
-    sent = RNG.random((1, 8, 1)).astype(np.float32)
-    by_count = [bounced(sent, reflectance, seen_shares, first(1, 8), bounces=count) for count in (0, 1, 2, 3)]
-    assert (by_count[0] == 0).all()
-    np.testing.assert_allclose(by_count[1][0, :, 0], seen_shares @ sent[0, :, 0], rtol=1e-6)
-    for fewer, more in pairwise(by_count):
-        assert (more > fewer).all()
+def test_an_open_floor_sees_only_sky_and_a_mirror_shows_it_the_rest_of_it() -> None:
+    floor = rectangle(0 * Z, X, Y, "grey", "floor")
+    sky = Sky("sky", 1000.0, "uniform")
+    alone = gathered_room([floor], spacing_m=0.1, step_m=0.5, skies=[sky])
+    escaped = alone.gatherer.gather(alone.middles, rays=64)
+    assert (escaped.escaped == 1).all()
+    assert (escaped.sky == 0).all()  # straight light of the sky is direct light
+    mirror = rectangle(2 * X + 20 * Z, 40 * Z, 200 * Y, "mirror", "mirror")
+    beside = gathered_room([floor, mirror], spacing_m=0.1, step_m=0.5, skies=[sky])
+    by_mirror = beside.gatherer.gather(beside.middles, rays=256)
+    np.testing.assert_allclose(by_mirror.escaped, 0.5, atol=0.08)
+    np.testing.assert_allclose(by_mirror.sky[0], 0.8 * (1 - by_mirror.escaped) * 1000, rtol=0.05)
 
 
-def test_light_by_mirrors_is_seen_once_and_then_bounces_as_all_other_light() -> None:
-    seen_shares = cavity(8, 0.2)
-    reflectance = np.full((8, 1), 0.6, np.float32)
-    by_mirrors = RNG.random((1, 8)).astype(np.float32)
-    dark = np.zeros((1, 8, 1), np.float32)
-    once = bounced(dark, reflectance, seen_shares, by_mirrors, bounces=1)
-    np.testing.assert_allclose(once[0, :, 0], by_mirrors[0], rtol=1e-6)
-    twice = bounced(dark, reflectance, seen_shares, by_mirrors, bounces=2)
-    again = seen_shares @ (0.6 * by_mirrors[0])
-    np.testing.assert_allclose(twice[0, :, 0] - once[0, :, 0], again, rtol=1e-4)
+def test_without_rays_everything_counts_as_open() -> None:
+    sample = CLOSED.gatherer.sample(CLOSED.middles, side=0)
+    assert (sample.escaped == 1).all()
+    assert sample.near.nnz == sample.far.nnz == 0
+    assert sample.near.shape == (len(CLOSED.middles), len(CLOSED.groups))
 
 
-def test_means_of_surfels_are_weighted_and_even_values_stay() -> None:
-    surfels = Surfels(np.array([0, 0, 1, 1, 1], np.int32), np.array([0, 2]), np.ones(2, np.float32))
-    weights = np.array([1.0, 3.0, 1.0, 1.0, 2.0])
-    values = np.array([[0.0], [4.0], [1.0], [2.0], [3.0]])
-    np.testing.assert_allclose(surfels.mean(values, weights), [[3.0], [2.25]])
-    np.testing.assert_allclose(surfels.mean(np.full((5, 3), 0.7), weights), 0.7, rtol=1e-6)
-    assert len(surfels) == 2
+def photons(count: int, *, is_shown: bool) -> Photons:
+    """Photons of 1 lm from the middle of a room towards all sides."""
+    directions = np.random.default_rng(1).normal(size=(count, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    return Photons(
+        origins_m=np.tile(Z, (count, 1)).astype(np.float32),
+        directions=directions.astype(np.float32),
+        flux_lm=np.ones(count, np.float32),
+        is_shown=np.full(count, is_shown),
+        dither=np.full((count, 2), 0.5, np.float32),
+    )
 
 
-def test_a_face_mirrors_and_scatters_no_more_than_all_light() -> None:
-    etas = np.array([0.0, 1.3, 1.5, 2.0], np.float32)
-    ones = np.ones(4, np.float32)
-    lamp = np.full(4, -1, np.int32)
-    response = Response(np.ones(4, bool), etas, ones, 0 * ones, 0 * ones, lamp, np.zeros(4, bool))
-    face = np.repeat(np.arange(4, dtype=np.int32), 50)
-    cosine = np.tile(np.linspace(0.01, 1, 50), 4)
-    mirrored, scattered = response.mirrored(face, cosine), response.scattered(face, cosine)
-    np.testing.assert_allclose(mirrored + scattered, 1, atol=1e-6)
-    assert (mirrored[face == 0] == 0).all()
-    by_face = mirrored.reshape(4, 50)
-    assert (np.diff(by_face[1:], axis=1) <= 1e-6).all()  # the more grazing, the more is mirrored
-    assert (np.diff(by_face[:, -1]) > 0).all()
-    metal = Response(np.ones(4, bool), 0 * etas, ones, 0.8 * ones, 0 * ones, lamp, np.zeros(4, bool))
-    np.testing.assert_allclose(metal.mirrored(face, cosine), 0.8, rtol=1e-6)
+def test_photons_bring_all_their_flux_unless_it_is_shown_already() -> None:
+    flux_lm = CLOSED.gatherer.deposited(photons(500, is_shown=False))
+    assert flux_lm.sum() == pytest.approx(500, rel=1e-5)
+    by_side_lm = np.bincount(CLOSED.thing_of_surfel, flux_lm)
+    np.testing.assert_allclose(by_side_lm, 500 / 6, rtol=0.3)
+    assert CLOSED.gatherer.deposited(photons(500, is_shown=True)).sum() == 0
+
+
+def test_each_turn_has_sample_offsets_of_its_own() -> None:
+    first, second = (turned(CLOSED.middles, turn).dither for turn in (0, 1))
+    np.testing.assert_array_equal(first, CLOSED.middles.dither)
+    assert (first != second).all()
+    assert second.min() >= 0
+    assert second.max() < 1

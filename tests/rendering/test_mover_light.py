@@ -13,10 +13,12 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.triangle import areas_m2
+from vobench.rendering.area_emitter import panel_emitter
 from vobench.rendering.bake import BakedScene, BakeSettings, bake
-from vobench.rendering.emitter import Emitter, bulb_emitter, panel_emitter
+from vobench.rendering.emitter import Emitter
 from vobench.rendering.geometry import BoundingSphere, RayCaster
 from vobench.rendering.mover_light import may_shade, occluder
+from vobench.rendering.point_emitter import bulb_emitter
 from vobench.rendering.renderer import single_instant
 from vobench.scene.light import PointLight, Sky
 from vobench.scene.material import Material

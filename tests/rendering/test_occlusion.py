@@ -1,6 +1,5 @@
 """Rays against bodies that move, compared with the planes they meet, in float64 and without Embree."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -9,12 +8,12 @@ import pytest
 from tests.rendering.rectangles import box, rectangle, room
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
-from vobench.rendering.occlusion import Bodies, back_faces, dot
+from vobench.rendering.occlusion import Bodies
 from vobench.rendering.shot import CameraShot, shot_transforms
 from vobench.scene.material import Material
-from vobench.scene.mesh import flipped, make_mesh, moved, quad, texture_coordinates, two_sided
+from vobench.scene.mesh import moved, quad
 from vobench.scene.scene import Mover, Scene, WaypointMotion
-from vobench.scene.triangles import Thing, triangle_table
+from vobench.scene.triangles import Thing
 
 MATERIALS = {"a": Material(), "glass": Material("pane", eta=1.5)}
 WALK = WaypointMotion(np.array([0.0, 2.0]), np.array([[1.0, 0, 0], [2.0, 1.0, 0]]), np.array([0.0, 90.0]))
@@ -114,19 +113,3 @@ def test_no_ray_slips_through_a_floor_of_many_triangles(shift: list[float]) -> N
     hits = bodies.visible(rays, [above])
     assert (hits.face >= 0).all()
     np.testing.assert_allclose(hits.distance, np.linalg.norm(targets, axis=1), rtol=1e-6)
-
-
-def test_the_back_of_a_face_has_its_corners_in_any_order_and_belongs_to_the_same_thing() -> None:
-    front = quad([0, 0, 0], [1, 0, 0], [0, 1, 0])
-    back = flipped(front)
-    rolled = make_mesh(back.vertices, np.roll(back.faces, 1, axis=1), texture_coordinates(back), back.vertex_normals)
-    sheet = Thing("sheet", front, "a")
-    for mesh in (back, rolled):
-        both = triangle_table([replace(sheet, mesh=front), replace(sheet, mesh=mesh)], [-1, -1], [-1, -1])
-        assert (back_faces(both) == -1).all()
-    both_sides = triangle_table([replace(sheet, mesh=two_sided(front))], [-1], [-1])
-    back_of = back_faces(both_sides)
-    assert back_of[-1] == -1
-    np.testing.assert_array_equal(back_of[back_of[:-1]], np.arange(len(both_sides)))
-    cosine = dot(both_sides.plane, both_sides.plane[back_of[:-1]])
-    np.testing.assert_allclose(cosine, -1)

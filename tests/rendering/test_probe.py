@@ -12,9 +12,9 @@ from vobench.asset.texture import Procedural
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
-from vobench.rendering.probe import FACES, LEVELS, glints, level_of, roughness_of
+from vobench.rendering.probe import FACES, LEVELS, level_of, roughness_of
 from vobench.rendering.renderer import Radiance, single_instant
-from vobench.scene.light import Flicker, PointLight, Sky, SpotLight, Sun
+from vobench.scene.light import Flicker, PointLight, Sky
 from vobench.scene.material import LUMINANCE, Material, inner_reflectance
 from vobench.scene.mesh import make_mesh, quad
 from vobench.scene.scene import Scene
@@ -187,20 +187,6 @@ def test_a_glint_is_not_there_where_the_lamp_does_not_reach(snap: Any) -> None:
         for lux in (1e4, 20.0)
     ]
     assert added[1].sum() < 0.01 * added[0].sum()
-
-
-def test_lamps_that_are_too_small_to_see_are_told_with_their_levels_and_ends() -> None:
-    flicker = Flicker(depth=0.5)
-    point = PointLight("point", np.array([0, 0, 2.0]), 4 * np.pi * 100, flicker, (1.0, 0.5, 0.2))
-    spot = SpotLight("spot", np.array([1.0, 0, 2]), np.array([0, 0, -1.0]), 500.0, 20.0, 30.0)
-    sun = Sun("sun", 5e4, (0.0,), (0.0,), (90.0,))
-    found = glints((point, spot, sun, ALL_AROUND), np.zeros(3), 0, 1_000_000)
-    assert found.shape == (3, 3, 4)
-    np.testing.assert_allclose(found[0, 1, :3], 100 * flicker.mean(0, 1_000_000) * np.array([1, 0.5, 0.2]))
-    assert found[1, 1, 3] == pytest.approx(np.deg2rad(30))
-    np.testing.assert_allclose(found[2, 0], [0, 0, 1, 0], atol=1e-12)
-    many = [replace(point, name=str(n), position_m=np.array([n, 0, 0.5])) for n in range(20, 0, -1)]
-    assert glints(many, np.zeros(3), 0, 0)[:, 0, 0].tolist() == list(range(1, 5))
 
 
 def test_colours_of_gloss_times_the_weights_are_the_picture_of_one_channel(snap: Any) -> None:

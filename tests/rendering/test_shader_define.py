@@ -6,8 +6,8 @@ import pytest
 
 pytest.importorskip("OpenGL.GL")
 
-from vobench.rendering.opengl import SHADERS
 from vobench.rendering.shader_define import ShaderDefine
+from vobench.rendering.shader_program import SHADERS
 
 
 def test_the_shaders_ask_for_exactly_these_names() -> None:

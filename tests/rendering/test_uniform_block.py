@@ -8,7 +8,7 @@ from OpenGL import GL
 from OpenGL.GL import shaders
 
 from vobench.rendering.context import create_context
-from vobench.rendering.opengl import _source
+from vobench.rendering.shader_program import shader_source
 from vobench.rendering.uniform_block import BATCH, BLOCKS, PASS, Field, UniformBlock
 
 MIXED = UniformBlock(
@@ -52,8 +52,8 @@ def program():
     context = create_context()
     defines = ("HAS_GLOSS", "HAS_LIGHT", "HAS_METAL", "HAS_PROBE", "HAS_TEXTURE", "HAS_EMISSION", "IS_MIRRORED")
     GL.glBindVertexArray(GL.glGenVertexArrays(1))
-    vertex = shaders.compileShader(_source("surface.vert", defines), GL.GL_VERTEX_SHADER)
-    fragment = shaders.compileShader(_source("surface.frag", defines), GL.GL_FRAGMENT_SHADER)
+    vertex = shaders.compileShader(shader_source("surface.vert", defines), GL.GL_VERTEX_SHADER)
+    fragment = shaders.compileShader(shader_source("surface.frag", defines), GL.GL_FRAGMENT_SHADER)
     yield int(shaders.compileProgram(vertex, fragment))
     context.release()
 
@@ -77,7 +77,7 @@ def test_no_two_blocks_share_a_binding_or_an_instance() -> None:
 
 
 def test_a_shader_has_its_defines_behind_the_version_and_its_blocks_declared() -> None:
-    lines = _source("surface.vert", ("IS_PANE", "HAS_LIGHT")).split("\n")
+    lines = shader_source("surface.vert", ("IS_PANE", "HAS_LIGHT")).split("\n")
     assert lines[0].startswith("#version")
     assert lines[1:3] == ["#define HAS_LIGHT 1", "#define IS_PANE 1"]
     assert "layout(std140, binding = 1) uniform Batch {" in lines

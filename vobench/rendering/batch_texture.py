@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
 from vobench.rendering.batch import Batch
-from vobench.rendering.opengl import SurfaceTexture
+from vobench.rendering.gl_texture import SurfaceTexture
 from vobench.scene.material import Material, Texture
 
 MOST_TEXELS = 1 << 26  # the largest sum of the texels of all textures; in colour they occupy half a gigabyte
@@ -46,10 +46,10 @@ def _distinct_textures(materials: Sequence[Material]) -> list[Texture]:
 def _surface_textures(textures: Sequence[Texture]) -> dict[Texture, SurfaceTexture]:
     pictures = [texture.pixels() for texture in textures]
     texel_counts = np.array([np.prod(picture.shape[:2]) for picture in pictures], float)
-    shrinks = halvings(texel_counts).tolist()
+    halving_counts = halvings(texel_counts).tolist()
     surface_textures = {}
-    for texture, picture, shrink in zip(textures, pictures, shrinks, strict=True):
-        surface_textures[texture] = SurfaceTexture(picture, shrink=shrink)
+    for texture, picture, halving_count in zip(textures, pictures, halving_counts, strict=True):
+        surface_textures[texture] = SurfaceTexture(picture, halvings=halving_count)
     return surface_textures
 
 

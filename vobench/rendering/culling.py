@@ -1,4 +1,4 @@
-"""Culling: which clusters of triangles can touch a part of a picture."""
+"""Culling: which clusters of triangles may be visible in a box of a picture, by frusta and by normal cones."""
 
 from collections import OrderedDict
 from collections.abc import Hashable
@@ -16,16 +16,17 @@ from vobench.scene.weld import WELD_M
 Indices = NDArray[np.int64]
 TriangleRuns = dict[int, list[tuple[int, int]]]  # for each batch, runs (first, count) of its indices
 
-RECENT = 32  # views whose clusters are known: what the light is computed for is drawn next
-MARGIN_PX = 1  # samples lie up to half a pixel from the middle
+RECENT = 32  # views whose result is cached, because the light is first computed for the views that are then drawn
+MARGIN_PX = 1  # around a box; samples are up to half a pixel from the centre of their pixel
 
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """Faces that lie together and are culled together, batch by batch: boxes low_m, high_m (C, 3) in a mover's frame.
+    """Groups of neighbouring faces of one batch that are culled together, in the order of batches.
 
-    first, count (C,): their part of the list of indices; batch, mover (C,); axis (C, 3), sine (C,): the mean direction
-    that they face and how far from it they turn, 1 where they may be seen from anywhere.
+    low_m, high_m (C, 3): the bounding box in the frame of the mover. first, count (C,): the range of indices of its
+    triangles. batch, mover (C,): the indices of these, -1 for no mover. axis (C, 3), sine (C,): the normal cone, as its
+    axis and the sine of its half-angle; 1 where a cluster may be seen from all sides.
     """
 
     low_m: Array
@@ -39,7 +40,7 @@ class Clusters:
 
 
 class CullingSet:
-    """All clusters of a scene."""
+    """All clusters of a scene, in whose frames views are tested. Recent results are cached."""
 
     def __init__(self, clusters: Clusters) -> None:
         self._clusters = clusters
@@ -51,7 +52,7 @@ class CullingSet:
         self._recent: OrderedDict[Hashable, TriangleRuns] = OrderedDict()
 
     def visible(self, view: PinholeView, box: Box) -> TriangleRuns:
-        """By batch the runs (first, count) of indices that can touch a box of a picture; no others can."""
+        """The triangles that may be visible in a box of a picture, as runs (first, count) of indices for each batch."""
         poses = np.array(view.T_world_movers).tobytes()
         mirror = view.mirror.key if view.mirror else ()
         key = (view.view_projection.tobytes(), view.eye_m.tobytes(), poses, mirror, view.camera, box)
@@ -63,6 +64,7 @@ class CullingSet:
         return self._recent[key]
 
     def _visible(self, view: PinholeView, box: Box) -> TriangleRuns:
+        """As `visible`, without the cache."""
         clusters = self._clusters
         is_visible = np.zeros(len(clusters.batch), bool)
         world_planes = bounds(view, box)
@@ -70,26 +72,26 @@ class CullingSet:
             T_world_mover = view.pose(mover)
             planes = world_planes @ T_world_mover
             normals = planes[:, :3]
-            # The corner of each box that lies farthest along a plane's normal.
-            upper = np.maximum(normals, 0) @ clusters.high_m[members].T
-            lower = np.minimum(normals, 0) @ clusters.low_m[members].T
-            reach = upper + lower
+            # A box is inside a plane if its corner that is farthest along the normal is.
+            by_upper_corner = np.maximum(normals, 0) @ clusters.high_m[members].T
+            by_lower_corner = np.minimum(normals, 0) @ clusters.low_m[members].T
+            farthest = by_upper_corner + by_lower_corner + planes[:, 3:]  # (P, K)
+            is_inside = (farthest > 0).all(0)
             eye_m = se3.apply(se3.inverse(T_world_mover), view.eye_m[None])[0]
-            is_visible[members] = (reach + planes[:, 3:] > 0).all(0)
-            is_visible[members] &= self._face_eye(eye_m, members)
+            is_visible[members] = is_inside & self._may_face_eye(eye_m, members)
         return self._runs(np.flatnonzero(is_visible))
 
-    def _face_eye(self, eye_m: Array, members: Indices) -> Mask:
-        """Which clusters (K,) have a face that may be seen from an eye (3,) in their frame."""
+    def _may_face_eye(self, eye_m: Array, members: Indices) -> Mask:
+        """Which clusters (K,) may have a face whose front is seen from an eye (3,) in their frame, by normal cones."""
         from_eye_m = self._centre_m[members] - eye_m
         distance_m = np.linalg.norm(from_eye_m, axis=1)
         along_axis_m = np.einsum("ij,ij->i", from_eye_m, self._clusters.axis[members])
-        nearest_m = along_axis_m - self._radius_m[members]
+        least_along_m = along_axis_m - self._radius_m[members]
         limit_m = self._clusters.sine[members] * distance_m
-        return np.asarray(nearest_m < limit_m + WELD_M)
+        return np.asarray(least_along_m < limit_m + WELD_M)
 
     def _runs(self, members: Indices) -> TriangleRuns:
-        """The indices of clusters (K,), those of neighbours joined."""
+        """The index runs of clusters (K,), with adjacent ones of a batch joined."""
         clusters = self._clusters
         batch = clusters.batch[members]
         is_apart = np.diff(members, prepend=-2) != 1
@@ -107,16 +109,17 @@ class CullingSet:
 
 
 def bounds(view: PinholeView, box: Box) -> Array:
-    """Planes (P, 4) of the world around all that a box shows, positive inside: four sides, near, and the mirror."""
+    """The planes (P, 4) in the world that bound what a box shows, positive inside: four sides, near, and the mirror."""
     u0, u1, v0, v1 = box
     camera = view.camera
     left = 2 * (u0 - MARGIN_PX) / camera.width_px - 1
     right = 2 * (u1 + MARGIN_PX) / camera.width_px - 1
     top = 1 - 2 * (v0 - MARGIN_PX) / camera.height_px
     bottom = 1 - 2 * (v1 + MARGIN_PX) / camera.height_px
-    x, y, nearness, w = view.view_projection
+    # Rows of the projection matrix (Gribb and Hartmann, 2001).
+    x, y, depth, w = view.view_projection
     sides = [x - left * w, right * w - x, y - bottom * w, top * w - y]
-    planes = [*sides, w - nearness]
+    planes = [*sides, w - depth]
     if view.mirror is not None:
         planes.append(view.mirror.coefficients)
     return np.array(planes)

@@ -9,7 +9,8 @@ from vobench.geometry import se3
 from vobench.rendering.batch import Batch, Geometry
 from vobench.rendering.culling import CullingSet, TriangleRuns
 from vobench.rendering.draw_call import LAYERS_UNIT, DrawCalls
-from vobench.rendering.opengl import Canvas, FlatTarget, PanoramaTexture, bind
+from vobench.rendering.framebuffer import Framebuffer, LayeredFramebuffer
+from vobench.rendering.gl_texture import PanoramaTexture, bind
 from vobench.rendering.planar_mirror import PlanarMirror
 from vobench.rendering.probe import Probe, probe_share
 from vobench.rendering.render_target import MIRRORS, RenderTarget
@@ -74,11 +75,11 @@ class BatchDraw:
         return views
 
     def draw(self, view: PinholeView, target: RenderTarget, box: Box) -> None:
-        """Fill a box of the target's canvas for as many mirrors as the view goes by, which must be clear there."""
+        """Fill a box of the target's framebuffer at the depth of the view, which must be clear there."""
         visible = self._culling.visible(view, box)
-        canvas = self._begin(view, target, box)
-        self._draw_unmirrored(self._with_holes, visible, view, canvas, ShaderDefine.IS_SOLID)
-        self._draw_unmirrored(self._opaque, visible, view, canvas)
+        framebuffer = self._begin(view, target, box)
+        self._draw_unmirrored(self._with_holes, visible, view, framebuffer, ShaderDefine.IS_SOLID)
+        self._draw_unmirrored(self._opaque, visible, view, framebuffer)
 
         boxes = self._boxes(view, visible)
         followed = self._followed(view, boxes, box)
@@ -88,10 +89,10 @@ class BatchDraw:
                 part = followed.get(mirror.index)
                 self._draw_mirror(mirror, view, target, box=box, visible=visible, part=part)
 
-        self._calls.draw_background(view, canvas, target.weights)
+        self._calls.draw_background(view, framebuffer, target.weights)
         # How much of what is behind passes between leaves does not depend on the order in which rims are blended.
-        self._draw_unmirrored(self._with_holes, visible, view, canvas, ShaderDefine.IS_RIM)
-        self._draw_unmirrored(self._panes, visible, view, canvas)
+        self._draw_unmirrored(self._with_holes, visible, view, framebuffer, ShaderDefine.IS_RIM)
+        self._draw_unmirrored(self._panes, visible, view, framebuffer)
         panes = [mirror for mirror in mirrors if mirror.is_pane]
         for mirror in sorted(panes, key=lambda pane: -_distance_m(pane, view)):
             part = followed.get(mirror.index)
@@ -100,25 +101,25 @@ class BatchDraw:
     def add(
         self,
         target: RenderTarget,
-        total: FlatTarget,
+        total: Framebuffer,
         box: Box,
         share: float,
     ) -> None:
         """Add the mean of a target's samples in a box, times a share, to a total."""
         self._calls.add_mean(target, total, box, share)
 
-    def _begin(self, view: PinholeView, target: RenderTarget, box: Box) -> Canvas:
-        canvas = target.canvases[view.depth]
-        canvas.begin(box)
-        self._calls.begin_view(view, canvas, target.weights, self._probe)
-        return canvas
+    def _begin(self, view: PinholeView, target: RenderTarget, box: Box) -> LayeredFramebuffer:
+        framebuffer = target.framebuffers[view.depth]
+        framebuffer.bind(box)
+        self._calls.begin_view(view, framebuffer, target.weights, self._probe)
+        return framebuffer
 
     def _draw_unmirrored(
         self,
         batches: Sequence[Batch],
         visible: TriangleRuns,
         view: PinholeView,
-        canvas: Canvas,
+        framebuffer: LayeredFramebuffer,
         *defines: ShaderDefine,
     ) -> None:
         """Draw batches that lie in no mirror's plane, with what the probe shows.
@@ -129,7 +130,7 @@ class BatchDraw:
             if batch.index in visible:
                 shows_probe = self._probe and batch.has_gloss and probe_share(batch.material) > 0
                 probe_defines = [ShaderDefine.HAS_PROBE] if shows_probe else []
-                self._calls.draw_surface(batch, visible, view, canvas, frozenset([*probe_defines, *defines]))
+                self._calls.draw_surface(batch, visible, view, framebuffer, frozenset([*probe_defines, *defines]))
 
     def _boxes(self, view: PinholeView, visible: TriangleRuns) -> dict[int, Box]:
         """Mirrors whose mirroring side is seen, all or those of which something is visible: boxes in the picture.
@@ -195,20 +196,20 @@ class BatchDraw:
         part: Box | None,
     ) -> None:
         """Draw what lies in one plane, with what it mirrors in a part of the picture, or with what the probe shows."""
-        canvas = target.canvases[view.depth]
+        framebuffer = target.framebuffers[view.depth]
         plane = _plane_towards(mirror, view)
         is_last = view.depth == MIRRORS or not self._probe
         reflected = ShaderDefine.IS_LAST if is_last else ShaderDefine.HAS_PROBE
         if part and plane:
-            reflections = target.canvases[view.depth + 1]
+            reflections = target.framebuffers[view.depth + 1]
             reflections.clear(part)
             self.draw(view.through(plane), target, part)
             self._begin(view, target, box)
-            bind(LAYERS_UNIT, reflections.colour, GL.GL_TEXTURE_2D_ARRAY)
+            bind(LAYERS_UNIT, reflections.colour_texture, GL.GL_TEXTURE_2D_ARRAY)
             reflected = ShaderDefine.HAS_REFLECTION
         for batch in self._batches_of[mirror.index]:
             if batch.index in visible:
-                self._calls.draw_surface(batch, visible, view, canvas, frozenset({reflected}))
+                self._calls.draw_surface(batch, visible, view, framebuffer, frozenset({reflected}))
 
 
 def _plane_towards(mirror: PlanarMirror, view: PinholeView) -> Plane | None:

@@ -10,19 +10,14 @@ from vobench.rendering.background import PanoramaSky, StandardSky
 from vobench.rendering.batch import Batch, Geometry
 from vobench.rendering.batch_texture import BatchTextures, batch_textures
 from vobench.rendering.culling import TriangleRuns
+from vobench.rendering.framebuffer import Framebuffer, LayeredFramebuffer
+from vobench.rendering.gl_buffer import UniformBuffer, VertexArray
 from vobench.rendering.gl_state import blending, disabled, set_initial_state, strictly_nearer, without_depth_writes
-from vobench.rendering.opengl import (
-    Canvas,
-    FlatTarget,
-    IndexedMesh,
-    PanoramaTexture,
-    ShaderProgram,
-    UniformBuffer,
-    bind,
-)
+from vobench.rendering.gl_texture import PanoramaTexture, bind
 from vobench.rendering.probe import Probe
 from vobench.rendering.render_target import RenderTarget
 from vobench.rendering.shader_define import NO_DEFINES, Defines, ShaderDefine
+from vobench.rendering.shader_program import ShaderProgram
 from vobench.rendering.uniform_block import BATCH, PASS
 from vobench.rendering.uniforms import set_batch, set_probe, set_view
 from vobench.rendering.view import Box, PinholeView
@@ -61,7 +56,7 @@ class DrawCalls:
         self._textures = batch_textures(geometry.batches)
         self.shader_defines = list(map(_shader_defines, self._batches, self._textures))
 
-        self._mesh = IndexedMesh(geometry.vertices, geometry.indices)
+        self._vertex_array = VertexArray(geometry.vertices, geometry.indices)
         self._empty_vertex_array = GL.glGenVertexArrays(1)
         self._pass_uniforms = np.zeros((), PASS.dtype)
         self._pass_buffer = UniformBuffer(PASS.binding, self._pass_uniforms[None])
@@ -75,17 +70,17 @@ class DrawCalls:
     def begin_view(
         self,
         view: PinholeView,
-        canvas: Canvas,
+        framebuffer: LayeredFramebuffer,
         weights: Rgb,
         probe: Probe | None,
     ) -> None:
         """Set the uniforms, textures and state that are the same for all draw calls of a view.
 
-        `weights` are the shares of red, green and blue in the luminance of a mono canvas.
+        `weights` are the shares of red, green and blue in the luminance of a framebuffer with one channel.
         """
         uniforms = self._pass_uniforms
         uniforms[...] = np.zeros((), PASS.dtype)  # reset: values of the last view must not remain
-        set_view(uniforms, view, canvas, weights)
+        set_view(uniforms, view, framebuffer, weights)
         if probe:
             set_probe(uniforms, view, probe)
             bind(PROBE_UNIT, probe.texture.id, GL.GL_TEXTURE_CUBE_MAP)
@@ -117,15 +112,15 @@ class DrawCalls:
         batch: Batch,
         visible: TriangleRuns,
         view: PinholeView,
-        canvas: Canvas,
+        framebuffer: LayeredFramebuffer,
         defines: Defines = NO_DEFINES,
     ) -> None:
         """Draw the visible triangles of a batch. The textures of its reflections must be bound.
 
-        `defines` are preprocessor names for the shader, in addition to those of the batch, the view and the canvas.
+        `defines` are preprocessor names for the shader, in addition to those that follow from the other arguments.
         """
         batch_defines = self.shader_defines[batch.index]
-        all_defines = defines | batch_defines | _canvas_defines(canvas)
+        all_defines = defines | batch_defines | _framebuffer_defines(framebuffer)
         if view.mirror:
             all_defines |= {ShaderDefine.IS_MIRRORED}
         if view.extinction_per_m:
@@ -142,47 +137,51 @@ class DrawCalls:
         # batch, with another define.
         runs = visible.get(batch.index, ())
         if batch.is_pane:
-            self._draw_pane(runs, canvas.layers, is_grey=ShaderDefine.IS_GREY in batch_defines)
+            self._draw_pane(runs, framebuffer.layers, is_grey=ShaderDefine.IS_GREY in batch_defines)
         elif ShaderDefine.IS_RIM in defines:
-            self._draw_rim(runs, canvas.layers)
+            self._draw_rim(runs, framebuffer.layers)
         else:
-            self._mesh.draw(runs, canvas.layers)
+            self._vertex_array.draw(runs, framebuffer.layers)
 
-    def draw_background(self, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
+    def draw_background(self, view: PinholeView, framebuffer: LayeredFramebuffer, weights: Rgb) -> None:
         """Draw the sum of all skies in the pixels without a surface."""
         # These pixels are black, so additive blending yields the sum.
         with blending(GL.GL_ONE, GL.GL_ONE):
             for sky in view.skies:
                 if isinstance(sky, PanoramaSky):
-                    self._draw_panorama(sky, view, canvas, weights)
+                    self._draw_panorama(sky, view, framebuffer, weights)
                 else:
-                    self._draw_standard_sky(sky, view, canvas, weights)
+                    self._draw_standard_sky(sky, view, framebuffer, weights)
 
-    def _draw_panorama(self, sky: PanoramaSky, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
+    def _draw_panorama(
+        self, sky: PanoramaSky, view: PinholeView, framebuffer: LayeredFramebuffer, weights: Rgb
+    ) -> None:
         bind(PANORAMA_UNIT, self._panoramas[sky.index].id)
-        self._program("background", "panorama", _canvas_defines(canvas)).use(
+        self._program("background", "panorama", _framebuffer_defines(framebuffer)).use(
             world_from_screen=view.world_from_screen,
             illuminance_lx=float(sky.illuminance_lx),
             lamp_share=sky.lamp_share,
             weights=np.array([*weights, 0.0]),
         )
-        self._cover(canvas.layers)
+        self._cover(framebuffer.layers)
 
-    def _draw_standard_sky(self, sky: StandardSky, view: PinholeView, canvas: Canvas, weights: Rgb) -> None:
+    def _draw_standard_sky(
+        self, sky: StandardSky, view: PinholeView, framebuffer: LayeredFramebuffer, weights: Rgb
+    ) -> None:
         mono_colour = np.array([sky.colour[:3] @ weights, 0, 0, 0])
         self._program("background", "background").use(
             world_from_screen=view.world_from_screen,
             gradation=sky.gradation,
             scatter=sky.scatter,
             sun=sky.sun,
-            colour=mono_colour if canvas.is_mono else sky.colour,
+            colour=mono_colour if framebuffer.is_mono else sky.colour,
         )
-        self._cover(canvas.layers)
+        self._cover(framebuffer.layers)
 
     def add_mean(
         self,
         target: RenderTarget,
-        total: FlatTarget,
+        total: Framebuffer,
         box: Box,
         share: float,
     ) -> None:
@@ -190,17 +189,17 @@ class DrawCalls:
 
         If `total` has one channel and the samples are in colour, their luminance is added.
         """
-        total.begin(box)
-        canvas = target.canvas
-        bind(LAYERS_UNIT, canvas.colour, GL.GL_TEXTURE_2D_ARRAY)
-        if total.channels == 1 and not canvas.is_mono:
+        total.bind(box)
+        framebuffer = target.framebuffer
+        bind(LAYERS_UNIT, framebuffer.colour_texture, GL.GL_TEXTURE_2D_ARRAY)
+        if total.channels == 1 and not framebuffer.is_mono:
             channel_weights = target.weights
             defines = MONO_DEFINES  # here: the shader adds the three weighted channels up
         else:
             channel_weights = (1.0, 1.0, 1.0)
             defines = NO_DEFINES
-        sample_weights = share / canvas.layers * np.array([*channel_weights, 0.0])
-        self._program("fullscreen", "mean", defines).use(count=canvas.layers, weight=sample_weights)
+        sample_weights = share / framebuffer.layers * np.array([*channel_weights, 0.0])
+        self._program("fullscreen", "mean", defines).use(count=framebuffer.layers, weight=sample_weights)
         with blending(GL.GL_ONE, GL.GL_ONE), disabled(GL.GL_DEPTH_TEST):
             self._cover(layers=1)
 
@@ -223,7 +222,7 @@ class DrawCalls:
         """
         transmittance = GL.GL_SRC_ALPHA if is_grey else GL.GL_SRC1_COLOR
         with disabled(GL.GL_CULL_FACE), without_depth_writes(), blending(GL.GL_ONE, transmittance):
-            self._mesh.draw(runs, layers)
+            self._vertex_array.draw(runs, layers)
 
     def _draw_rim(self, runs: Sequence[tuple[int, int]], layers: int) -> None:
         """Blend the partly transparent rims of holes over the surfaces behind them.
@@ -232,12 +231,12 @@ class DrawCalls:
         """
         opacity_blending = blending(GL.GL_SRC_ALPHA, GL.GL_ONE_MINUS_SRC_ALPHA)
         with without_depth_writes(), strictly_nearer(), opacity_blending:
-            self._mesh.draw(runs, layers)
+            self._vertex_array.draw(runs, layers)
 
 
-def _canvas_defines(canvas: Canvas) -> Defines:
-    """The preprocessor names for shaders that draw on a canvas."""
-    return MONO_DEFINES if canvas.is_mono else NO_DEFINES
+def _framebuffer_defines(framebuffer: LayeredFramebuffer) -> Defines:
+    """The preprocessor names for shaders that draw into a framebuffer."""
+    return MONO_DEFINES if framebuffer.is_mono else NO_DEFINES
 
 
 def _shader_defines(batch: Batch, textures: BatchTextures) -> Defines:

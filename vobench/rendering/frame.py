@@ -1,4 +1,4 @@
-"""Pictures of one baked scene: its light brought up to date, its movers put in place, strips and sub-frames added."""
+"""Pictures of a baked scene: for each sub-frame the light map is updated, movers are placed, and views are drawn."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -10,15 +10,17 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera, Pinhole
 from vobench.geometry.se3 import Array
 from vobench.rendering.background import Background, even_sky
-from vobench.rendering.bake import BakedScene
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
+from vobench.rendering.gl_texture import LightTexture, PanoramaTexture
+from vobench.rendering.glint import glints
 from vobench.rendering.illumination import AmbientLight, Illumination
 from vobench.rendering.mover_shade import ShadedLight
-from vobench.rendering.opengl import CENTRE, HALVES, TURNED, LightTexture, PanoramaTexture
-from vobench.rendering.probe import Probe, glints, room_probe
+from vobench.rendering.probe import Probe, room_probe
 from vobench.rendering.render_target import RenderTarget, render_target
 from vobench.rendering.renderer import Radiance, View
+from vobench.rendering.sample_pattern import HALVES, PIXEL_CENTRE, ROTATED_GRID
 from vobench.rendering.view import NO_GLINTS, Box, PinholeView, pinhole_view
 from vobench.rendering.warp import Warp, warp
 from vobench.scene.fog import Fog
@@ -26,12 +28,12 @@ from vobench.scene.light import STEADY, Light, Steady
 from vobench.scene.material import Rgb
 from vobench.scene.triangles import Triangles
 
-AWAY_M = 1e6  # where movers are while the probe is drawn
-HALVED_FRAMES = 4  # sub-frames, of which each may have half of the samples
+AWAY_M = 1e6  # the depth below the scene at which movers are while the probe is drawn
+HALVED_FRAMES = 4  # the least number of sub-frames that have half of the samples each
 
 
 class FrameRenderer:
-    """Draws in the context that is current when it is created, and must be current when it is used."""
+    """Renders pictures in the OpenGL context that is current when it is created, and must be when it is used."""
 
     def __init__(self, baked: BakedScene) -> None:
         self._illumination = Illumination(baked)
@@ -56,7 +58,7 @@ class FrameRenderer:
         views: Sequence[View],
         weights: Rgb | None,
     ) -> Radiance:
-        """Luminance of views that tile a picture's rows, each with the same number of sub-frames; see `Renderer`."""
+        """The picture of views that tile its rows and have equal numbers of sub-frames; see `Renderer`."""
         _require_tiling(camera, views)
         if isinstance(camera, Pinhole):
             return self._pinhole_picture(camera, views, weights)
@@ -72,17 +74,17 @@ class FrameRenderer:
     ) -> Radiance:
         boxes = [(0, camera.width_px, view.rows.start, view.rows.stop) for view in views]
         frame_count = len(views[0].start_ns)
-        # An even number of sub-frames, four or more, share the samples between them at half the cost.
+        # Sub-frames alternate between the two halves of the samples, at half the cost, if their number is even.
         can_share = frame_count >= HALVED_FRAMES and frame_count % 2 == 0
-        grids = HALVES if can_share else (TURNED,)
+        patterns = HALVES if can_share else (ROTATED_GRID,)
         size_px = (camera.width_px, camera.height_px)
-        targets = [self._target(*size_px, grid, weights) for grid in grids]
+        targets = [self._target(*size_px, pattern, weights) for pattern in patterns]
         total = targets[0].total
         self._expose(targets, camera, views, boxes, total.whole)
         return total.read(total.whole)
 
     def _room_probe(self, baked: BakedScene, faces: Triangles) -> Probe:
-        """The probe of the stationary things, with every lamp of variable level at level 1."""
+        """The probe of what is stationary, with lamps of variable level at level 1."""
         lights = tuple(_steady(light) for light in self._lights)
         skies = Background(lights).skies(0, 0)
         if all(isinstance(light.level, Steady) for light in self._lights):
@@ -96,14 +98,14 @@ class FrameRenderer:
         away = [T_world_away] * len(self._movers)
 
         def draw(camera: Pinhole, T_world_camera: Array) -> tuple[Radiance, Radiance]:
-            target = self._target(camera.width_px, camera.height_px, TURNED, None)
+            target = self._target(camera.width_px, camera.height_px, ROTATED_GRID, None)
             whole = target.total.whole
             view = pinhole_view(camera, T_world_camera, away, skies, ambient_cd_m2=ambient_cd_m2)
             target.total.clear(whole)
-            target.canvas.clear(whole)
+            target.framebuffer.clear(whole)
             self._draw.draw(view, target, whole)
             self._draw.add(target, target.total, whole, 1.0)
-            return target.total.read(whole), target.canvas.nearness()
+            return target.total.read(whole), target.framebuffer.reversed_depth()
 
         return room_probe(draw, faces.corners_m[faces.mover < 0], ambient_cd_m2)
 
@@ -113,13 +115,13 @@ class FrameRenderer:
         view: View,
         weights: Rgb | None,
     ) -> Radiance:
-        """The rows of a view through a lens, put together of pinhole faces."""
+        """The rows of a view through a lens, resampled from pinhole pictures."""
         atlas = lens.blank(3 if weights is None else 1)
         for face in lens.faces:
             box = face.needed_for(view.rows)
             if box is None:
                 continue
-            target = self._target(face.camera.width_px, face.camera.height_px, CENTRE, weights)
+            target = self._target(face.camera.width_px, face.camera.height_px, PIXEL_CENTRE, weights)
             T_camera_face = se3.transform(face.R_camera_face, np.zeros(3))
             face_view = replace(view, T_world_camera=view.T_world_camera @ T_camera_face)
             self._expose([target], face.camera, [face_view], [box], box)
@@ -134,16 +136,16 @@ class FrameRenderer:
         boxes: Sequence[Box],
         around: Box,
     ) -> None:
-        """Draw the mean over sub-frames, on the targets by turns, of all views, each in its box.
+        """Draw the mean over the sub-frames of all views, each view in its box.
 
-        It is in the first target's total, in the box around all boxes.
+        Sub-frames alternate between the targets. The mean is in the total of the first target, inside the box `around`.
         """
         frame_count = len(views[0].start_ns)
         total = targets[0].total
         total.clear(around)
         for index in range(frame_count):
             target = targets[index % len(targets)]
-            target.canvas.clear(around)
+            target.framebuffer.clear(around)
             for view, box in zip(views, boxes, strict=True):
                 self._draw.draw(self._lit_view(camera, view, index, box), target, box)
             self._draw.add(target, total, around, 1 / frame_count)
@@ -155,7 +157,7 @@ class FrameRenderer:
         index: int,
         box: Box,
     ) -> PinholeView:
-        """A sub-frame of a view, whose light is then in the texture."""
+        """A sub-frame of a view. The texture of the light map is updated for it."""
         start_ns = int(view.start_ns[index])
         end_ns = int(view.end_ns[index])
         middle_ns = (start_ns + end_ns) / 2
@@ -183,7 +185,7 @@ class FrameRenderer:
         return pinhole
 
     def _in_fog(self, view: PinholeView, fog: Fog, start_ns: int, end_ns: int) -> PinholeView:
-        """A view in fog, which hides the sky."""
+        """A view in fog, whose airlight takes the place of the sky."""
         airlight_cd_m2 = view.ambient_cd_m2
         if fog.airlight == "sky":
             airlight_cd_m2 = self._background.mean_cd_m2(start_ns, end_ns)
@@ -196,12 +198,12 @@ class FrameRenderer:
 
 
 def _steady(light: Light) -> Light:
-    """A light at level 1 if it varies."""
+    """A light at level 1 if its level varies, otherwise as it is."""
     return light if isinstance(light.level, Steady) else replace(light, level=STEADY)
 
 
 def _require_tiling(camera: Camera, views: Sequence[View]) -> None:
-    """Raise ValueError where views leave out rows, overlap, or differ in their number of sub-frames."""
+    """Raise ValueError if views leave out rows, overlap, or have different numbers of sub-frames."""
     edges = sorted((view.rows.start, view.rows.stop) for view in views)
     starts = [start for start, _ in edges]
     ends = [0, *(stop for _, stop in edges)]

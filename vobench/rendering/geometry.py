@@ -1,4 +1,4 @@
-"""Rays against the faces of a scene; its planar patches, bounding spheres and points on its surfaces."""
+"""Rays against the faces of a scene; bounding spheres, and random points on surfaces."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -9,16 +9,15 @@ from numpy.typing import ArrayLike
 
 from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
-from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.embree import Hits, TriangleCaster
 from vobench.scene.material import Material
 from vobench.scene.triangles import Triangles
-from vobench.scene.weld import distinct_rows
 
 T = TypeVar("T")
 
-# Rays start this far off their face, and further the further they are from the origin: float32 resolves 1e-7 of it.
+# The distance at which rays start off their face, and what is added for each metre from the origin: float32 resolves
+# 1e-7 of that.
 RAY_OFFSET_M = 1e-4
 RAY_OFFSET = 1e-6
 FAR_M = 1e3  # beyond every scene
@@ -26,13 +25,10 @@ ENDLESS = 1e8  # lengths of a direction, beyond every scene
 SHORT_OF_END = 1 - 1e-3  # share of the segment between two points in which something blocks it
 X_AXIS = (1.0, 0.0, 0.0)
 Z_AXIS = (0.0, 0.0, 1.0)
-# faces this near to one plane lie in it
-FLAT_RAD = 1e-3
-FLAT_M = 1e-3
 
 
 def take(table: T, rows: Rows | Mask | slice) -> T:
-    """The same rows of all the arrays that a dataclass has."""
+    """The same rows of all arrays of a dataclass."""
     columns = [getattr(table, field.name) for field in fields(table)]  # type: ignore[arg-type]
     if isinstance(rows, np.ndarray) and rows.dtype != bool:
         return type(table)(*(column.take(rows, axis=0) for column in columns))  # three times as fast as an index
@@ -41,7 +37,7 @@ def take(table: T, rows: Rows | Mask | slice) -> T:
 
 @dataclass(frozen=True, slots=True)
 class BoundingSphere:
-    """A sphere around something: centre (..., 3) and radius (...)."""
+    """Bounding spheres: centres (..., 3) and radii (...)."""
 
     centre_m: Array
     radius_m: Any
@@ -50,55 +46,15 @@ class BoundingSphere:
 
 
 def bounding_sphere(points_m: Array) -> BoundingSphere:
-    """A sphere around points (..., 3)."""
+    """A sphere that contains all points (..., 3)."""
     points = points_m.reshape(-1, 3)
     centre = (points.min(0) + points.max(0)) / 2
     distances = np.linalg.norm(points - centre, axis=1)
     return BoundingSphere(centre, float(distances.max()))
 
 
-@dataclass(frozen=True, slots=True)
-class PlanarPatch:
-    """Faces (K,) of a table that lie in one plane, seen from one side: their corners (K, 3, 3) and normal (3,)."""
-
-    faces: Indices
-    corners_m: Array
-    normal: Array
-
-    def height_m(self, points_m: Floats) -> Floats:
-        """How far (...) points (..., 3) lie before the plane."""
-        return np.asarray((points_m - self.corners_m[0, 0]) @ self.normal)
-
-    def coincides(self, other: "PlanarPatch") -> bool:
-        """Whether they are the front and the back of one sheet."""
-        middle_m = self.corners_m.mean((0, 1))
-        other_middle_m = other.corners_m.mean((0, 1))
-        apart_m = np.abs(middle_m - other_middle_m).max()
-        return bool(apart_m < FLAT_M and self.normal @ other.normal < 0)
-
-
-def planar_patches(
-    faces: Triangles,
-    among: ArrayLike,
-    *,
-    at_least_m2: float = 0.0,
-) -> list[PlanarPatch]:
-    """The faces among a table's, plane by plane of each thing, without planes that hold less than some area."""
-    rows = np.asarray(among, np.int32)
-    offset = np.einsum("ij,ij->i", faces.plane[rows], faces.corners_m[rows, 0])
-    normal_cells = faces.plane[rows] / FLAT_RAD
-    cells = np.column_stack([normal_cells, offset / FLAT_M, faces.thing[rows]])
-    group = distinct_rows(np.rint(cells).astype(np.int64)).inverse
-    patches = []
-    for number in range(group.max(initial=-1) + 1):
-        members = rows[group == number]
-        normal = unit(faces.plane[members].mean(0))
-        patches.append(PlanarPatch(members, faces.corners_m[members], normal))
-    return [patch for patch in patches if areas_m2(patch.corners_m).sum() >= at_least_m2]
-
-
 def reversed_faces(corners_m: Array) -> Indices:
-    """For each triangle (F, 3, 3) one with the same corners in reverse, its back where a sheet has two sides; or -1."""
+    """For each triangle (F, 3, 3) one with the same corners in reverse order, the back of a sheet; -1 for none."""
     weights = np.sqrt(np.arange(2.0, 11.0)).reshape(3, 3)
     reverse = np.ascontiguousarray(corners_m[:, ::-1])
     keys = np.einsum("fij,ij->f", np.ascontiguousarray(corners_m), weights)
@@ -112,10 +68,10 @@ def reversed_faces(corners_m: Array) -> Indices:
 
 
 class RayCaster:
-    """Rays against the faces `among` (K,) of a table, by Embree; hits name them by their place in the table.
+    """Casts rays against the faces `among` (K,) of a table, by Embree. Hits have their indices in the table.
 
-    Of the two sides of a sheet rays meet the one that they come from. twin (F + 1,): the other side of a sheet that a
-    face is one of, -1 for none.
+    A ray hits the side of a sheet that it comes from. twin (F + 1,): the other side of the sheet that a face belongs
+    to, -1 for none. solid: the faces that belong to no sheet.
     """
 
     def __init__(
@@ -135,22 +91,22 @@ class RayCaster:
         self.solid = rows[~has_twin]
 
     def occluded(self, origins_m: ArrayLike, targets_m: ArrayLike) -> Mask:
-        """Whether anything is between each of (R, 3) origins and its target (R, 3)."""
+        """Whether a face is between each origin (R, 3) and its target (R, 3)."""
         return self.stops(origins_m, np.asarray(targets_m) - np.asarray(origins_m))
 
     def stops(self, origins_m: ArrayLike, segments_m: ArrayLike) -> Mask:
-        """Whether anything is between origins and origins + segments (R, 3)."""
+        """Whether a face is between origins and origins + segments (R, 3)."""
         return self._triangles.stops(origins_m, segments_m, SHORT_OF_END)
 
     def nearest(self, origins_m: ArrayLike, directions: ArrayLike) -> Indices:
-        """Which face each ray (R, 3) meets first, -1 for none: `hits` for those who work out the rest."""
+        """The face that each ray (R, 3) hits first, -1 for none: as `hits`, but faster."""
         face = self._triangles.nearest(origins_m, directions, ENDLESS)
         behind = self._behind(face, directions)
         face[behind] = self.twin[face[behind]]
         return face
 
     def _behind(self, face: Indices, directions: ArrayLike) -> Rows:
-        """The rays (K,) that met the far one of a sheet's two sides."""
+        """The rays (K,) whose hit is on the far side of a sheet."""
         if not self._has_sheets:
             return np.zeros(0, np.int64)
         rays = np.flatnonzero(self.twin[face] >= 0)
@@ -164,15 +120,15 @@ class RayCaster:
         directions: ArrayLike,
         reach: ArrayLike = ENDLESS,
     ) -> Hits:
-        """The nearest face along each ray (R, 3), of a sheet any side, no farther than `reach` of its lengths."""
+        """The first hit of each ray (R, 3) within `reach` lengths of its direction, on either side of a sheet."""
         return self._triangles.hits(origins_m, directions, reach)
 
     def hits(self, origins_m: ArrayLike, directions: ArrayLike) -> Hits:
-        """The nearest face along each ray (R, 3)."""
+        """The first hit of each ray (R, 3)."""
         return self.facing(self._triangles.hits(origins_m, directions, ENDLESS), directions)
 
     def facing(self, hits: Hits, directions: ArrayLike) -> Hits:
-        """The same hits on the side of each sheet that their rays (R, 3) come from; changed in place."""
+        """The same hits, moved in place to the side of each sheet that the ray (R, 3) comes from."""
         behind = self._behind(hits.face, directions)
         # The corners in reverse: the second keeps its place, the first is the third.
         hits.v[behind] = 1 - hits.u[behind] - hits.v[behind]
@@ -195,14 +151,14 @@ def tangents(normals: Floats) -> tuple[Floats, Floats]:
 
 
 def offset_from_surface(points_m: Floats, normals: Floats) -> Floats:
-    """Points (P, 3) lifted off their faces, so that rays from there do not meet these."""
+    """Points (P, 3) lifted off their faces along normals (P, 3), so that rays from there do not hit these faces."""
     largest_m = np.abs(points_m).max(1, keepdims=True)
     lift = RAY_OFFSET_M + RAY_OFFSET * largest_m
     return np.asarray(points_m + lift * normals)
 
 
 def sample_points(corners_m: Array, a: Floats, b: Floats) -> Array:
-    """Points (P, 3) spread evenly over triangles (K, 3, 3) by two numbers (P,) in [0, 1) each."""
+    """Points (P, 3) uniform over triangles (K, 3, 3), by two uniform random numbers (P,) in [0, 1)."""
     ends_m2 = np.cumsum(areas_m2(corners_m))
     starts_m2 = np.concatenate([[0.0], ends_m2])
     sample_m2 = a * ends_m2[-1]
@@ -220,12 +176,12 @@ def face_materials(
     faces: Triangles,
     materials: Mapping[str, Material],
 ) -> list[Material | None]:
-    """The material of each thing of a table, None for lamps and things without one."""
+    """The material of each thing of a table, None for lamps and for things without a material."""
     lamps = set(faces.thing[faces.lamp >= 0].tolist())
     return [None if i in lamps else materials.get(thing.material) for i, thing in enumerate(faces.things)]
 
 
 def are_panes(faces: Triangles, materials: Mapping[str, Material]) -> Mask:
-    """Which faces (F,) of a table are of glass."""
-    kinds = face_materials(faces, materials)
-    return np.array([kind is not None and kind.kind == "pane" for kind in kinds], bool)[faces.thing]
+    """Which faces (F,) of a table are panes."""
+    by_thing = [material is not None and material.kind == "pane" for material in face_materials(faces, materials)]
+    return np.array(by_thing, bool)[faces.thing]

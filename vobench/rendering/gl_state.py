@@ -18,7 +18,7 @@ def set_initial_state() -> None:
 
 @contextmanager
 def blending(source_factor: int, destination_factor: int) -> Iterator[None]:
-    """Add the drawn colours and the colours of the canvas, each multiplied by a factor of OpenGL."""
+    """Add the drawn colours and the colours of the framebuffer, each multiplied by a factor of OpenGL."""
     GL.glEnable(GL.GL_BLEND)
     GL.glBlendFunc(source_factor, destination_factor)
     try:

@@ -1,4 +1,4 @@
-"""The light on every face over an interval, and the mean luminance of a scene."""
+"""The light map of a baked scene at any time, and the mean luminance of its surfaces."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
@@ -8,18 +8,21 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats
-from vobench.rendering.bake import BakedScene, SunTrack, direct_layer, direct_points, static_scene, travelled_rad
+from vobench.rendering.bake import direct_layer, direct_points
+from vobench.rendering.baked_scene import BakedScene, SunTrack
+from vobench.rendering.key_time import travelled_rad
+from vobench.rendering.static_scene import static_scene
 from vobench.scene.light import Light, Steady, Sun
 from vobench.trajectory.nanoseconds import NS_PER_S
 
-SUN_TURN_RAD = 1e-4  # a moving sun counts as still within less than a fiftieth of its disc
-CACHED = 16  # maps and moments: enough for the strips of a stereo pair
+SUN_TURN_RAD = 1e-4  # steps in which a moving sun turns: less than a fiftieth of the diameter of its disc
+CACHED = 16  # light maps: enough for the strips of a stereo pair
 
 
 class AmbientLight:
-    """Mean over the area of a scene's stationary bodies, in whatever light.
+    """The mean luminance of the stationary bodies of a scene, weighted by area, under any light map.
 
-    Lamps and the sky do not count: few directions lead there, and in all others their share would be too bright.
+    Lamps and the sky do not count: they are seen in few directions, and in all others the mean would be too bright.
     """
 
     def __init__(self, baked: BakedScene) -> None:
@@ -37,7 +40,7 @@ class AmbientLight:
         self._mean_cd_m2 = np.zeros(3)
 
     def cd_m2(self, light: Floats) -> Array:
-        """The mean (3,) under a map of light (H, W, 3); the very array of the last call costs nothing."""
+        """The mean (3,) under a light map (H, W, 3). It is recomputed only for another array than in the last call."""
         if light is not self._light:
             # No dot product, whose order of adding up depends on the number of threads.
             self._light = light
@@ -53,7 +56,7 @@ def _cached(
     key: Hashable,
     compute: Callable[[], T],
 ) -> T:
-    """The value of a key among the CACHED ones that were asked for last."""
+    """The value of a key, computed unless it is one of the CACHED values that were used last."""
     if key not in cache:
         cache[key] = compute()
     cache.move_to_end(key)
@@ -63,9 +66,9 @@ def _cached(
 
 
 class Illumination:
-    """A baked scene's light at any time. Steady light costs nothing; see docs/rendering.md for the rest.
+    """The light map of a baked scene over an interval of time, without movers; see docs/rendering.md.
 
-    A light counts with its mean over the interval; movers and a moving sun are where they are at its middle.
+    A light counts with its mean level over the interval, and a moving sun is where it is at the middle of it.
     """
 
     def __init__(self, baked: BakedScene) -> None:
@@ -88,9 +91,10 @@ class Illumination:
         self._suns: OrderedDict[Hashable, Floats] = OrderedDict()
 
     def at(self, start_ns: int, end_ns: int) -> Floats:
-        """Map (H, W, 3) float32 of linear RGB without movers: illuminance in lux, pi times their luminance on lamps.
+        """The mean light map (H, W, 3) float32 of linear RGB from start_ns to end_ns, without movers.
 
-        The mean from start_ns to end_ns; the very array of an earlier call where nothing differs.
+        It has the illuminance in lx, and on lamps π times their luminance. If the light is the same as in a recent
+        call, the same array is returned.
         """
         levels, suns_ns = self._now(start_ns, end_ns)
         if not self._varying and not self._tracks:
@@ -98,7 +102,7 @@ class Illumination:
         return _cached(self._maps, (levels, suns_ns), lambda: self._map(levels, suns_ns))
 
     def lights_at(self, start_ns: int, end_ns: int) -> tuple[Floats, tuple[float, ...]]:
-        """The colour of each light times its level (L, 3), and the instant of each sun that moves."""
+        """The colours of the lights times their levels (L, 3), and the instant of each sun that moves, 0 of others."""
         levels, suns_ns = self._now(start_ns, end_ns)
         colours = np.array([light.colour for light in self._lights], np.float32).reshape(-1, 3)
         return colours * np.array(levels, np.float32)[:, None], suns_ns
@@ -108,7 +112,7 @@ class Illumination:
         start_ns: int,
         end_ns: int,
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The level of each light, and the instant of each sun that moves."""
+        """The level of each light, and the instant of its sun if it is one that moves, otherwise 0."""
         middle_ns = (start_ns + end_ns) / 2
         levels = tuple(light.level.mean(start_ns, end_ns) for light in self._lights)
         suns_ns = tuple(_stepped_ns(light, middle_ns) for light in self._lights)
@@ -127,7 +131,7 @@ class Illumination:
         return total
 
     def _sum(self, levels: dict[int, float]) -> Floats:
-        """The map of lights, by their index, at levels."""
+        """The light map (H, W, 3) of lights, given by their indices, at levels."""
         baked = self._baked
         total = np.zeros((*baked.direct.shape[1:], 3), np.float32)
         indirect = np.zeros(baked.bounced.shape[1:], np.float32)
@@ -141,7 +145,7 @@ class Illumination:
         return total
 
     def _sun(self, index: int, t_ns: float) -> Floats:
-        """A moving sun's map at an instant: direct light by rays, the rest between the baked ones."""
+        """The light map of a moving sun at an instant: direct light by rays, indirect light between baked instants."""
 
         def compute() -> Floats:
             baked = self._baked
@@ -157,7 +161,7 @@ class Illumination:
 
 
 def _stepped_ns(light: Light, t_ns: float) -> float:
-    """When a moving sun last took a step of SUN_TURN_RAD, so that it need not be traced for every picture; else 0."""
+    """The instant of the last step of SUN_TURN_RAD of a moving sun, so that few of them are computed; otherwise 0."""
     if not isinstance(light, Sun) or not light.moves:
         return 0.0
     times_ns = NS_PER_S * np.array(light.times_s)
@@ -167,7 +171,7 @@ def _stepped_ns(light: Light, t_ns: float) -> float:
 
 
 def _between(track: SunTrack, t_ns: float) -> Floats:
-    """Indirect light of surfels (S, 3) at an instant, straight lines between the baked ones."""
+    """The indirect light (S, 3) of surfels at an instant, interpolated linearly between the baked ones."""
     last = len(track.times_ns) - 1
     after = int(np.clip(np.searchsorted(track.times_ns, t_ns), 1, last))
     start_ns = track.times_ns[after - 1]

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from vobench.geometry.se3 import Array
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Mask
+from vobench.rendering.dot_product import dot
 from vobench.rendering.geometry import RAY_OFFSET_M
-from vobench.rendering.occlusion import Bodies, dot
+from vobench.rendering.occlusion import Bodies
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.scene import Scene
 

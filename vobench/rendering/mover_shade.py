@@ -14,8 +14,10 @@ from vobench.rendering.bake import BakedScene
 from vobench.rendering.batch import morton
 from vobench.rendering.culling import bounds
 from vobench.rendering.geometry import BoundingSphere
+from vobench.rendering.gl_buffer import UniformBuffer
+from vobench.rendering.gl_texture import bind
 from vobench.rendering.mover_light import MoverLight, MoverLightAt, SampledEmitter, may_shade
-from vobench.rendering.opengl import ShaderProgram, UniformBuffer, bind
+from vobench.rendering.shader_program import ShaderProgram
 from vobench.rendering.texel_owner import Owners, owners
 from vobench.rendering.uniform_block import MOST_SPHERES, SHADE
 from vobench.rendering.view import Box, PinholeView

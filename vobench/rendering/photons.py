@@ -1,10 +1,12 @@
 """Light of lamps and the sun that coats, metals, mirrors and panes reflect, computed with photons."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from vobench import stop
+from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
 from vobench.rendering.array_types import Floats, Indices, Rows
 from vobench.rendering.emitter import Emitter
@@ -28,6 +30,16 @@ LEAST_EFFORT = 1 / 16
 CHUNK = 1 << 15  # the number of photons that a thread computes at a time
 
 
+@dataclass(frozen=True, slots=True)
+class _Places:
+    """Points (N, 3) on reflecting faces, slightly off them, with normals (N, 3), faces (N,) and areas (N,) in m²."""
+
+    points_m: Array
+    normals: Array
+    face: Rows
+    area_m2: Array
+
+
 class Reflectors:
     """The reflecting places of a scene, from which photons start: texels, followed by points on panes and mirrors.
 
@@ -43,47 +55,59 @@ class Reflectors:
         seed: int,
     ) -> None:
         self._gatherer = gatherer
-        visibility = gatherer.visibility
-        self.visibility = visibility
-        self._is_pane = visibility.is_pane
-        faces = visibility.faces
+        self.visibility = gatherer.visibility
+        self._is_pane = self.visibility.is_pane
         mirrored = self._mirrored(points.face, np.full(len(points), TYPICAL_COSINE))
         self.texels = np.flatnonzero(mirrored > FAINT)
+        on_faces = self._places_on_faces(seed)
 
-        # Faces without texels. A pane of a single face reflects on both sides, so it is added with the other normal.
-        all_faces = np.arange(len(faces), dtype=np.int32)
-        face_mirrors = self._mirrored(all_faces, np.full(len(faces), TYPICAL_COSINE))
-        is_mirror_face = visibility.is_static & ~gatherer.response.scatters[:-1] & (face_mirrors > FAINT)
-        mirror_faces = np.flatnonzero(is_mirror_face)
-        is_single_pane = self._is_pane[mirror_faces] & (reversed_faces(faces.corners_m)[mirror_faces] < 0)
-        mirror_faces = np.concatenate([mirror_faces, mirror_faces[is_single_pane]])
-        sign = np.ones(len(mirror_faces), np.float32)
-        sign[len(mirror_faces) - np.count_nonzero(is_single_pane) :] = -1
-
-        place_count = PLACES if len(mirror_faces) else 0
-        number = np.random.default_rng([seed, 2]).random((2, place_count))
-        along = (np.arange(place_count) + number[0]) / max(place_count, 1)
-        corners_m = faces.corners_m[mirror_faces]
-        mirror_areas_m2 = areas_m2(corners_m)
-        ends_m2 = np.cumsum(mirror_areas_m2)
-        row = np.zeros(0, np.int64)
-        places_m = np.zeros((0, 3))
-        if place_count:
-            row = np.searchsorted(ends_m2, along * ends_m2[-1], side="right")
-            row = np.minimum(row, len(mirror_faces) - 1)
-            places_m = sample_points(corners_m, along, number[1])
-        normals = faces.plane[mirror_faces[row]] * sign[row, None]
-        places_m = offset_from_surface(places_m, normals)
-        place_area_m2 = ends_m2[-1] / place_count if place_count else 0.0
-
-        self._points_m = np.concatenate([points.points_m[self.texels], places_m]).astype(np.float32)
-        no_step = np.zeros((place_count, 3))
+        no_step = np.zeros_like(on_faces.points_m)
+        self._points_m = np.concatenate([points.points_m[self.texels], on_faces.points_m]).astype(np.float32)
         self._step_u_m = np.concatenate([points.step_u_m[self.texels], no_step]).astype(np.float32)
         self._step_v_m = np.concatenate([points.step_v_m[self.texels], no_step]).astype(np.float32)
-        self._normals = np.concatenate([points.planes[self.texels], normals]).astype(np.float32)
-        self._face = np.concatenate([points.face[self.texels], mirror_faces[row]]).astype(np.int32)
-        self._area_m2 = np.concatenate([point_areas_m2[self.texels], np.full(place_count, place_area_m2)])
+        self._normals = np.concatenate([points.planes[self.texels], on_faces.normals]).astype(np.float32)
+        self._face = np.concatenate([points.face[self.texels], on_faces.face]).astype(np.int32)
+        self._area_m2 = np.concatenate([point_areas_m2[self.texels], on_faces.area_m2])
         self._weight = self._area_m2 * self._mirrored(self._face, np.full(len(self._face), TYPICAL_COSINE))
+
+    def _places_on_faces(self, seed: int) -> _Places:
+        """Random points on the panes and mirrors, which have no texels: PLACES, or none if there are no such faces."""
+        corners_of_faces_m = self.visibility.faces.corners_m
+        face, sign = self._mirror_faces()
+        place_count = PLACES if len(face) else 0
+        number = np.random.default_rng([seed, 2]).random((2, place_count))
+        if not place_count:
+            no_places_m = np.zeros((0, 3))
+            return _Places(no_places_m, no_places_m, face, np.zeros(0))
+        along = (np.arange(place_count) + number[0]) / place_count
+        corners_m = corners_of_faces_m[face]
+        ends_m2 = np.cumsum(areas_m2(corners_m))
+        row = np.searchsorted(ends_m2, along * ends_m2[-1], side="right")
+        row = np.minimum(row, len(face) - 1)
+        normals = self.visibility.faces.plane[face[row]] * sign[row, None]
+        on_surface_m = sample_points(corners_m, along, number[1])
+        return _Places(
+            points_m=offset_from_surface(on_surface_m, normals),
+            normals=normals,
+            face=face[row],
+            area_m2=np.full(place_count, ends_m2[-1] / place_count),
+        )
+
+    def _mirror_faces(self) -> tuple[Rows, Floats]:
+        """The reflecting faces (K,) without texels, and the side (K,) on which each reflects: 1 before, -1 behind.
+
+        A pane of a single face reflects on both sides, so it is there twice.
+        """
+        faces = self.visibility.faces
+        all_faces = np.arange(len(faces), dtype=np.int32)
+        mirrored = self._mirrored(all_faces, np.full(len(faces), TYPICAL_COSINE))
+        has_no_texels = self.visibility.is_static & ~self._gatherer.response.scatters[:-1]
+        fronts = np.flatnonzero(has_no_texels & (mirrored > FAINT))
+        has_back = reversed_faces(faces.corners_m)[fronts] >= 0
+        single_panes = fronts[self._is_pane[fronts] & ~has_back]
+        sign = np.ones(len(fronts) + len(single_panes), np.float32)
+        sign[len(fronts) :] = -1
+        return np.concatenate([fronts, single_panes]), sign
 
     def __len__(self) -> int:
         return len(self._face)
@@ -196,7 +220,7 @@ class Reflectors:
 
         # A shadow ray to a random point on the emitter.
         ahead_m = np.einsum("ij,ij->i", emitter.ball.centre_m - points.points_m, points.planes)
-        rows = np.flatnonzero((ahead_m > -emitter.ball.radius_m) & emitter.may_light(points.points_m))
+        rows = np.flatnonzero((ahead_m > -emitter.ball.radius_m) & emitter.may_reach(points.points_m))
         points = points.take(rows)
         vectors_m, strength = emitter.towards(points)(number[4, rows], number[5, rows])
         cosine = points.cosine(vectors_m)

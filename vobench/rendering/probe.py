@@ -1,6 +1,6 @@
-"""What gloss shows of a scene: the room probe, a picture of all that is around one place, and glints of lamps."""
+"""The room probe: a picture of everything around one place, which glossy surfaces show (a corrected cube map)."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -8,11 +8,9 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
-from vobench.rendering.opengl import CubeTexture
+from vobench.rendering.cube_map import PrefilteredCubeMap
 from vobench.rendering.renderer import Radiance
-from vobench.rendering.uniform_block import MOST_GLINTS
 from vobench.rendering.view import NEAR_M
-from vobench.scene.light import Light, PointLight, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, Material
 
 PROBE_MOST = 0.4  # roughness above which what is mirrored looks like what lights the place
@@ -37,13 +35,14 @@ WALL = 0.9  # the share of a face's pixels that are nearer than the wall there
 
 @dataclass(frozen=True, slots=True)
 class Probe:
-    """Luminance around centre_m as a cube map, each level blurred by more roughness, and the room that it shows.
+    """The luminance around a place as a cube map, and the box of the room that it shows.
 
-    low_m, high_m (3,): the room's bounds. light (4,): irradiance over π is the last plus the first three times the
-    normal. ambient_cd_m2 (3,) is the scene's mean luminance in the light that it was drawn in.
+    texture: its levels are blurred for increasing roughness. low_m, high_m (3,): the bounds of the room. light (4,):
+    the irradiance over π at the place is light[:3] · normal + light[3]. ambient_cd_m2 (3,): the mean luminance of the
+    scene in the light in which the probe was drawn.
     """
 
-    texture: CubeTexture
+    texture: PrefilteredCubeMap
     centre_m: Array
     low_m: Array
     high_m: Array
@@ -54,20 +53,20 @@ class Probe:
 def room_probe(
     draw: Callable[[Pinhole, Array], tuple[Radiance, Radiance]], corners_m: Array, ambient_cd_m2: Array
 ) -> Probe:
-    """The probe of a scene of faces (F, 3, 3): `draw` gives picture (H, W, 3) and nearness (H, W) of a camera."""
+    """The probe of a scene of faces (F, 3, 3). `draw` returns the picture (H, W, 3) and depth (H, W) of a camera."""
     centre_m = _free_place(corners_m)
     pictures = []
     wall_distances_m = []
     for right, down, ahead in FACES:
         R_world_camera = np.stack([-right, down, ahead], 1)
-        picture, nearness = draw(CAMERA, se3.transform(R_world_camera, centre_m))
+        picture, reversed_depth = draw(CAMERA, se3.transform(R_world_camera, centre_m))
         pictures.append(picture[:, ::-1])
         farthest_m = float(((corners_m - centre_m) @ ahead).max())
-        distance_m = np.where(nearness > 0, NEAR_M / np.maximum(nearness, 1e-9), farthest_m)
+        distance_m = np.where(reversed_depth > 0, NEAR_M / np.maximum(reversed_depth, 1e-9), farthest_m)
         wall_distances_m.append(np.quantile(distance_m, WALL))
     roughness = [roughness_of(level) for level in range(LEVELS)]
     return Probe(
-        texture=CubeTexture(pictures, FACES, roughness),
+        texture=PrefilteredCubeMap(pictures, FACES, roughness),
         centre_m=centre_m,
         low_m=centre_m - wall_distances_m[1::2],
         high_m=centre_m + wall_distances_m[::2],
@@ -95,12 +94,12 @@ def probe_share(material: Material) -> float:
     return float(np.clip(margin / FADE, 0, 1))
 
 
-CLEAR_M = 0.5  # from the probe to what is next to it
-DISTANCE_COST_M = 0.1  # of clearance that a place as far from the middle as the scene is large must have more
+CLEAR_M = 0.5  # the distance of the probe from the nearest face above which more is no better
+DISTANCE_COST_M = 0.1  # the clearance that outweighs a distance from the centre of the size of the scene
 
 
 def _free_place(corners_m: Array) -> Array:
-    """A place (3,) near the middle of faces (F, 3, 3) with room around it."""
+    """A place (3,) near the centre of faces (F, 3, 3) that is at some distance from all of them."""
     low_m = corners_m.min((0, 1))
     high_m = corners_m.max((0, 1))
     middle_m = (low_m + high_m) / 2
@@ -114,7 +113,7 @@ def _free_place(corners_m: Array) -> Array:
     distance = np.linalg.norm(offsets, axis=1).round(9)
     best_value = -np.inf
     best_offset = offsets[0]
-    # From the middle outwards, until what is farther out cannot be better.
+    # From the centre outwards, until no place that is farther out can be better.
     for nth in np.argsort(distance, kind="stable"):
         offset = offsets[nth]
         most = CLEAR_M - DISTANCE_COST_M * distance[nth]
@@ -140,52 +139,3 @@ def _irradiance(pictures: Array) -> Array:
     directions = (vectors / distance[..., None]) @ FACES[:, None]
     gradient = 2 * np.einsum("fij,fijk->k", weighted, directions)
     return np.array([*gradient, weighted.sum()])
-
-
-EVERYWHERE_RAD = 10.0  # more than any angle to an axis
-NO_AXIS = (0.0, 0.0, 0.0, 1.0)
-
-
-def glints(
-    lights: Sequence[Light],
-    eye_m: Array,
-    start_ns: int,
-    end_ns: int,
-) -> Array:
-    """The lamps (G, 3, 4) that no picture shows, including the sun: those with the highest illuminance at an eye (3,).
-
-    Each: place and 1, or direction and 0; intensity or illuminance of three channels, and the angle at which a spot
-    ends; the spot's direction, and 1 / the angle over which it fades.
-    """
-    bulbs = [light for light in lights if isinstance(light, PointLight | SpotLight | Sun)]
-    rows = [_glint(light, start_ns, end_ns) for light in bulbs]
-    if len(rows) > MOST_GLINTS:
-        rows.sort(key=lambda glint: -_illuminance(glint, eye_m))
-    return np.array(rows[:MOST_GLINTS]).reshape(-1, 3, 4)
-
-
-def _illuminance(glint: Array, eye_m: Array) -> float:
-    """How much a lamp (3, 4) shines on an eye (3,), in units of its own."""
-    place, power, _ = glint
-    is_near = place[3]  # 0 for a direction
-    squared_m2 = np.sum((place[:3] - is_near * eye_m) ** 2)
-    return float(power[:3].sum() / squared_m2)
-
-
-def _glint(
-    light: PointLight | SpotLight | Sun,
-    start_ns: int,
-    end_ns: int,
-) -> Array:
-    """The three rows of a lamp in `glints`."""
-    level = light.level.mean(start_ns, end_ns) * np.array(light.colour)
-    if isinstance(light, Sun):
-        direction = light.direction((start_ns + end_ns) / 2)
-        return np.array([[*direction, 0], [*light.illuminance_lx * level, EVERYWHERE_RAD], NO_AXIS])
-    place = [*light.position_m, 1]
-    if isinstance(light, PointLight):
-        intensity_cd = light.power_lm / (4 * np.pi)
-        return np.array([place, [*intensity_cd * level, EVERYWHERE_RAD], NO_AXIS])
-    inner_rad, outer_rad = np.deg2rad([light.inner_deg, light.outer_deg])
-    fade = 1 / max(outer_rad - inner_rad, 1e-9)
-    return np.array([place, [*light.peak_cd * level, outer_rad], [*light.direction, fade]])

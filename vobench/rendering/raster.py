@@ -7,7 +7,7 @@ mirrors. Here each pixel is the mean of four samples of linear light, read back 
 from collections.abc import Sequence
 
 from vobench.geometry.camera import Camera
-from vobench.rendering.bake import BakedScene
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.context import DriverFacts, create_context, driver_facts
 from vobench.rendering.renderer import Radiance, View
 from vobench.scene.material import LUMINANCE, Rgb

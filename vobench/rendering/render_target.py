@@ -1,45 +1,50 @@
-"""The targets that pictures are drawn on: a canvas for each depth of mirrors, and the sum of sub-frames."""
+"""The framebuffers that a picture is drawn into: one for each depth of mirrors, and one for the sum of sub-frames."""
 
 from dataclasses import dataclass
 
-from vobench.rendering.opengl import Canvas, FlatTarget, Grid, canvas, flat_target
+from vobench.rendering.framebuffer import Framebuffer, LayeredFramebuffer, framebuffer, layered_framebuffer
+from vobench.rendering.sample_pattern import SamplePattern
 from vobench.rendering.uniform_block import MIRROR_PLANES
 from vobench.scene.material import LUMINANCE, Rgb
 
-MIRRORS = MIRROR_PLANES  # followed, each seen in the one before
+MIRRORS = MIRROR_PLANES  # the largest number of mirrors that are followed one after another
 
 
 @dataclass(frozen=True, slots=True)
 class RenderTarget:
-    """The canvas of a picture and one for each mirror seen in a mirror; the total of sub-frames.
+    """The framebuffers of a picture.
 
-    weights (3,) of linear red, green and blue where the total has one channel.
+    framebuffers: the first is for the picture, the others for what is seen by way of one mirror, two mirrors and so on.
+    total: the weighted sum of the sub-frames.
+    weights: of linear red, green and blue, if `total` has one channel.
     """
 
-    canvases: tuple[Canvas, ...]
-    total: FlatTarget
+    framebuffers: tuple[LayeredFramebuffer, ...]
+    total: Framebuffer
     weights: Rgb
 
     @property
-    def canvas(self) -> Canvas:
-        """The canvas of the picture itself."""
-        return self.canvases[0]
+    def framebuffer(self) -> LayeredFramebuffer:
+        """The framebuffer of the picture itself."""
+        return self.framebuffers[0]
 
 
 def render_target(
     width_px: int,
     height_px: int,
-    grid: Grid,
+    pattern: SamplePattern,
     weights: Rgb | None,
     *,
     in_colour: bool,
 ) -> RenderTarget:
-    """A target for pictures of a size and grid of samples, with one channel or, without weights, three.
+    """Create the framebuffers for pictures of a size, with one channel or, without weights, three.
 
-    in_colour: whether samples have three channels in either case, as where mirrors are tinted.
+    in_colour: whether the samples have three channels in either case, as they need if mirrors are tinted.
+
+    Raises RenderError if the driver does not support them.
     """
     channels = 3 if weights is None else 1
     sample_channels = 3 if in_colour else channels
-    canvases = tuple(canvas(width_px, height_px, grid, sample_channels) for _ in range(1 + MIRRORS))
-    total = flat_target(width_px, height_px, channels)
-    return RenderTarget(canvases, total, weights or LUMINANCE)
+    framebuffers = [layered_framebuffer(width_px, height_px, pattern, sample_channels) for _ in range(1 + MIRRORS)]
+    total = framebuffer(width_px, height_px, channels)
+    return RenderTarget(tuple(framebuffers), total, weights or LUMINANCE)

@@ -10,7 +10,7 @@ import numpy as np
 from vobench.errors import RenderError
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Mask, Rows
-from vobench.rendering.bake import BakedScene
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.cutout import CutOuts
 from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import RayCaster, face_materials, take

@@ -6,7 +6,7 @@ from enum import StrEnum
 class ShaderDefine(StrEnum):
     """A preprocessor name of a shader."""
 
-    # The canvas.
+    # The framebuffer.
     IS_MONO = "IS_MONO"  # it has one channel
 
     # The view.

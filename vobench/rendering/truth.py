@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Indices, Mask, Pixels, Rows
+from vobench.rendering.dot_product import dot
 from vobench.rendering.lamp import Lamp, LampGroup, lamp_groups, lamps_on
-from vobench.rendering.occlusion import Bodies, dot
+from vobench.rendering.occlusion import Bodies
 from vobench.rendering.receiver_plane import large_planes
 from vobench.rendering.shadow_cells import KnownShadows
 from vobench.rendering.shot import CameraShot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn

@@ -4,7 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.rendering.batch import Batch
-from vobench.rendering.opengl import Canvas, SurfaceTexture
+from vobench.rendering.framebuffer import LayeredFramebuffer
+from vobench.rendering.gl_texture import SurfaceTexture
 from vobench.rendering.probe import Probe, level_of, probe_share
 from vobench.rendering.view import PinholeView
 from vobench.scene.material import Rgb, emitted_cd_m2, inner_reflectance
@@ -16,7 +17,7 @@ Block = NDArray[np.void]  # the values of one uniform block, a structured array 
 def set_view(
     uniforms: Block,
     view: PinholeView,
-    canvas: Canvas,
+    framebuffer: LayeredFramebuffer,
     weights: Rgb,
 ) -> None:
     """Set the uniforms of a view, without those of the probe."""
@@ -28,7 +29,7 @@ def set_view(
         # The product of `pixel_width_m` (4,) and a homogeneous point is the width of a pixel at the point's depth.
         pixel_width_m = view.view_projection[3] / focal_px
         uniforms["clip_plane"] = view.mirror.coefficients + pixel_width_m * CLIP_MARGIN_PX
-    uniforms["lod_bias"][: canvas.layers] = canvas.grid.lod_bias
+    uniforms["lod_bias"][: framebuffer.layers] = framebuffer.pattern.lod_bias
     for index, plane in enumerate(view.mirrors):
         uniforms["mirrors"][index] = plane.coefficients
     uniforms["ambient"] = view.ambient_cd_m2

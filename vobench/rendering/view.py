@@ -108,7 +108,7 @@ class PinholeView:
     view_projection (4, 4): from the world to OpenGL's screen, nearness from 1 at NEAR_M to 0; `direct` (4, 4) as if
     there were no mirrors.
     eye_m (3,) is behind the last mirror, if any.
-    images (4, 4) takes what the last mirror shows to where the camera sees it. glints (G, 3, 4) as in `probe`.
+    images (4, 4) takes what the last mirror shows to where the camera sees it. glints (G, 3, 4) as in `glint`.
     extinction_per_m and airlight_cd_m2 (3,) are those of fog; 0 where the air is clear.
     """
 

@@ -13,13 +13,12 @@ from vobench.rendering.geometry import (
     FAR_M,
     RAY_OFFSET_M,
     SHORT_OF_END,
-    PlanarPatch,
     RayCaster,
     face_materials,
     lengths,
-    planar_patches,
     sample_points,
 )
+from vobench.rendering.planar_patch import PlanarPatch, planar_patches
 from vobench.rendering.shadow_kernels import meet_boxes
 from vobench.scene.material import Material, pane_reflectance
 from vobench.scene.triangles import Triangles

@@ -1,0 +1,43 @@
+"""The instants that lights are baked for: one, or several along the path of a moving sun."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from vobench.geometry.se3 import Array
+from vobench.scene.light import Light, Sun
+from vobench.scene.scene import Scene
+from vobench.trajectory.nanoseconds import NS_PER_S
+
+SUN_STEP_RAD = np.deg2rad(3)  # between the positions of a moving sun for which indirect light is baked
+
+
+def moving_suns(scene: Scene) -> tuple[int, ...]:
+    """The indices of the lights that are moving suns."""
+    return tuple(index for index, light in enumerate(scene.lights) if light.moves)
+
+
+def key_times_ns(light: Light) -> tuple[float, ...]:
+    """The instants in ns that a light is baked for: one, or for a moving sun several that are SUN_STEP_RAD apart."""
+    if not isinstance(light, Sun):
+        return (0.0,)
+    if not light.moves:
+        return (light.times_s[0] * NS_PER_S,)
+    times_ns = np.array(light.times_s) * NS_PER_S
+    steps = np.ceil(np.diff(travelled_rad(light)) / SUN_STEP_RAD)
+    step_counts = np.maximum(steps, 1).astype(int)
+    inner_ns = []
+    for (start_ns, end_ns), count in zip(pairwise(times_ns), step_counts, strict=True):
+        inner_ns.append(np.linspace(start_ns, end_ns, count, endpoint=False))
+    return (*np.concatenate(inner_ns).tolist(), float(times_ns[-1]))
+
+
+def travelled_rad(sun: Sun) -> Array:
+    """The angle (K,) that a sun has travelled along its path, at most, at each of its K times."""
+    azimuth_rad = np.deg2rad(sun.azimuth_deg)
+    elevation_rad = np.deg2rad(sun.elevation_deg)
+    height_rad = np.abs(elevation_rad)
+    lower_rad = np.minimum(height_rad[1:], height_rad[:-1])
+    across_rad = np.diff(azimuth_rad) * np.cos(lower_rad)  # along the wider circle of equal elevation
+    steps_rad = np.hypot(across_rad, np.diff(elevation_rad))
+    return np.concatenate([[0.0], np.cumsum(steps_rad)])

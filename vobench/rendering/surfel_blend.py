@@ -1,0 +1,88 @@
+"""The weights by which the indirect light of surfels is interpolated on the light map."""
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import scipy
+
+from vobench.rendering.array_types import Floats, Mask, Rows
+from vobench.rendering.blend_kernels import TURNED, Blending, count_weights, write_weights
+from vobench.rendering.surfel import RAISED, Surfels
+from vobench.rendering.texel import Texels
+from vobench.rendering.texel_layout import TexelLayout
+from vobench.rendering.thread_pool import chunked, in_chunks
+from vobench.rendering.visibility import Visibility
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+NEIGHBOURS = 9  # surfels that the light of a texel is interpolated between at most, its own included
+
+
+def blend(
+    points: Texels,
+    groups: Surfels,
+    layout: TexelLayout,
+    visibility: Visibility,
+    usable: Mask,
+) -> "csr_matrix":
+    """The weights (H·W, S) of surfels at each texel of the map.
+
+    They are those of surfels near the texel's own that face alike, and that are not hidden from it. Only `usable` ones
+    (S,) have weights.
+    """
+    usable_surfels = np.flatnonzero(usable)
+    if not len(usable_surfels):
+        return scipy.sparse.csr_matrix((layout.source.size, len(groups)), dtype=np.float32)
+    middles = points.take(groups.middle)
+    neighbours = _neighbours(middles, groups.step_m, usable_surfels)
+    blending = Blending(
+        points_m=points.points_m,
+        point_normals=points.normals,
+        surfel_of_point=groups.of,
+        neighbours=neighbours,
+        is_hidden=_are_hidden(middles, groups.step_m, neighbours, visibility),
+        middles_m=middles.points_m,
+        normals=middles.normals,
+        step_m=groups.step_m,
+    )
+    return _weights(blending, layout)
+
+
+def _neighbours(middles: Texels, step_m: Floats, usable_surfels: Rows) -> Rows:
+    """The usable surfels (S, K) nearest to each surfel, in distance and in direction."""
+    places = np.hstack([middles.points_m, TURNED * step_m[:, None] * middles.normals])  # (S, 6)
+    tree = scipy.spatial.cKDTree(places[usable_surfels])
+    _, nearest = tree.query(places, k=min(NEIGHBOURS, len(usable_surfels)))
+    return np.sort(usable_surfels[nearest.reshape(len(middles), -1)], axis=1)
+
+
+def _are_hidden(middles: Texels, step_m: Floats, neighbours: Rows, visibility: Visibility) -> Mask:
+    """Which neighbours (S, K) something hides from their surfel; none of them if something hides all."""
+    raised_m = middles.points_m + RAISED * step_m[:, None] * middles.planes
+    surfel = np.repeat(np.arange(len(middles)), neighbours.shape[1])
+
+    def hidden(part: slice) -> Mask:
+        return visibility.opaque.occluded(raised_m[surfel[part]], middles.points_m[neighbours.ravel()[part]])
+
+    is_hidden = chunked(hidden, len(surfel)).reshape(neighbours.shape)
+    is_hidden = is_hidden & (neighbours != np.arange(len(middles))[:, None])
+    is_hidden &= ~is_hidden.all(1, keepdims=True)
+    return np.asarray(is_hidden)
+
+
+def _weights(blending: Blending, layout: TexelLayout) -> "csr_matrix":
+    """The weights (H·W, S) of surfels at the texels of a map."""
+    texel_count = layout.source.size
+    starts = np.zeros(texel_count + 1, np.int32)  # of the entries of each texel
+    in_chunks(lambda part: count_weights(layout.source[part], blending, starts[1:][part]), texel_count)
+    np.cumsum(starts, out=starts)
+    columns = np.empty(starts[-1], np.int32)
+    values = np.empty(starts[-1], np.float32)
+
+    def write(part: slice) -> None:
+        entries = slice(starts[part.start], starts[part.stop])
+        write_weights(layout.source[part], blending, columns[entries], values[entries])
+
+    in_chunks(write, texel_count)
+    return scipy.sparse.csr_matrix((values, columns, starts), (texel_count, len(blending.step_m)))
