@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Field:
         return f"    {self.glsl_type} {self.name}{length};  // {self.comment}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class UniformBlock:
     """A block of the std140 layout, which shaders read by the name of its instance."""
 
@@ -46,11 +47,12 @@ class UniformBlock:
     binding: int
     fields: tuple[Field, ...]
 
-    @property
+    @cached_property
     def dtype(self) -> np.dtype[np.void]:
-        """The structured type with the memory layout of the block."""
-        offsets = [offset for offset, _ in self._placed()]
-        end = max(offset + _bytes(field) for offset, field in self._placed())
+        """The structured type with the memory layout of the block; computed once, as each draw call asks for it."""
+        placed = tuple(self._placed())
+        offsets = [offset for offset, _ in placed]
+        end = max(offset + _bytes(field) for offset, field in placed)
         return np.dtype(
             {
                 "names": [field.name for field in self.fields],
