@@ -139,34 +139,4 @@ BATCH = UniformBlock(
         Field("float", "normal_reflectance", "Fresnel's share at normal incidence"),
     ),
 )
-MOST_SAMPLES = 24  # of one emitter
-MOST_MAPS = 512  # of one emitter: samples times bodies
-MOST_SPHERES = 240
-MOST_REACHES = 4096  # samples times probes
-
-SHADE = UniformBlock(
-    "Shade",
-    "shade",
-    2,
-    (
-        Field("vec3", "colour", "of the emitter's light, times its level"),
-        Field("float", "unit_lx", "of direct light in the map's texels"),
-        Field("float", "is_hard", "1 where its light on bodies comes with each point"),
-        Field("vec4", "ball", "around the emitter; a negative radius for what is all around"),
-        Field("vec4", "size_px", "of the atlas of shadow maps, and of the map of light"),
-        Field("float", "tile_px", "along a side of one shadow map"),
-        Field("float", "sample_count", "of the emitter"),
-        Field("float", "body_count", "of moving bodies"),
-        Field("float", "probe_count", "along all bodies"),
-        Field("float", "sphere_count", "around all bodies"),
-        Field("vec4", "places", "of samples: a point and 1, or a direction and 0", count=MOST_SAMPLES),
-        Field("vec4", "axes", "that samples shine along and 0, or that of a pane and 1", count=MOST_SAMPLES),
-        Field("vec4", "strengths", "of samples at the bodies, on the mean", count=MOST_SAMPLES),
-        Field("vec4", "maps", "from the world across and along, for each body and sample", count=3 * MOST_MAPS),
-        Field("vec4", "tiles", "where each of these maps is in the atlas, and 1 if it is there", count=MOST_MAPS),
-        Field("vec4", "spheres", "around parts of bodies", count=MOST_SPHERES),
-        Field("vec4", "sphere_bodies", "the bodies that they belong to", count=MOST_SPHERES),
-        Field("vec4", "reach", "strength of each sample at each probe, four of them", count=MOST_REACHES // 4),
-    ),
-)
-BLOCKS = {block.name: block for block in (PASS, BATCH, SHADE)}
+BLOCKS = {block.name: block for block in (PASS, BATCH)}
