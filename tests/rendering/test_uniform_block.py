@@ -32,6 +32,10 @@ def test_std140_aligns_vectors_to_16_bytes_and_puts_a_float_behind_three() -> No
     assert MIXED.dtype.itemsize == 144
 
 
+def test_the_layout_of_a_block_is_computed_once() -> None:
+    assert MIXED.dtype is MIXED.dtype
+
+
 def test_the_declaration_names_every_field_once_in_order_with_its_length() -> None:
     lines = MIXED.declaration.split("\n")
     assert lines[0] == "layout(std140, binding = 0) uniform Mixed {"

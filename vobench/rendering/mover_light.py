@@ -21,43 +21,12 @@ from vobench.rendering.light_emitter import emitters
 from vobench.rendering.solid_angle import rectangle
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_owner import Owners
-from vobench.rendering.uniform_block import MOST_MAPS, MOST_REACHES, MOST_SAMPLES
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.mesh import face_corners
 from vobench.scene.scene import Mover
 from vobench.scene.triangles import Triangles
 from vobench.scene.weld import distinct_rows
-
-STEEPEST = 0.999  # the largest sine of the half-angle of a frustum, for points near the emitter
-SKY_REACH = 10  # the distance, in radii of a body, beyond which the body hides less than 1 % of an open sky
-
-
-def may_shade(movers: BoundingSphere, emitter: BoundingSphere, points: BoundingSphere) -> Mask:
-    """Which of N spheres `points` may lie in the shadow of a mover, for the light of an emitter.
-
-    All rays from one sphere to that of the emitter are inside a conical frustum around the line between the centres.
-    A sphere of points is selected if a mover's sphere touches a slightly wider frustum, so no shadow is missed.
-    """
-    to_mover_m = movers.centre_m[:, None] - points.centre_m  # (S, N, 3)
-    radius_m = np.reshape(movers.radius_m, (-1, 1))
-    squared_m2 = np.einsum("sij,sij->si", to_mover_m, to_mover_m)
-    if np.isinf(emitter.radius_m):
-        reach_m = SKY_REACH * radius_m + points.radius_m
-        return np.asarray((squared_m2 <= reach_m**2).any(0))
-    near_m = radius_m + points.radius_m
-    to_emitter_m = emitter.centre_m - points.centre_m
-    emitter_distance_m = np.maximum(np.sqrt(np.einsum("ij,ij->i", to_emitter_m, to_emitter_m)), 1e-9)
-    along_m = np.einsum("sij,ij->si", to_mover_m, to_emitter_m) / emitter_distance_m
-    aside_m = np.sqrt(np.maximum(squared_m2 - along_m**2, 0))
-    sine = np.minimum((emitter.radius_m + points.radius_m) / emitter_distance_m, STEEPEST)
-    cone_radius_m = near_m + sine * np.maximum(along_m, 0)
-    is_in_cone = aside_m * np.sqrt(1 - sine**2) <= cone_radius_m
-    is_before_emitter = along_m <= emitter_distance_m + emitter.radius_m + near_m
-    is_ahead = along_m >= -near_m
-    is_shading = (squared_m2 <= near_m**2) | (is_in_cone & is_before_emitter & is_ahead)
-    return np.asarray(is_shading.any(0))
-
 
 HULL_DIRECTIONS = 20  # the number of directions in which the outermost vertex of a shape is found
 SMALL = 1 / 32  # a thing casts no shadow if its size relative to that of the body is smaller
@@ -201,7 +170,8 @@ PER_RADIUS_M = 14
 PANE_PER_RADIUS_M = 5
 FEWEST_SAMPLES = 2
 PANEL_SAMPLES = 9
-OPEN_SKY_SAMPLES = MOST_SAMPLES
+OPEN_SKY_SAMPLES = 24
+MOST_MAPS = 512  # the largest number of shadow maps of one emitter: samples times bodies
 GOLDEN = (0.7548776662, 0.5698402910)  # steps of a low-discrepancy sequence in the unit square: Roberts (2018), R2
 
 
@@ -229,7 +199,7 @@ class SampledEmitter:
 
 
 def sampled_emitters(
-    lights: Sequence[Light], visibility: Visibility, suns_ns: Sequence[float], most_samples: int = MOST_SAMPLES
+    lights: Sequence[Light], visibility: Visibility, suns_ns: Sequence[float], most_samples: int = OPEN_SKY_SAMPLES
 ) -> list[SampledEmitter]:
     """The emitters of all lights, in the order of the lights. Each has at most `most_samples` samples.
 
@@ -339,7 +309,7 @@ LIFT_M = 1e-3  # the distance of the origin of a ray from its surface
 
 @dataclass(frozen=True, slots=True)
 class MoverLightAt:
-    """The movers at one instant and the light around them, as the input of the shaders `occluder` and `shade`.
+    """The movers at one instant and the light around them, as the input of the kernels in `mover_kernels`.
 
     There are B bodies with N probes in total, K samples of all emitters, M shadow maps, and P points on movers.
 
@@ -348,13 +318,13 @@ class MoverLightAt:
     light reaches it. The maps of a body are adjacent.
     `map_of` (B, K) is the index of the map for each body and sample, -1 if there is none.
     `spheres` are S bounding spheres of parts of the bodies; `sphere_body` (S,) is the index of each sphere's body.
-    `samples` (K, 2, 4) are the place and the axis of each sample.
+    `places` and `axes` (K, 4) are those of each sample.
     `reach` (N + B, K) is the strength of each sample that arrives at each probe, followed by the mean over the probes
     of each body.
     `cubes` (N, 6, L, 3) are the indirect illuminances at each probe on faces with the normals AXES, for each light at
     level 1.
-    `points` (P, 2, 4) are the position of each point and its coordinate among the probes, then its normal and the
-    refractive index of its coat.
+    `points_m` and `normals` (P, 3) are the positions and normals of the points.
+    `probe_place` (P,) is the coordinate of each point among the probes, `eta` (P,) the refractive index of its coat.
     `hard` (H, P) is the illuminance by each hard emitter, without the shadows of movers.
     """
 
@@ -364,10 +334,14 @@ class MoverLightAt:
     map_of: Indices
     spheres: BoundingSphere
     sphere_body: Rows
-    samples: Floats
+    places: Floats
+    axes: Floats
     reach: Floats
     cubes: Floats
-    points: Floats
+    points_m: Floats
+    normals: Floats
+    probe_place: Floats
+    eta: Floats
     hard: Floats
 
     def sample_range(self, emitter: int) -> tuple[int, int]:
@@ -381,16 +355,14 @@ class MoverLightAt:
         The cubes of the two nearest probes are interpolated, and the faces are weighted by the squared normal.
         """
         cubes = np.einsum("nslc,lc->nsc", self.cubes, colours)
-        coordinate = self.points[:, 0, 3]
-        probe = coordinate.astype(np.int64)
-        fraction = (coordinate - probe)[:, None]
+        probe = self.probe_place.astype(np.int64)
+        fraction = (self.probe_place - probe)[:, None]
         next_probe = np.minimum(probe + 1, len(cubes) - 1)
-        normals = self.points[:, 1, :3]
-        total = np.zeros((len(normals), 3), np.float32)
+        total = np.zeros((len(self.normals), 3), np.float32)
         for axis in range(3):
-            side = np.where(normals[:, axis] < 0, axis + 3, axis)
+            side = np.where(self.normals[:, axis] < 0, axis + 3, axis)
             light = (1 - fraction) * cubes[probe, side] + fraction * cubes[next_probe, side]
-            total += normals[:, axis, None] ** 2 * light
+            total += self.normals[:, axis, None] ** 2 * light
         return total
 
 
@@ -468,17 +440,15 @@ class MoverLight:
         return np.array([mover.path.pose(t_ns) for mover in self._scene.movers])
 
     def emitters(self, suns_ns: Sequence[float]) -> list[SampledEmitter]:
-        """The emitters of all lights. The arrays of the shaders limit the number of their samples.
+        """The emitters of all lights. With many bodies they have fewer samples, so that there are fewer shadow maps.
 
         `suns_ns` (L,) is the time at which the direction of a moving sun is evaluated. The emitters of the last call
         are returned again if no time has changed.
         """
         key = tuple(suns_ns)
         if key != self._emitters_key:
-            probe_count = sum(len(body.probes_m) for body in self.bodies)
-            most = min(MOST_MAPS // max(len(self.bodies), 1), MOST_REACHES // max(probe_count, 1))
-            lights = self._scene.lights
-            self._emitters = sampled_emitters(lights, self._visibility, suns_ns, min(most, MOST_SAMPLES))
+            most = min(max(MOST_MAPS // max(len(self.bodies), 1), 1), OPEN_SKY_SAMPLES)
+            self._emitters = sampled_emitters(self._scene.lights, self._visibility, suns_ns, most)
             self._emitters_key = key
         return self._emitters
 
@@ -508,7 +478,6 @@ class MoverLight:
         T = T_world_movers[self._mover]
         points_m = np.einsum("nij,nj->ni", T[:, :3, :3], self._points_m) + T[:, :3, 3]
         normals = np.einsum("nij,nj->ni", T[:, :3, :3], self._normals)
-        points = np.stack([np.column_stack([points_m, self._probe_place]), np.column_stack([normals, self._eta])], 1)
         return MoverLightAt(
             emitters=sampled,
             occluders_m=occluders_m,
@@ -516,10 +485,14 @@ class MoverLight:
             map_of=map_of.astype(np.int32),
             spheres=spheres,
             sphere_body=np.repeat(np.arange(len(self.bodies)), [len(np.unique(body.part)) for body in self.bodies]),
-            samples=np.stack([places, axes], 1).astype(np.float32),
+            places=places.astype(np.float32),
+            axes=axes.astype(np.float32),
             reach=np.concatenate([arriving, body_means]).astype(np.float32),
             cubes=self._cubes(all_probes_m),
-            points=points.astype(np.float32),
+            points_m=points_m.astype(np.float32),
+            normals=normals.astype(np.float32),
+            probe_place=self._probe_place,
+            eta=self._eta,
             hard=self._hard(points_m, normals, suns_ns),
         )
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,7 @@ class Field:
         return f"    {self.glsl_type} {self.name}{length};  // {self.comment}"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class UniformBlock:
     """A block of the std140 layout, which shaders read by the name of its instance."""
 
@@ -46,11 +47,12 @@ class UniformBlock:
     binding: int
     fields: tuple[Field, ...]
 
-    @property
+    @cached_property
     def dtype(self) -> np.dtype[np.void]:
-        """The structured type with the memory layout of the block."""
-        offsets = [offset for offset, _ in self._placed()]
-        end = max(offset + _bytes(field) for offset, field in self._placed())
+        """The structured type with the memory layout of the block; computed once, as each draw call asks for it."""
+        placed = tuple(self._placed())
+        offsets = [offset for offset, _ in placed]
+        end = max(offset + _bytes(field) for offset, field in placed)
         return np.dtype(
             {
                 "names": [field.name for field in self.fields],
@@ -137,34 +139,4 @@ BATCH = UniformBlock(
         Field("float", "normal_reflectance", "Fresnel's share at normal incidence"),
     ),
 )
-MOST_SAMPLES = 24  # of one emitter
-MOST_MAPS = 512  # of one emitter: samples times bodies
-MOST_SPHERES = 240
-MOST_REACHES = 4096  # samples times probes
-
-SHADE = UniformBlock(
-    "Shade",
-    "shade",
-    2,
-    (
-        Field("vec3", "colour", "of the emitter's light, times its level"),
-        Field("float", "unit_lx", "of direct light in the map's texels"),
-        Field("float", "is_hard", "1 where its light on bodies comes with each point"),
-        Field("vec4", "ball", "around the emitter; a negative radius for what is all around"),
-        Field("vec4", "size_px", "of the atlas of shadow maps, and of the map of light"),
-        Field("float", "tile_px", "along a side of one shadow map"),
-        Field("float", "sample_count", "of the emitter"),
-        Field("float", "body_count", "of moving bodies"),
-        Field("float", "probe_count", "along all bodies"),
-        Field("float", "sphere_count", "around all bodies"),
-        Field("vec4", "places", "of samples: a point and 1, or a direction and 0", count=MOST_SAMPLES),
-        Field("vec4", "axes", "that samples shine along and 0, or that of a pane and 1", count=MOST_SAMPLES),
-        Field("vec4", "strengths", "of samples at the bodies, on the mean", count=MOST_SAMPLES),
-        Field("vec4", "maps", "from the world across and along, for each body and sample", count=3 * MOST_MAPS),
-        Field("vec4", "tiles", "where each of these maps is in the atlas, and 1 if it is there", count=MOST_MAPS),
-        Field("vec4", "spheres", "around parts of bodies", count=MOST_SPHERES),
-        Field("vec4", "sphere_bodies", "the bodies that they belong to", count=MOST_SPHERES),
-        Field("vec4", "reach", "strength of each sample at each probe, four of them", count=MOST_REACHES // 4),
-    ),
-)
-BLOCKS = {block.name: block for block in (PASS, BATCH, SHADE)}
+BLOCKS = {block.name: block for block in (PASS, BATCH)}

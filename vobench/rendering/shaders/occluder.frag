@@ -1,3 +1,0 @@
-#version 410 core
-// Depth alone.
-void main() {}
