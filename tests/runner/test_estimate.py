@@ -162,6 +162,13 @@ def test_an_outcome_with_an_unknown_key_is_refused(tmp_path):
         estimate_file.read_outcome(tmp_path)
 
 
+def test_nobody_can_change_an_outcome_after_the_fact():
+    outcome = estimate_file.EstimatorOutcome(kind="crashed", reason="out of tracks")
+    with pytest.raises(ValueError, match="frozen"):
+        outcome.kind = "finished"
+    assert outcome.kind == "crashed"
+
+
 def test_a_trajectory_with_bytes_of_no_text_is_one_sentence_with_its_place(tmp_path):
     (tmp_path / "a.tum").write_bytes(b"0 0\xff")
     with pytest.raises(TrajectoryError, match=r"^not a text file in UTF-8 \(byte 3\): .*a\.tum$"):
