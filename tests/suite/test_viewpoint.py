@@ -55,6 +55,14 @@ def test_cameras_stay_below_a_low_ceiling() -> None:
     assert eyes_m[:, 2].max() == pytest.approx(EYE_SHARE * 1.0, abs=1e-3)
 
 
+def test_cameras_stay_below_every_face_of_a_ceiling_the_first_of_all_faces_too() -> None:
+    ceiling = quad((-3, -2.5, 1.0), (0, 5, 0), (6, 0, 0))  # seen from below
+    faces = faces_of(ceiling, room(height_m=2.5))
+    eyes_m = np.array([view.eye_m for view in viewpoints(faces, RayCaster(faces))])
+    assert len(eyes_m) == 16
+    assert (eyes_m[:, 2] < 1.0).all()
+
+
 def test_all_of_an_object_is_in_each_picture_around_it() -> None:
     low_m = np.array([1.0, 2.0, 0.0])
     high_m = np.array([1.4, 2.1, 0.3])
