@@ -193,6 +193,10 @@ def test_no_explanation_takes_more_trials_than_were_announced(hard: Case) -> Non
         assert SEEDS.screening_trials(8) <= found.trials <= SEEDS.most_trials(8)
 
 
+def test_the_announced_screening_is_all_that_is_run_where_nothing_helps(hard: Case) -> None:
+    assert explained(hard, lambda _: 0.3, spread=0.02).trials == SEEDS.screening_trials(len(nuisances()))
+
+
 # --- Sentences about variants ---
 
 

@@ -357,6 +357,12 @@ def test_the_placement_is_in_the_scale_of_the_recording() -> None:
     assert ((in_place_m > low_m + 0.29) & (in_place_m < high_m - 0.29)).all()
 
 
+def test_a_path_may_come_as_close_as_the_clearance_and_no_closer(place: _Surroundings) -> None:
+    up_to_half_a_metre = np.array([[3.25, 0.0, 1.5], [3.5, 0.0, 1.5]])
+    assert place._is_free(up_to_half_a_metre, 0.5)
+    assert not place._is_free(up_to_half_a_metre, 0.5 + 1e-6)
+
+
 def test_every_face_counts_the_first_one_too(place: _Surroundings) -> None:
     near_first = np.array([[-3.8, -2.0, 2.4], [-3.7, -2.0, 2.4]])  # the first triangle is that part of the wall
     hits = place.caster.hits(near_first[:1], np.array([[-1.0, 0.0, 0.0]]))

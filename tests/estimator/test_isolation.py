@@ -320,6 +320,12 @@ def test_other_options_of_a_socket_can_be_set(machine):
 
 
 @machines
+def test_of_other_layers_than_the_socket_every_option_can_be_set(machine):
+    for level in set(range(64)) - {SOL_SOCKET}:
+        assert called(machine, "setsockopt", 3, level, SO_KEEPALIVE) == ALLOW
+
+
+@machines
 @pytest.mark.parametrize(
     ("mode", "empties", "is_allowed"),
     [
@@ -407,3 +413,20 @@ def test_a_process_that_is_not_the_first_of_a_namespace_loses_its_capabilities_a
     if os.getuid() != 0:
         sets.pop("CapBnd")  # only root may reduce it
     assert set(sets.values()) == {0}
+
+
+# LANDLOCK_ACCESS_FS_MAKE_SYM, _REFER, _TRUNCATE and _IOCTL_DEV of linux/landlock.h
+@pytest.mark.parametrize(
+    ("version", "newest_right"), [(1, 1 << 12), (2, 1 << 13), (3, 1 << 14), (4, 1 << 14), (5, 1 << 15), (7, 1 << 15)]
+)
+def test_every_right_that_a_version_of_landlock_knows_is_denied_and_no_other(monkeypatch, version, newest_right):
+    denied = []
+
+    def new_ruleset(_, every_access):
+        denied.append(every_access)
+        return -1
+
+    monkeypatch.setattr(isolation, "_landlock_version", lambda: version)
+    monkeypatch.setattr(isolation, "_new_ruleset", new_ruleset)
+    assert not isolation._restrict_files({})
+    assert denied == [newest_right | newest_right - 1]

@@ -4,6 +4,7 @@ import os
 import resource
 import sys
 import time
+from io import StringIO
 from types import SimpleNamespace
 
 import pytest
@@ -174,6 +175,33 @@ def test_the_memory_of_a_process_is_its_part_of_each_page_or_all_that_is_residen
     assert 10 << 20 < private <= most
     assert shared >= 0
     assert _proportional_bytes(2**22 + 1, 3) == (3 * resource.getpagesize(), 0)
+
+
+def test_the_page_tables_of_a_process_are_some_pages_and_those_of_an_ended_one_nothing():
+    used = program._page_table_bytes(os.getpid())
+    assert resource.getpagesize() <= used < 100 << 20
+    assert program._page_table_bytes(2**22 + 1) == 0
+
+
+SOCKSTAT = """sockets: used 9
+TCP: inuse 3 orphan 0 tw 0 alloc 3 mem 0
+UDP: inuse 4 mem 0
+UDPLITE: inuse 0
+RAW: inuse 1
+FRAG: inuse 0 memory 0
+"""
+SOCKSTAT6 = """TCP6: inuse 2
+UDP6: inuse 5
+UDPLITE6: inuse 0
+RAW6: inuse 0
+FRAG6: inuse 0 memory 0
+"""
+
+
+def test_sockets_of_a_network_are_counted_and_those_of_tcp_by_both_protocols(monkeypatch):
+    network = {"/proc/7/net/sockstat": SOCKSTAT, "/proc/7/net/sockstat6": SOCKSTAT6}
+    monkeypatch.setattr(program, "open", lambda path, **_: StringIO(network[path]), raising=False)
+    assert program._socket_counts(7) == (9, 5)
 
 
 FAULT = """

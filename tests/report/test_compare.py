@@ -1,5 +1,7 @@
 """What became better or worse between two runs, and what only looks so."""
 
+from math import comb
+
 import numpy as np
 import pytest
 
@@ -126,6 +128,20 @@ def test_failures_by_chance_are_no_regression_and_many_are(scored):
 
     assert verdicts(board(0), board(2))[0]["a"].verdict == UNDECIDED
     assert verdicts(board(0), board(12))[0]["a"].verdict == FAILS
+
+
+@pytest.mark.parametrize("failed", [3, 4])
+def test_new_failures_count_from_the_number_that_chance_rarely_puts_into_one_run(scored, failed):
+    def board(failed, trials=10):
+        statuses = ["lost"] * failed + ["ok"] * (trials - failed)
+        return make_board(
+            [scored("a", status, case=f"c{k}", claims=RANDOM, coverage=0.4) for k, status in enumerate(statuses)], {}
+        )
+
+    # Of all ways to spread the failures over both runs, these have all of them in the new one.
+    chance = comb(10, failed) / comb(20, failed)
+    verdict = FAILS if chance < 0.05 else UNDECIDED
+    assert verdicts(board(0), board(failed))[0]["a"].verdict == verdict
 
 
 def test_many_trials_decide_a_cell(trials):

@@ -11,7 +11,7 @@ import pytest
 
 from vobench.report import page
 from vobench.report.leaderboard import Board
-from vobench.report.practice import PRACTICES
+from vobench.report.practice import PRACTICES, Practice
 from vobench.report.thumbnail import Thumbnails
 from vobench.runner.environment import ENVIRONMENT, ENVIRONMENTS, Environment, Processor
 from vobench.runner.folder import CASE, SEQUENCE, SUITE, RunFolder
@@ -142,8 +142,9 @@ def test_every_report_says_the_drift_of_a_still_case_and_the_commonest_reason_of
 
 @pytest.fixture
 def seen(tmp_path, scored, write_run):
-    """A run of cases with pictures, each with the rig that its name begins with."""
+    """A run of cases with pictures, each with the rig that its name begins with; those of `flipped` are upside down."""
     practice = PRACTICES["drive"].write(tmp_path / "practice")
+    flipped = Practice(change=lambda _, picture: picture[::-1]).write(tmp_path / "flipped")
 
     def make(*cases):
         trials = [scored("a", case=case) for case in cases]
@@ -151,7 +152,8 @@ def seen(tmp_path, scored, write_run):
         for case in cases:
             rig = case.partition("_")[0]
             (folder.case(case) / CASE).write_text(json.dumps({"variant": {"rig": rig}}))
-            (folder.case(case) / SEQUENCE).symlink_to(practice)
+            recording = flipped if case.endswith("flipped") else practice
+            (folder.case(case) / SEQUENCE).symlink_to(recording)
         return text_of(folder, trials)
 
     return make
@@ -166,11 +168,16 @@ def test_each_rig_is_shown_once_by_its_first_picture(seen):
 
 
 def test_the_picture_of_a_rig_is_the_first_frame_of_its_first_case(seen, tmp_path):
-    text = seen("down_1", "down_2")
+    text = seen("down_1", "down_flipped")
     pictures = Thumbnails(RunFolder(tmp_path / "suite" / "stamp"))
     first, second = (pictures.get("down_1", frame, page.RIG_WIDTH_PX) for frame in (0, 1))
     assert first in text
     assert second not in text
+    assert pictures.get("down_flipped", 0, page.RIG_WIDTH_PX) not in text
+
+
+def test_a_case_that_names_no_rig_has_pictures_but_shows_none(seen):
+    assert "First picture of" not in seen("_1")
 
 
 def test_at_most_four_rigs_are_shown(seen):

@@ -149,6 +149,12 @@ def test_the_gap_is_the_factor_between_errors_and_deviations(factor, verdict):
     assert found.sentence.startswith(f"claims {verdict}: ")
 
 
+def test_nobody_can_change_a_verdict_after_the_fact():
+    found = CovarianceConsistency.of(np.full(100, 6.0))
+    with pytest.raises(ValueError, match="frozen"):
+        found.scale_gap = 1.0
+
+
 def estimate_with_covariances(folder, est, scale):
     rows = [(t, np.eye(6) * 1e-4) for t in est.t_ns.tolist()]
     (folder / COVARIANCE).write_text(format_covariances(rows))

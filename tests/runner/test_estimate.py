@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from vobench.errors import TrajectoryError
 from vobench.estimator.process import EstimatorProcess
@@ -160,6 +161,38 @@ def test_an_outcome_with_an_unknown_key_is_refused(tmp_path):
     (tmp_path / estimate_file.OUTCOME).write_text('{"kind": "finished", "reason": "", "mood": "good"}')
     with pytest.raises(ValueError, match="mood"):
         estimate_file.read_outcome(tmp_path)
+
+
+def test_the_covariance_of_the_left_camera_is_that_of_small_errors_of_the_frame_that_carries_it():
+    """An error of a frame's pose moves the camera on it by what the camera's own pose then differs."""
+    T_frame_left = se3.transform(Rotation.from_euler("xyz", [-1.7, 0.2, -1.5]).as_matrix(), [0.3, -0.1, 0.7])
+    T_odom_frame = se3.transform(Rotation.from_euler("xyz", [0.2, -0.3, 1.1]).as_matrix(), [2.0, 1.0, -0.5])
+    size = 1e-6
+
+    def T_start_left(error):
+        R = Rotation.from_rotvec(error[3:]).as_matrix() @ T_odom_frame[:3, :3]
+        return se3.inverse(T_frame_left) @ se3.transform(R, T_odom_frame[:3, 3] + error[:3]) @ T_frame_left
+
+    before = T_start_left(np.zeros(6))
+    derivatives = []
+    for error in size * np.eye(6):
+        after = T_start_left(error)
+        turn = Rotation.from_matrix(after[:3, :3] @ before[:3, :3].T).as_rotvec()
+        derivatives.append(np.r_[after[:3, 3] - before[:3, 3], turn] / size)
+    jacobian = np.stack(derivatives, 1)
+
+    spread = np.random.default_rng(1).normal(size=(6, 6))
+    covariance = spread @ spread.T
+    keeper = estimate_file._Keeper(None, None, None, T_frame_left=T_frame_left)
+    found = keeper._covariance_of_left(T_odom_frame[:3, :3], covariance)
+    np.testing.assert_allclose(found, jacobian @ covariance @ jacobian.T, rtol=1e-4, atol=1e-4)
+
+
+def test_nobody_can_change_an_outcome_after_the_fact():
+    outcome = estimate_file.EstimatorOutcome(kind="crashed", reason="out of tracks")
+    with pytest.raises(ValueError, match="frozen"):
+        outcome.kind = "finished"
+    assert outcome.kind == "crashed"
 
 
 def test_a_trajectory_with_bytes_of_no_text_is_one_sentence_with_its_place(tmp_path):

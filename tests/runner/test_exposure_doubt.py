@@ -48,6 +48,19 @@ def test_cases_of_a_plan_with_the_same_doubt_share_a_line(bench, light):
     assert "lower exposure_gain of the camera from 1 to about" in dim  # white is that of the scene's own lighting
 
 
+@pytest.mark.parametrize("stops", [1, 3])
+def test_a_gain_in_decibels_is_doubted_as_an_exposure_that_is_as_bright(bench, light, stops):
+    light(1.0)
+    decibels = 20 * np.log10(2) * stops
+
+    def doubts(camera):
+        return doubts_of_plan(bench.plan(("seed: 1", f"seed: 1\ncameras: {{a: {camera}}}"), ("full: {}, ", "")))
+
+    by_gain = doubts(f"{{gain_db: {decibels:.9f}}}")
+    assert by_gain == doubts(f"{{exposure_compensation_ev: {stops}}}")
+    assert bool(by_gain) == (stops == 3)
+
+
 def test_auto_exposure_scenarios_and_unknown_light_are_not_doubted(bench, light, monkeypatch):
     light(10.0)
     plan = bench.plan(("seed: 1", "seed: 1\ncameras: {auto: {auto_exposure: {}}}"))

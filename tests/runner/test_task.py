@@ -8,7 +8,9 @@ from multiprocessing import get_context
 import pytest
 
 from vobench.runner.entry import MANIFEST, seal
-from vobench.runner.task import is_done, missing, perform, plan, sequence_tasks
+from vobench.runner.task import bake_task, is_done, missing, perform, plan, sequence_tasks
+from vobench.scene.fog import Fog
+from vobench.suite.scene_spec import LevelSpec
 
 
 @pytest.fixture
@@ -48,6 +50,28 @@ def test_equal_cases_of_two_names_share_a_sequence_and_are_scored_each(bench):
     twins = plan(bench.plan(("dim: {lamp: {power_lm: 150}}", "twin: {}")), {})
     stages = [task.stage for task in twins]
     assert (stages.count("sequence"), stages.count("estimate"), stages.count("score")) == (1, 2, 4)
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"summary": "a closet"}, {"white_cd_m2": 80.0}, {"white_cd_m2": None}, {"fog": Fog(visibility_m=30.0)}],
+    ids=["summary", "white", "no white", "fog"],
+)
+def test_a_change_of_a_scene_that_does_not_light_it_keeps_its_light(bench, change):
+    scene = bench.plan().simulated[0].scene
+    assert bake_task(replace(scene, **change)).key == bake_task(scene).key
+
+
+@pytest.mark.parametrize(
+    ("change", "is_kept"),
+    [({"level": LevelSpec(steady=0.5)}, True), ({"power_lm": 601.0}, False), ({"center_m": (0, 0, 1.3)}, False)],
+    ids=["level", "power", "place"],
+)
+def test_of_a_lamp_all_but_its_level_counts_for_the_light(bench, change, is_kept):
+    scene = bench.plan().simulated[0].scene
+    (lamp,) = scene.lamps
+    changed = replace(scene, lamps=(replace(lamp, **change),))
+    assert (bake_task(changed).key == bake_task(scene).key) == is_kept
 
 
 def test_light_is_computed_only_for_sequences_that_are_still_to_be_made(tasks, tmp_path):

@@ -11,7 +11,7 @@ from vobench.scene.light import PointLight, Sky, Sun
 from vobench.scene.material import Material
 from vobench.scene.mesh import flipped, moved, quad
 from vobench.scene.triangles import Thing
-from vobench.suite.bare_model import bare_model_scene
+from vobench.suite.bare_model import LEAST_LX, bare_model_scene
 from vobench.suite.default_light import DAYLIGHT_SKY, DAYLIGHT_SUN
 
 GREY = 0.5
@@ -75,6 +75,18 @@ def test_luminous_faces_count_as_lamps(read):
 def test_a_screen_that_hardly_glows_leaves_a_room_dark_so_lamps_are_added(read):
     spec, _ = read(room(), screen(), materials={"grey": grey(GREY), "glow": glowing(1.0)})
     assert len(spec.lamps) == 1
+
+
+@pytest.mark.parametrize("size_m", [(0.5, 0.4), (2.0, 1.5)])
+@pytest.mark.parametrize(("share", "is_lit"), [(0.8, False), (1.3, True)])
+def test_a_luminous_panel_counts_by_the_power_that_it_emits_whatever_its_size(read, size_m, share, is_lit):
+    """A diffuse panel of luminance L and area A emits π L A lumens."""
+    x_m, y_m = size_m
+    panel = Thing("panel", quad((0, 0, 2.4), (0, y_m, 0), (x_m, 0, 0)), "glow")
+    dim_room_lm = LEAST_LX * AREA_M2 * (1 - GREY)
+    luminance_cd_m2 = share * dim_room_lm / (np.pi * x_m * y_m)
+    spec, _ = read(room(), panel, materials={"grey": grey(GREY), "glow": glowing(luminance_cd_m2)})
+    assert (spec.lamps == ()) == is_lit
 
 
 def test_lamps_that_light_hidden_faces_only_are_no_reason_to_add_others(read):

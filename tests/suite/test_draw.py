@@ -74,4 +74,11 @@ def test_random_base_seeds_leave_room_for_draws_below_the_largest():
     seeds = {random_base_seed() for _ in range(20)}
     assert len(seeds) > 1
     assert all(seed % SEEDS_PER_DRAW == 0 for seed in seeds)
+    assert all(0 < seed < LARGEST_BASE_SEED for seed in seeds)
     assert (DRAWS + 1) * SEEDS_PER_DRAW < LARGEST_BASE_SEED
+
+
+def test_a_suite_may_be_run_with_any_random_base_seed(suite):
+    seed = random_base_seed()
+    plan = Draws(suite, {"base_seed": str(seed)}).plan(0)
+    assert places(plan) == {f"flat.{seed + 1}", f"flat.{seed + 2}"}

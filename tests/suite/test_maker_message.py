@@ -163,6 +163,13 @@ class TestHostile:
         with pytest.raises(SuiteError):
             decode(self._changed(change))
 
+    def test_a_negative_length_does_not_mean_all_the_rest(self) -> None:
+        def change(header):
+            self._first(header, "Picture")["values"]["array"].update(shape=[-1, 1], offset=0)
+
+        with pytest.raises(SuiteError, match=r"an array of uint8, shape \[-1, 1\]"):
+            decode(self._changed(change))
+
     def test_faces_of_vertices_that_are_not_there_are_refused(self) -> None:
         mesh = make_mesh(WALL.vertices, [[0, 1, 99]], np.zeros((4, 2)), WALL.vertex_normals)
         with pytest.raises(SuiteError, match="'wall' with a mesh whose faces name a vertex that is not there"):

@@ -164,6 +164,24 @@ def test_a_treatment_gets_different_kinds_of_places_where_it_can_and_units_stay_
     assert max(load.values()) - min(load.values()) <= 2
 
 
+def test_a_unit_of_another_kind_is_chosen_although_it_has_one_treatment_more() -> None:
+    made = units(Spread(units=3), {"scene": ["flat.1", "flat.2", "park"], "trajectory": ["tour"]})
+    dealer = Dealer(made, 2, seed=1)
+    # After two treatments, the park has two and each flat has one.
+    for _ in range(3):
+        assert {unit.kind for unit in dealer.deal()} == {"flat", "park"}
+
+
+@pytest.mark.parametrize("runs", [2, 5])
+def test_who_gets_which_units_does_not_depend_on_how_many_runs_each_treatment_has(runs: int) -> None:
+    scenes = ["park", "flat.1", "flat.2", "street.1", "street.2", "street.3"]
+    made = units(Spread(units=9), {"scene": scenes, "trajectory": ["tour.1", "tour.2"]})
+    of_one_run = Dealer(made, 3, seed=1)
+    of_several = Dealer(made, 3, seed=1)
+    for _ in range(12):
+        assert of_several.deal(runs) == of_one_run.deal()
+
+
 def test_where_all_places_are_of_one_kind_it_does_not_matter() -> None:
     of_one_kind = Dealer(units(Spread(units=12), VARIANTS), 3, seed=1).deal()
     assert len({unit.place for unit in of_one_kind}) == 3

@@ -71,6 +71,14 @@ def test_a_suite_without_trajectories_goes_round_in_each_scene_and_in_no_other(p
     assert one[0].trajectory == two[0].trajectory
 
 
+def test_cases_of_a_design_are_named_by_what_differs_between_them(plan):
+    design = "spread: {units: 1, each: 1}\n"
+    text = "lightings: {full: {}, dim: {lamp: {power_lm: 150}}}\ncameras: {a: {}, b: {}, c: {}}\n"
+    cases = plan(text + SHORT + design).simulated
+    expected = product(("full", "dim"), ("a", "b", "c"))
+    assert [case.name for case in cases] == [f"{lighting}-{camera}-closet-short" for lighting, camera in expected]
+
+
 def test_what_a_suite_says_once_holds_for_every_case(plan):
     text = "seed: 5\ntruth: [depth]\nframes: [1, 4]\ntruth_noise: {position_m: 0.01}\ncameras: {a: {}, b: {}}\n"
     cases = plan(text + SHORT).simulated

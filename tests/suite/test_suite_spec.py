@@ -61,6 +61,23 @@ def test_calibrations_without_scenarios_are_refused():
         checked(Suite, content)
 
 
+@pytest.mark.parametrize("key", ["lightings", "rigs", "cameras"])
+def test_scenarios_are_spread_with_one_variant_of_every_other_axis(key):
+    variants = {"lightings": {}, "rigs": {"pitch_deg": 90}, "cameras": {}}
+    content = {
+        "name": "s",
+        "scenes": [{"name": "flat", "seeds": 2}],
+        "trajectories": {"tour": {"kind": "wander", "length_m": 1}},
+        "scenarios": {"dusk": 3},
+        "spread": {"units": 2, "each": 1},
+        "estimators": ["a"],
+    }
+    one = {"a": variants[key]}
+    assert set(getattr(checked(Suite, {**content, key: one}), key)) == {"a"}
+    with pytest.raises(ValueError, match=f"{key}: scenarios are spread with one variant of {key}, but there are sev"):
+        checked(Suite, {**content, key: {**one, "b": variants[key]}})
+
+
 def test_the_schema_allows_the_short_forms():
     properties = json_schema(Suite)["properties"]
     assert {"type": "string"} in properties["estimators"]["items"]["anyOf"]

@@ -1,5 +1,7 @@
 """Cameras stand in the free space of a place and look along its path, or stand around an object and look at it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from vobench.geometry.camera import Pinhole
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.mesh import flipped, moved, quad
 from vobench.scene.triangles import Thing, Triangles, triangle_table
-from vobench.suite.free_space import largest_free_circle
+from vobench.suite.free_space import LEAST_RADIUS_M, FreeCircle, largest_free_circle
 from vobench.suite.viewpoint import EYE_SHARE, Viewpoint, around, is_place, viewpoints
 
 LENS = Pinhole(8, 6, 4.0, 4.0, 3.5, 2.5)
@@ -53,6 +55,14 @@ def test_cameras_stay_below_a_low_ceiling() -> None:
     assert eyes_m[:, 2].max() == pytest.approx(EYE_SHARE * 1.0, abs=1e-3)
 
 
+def test_cameras_stay_below_every_face_of_a_ceiling_the_first_of_all_faces_too() -> None:
+    ceiling = quad((-3, -2.5, 1.0), (0, 5, 0), (6, 0, 0))  # seen from below
+    faces = faces_of(ceiling, room(height_m=2.5))
+    eyes_m = np.array([view.eye_m for view in viewpoints(faces, RayCaster(faces))])
+    assert len(eyes_m) == 16
+    assert (eyes_m[:, 2] < 1.0).all()
+
+
 def test_all_of_an_object_is_in_each_picture_around_it() -> None:
     low_m = np.array([1.0, 2.0, 0.0])
     high_m = np.array([1.4, 2.1, 0.3])
@@ -80,6 +90,15 @@ def test_cameras_around_an_object_move_with_it_and_look_at_its_middle_from_sligh
         ahead = view.T_world_camera()[:3, 2]
         np.testing.assert_allclose(ahead, to_middle / np.linalg.norm(to_middle), atol=1e-9)
         assert 10 < np.degrees(np.arcsin(-ahead[2])) < 30
+
+
+def test_a_scene_without_free_space_or_with_a_gap_only_is_no_place() -> None:
+    plain = faces_of(quad((-20, -20, 0), (40, 0, 0), (0, 40, 0)))
+    caster = RayCaster(plain)
+    gap = FreeCircle(0.0, 0.0, 0.0, LEAST_RADIUS_M / 2)
+    assert not is_place(plain, caster, None)
+    assert not is_place(plain, caster, gap)
+    assert is_place(plain, caster, replace(gap, radius_m=2 * LEAST_RADIUS_M))
 
 
 def test_a_chair_a_cube_and_a_roof_are_objects_and_a_room_and_a_plain_are_places() -> None:
