@@ -1,5 +1,10 @@
-"""Every run tries the same examples, so that a test that failed fails again. Makers that tests write may run."""
+"""Every run tries the same examples, so that a test that failed fails again. Makers that tests write may run.
 
+Many tests start processes with an empty cache. They share the machine code of compiled functions, since compiling takes
+a second or more of each process.
+"""
+
+import os
 from pathlib import Path
 
 import pytest
@@ -7,6 +12,7 @@ from hypothesis import settings
 
 from vobench import trust
 
+os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "kernels"))
 settings.register_profile("steady", derandomize=True, max_examples=40, deadline=None)
 settings.load_profile("steady")
 

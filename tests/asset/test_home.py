@@ -8,9 +8,10 @@ from vobench.asset.daylight import LIGHTINGS
 from vobench.scene.light import AreaLight, Sky
 
 SEEDS = range(1, 25)
+MORE_SEEDS = [pytest.param(seed, marks=pytest.mark.slow) for seed in SEEDS[8:]]
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", [*SEEDS[:8], *MORE_SEEDS])
 def test_nothing_is_wrong_with_a_flat(seed: int) -> None:
     interior = home.furnished_flat(seed, LIGHTINGS[seed % 4])
     assert place_check.complaints(interior) == []

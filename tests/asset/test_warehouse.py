@@ -8,7 +8,7 @@ from vobench.asset.daylight import LIGHTINGS
 from vobench.asset.site import Site
 from vobench.scene.light import AreaLight, Sky
 
-SEEDS = range(1, 5)
+SEEDS = (2, 3)
 MANY_SEEDS = range(1, 13)
 
 

@@ -7,9 +7,10 @@ from vobench.asset.daylight import LIGHTINGS
 from vobench.scene.light import AreaLight
 
 SEEDS = range(1, 17)
+MORE_SEEDS = [pytest.param(seed, marks=pytest.mark.slow) for seed in SEEDS[6:]]
 
 
-@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("seed", [*SEEDS[:6], *MORE_SEEDS])
 def test_nothing_is_wrong_with_an_office(seed: int) -> None:
     interior = workplace.furnished_office(seed, LIGHTINGS[seed % 4])
     assert place_check.complaints(interior) == []

@@ -105,7 +105,6 @@ JSON = [
     (("bundle", "runs/tiny", "tiny.zip"), "bytes"),
     (("view", "runs/tiny"), "path"),
     (("view", "runs/tiny", "--save", "look.rrd"), "path"),
-    (("doctor",), "checks"),
     (("schema",), "properties"),
     (("schema", "scene"), "properties"),
     (("schema", "estimator"), "properties"),

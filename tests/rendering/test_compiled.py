@@ -28,19 +28,29 @@ def test_tangents_are_at_right_angles_to_the_normal_and_to_each_other(normal: tu
         assert product == pytest.approx(expected, abs=1e-12)
 
 
-def called(cache: Path) -> str:
-    environment = {**os.environ, "VOBENCH_CACHE": str(cache)}
+def called(cache: Path, **variables: str) -> str:
+    environment = {name: text for name, text in os.environ.items() if name != "NUMBA_CACHE_DIR"}
+    environment |= {"VOBENCH_CACHE": str(cache), **variables}
     done = subprocess.run([sys.executable, "-c", CALL], env=environment, check=True, capture_output=True, text=True)
     return done.stdout
 
 
+def kept_files(folder: Path) -> list[Path]:
+    return list(folder.rglob("*fresnel_of*.nbc"))
+
+
 def test_machine_code_is_kept_in_the_cache_folder(tmp_path: Path) -> None:
     called(tmp_path)
-    kept = list((tmp_path / "kernels").rglob("*fresnel_of*.nbc"))
-    assert len(kept) == 1
-    written_ns = kept[0].stat().st_mtime_ns
+    (kept,) = kept_files(tmp_path / "kernels")
+    written_ns = kept.stat().st_mtime_ns
     called(tmp_path)
-    assert kept[0].stat().st_mtime_ns == written_ns
+    assert kept.stat().st_mtime_ns == written_ns
+
+
+def test_machine_code_is_kept_in_the_folder_that_numbas_own_variable_names(tmp_path: Path) -> None:
+    called(tmp_path / "cache", NUMBA_CACHE_DIR=str(tmp_path / "other"))
+    assert len(kept_files(tmp_path / "other")) == 1
+    assert kept_files(tmp_path / "cache") == []
 
 
 def test_functions_run_where_the_cache_folder_cannot_be_created(tmp_path: Path) -> None:

@@ -109,7 +109,9 @@ def window_room() -> tuple[Thing, ...]:
     return tuple(replace(thing, material="pane") if thing.name == "north" else thing for thing in ROOM)
 
 
-@pytest.mark.parametrize("t_s", [0.0, 4.3, 10.0])
+@pytest.mark.parametrize(
+    "t_s", [4.3, pytest.param(0.0, marks=pytest.mark.slow), pytest.param(10.0, marks=pytest.mark.slow)]
+)
 def test_a_moving_sun_lights_as_one_that_stands_where_it_is(t_s: float) -> None:
     sun = Sun("sun", 1e4, (0.0, 10.0), (80.0, 100.0), (30.0, 40.0))
     baked = bake(scene(sun, things=window_room()), COARSE)

@@ -11,11 +11,15 @@ from vobench.scene.material import Picture
 
 SCENES = Path(__file__).parents[2] / "scenes"
 MADE = sorted(path.parent.name for path in SCENES.glob("*/maker.py"))
+LARGE = ("park", "street", "warehouse")
 # Triangles do not hang on what is painted on them, which takes most of the time.
 PAINTED = ("boards", "carton", "fabric", "ground", "masonry", "pages", "poster", "terrazzo")
 
 
-@pytest.mark.parametrize("name", MADE)
+@pytest.mark.parametrize(
+    "name",
+    [*(name for name in MADE if name not in LARGE), *(pytest.param(name, marks=pytest.mark.slow) for name in LARGE)],
+)
 def test_a_place_is_the_same_for_one_seed_and_stands_above_its_ground(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

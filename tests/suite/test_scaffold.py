@@ -55,7 +55,10 @@ def test_an_example_is_copied_under_another_name(name: str) -> None:
     assert [case.name for case in copy.cases] == [case.name for case in first.cases]
 
 
-@pytest.mark.parametrize("name", names_of_the_house("suite"))
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.slow if name == "full" else ()) for name in names_of_the_house("suite")],
+)
 def test_a_suite_of_the_house_is_copied_under_another_name(name: str) -> None:
     new_suite("mine", source=name)
     copy = read_plan("mine")

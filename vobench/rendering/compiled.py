@@ -1,4 +1,7 @@
-"""Functions that Numba compiles to machine code, which is kept in the cache folder for the next process."""
+"""Functions that Numba compiles to machine code, which is kept in the cache folder for the next process.
+
+The environment variable ``NUMBA_CACHE_DIR`` names another folder.
+"""
 
 import os
 import tempfile
@@ -12,10 +15,19 @@ Function = TypeVar("Function", bound=Callable[..., object])
 FOLDER = "kernels"  # below vobench's cache folder
 
 
+def _folder() -> Path:
+    """The folder that Numba keeps machine code in: the one that Numba's own variable names, or one of the cache."""
+    stated = os.environ.get("NUMBA_CACHE_DIR")
+    if stated:
+        return Path(stated)
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    cache = Path(os.environ.get("VOBENCH_CACHE") or home / "vobench")
+    return cache / FOLDER
+
+
 def _is_cached() -> bool:
     """Set the folder that Numba keeps machine code in; whether files can be written there."""
-    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    folder = Path(os.environ.get("VOBENCH_CACHE") or home / "vobench") / FOLDER
+    folder = _folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
