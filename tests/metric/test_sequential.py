@@ -81,13 +81,13 @@ def test_a_unit_counts_for_the_largest_ratio_at_most():
 
 def test_few_units_state_nothing_however_much_they_differ():
     few = verdict_on([100.0] * (MIN_UNITS - 1))
-    assert (few.verdict, few.is_stated, few.units_needed(1000)) == (PairState.OPEN, False, None)
+    assert (few.verdict, few.has_interval, few.units_needed(1000)) == (PairState.OPEN, False, None)
     assert verdict_on([100.0] * (MIN_UNITS + 2)).verdict is PairState.FIRST_BETTER
 
 
 def test_equal_losses_are_alike_once_rare_failures_are_excluded():
     assert verdict_on([0.0] * 10).verdict is PairState.OPEN
-    assert verdict_on([0.0] * 90).verdict is PairState.ALIKE
+    assert verdict_on([0.0] * 90).verdict is PairState.EQUIVALENT
     assert e_value(np.zeros(90)) == pytest.approx(1)
 
 
@@ -136,7 +136,7 @@ def test_what_differs_is_decided_and_what_does_not_is_found_alike():
     same = rng.normal(0.0, 0.6, 300)
     assert pair_verdicts(np.array([np.zeros(60), worse]), ratio=1.5, alpha=ALPHA)[0].verdict is PairState.FIRST_BETTER
     assert pair_verdicts(np.array([worse, np.zeros(60)]), ratio=1.5, alpha=ALPHA)[0].verdict is PairState.SECOND_BETTER
-    assert pair_verdicts(np.array([np.zeros(300), same]), ratio=1.5, alpha=ALPHA)[0].verdict is PairState.ALIKE
+    assert pair_verdicts(np.array([np.zeros(300), same]), ratio=1.5, alpha=ALPHA)[0].verdict is PairState.EQUIVALENT
 
 
 def test_all_pairs_share_the_error():

@@ -31,57 +31,63 @@ BISECTIONS = 50
 
 
 def log_wealths(differences: Array, mean: float) -> Array:
-    """The logarithm of the wealth, after each of N units, of a bet that the mean is larger than `mean`, (..., N).
+    """The log wealth (..., N) after each of N units in a bet that the mean of differences (..., N) exceeds `mean`.
 
-    The bet is on differences (..., N), and begins with a wealth of 1. Whatever their distribution, a wealth of
-    1 / alpha is reached with probability alpha at most, at any time, if their mean is `mean` or smaller (Ville's
-    inequality). Differences beyond the BOUND count like it.
+    The wealth process starts at 1. It is a nonnegative supermartingale if the true mean is `mean` or smaller; then it
+    ever reaches 1 / alpha with probability alpha at most (Ville's inequality). Differences are clipped to ±BOUND.
 
     Source: Waudby-Smith and Ramdas (2024), Estimating means of bounded random variables by betting.
     """
     excess = np.clip(differences, -BOUND, BOUND) - mean
-    log_wealth = np.full(excess.shape, -np.inf)
+    log_mixture = np.full(excess.shape, -np.inf)
     for share, weight in zip(STAKES, WEIGHTS, strict=True):
         stake = share / (BOUND + mean)  # such that no difference can cost all of the wealth
-        gains = np.log1p(stake * excess).cumsum(axis=-1)
-        log_wealth = np.logaddexp(log_wealth, gains + np.log(weight))
-    return log_wealth
+        log_growth = np.log1p(stake * excess).cumsum(axis=-1)
+        log_mixture = np.logaddexp(log_mixture, log_growth + np.log(weight))
+    return log_mixture
 
 
 def log_wealth(differences: Array, mean: float) -> float:
-    """The wealth of `log_wealths` after all of the differences (N,), which does not depend on their order."""
-    return float(log_wealths(differences, mean)[-1]) if len(differences) else 0.0
+    """The log wealth after the last of the differences (N,), in any order; 0 without differences."""
+    if not len(differences):
+        return 0.0
+    return float(log_wealths(differences, mean)[-1])
 
 
 def e_value(differences: Array) -> float:
-    """The e-value of differences (N,) against a mean of zero: half of a bet on more, half of one on less.
+    """The two-sided e-value of differences (N,) against a mean of zero: the average wealth of two opposite bets.
 
-    If the mean is zero it exceeds 1 / alpha, at any time, with probability alpha at most.
+    If the mean is zero, it ever exceeds 1 / alpha with probability alpha at most.
     """
-    log_value = np.logaddexp(log_wealth(differences, 0.0), log_wealth(-differences, 0.0)) - np.log(2.0)
+    log_upward = log_wealth(differences, 0.0)
+    log_downward = log_wealth(-differences, 0.0)
+    log_value = np.logaddexp(log_upward, log_downward) - np.log(2.0)
     return float(np.exp(min(log_value, 700.0)))
 
 
 def interval(differences: Array, alpha: float) -> tuple[float, float]:
-    """The confidence sequence of the mean of differences (N,) after N units, from -BOUND to BOUND before it states any.
+    """The confidence sequence for the mean of differences (N,), at time N: its lower and upper limit.
 
-    The intervals for all N hold together with probability 1 - alpha.
+    The limits are ±BOUND while no mean is rejected. With probability 1 - alpha, the intervals at all times cover the
+    mean.
     """
-    return _lower_end(differences, alpha / 2), -_lower_end(-differences, alpha / 2)
+    lower = _lower_limit(differences, alpha / 2)
+    upper = -_lower_limit(-differences, alpha / 2)
+    return lower, upper
 
 
-def _lower_end(differences: Array, alpha: float) -> float:
-    """The largest mean that a bet on more refutes at the level alpha; -BOUND if it refutes none."""
+def _lower_limit(differences: Array, alpha: float) -> float:
+    """The largest mean that the bet rejects at level alpha, by bisection; -BOUND if it rejects none."""
     threshold = -np.log(alpha)
-    refuted = -BOUND
-    not_refuted = BOUND
+    rejected = -BOUND
+    not_rejected = BOUND
     for _ in range(BISECTIONS):
-        middle = (refuted + not_refuted) / 2
+        middle = (rejected + not_rejected) / 2
         if log_wealth(differences, middle) >= threshold:
-            refuted = middle
+            rejected = middle
         else:
-            not_refuted = middle
-    return refuted
+            not_rejected = middle
+    return rejected
 
 
 class PairState(StrEnum):
@@ -90,7 +96,7 @@ class PairState(StrEnum):
     OPEN = "open"
     FIRST_BETTER = "first better"
     SECOND_BETTER = "second better"
-    ALIKE = "alike"
+    EQUIVALENT = "alike"
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,7 +104,7 @@ class PairVerdict:
     """A pair of estimators after N units: the differences of their log losses, and what is known of their mean.
 
     `differences` are positive where the second loses more. The pair is decided if the confidence sequence at this
-    moment excludes a ratio of 1, and alike if it is within the chosen `ratio`, in either direction.
+    moment excludes a ratio of 1, and equivalent if it is within the chosen `ratio`, in either direction.
     """
 
     first: int
@@ -119,7 +125,7 @@ class PairVerdict:
         return float(np.exp(low)), float(np.exp(high))
 
     @property
-    def is_stated(self) -> bool:
+    def has_interval(self) -> bool:
         """Whether there are enough units for an interval that excludes anything of interest."""
         return self.units >= MIN_UNITS
 
@@ -138,8 +144,10 @@ class PairVerdict:
             return PairState.FIRST_BETTER
         if log_wealth(-differences, 0.0) >= threshold:
             return PairState.SECOND_BETTER
-        if min(log_wealth(differences, -limit), log_wealth(-differences, -limit)) >= threshold:
-            return PairState.ALIKE
+        exceeds_lower_limit = log_wealth(differences, -limit) >= threshold
+        is_below_upper_limit = log_wealth(-differences, -limit) >= threshold
+        if exceeds_lower_limit and is_below_upper_limit:
+            return PairState.EQUIVALENT
         return PairState.OPEN
 
     def units_needed(self, most: int) -> int | None:
@@ -147,24 +155,29 @@ class PairVerdict:
 
         None with fewer than MIN_UNITS units, or beyond `most`.
         """
-        if not self.is_stated:
+        if not self.has_interval:
             return None
         differences = np.array(self.differences)
         limit = float(np.log(self.ratio))
-        to_order = min(self._units_to_refute(differences, 0.0), self._units_to_refute(-differences, 0.0))
-        to_alike = max(self._units_to_refute(differences, -limit), self._units_to_refute(-differences, -limit))
-        needed = min(to_order, to_alike)
+        first_better = self._units_to_reject(differences, 0.0)
+        second_better = self._units_to_reject(-differences, 0.0)
+        above_lower_limit = self._units_to_reject(differences, -limit)
+        below_upper_limit = self._units_to_reject(-differences, -limit)
+        equivalent = max(above_lower_limit, below_upper_limit)
+        needed = min(first_better, second_better, equivalent)
         return int(needed) if needed <= most else None
 
-    def _units_to_refute(self, differences: Array, mean: float) -> float:
-        """The number of units after which a bet on more refutes a mean; infinite if it never does."""
+    def _units_to_reject(self, differences: Array, mean: float) -> float:
+        """The number of units after which the bet rejects a mean; infinite if it never does."""
         excess = np.clip(differences, -BOUND, BOUND) - mean
         units = []
         for share, weight in zip(STAKES, WEIGHTS, strict=True):
-            growth = float(np.log1p(share / (BOUND + mean) * excess).mean())  # of the logarithm, in each unit
-            missing = float(np.log(2.0 / self.alpha) - np.log(weight))
-            units.append(missing / growth if growth > 0 else inf)
-        return ceil(min(units)) if min(units) < inf else inf
+            stake = share / (BOUND + mean)
+            growth_per_unit = float(np.log1p(stake * excess).mean())
+            growth_needed = float(np.log(2.0 / self.alpha) - np.log(weight))
+            units.append(growth_needed / growth_per_unit if growth_per_unit > 0 else inf)
+        fewest = min(units)
+        return ceil(fewest) if fewest < inf else inf
 
 
 def pair_verdicts(log_losses: Array, *, ratio: float, alpha: float) -> list[PairVerdict]:
@@ -188,5 +201,5 @@ def known_differences(differences: Array) -> Array:
 
 
 def open_pairs(verdicts: Sequence[PairVerdict]) -> list[PairVerdict]:
-    """The pairs that are neither decided nor alike."""
+    """The pairs that are neither decided nor equivalent."""
     return [pair for pair in verdicts if pair.verdict is PairState.OPEN]

@@ -12,7 +12,7 @@ from vobench.report.total import ranked_table
 PHRASES = {
     PairState.FIRST_BETTER: "decided",
     PairState.SECOND_BETTER: "decided",
-    PairState.ALIKE: "alike within {ratio:g} ×",
+    PairState.EQUIVALENT: "alike within {ratio:g} ×",
     PairState.OPEN: "open",
 }
 
@@ -45,7 +45,7 @@ class NamedPair:
             return f"{self.second} and {self.first}: no unit has both"
         low, high = self.known.interval
         ratio = f"{self.known.loss_ratio:.3g}"
-        interval = f"[{low:.3g}, {high:.3g}]" if self.known.is_stated else "(too few units for an interval)"
+        interval = f"[{low:.3g}, {high:.3g}]" if self.known.has_interval else "(too few units for an interval)"
         phrase = PHRASES[self.known.verdict].format(ratio=self.known.ratio)
         return f"{self.second} has {ratio} × {self.first}'s loss {interval}: {phrase}"
 
