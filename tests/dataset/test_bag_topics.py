@@ -1,6 +1,6 @@
 import pytest
 
-from vobench.dataset.bag_topics import COMPRESSED, IMU, INFO, RAW, Chosen, choose
+from vobench.dataset.bag_topics import COMPRESSED, IMU, INFO, RAW, SelectedTopics, choose
 from vobench.dataset.recording import Topics
 from vobench.errors import InputError
 
@@ -8,7 +8,7 @@ ODOMETRY = "nav_msgs/msg/Odometry"
 PAIR = {"/cam0/image_raw": RAW, "/cam1/image_raw": RAW}
 
 
-def chosen(types: dict[str, str], **topics: str) -> Chosen:
+def chosen(types: dict[str, str], **topics: str) -> SelectedTopics:
     return choose(types, Topics(**topics), "a.bag")
 
 

@@ -13,7 +13,7 @@ from mcap.opcode import Opcode
 
 from vobench.dataset.bag_picture import MOSAICS, picture
 from vobench.dataset.bag_rig import FramedInfo, Info, Tree, between, info_rig, plain, tree_of
-from vobench.dataset.bag_topics import Chosen, choose
+from vobench.dataset.bag_topics import SelectedTopics, choose
 from vobench.dataset.bag_writer import write_ros2
 from vobench.dataset.kalibr import chain_has_imu, chain_rig, find_imu, read_imu
 from vobench.dataset.layout import Layout, Writing, head
@@ -125,7 +125,7 @@ def _require_ros2(path: Path) -> None:
     raise InputError(f"an MCAP file {problem}; {advice}: {path}")
 
 
-def _contents(reader: Any, chosen: Chosen, path: Path) -> BagContents:
+def _contents(reader: Any, chosen: SelectedTopics, path: Path) -> BagContents:
     """Read the chosen topics once, without decoding or keeping pictures. Raises InputError."""
     messages = _read_once(reader, chosen)
     _require_pictures(chosen, messages.first, path)
@@ -151,7 +151,7 @@ class _Messages(NamedTuple):
     static: list[Any]
 
 
-def _read_once(reader: Any, chosen: Chosen) -> _Messages:
+def _read_once(reader: Any, chosen: SelectedTopics) -> _Messages:
     """Read the messages of the chosen topics in order. Of the truth and the calibrations, only the first is read."""
     wanted = {*chosen.sensors, TF_STATIC.name, chosen.truth_topic}
     first_only = (chosen.truth_topic, chosen.left_info, chosen.right_info)
@@ -175,7 +175,7 @@ def _read_once(reader: Any, chosen: Chosen) -> _Messages:
 
 
 def _require_pictures(
-    chosen: Chosen,
+    chosen: SelectedTopics,
     first: Mapping[str, Any],
     path: Path,
 ) -> None:
@@ -232,7 +232,7 @@ class _Pictures(NamedTuple):
 
 def _pictures(
     path: Path,
-    chosen: Chosen,
+    chosen: SelectedTopics,
     contents: BagContents,
     options: ReadOptions,
 ) -> _Pictures:
@@ -278,7 +278,7 @@ def _read_pictures(
                 due += 1
 
 
-def _body(chosen: Chosen, contents: BagContents) -> tuple[str | None, Notes]:
+def _body(chosen: SelectedTopics, contents: BagContents) -> tuple[str | None, Notes]:
     """The name of the body's frame, None for that of the left camera, and a note on it.
 
     It is the frame of the truth, or otherwise base_link, if /tf_static connects it with the left camera.
@@ -297,7 +297,7 @@ def _body(chosen: Chosen, contents: BagContents) -> tuple[str | None, Notes]:
     return None, (f"The body is the left camera{assumed}.",)
 
 
-def _truth_frame(chosen: Chosen, contents: BagContents) -> str:
+def _truth_frame(chosen: SelectedTopics, contents: BagContents) -> str:
     """The frame whose poses are the truth; empty if it has no name."""
     child = chosen.truth_frames.rpartition(".")[2]
     if child:
@@ -308,7 +308,7 @@ def _truth_frame(chosen: Chosen, contents: BagContents) -> str:
 
 def _rig(
     path: Path,
-    chosen: Chosen,
+    chosen: SelectedTopics,
     contents: BagContents,
     body: str | None,
     options: ReadOptions,
@@ -343,7 +343,7 @@ def _chain_rig(chain: Path, count: int) -> CalibratedRig:
 
 def _imu(
     path: Path,
-    chosen: Chosen,
+    chosen: SelectedTopics,
     contents: BagContents,
     body: str | None,
     options: ReadOptions,

@@ -1,4 +1,4 @@
-"""Selects the topics of a bag with the left and right pictures, the IMU readings and the ground truth."""
+"""Selects the topics of a bag with the left and right images, the IMU readings and the ground truth."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,15 +19,18 @@ SIDES = (
     *((f"{name}0", f"{name}1") for name in COUNTED_FROM_0),
     *((f"{name}1", f"{name}2") for name in COUNTED_FROM_1),
 )
-NO_PICTURES = ("depth", "disparity", "theora", "confidence", "mask")
+OTHER_IMAGES = ("depth", "disparity", "theora", "confidence", "mask")
 TRUTH_WORDS = ("ground_truth", "groundtruth", "gt", "truth", "vicon", "mocap", "optitrack", "vrpn")
 
 Types = Mapping[str, str]  # message type by topic
 
 
 @dataclass(frozen=True, slots=True)
-class Chosen:
-    """The topics to read; None for what a bag does not contain."""
+class SelectedTopics:
+    """The topics to read; None for what a bag does not contain.
+
+    `truth` names a topic of poses, or a transform as `topic:parent.child`, such as `/tf:map.base_link`.
+    """
 
     left: str
     right: str | None
@@ -46,20 +49,22 @@ class Chosen:
     @property
     def truth_topic(self) -> str:
         """The topic of the truth, without the frames of a transform; empty if there is none."""
-        return (self.truth or "").partition(":")[0]
+        topic, _, _ = (self.truth or "").partition(":")
+        return topic
 
     @property
     def truth_frames(self) -> str:
         """The frames `parent.child` of a truth that is a transform; empty if they are not given."""
-        return (self.truth or "").partition(":")[2]
+        _, _, frames = (self.truth or "").partition(":")
+        return frames
 
 
-def choose(types: Types, topics: Topics, path: str) -> Chosen:
+def choose(types: Types, topics: Topics, path: str) -> SelectedTopics:
     """The topics that are given, and for the others, the only topic of the bag that fits.
 
-    Raises InputError for a given topic that the bag does not contain, and if no or several topics of pictures fit.
+    Raises InputError for a given topic that the bag does not contain, and if no image topic fits, or several do.
     """
-    left, right = _picture_topics(types, topics, path)
+    left, right = _image_topics(types, topics, path)
     for topic, message_type in ((topics.left_info, INFO), (topics.right_info, INFO), (topics.imu, IMU)):
         if topic is not None:
             _require(types, topic, (message_type,), path)
@@ -72,61 +77,61 @@ def choose(types: Types, topics: Topics, path: str) -> Chosen:
     imu, imu_notes = _imu_topic(types, topics)
     truth, truth_notes = _truth_topic(types, topics)
     notes = (f"The pictures are those of {source}.", *truth_notes, *imu_notes)
-    return Chosen(left, right, left_info, right_info, imu, truth, notes)
+    return SelectedTopics(left, right, left_info, right_info, imu, truth, notes)
 
 
-def _picture_topics(
+def _image_topics(
     types: Types,
     topics: Topics,
     path: str,
 ) -> tuple[str, str | None]:
-    """The topics of the left and the right pictures. The right one is None for a single camera."""
+    """The left and the right image topic. The right one is None for a single camera."""
     for topic in (topics.left, topics.right):
         if topic is not None:
             _require(types, topic, (RAW, COMPRESSED), path)
-    with_pictures = [topic for topic, message_type in types.items() if message_type in (RAW, COMPRESSED)]
+    image_topics = [topic for topic, message_type in types.items() if message_type in (RAW, COMPRESSED)]
     if topics.left is not None:
-        return topics.left, topics.right or _only_partner(topics.left, with_pictures)
-    chosen = _only_pair(with_pictures, topics.right)
-    if chosen is None:
-        raise _undecided(types, with_pictures, path)
-    return chosen
+        return topics.left, topics.right or _only_partner(topics.left, image_topics)
+    pair = _only_pair(image_topics, topics.right)
+    if pair is None:
+        raise _undecided(types, image_topics, path)
+    return pair
 
 
-def _only_pair(with_pictures: list[str], right_topic: str | None) -> tuple[str, str | None] | None:
+def _only_pair(image_topics: list[str], right_topic: str | None) -> tuple[str, str | None] | None:
     """The only pair of topics, with the given right topic if any, or the only camera; None if several fit."""
-    pairs = _pairs(with_pictures)
+    pairs = _pairs(image_topics)
     if right_topic is not None:
         pairs = [pair for pair in pairs if pair[1] == right_topic]
     if len(pairs) == 1:
         return pairs[0]
-    cameras = [topic for topic in with_pictures if not _contains(topic, NO_PICTURES)]
+    cameras = [topic for topic in image_topics if not _contains(topic, OTHER_IMAGES)]
     is_single_camera = not pairs and len(cameras) == 1 and right_topic is None
     return (cameras[0], None) if is_single_camera else None
 
 
-def _undecided(types: Types, with_pictures: list[str], path: str) -> InputError:
+def _undecided(types: Types, image_topics: list[str], path: str) -> InputError:
     """The error about topics that must be named."""
-    if not with_pictures:
+    if not image_topics:
         return InputError(f"no pictures (Image or CompressedImage) in {path}; its topics: {_listed(types)}")
-    return InputError(f"name the left and the right topic of {path}; with pictures: {', '.join(with_pictures)}")
+    return InputError(f"name the left and the right topic of {path}; with pictures: {', '.join(image_topics)}")
 
 
-def _only_partner(left_topic: str, with_pictures: list[str]) -> str | None:
+def _only_partner(left_topic: str, image_topics: list[str]) -> str | None:
     """The right topic for a left topic; None unless exactly one fits."""
-    partners = [right for left, right in _pairs(with_pictures) if left == left_topic]
+    partners = [right for left, right in _pairs(image_topics) if left == left_topic]
     return partners[0] if len(partners) == 1 else None
 
 
-def _pairs(with_pictures: list[str]) -> list[tuple[str, str]]:
-    """The pairs of topics of pictures whose names differ only in left and right, without duplicates."""
+def _pairs(image_topics: list[str]) -> list[tuple[str, str]]:
+    """The pairs of image topics whose names differ only in left and right, without duplicates."""
     pairs = []
-    for topic in with_pictures:
-        if _contains(topic, NO_PICTURES):
+    for topic in image_topics:
+        if _contains(topic, OTHER_IMAGES):
             continue
         for left, right in SIDES:
             partner = topic.replace(left, right)
-            if left in topic and partner in with_pictures:
+            if left in topic and partner in image_topics:
                 pairs.append((topic, partner))
     return list(dict.fromkeys(pairs))
 
@@ -135,9 +140,9 @@ def _contains(topic: str, words: tuple[str, ...]) -> bool:
     return any(word in topic.lower() for word in words)
 
 
-def _info_of(types: Types, picture_topic: str) -> str | None:
-    """The camera_info topic of a topic of pictures: the first one found in its namespace, or a parent of that."""
-    parts = picture_topic.split("/")
+def _info_of(types: Types, image_topic: str) -> str | None:
+    """The camera_info topic of an image topic: the first one found in its namespace, or a parent of that."""
+    parts = image_topic.split("/")
     for end in range(len(parts), 0, -1):
         name = "/".join([*parts[:end], "camera_info"])
         if types.get(name) == INFO:
