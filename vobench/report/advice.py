@@ -12,21 +12,31 @@ STAGES_PER_TRIAL = ("estimate", "score")
 
 
 def cost_of_deciding(totals: Sequence[Total], plan: Plan, typical_s: Mapping[str, float], *, jobs: int) -> str:
-    """The sentence on what it takes to decide a ratio of CHOSEN_RATIO between all neighbours; empty if nothing more.
+    """The sentence on what it takes to decide a ratio of CHOSEN_RATIO between all neighbours.
+
+    It is empty if no pair of neighbours needs more places, as far as is known.
 
     `typical_s` is the duration of a task of each stage in earlier runs. The number of places follows from the variance
     between places that this board saw; a ratio of CHOSEN_RATIO is then decided in 95 of 100 boards.
     """
-    open_totals = [total for total in totals if total.decided_above is False and total.places_needed is not None]
-    most = max(open_totals, key=lambda total: (total.places_needed or 0) - total.places, default=None)
-    if most is None or most.places_needed is None or most.places_needed <= most.places:
+    if not totals:
         return ""
-    more_places = most.places_needed - most.places
+    most = max(totals, key=_more_places_needed)
+    more_places = _more_places_needed(most)
+    if more_places == 0:
+        return ""
     more_drives = ceil(more_places * most.drives / most.places)
     seconds = more_places * _seconds_per_place(plan, typical_s, jobs=jobs, places=most.places)
     time = f", {_duration(seconds)}" if seconds > 0 else ""
     drives = counted(more_drives, "more drive")
     return f"To decide a ratio of {CHOSEN_RATIO:g}: about {drives} in {counted(more_places, 'more place')}{time}"
+
+
+def _more_places_needed(total: Total) -> int:
+    """The places that are missing for a decision on an estimator and the one above; 0 if decided, or if not known."""
+    if total.decided_above is not False or total.places_needed is None:
+        return 0
+    return max(0, total.places_needed - total.places)
 
 
 def _seconds_per_place(plan: Plan, typical_s: Mapping[str, float], *, jobs: int, places: int) -> float:
