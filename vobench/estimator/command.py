@@ -160,8 +160,10 @@ def poses_in(text: str, t_ns: Stamps) -> dict[int, Array]:
     for unit in UNITS:
         try:
             parsed = parse_any(text, name="{out}", unit=unit)
-            if not (unit and parsed.notes):  # too fine a unit makes several stamps equal
-                return _matched(parsed, t_ns)
+            has_dropped_rows = bool(parsed.notes)
+            if unit is not None and has_dropped_rows:
+                continue  # this unit is too fine: it made several stamps equal
+            return _matched(parsed, t_ns)
         except TrajectoryError as error:
             errors.append(" ".join(str(error).split()))
     raise EstimatorFailure("invalid_output", errors[0])
@@ -180,14 +182,19 @@ def _matched(parsed: ParsedTrajectory, t_ns: Stamps) -> dict[int, Array]:
         raise TrajectoryError(f"{{out}} has a pose farther than {FARTHEST_M:g} m away")
 
     frames = _nearest(t_ns, stamps)
-    half_step_ns = np.diff(t_ns).min() / 2 if len(t_ns) > 1 else np.inf
-    is_off = np.abs(t_ns[frames] - stamps) > half_step_ns
-    is_repeated = np.diff(frames, prepend=-1) < 1
-    for is_wrong, cause in ((is_off, "no frame"), (is_repeated, "the same frame as the one before")):
-        if is_wrong.any():
-            row = int(np.argmax(is_wrong))
-            raise TrajectoryError(f"{{out}}: pose {row}, stamped {stamps[row] / 1e9:.9f} s, is of {cause}")
+    largest_offset_ns = np.diff(t_ns).min() / 2 if len(t_ns) > 1 else np.inf
+    offsets_ns = np.abs(t_ns[frames] - stamps)
+    _refuse_any(offsets_ns > largest_offset_ns, stamps, "no frame")
+    frames_since_last_pose = np.diff(frames, prepend=-1)
+    _refuse_any(frames_since_last_pose < 1, stamps, "the same frame as the one before")
     return dict(zip(t_ns[frames].tolist(), parsed.T, strict=True))
+
+
+def _refuse_any(is_wrong: NDArray[np.bool_], stamps: Stamps, cause: str) -> None:
+    """Raise TrajectoryError about the first pose that is wrong (M,), if any is."""
+    if is_wrong.any():
+        row = int(np.argmax(is_wrong))
+        raise TrajectoryError(f"{{out}}: pose {row}, stamped {stamps[row] / 1e9:.9f} s, is of {cause}")
 
 
 def _nearest(t_ns: Stamps, stamps: Stamps) -> NDArray[np.intp]:
