@@ -53,7 +53,11 @@ def option_group(cls: type[Group]) -> type[Group]:
 
 
 def with_option_groups(command: Callable[..., None]) -> Callable[..., None]:
-    """The command with the options of its groups as parameters, so that Typer finds them."""
+    """Let a command take option groups, although Typer knows only single options.
+
+    Returns a function whose signature lists each option of the command's groups as a parameter of its own, for Typer to
+    read. When called, it builds the groups from the values of these options and calls the command with them.
+    """
     hints = get_type_hints(command, include_extras=True)
     group_classes = dict[str, type]()
     parameters = list[inspect.Parameter]()
