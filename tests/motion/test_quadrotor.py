@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vobench.errors import MotionError, SettingError
-from vobench.motion.quadrotor import HELD_MPS2, Quadrotor, minimum_snap, snap_cost
+from vobench.motion.quadrotor import HOVER_THRUST_MPS2, Quadrotor, minimum_snap, snap_cost
 
 POINTS = np.array([[0, 0, 0], [0, 0, 1], [2, 0, 1.5], [3, 2, 1], [1, 3, 2], [0, 2, 1.0]])
 TIMES_S = np.array([0, 2, 4, 6, 8, 11.0])
@@ -22,14 +22,14 @@ def test_it_passes_its_points_at_their_times():
 @pytest.mark.parametrize("yaw_deg", [None, 40.0])
 def test_its_z_axis_is_the_direction_of_its_thrust(yaw_deg):
     k = sampled(Quadrotor(points_m=POINTS.tolist(), yaw_deg=yaw_deg, speed_mps=1.5).motion())
-    thrust = np.einsum("kij,kj->ki", k.T_world_body[:, :3, :3], k.acceleration_mps2) + HELD_MPS2
+    thrust = np.einsum("kij,kj->ki", k.T_world_body[:, :3, :3], k.acceleration_mps2) + HOVER_THRUST_MPS2
     z = k.T_world_body[:, :3, 2]
     np.testing.assert_allclose(z, thrust / np.linalg.norm(thrust, axis=1, keepdims=True), atol=1e-12)
 
 
 def test_an_accelerometer_on_it_feels_thrust_along_z_alone():
     k = sampled(Quadrotor(points_m=POINTS.tolist(), speed_mps=1).motion())
-    felt = k.acceleration_mps2 + np.einsum("kji,j->ki", k.T_world_body[:, :3, :3], HELD_MPS2)
+    felt = k.acceleration_mps2 + np.einsum("kji,j->ki", k.T_world_body[:, :3, :3], HOVER_THRUST_MPS2)
     np.testing.assert_allclose(felt[:, :2], 0, atol=1e-10)
     assert felt[:, 2].min() > 0
 

@@ -23,10 +23,10 @@ from vobench.setting import MOST_POINTS, Triple, settings
 from vobench.trajectory.kinematics import STANDARD_GRAVITY_MPS2, CurveMotion, Kinematics, evenly
 from vobench.trajectory.trajectory import step_lengths_m
 
-HELD_MPS2 = np.array([0.0, 0.0, STANDARD_GRAVITY_MPS2])  # added to the acceleration by the rotors
+HOVER_THRUST_MPS2 = np.array([0.0, 0.0, STANDARD_GRAVITY_MPS2])  # per mass: it balances the weight
 LEAST_LIFT = 0.1  # of the weight: below it the rotors nearly stop, and the direction of thrust is undefined
 CHECKS_PER_LEG = 64
-SLOW = 1e-3  # of the largest ground speed: below it there is no heading
+LEAST_SPEED_SHARE = 1e-3  # of the largest ground speed: below it there is no heading
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact for the square of a cubic
 
 
@@ -44,7 +44,7 @@ class QuadrotorCurve:
         acceleration = self.position(s, 2)
         jerk = self.position(s, 3)
         snap = self.position(s, 4)
-        thrust = Jet(acceleration + HELD_MPS2, jerk, snap)
+        thrust = Jet(acceleration + HOVER_THRUST_MPS2, jerk, snap)
         z = thrust.direction()
         y = z.cross(self._ahead(s)).direction()
         x = y.cross(z)
@@ -102,8 +102,8 @@ class Quadrotor:
         yaw_rad = scipy.interpolate.make_interp_spline(t_s, yaw, k=5, bc_type=(rest, rest))
         curve = QuadrotorCurve(position, yaw_rad, t_s[1:-1])
         _check_lift(curve, t_s)
-        law = evenly(t_s[0], t_s[-1], begin=t_s[0])
-        return CurveMotion(curve, law)
+        curve_time = evenly(t_s[0], t_s[-1], begin=t_s[0])  # the curve's parameter is the time itself
+        return CurveMotion(curve, curve_time)
 
     def _times(self, points_m: Array) -> Array:
         """Times (N,) in s since the first point."""
@@ -160,7 +160,7 @@ def _headings(position: "scipy.interpolate.BSpline", t_s: Array, points_m: Array
     velocities[-1] = points_m[-1] - points_m[-2]
     ground_speed = np.hypot(velocities[:, 0], velocities[:, 1])
     fastest = max(ground_speed.max(), np.finfo(float).tiny)
-    has_heading = ground_speed > SLOW * fastest
+    has_heading = ground_speed > LEAST_SPEED_SHARE * fastest
     if not has_heading.any():
         return np.zeros(len(t_s))
 
