@@ -13,7 +13,15 @@ from vobench.geometry.se3 import Array
 from vobench.motion.controller import CONTROLLERS, references
 from vobench.motion.drive import Drive, drive
 from vobench.motion.pioneer import THETAS, AccelerationLimits, Theta, accelerations, over_period, velocities
-from vobench.motion.slip import DELTAS, DISTURBANCE_STREAMS, SLIP_STREAMS, SLIPS, FloorPatch, SlipSettings, drawn
+from vobench.motion.slip import (
+    DELTAS,
+    DISTURBANCE_STREAMS,
+    SLIP_STREAMS,
+    SLIPS,
+    FloorPatch,
+    SlipSettings,
+    random_disturbances,
+)
 from vobench.trajectory.kinematics import level
 
 PATHS = {"figure_10": ((1, 1), (0, 1), (1, 0), (2, 2)), "figure_12": ((0, 1), (1, 1), (2, 2))}
@@ -387,7 +395,7 @@ def test_the_disturbance_of_each_frame_is_the_one_drawn_for_it() -> None:
     slip = SLIPS["slippery"]
     delta = DELTAS["bumpy"]
     run = drive([(0.5, 0.0)], slip=slip, delta=delta, rngs=generators())
-    rows = drawn(len(run.slip), slip, delta, (), step_s=1 / 30, rngs=generators()).rows
+    rows = random_disturbances(len(run.slip), slip, delta, (), step_s=1 / 30, rngs=generators()).rows
 
     np.testing.assert_array_equal(run.slip, rows[:, :3])
     np.testing.assert_array_equal(run.delta, rows[:, 3:])

@@ -27,18 +27,18 @@ from vobench.motion.slip import (
     Generators,
     GroundSlip,
     SlipSettings,
-    drawn,
     ground_effect,
     ornstein_uhlenbeck,
+    random_disturbances,
 )
 
 
 def slip_path(count: int, slip: SlipSettings, *, step_s: float, rngs: Generators | None) -> Array:
-    return drawn(count, slip, DELTAS["none"], (), step_s=step_s, rngs=rngs).rows[:, :3]
+    return random_disturbances(count, slip, DELTAS["none"], (), step_s=step_s, rngs=rngs).rows[:, :3]
 
 
 def delta_path(count: int, delta: DeltaSettings, *, step_s: float, rngs: Generators | None) -> Array:
-    return drawn(count, SLIPS["none"], delta, (), step_s=step_s, rngs=rngs).rows[:, 3:]
+    return random_disturbances(count, SLIPS["none"], delta, (), step_s=step_s, rngs=rngs).rows[:, 3:]
 
 
 BUMPY = DELTAS["bumpy"]
@@ -197,15 +197,15 @@ def driven(*patches: FloorPatch) -> Drive:
 
 def test_a_patch_holds_the_points_inside_its_turned_rectangle() -> None:
     patch = patch_of("wet", (1.0, 2.0), (2.0, 0.2), 90)
-    assert [patch.holds(1.05, y) for y in (1.01, 2.99, 3.01)] == [True, True, False]
-    assert not patch.holds(1.11, 2.0)
+    assert [patch.contains(1.05, y) for y in (1.01, 2.99, 3.01)] == [True, True, False]
+    assert not patch.contains(1.11, 2.0)
 
 
 def test_a_patch_turns_with_its_yaw_about_its_center() -> None:
     flat, turned = (patch_of("wet", (1.0, 2.0), (2.0, 0.5), yaw_deg) for yaw_deg in (0, 40))
     R = se3.rotation_z(np.deg2rad(40))[:2, :2]
     for offset in np.random.default_rng(0).uniform(-1.5, 1.5, (200, 2)):
-        assert turned.holds(*np.add(R @ offset, [1, 2]).tolist()) == flat.holds(*np.add(offset, [1, 2]).tolist())
+        assert turned.contains(*np.add(R @ offset, [1, 2]).tolist()) == flat.contains(*np.add(offset, [1, 2]).tolist())
 
 
 def test_where_patches_overlap_factors_multiply_and_biases_add() -> None:

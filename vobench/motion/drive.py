@@ -24,8 +24,8 @@ from vobench.motion.slip import (
     FloorPatch,
     Generators,
     SlipSettings,
-    drawn,
     generator_of,
+    random_disturbances,
 )
 from vobench.motion.wheeled import PIONEER_KEYS, Mover, Wheeled
 from vobench.setting import MOST_POINTS, Positive
@@ -353,7 +353,7 @@ def _ready(
     vehicle = Vehicle(theta, controller, wheels, rate_hz, substeps, integrator, limits)
 
     def disturbances(frames: int) -> Disturbances:
-        return drawn(frames, slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
+        return random_disturbances(frames, slip, delta, floor, step_s=1 / rate_hz, rngs=rngs)
 
     return vehicle, disturbances
 

@@ -1,4 +1,11 @@
-"""Wheel slip, patches of floor, and the disturbances delta of (18)."""
+"""Disturbances of a drive: wheel slip, patches of floor that change it, and the disturbances of the dynamic model.
+
+Source of the dynamic model: Bastos, Lima and Kurka, Virtual 3D environments for image-based navigation algorithms. Its
+equation (18) gives the accelerations of a Pioneer and ends in the additive disturbances delta_u and delta_omega.
+
+Terms: a wheel's slip ratio is 1 - ground speed / rim speed; the side-slip angle is that of the velocity to the left of
+the heading.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -23,8 +30,9 @@ Generators = Mapping[str, np.random.Generator]
 class SlipSettings:
     """Three independent, stationary, zero-mean Ornstein-Uhlenbeck processes, and two deterministic terms.
 
-    `ratio_std` is the standard deviation of both wheels' sigma, `angle_std_rad` that of beta,
-    `correlation_s` their correlation time; `skid_s` is c and `traction_s2pm` kappa.
+    Random are the slip ratio of each wheel, with standard deviation `ratio_std`, and the side-slip angle, with
+    `angle_std_rad`; `correlation_s` is their correlation time. Deterministic are `skid_s`, the sideways speed to the
+    outside of a bend per product of speed and turn rate, and `traction_s2pm`, the slip ratio per acceleration.
     Engineering choices: no published values exist.
     """
 
@@ -49,7 +57,11 @@ SLIPS = {
 
 
 class Disturbance(NamedTuple):
-    """The disturbance at one instant: both sigmas, beta (rad), c (s), kappa (s^2/m), and the delta of (18)."""
+    """The disturbance at one instant.
+
+    `left` and `right` are slip ratios, `beta` is the side-slip angle (rad), `skid_s` and `traction_s2pm` are as in
+    SlipSettings, `delta_u` (m/s^2) and `delta_omega` (rad/s^2) are as in DeltaSettings.
+    """
 
     left: float = 0.0
     right: float = 0.0
@@ -160,8 +172,8 @@ class FloorPatch:
         corners: Array = offsets_m + self.center_m
         return corners
 
-    def holds(self, x_m: float, y_m: float) -> bool:
-        """Whether a point of the floor is on it."""
+    def contains(self, x_m: float, y_m: float) -> bool:
+        """Whether a point of the floor is on the patch."""
         x = x_m - self.center_m[0]
         y = y_m - self.center_m[1]
         c = cos(radians(self.yaw_deg))
@@ -177,7 +189,7 @@ def ground_effect(patches: Sequence[FloorPatch], x_m: float, y_m: float) -> tupl
     ratio_bias = 0.0
     angle_bias_rad = 0.0
     for patch in patches:
-        if patch.holds(x_m, y_m):
+        if patch.contains(x_m, y_m):
             ground = SURFACES[patch.surface]
             factor *= ground.factor
             ratio_bias += ground.ratio_bias
@@ -185,7 +197,7 @@ def ground_effect(patches: Sequence[FloorPatch], x_m: float, y_m: float) -> tupl
     return factor, ratio_bias, angle_bias_rad
 
 
-# The random streams of a drive: slip's three, delta's two, and the one that perturbs theta.
+# The random streams of a drive: three of slip, two of delta, and the one that perturbs theta.
 DELTA_STREAMS = ("delta_u", "delta_omega")
 DISTURBANCE_STREAMS = (*SLIP_STREAMS, *DELTA_STREAMS, "theta")
 
@@ -195,7 +207,7 @@ MAX_SLIP = 0.5
 
 @settings(kw_only=False)
 class DeltaSettings:
-    """The disturbances delta_u (m/s^2) and delta_omega (rad/s^2) of (18) as Ornstein-Uhlenbeck processes.
+    """The disturbances delta_u (m/s^2) and delta_omega (rad/s^2) of equation (18) as Ornstein-Uhlenbeck processes.
 
     They have standard deviations, and a common correlation time.
     """
@@ -215,10 +227,10 @@ DELTAS = {
 
 @dataclass(frozen=True, slots=True)
 class Disturbances:
-    """The disturbances of a drive at its frames: rows (N, 5) of both sigmas, beta (rad) and both deltas as drawn.
+    """The disturbances of a drive at its frames: rows (N, 5) of left, right, beta and both deltas.
 
-    The floor under the wheels changes the first three. Between frames all change linearly, so that no velocity
-    jumps; at the edge of a patch they take one frame to change.
+    Rows are those on a plain floor; a patch under the wheels changes the first three columns. Between frames all change
+    linearly, so that no velocity jumps; at the edge of a patch they take one frame to change.
     """
 
     rows: Array
@@ -248,7 +260,7 @@ class Disturbances:
         )
 
 
-def drawn(
+def random_disturbances(
     count: int,
     slip: SlipSettings,
     delta: DeltaSettings,
