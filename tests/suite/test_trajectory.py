@@ -153,8 +153,8 @@ def test_a_patch_ends_at_its_corners(trajectory):
         "{targets_m: [[1, 0]], floor: [{surface: wet, center_m: [1, 2], size_m: [0.4, 0.2], yaw_deg: 30}]}"
     ).floor[0]
     corners = patch.corners_m - patch.center_m
-    assert [patch.holds(*(0.999 * corner + patch.center_m)) for corner in corners] == [True] * 4
-    assert [patch.holds(*(1.001 * corner + patch.center_m)) for corner in corners] == [False] * 4
+    assert [patch.contains(*(0.999 * corner + patch.center_m)) for corner in corners] == [True] * 4
+    assert [patch.contains(*(1.001 * corner + patch.center_m)) for corner in corners] == [False] * 4
 
 
 class TestReplay:
