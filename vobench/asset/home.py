@@ -6,19 +6,19 @@ import numpy as np
 
 from vobench.asset import floor_plan
 from vobench.asset.ceiling_lamp import add_ceiling_lamps
-from vobench.asset.daylight import Daylight, daylight
+from vobench.asset.daylight import Daylight
 from vobench.asset.floor_plan import SIDES, FloorPlan, Room, Side
 from vobench.asset.furniture import wood
 from vobench.asset.home_room import FURNISH
-from vobench.asset.interior import Interior, most_faces, without_excess
+from vobench.asset.interior import Interior, furnished_interior
 from vobench.asset.interior_shell import RoomFinish, shell
 from vobench.asset.palette import Style, home_style
 from vobench.asset.picture import Rng
 from vobench.asset.room_fitting import door_fittings, skirtings
-from vobench.asset.room_layout import RoomLayout
+from vobench.asset.room_layout import RoomLayout, room_layouts
 from vobench.asset.small_lamp import light_small_lamps
 from vobench.asset.window_dressing import dress_windows
-from vobench.asset.window_view import outward_deg
+from vobench.asset.window_view import view_outside
 
 PANORAMAS = ("city", "city", "suburb", "country")
 FLOOR_HEIGHTS_M = (1.2, 4.0, 7.0, 10.0, 16.0)  # of the flat above the ground
@@ -33,34 +33,15 @@ def furnished_flat(seed: int, lighting: str) -> Interior:
     rng = np.random.default_rng([seed, 1])
     style = home_style(rng)
     finishes = {room.name: _finish(rng, room, style) for room in plan.rooms}
-    outside = _outside(plan, np.random.default_rng([seed, 3]), lighting)
-    layouts = {
-        room.name: RoomLayout(plan, room, seed, np.random.default_rng([seed, 2, number]))
-        for number, room in enumerate(plan.rooms)
-    }
+    outside_rng = np.random.default_rng([seed, 3])
+    outside = view_outside(plan, outside_rng, lighting, floor_heights_m=FLOOR_HEIGHTS_M, kinds=PANORAMAS)
+    layouts = room_layouts(plan, seed, 2)
 
     door_fittings(plan, layouts, style.doors, panels=bool(rng.random() < 0.6))
     _furnish(plan, layouts, style, outside, np.random.default_rng([seed, 4]))
 
-    placed = [piece for layout in layouts.values() for piece in layout.placed]
-    lamps = [light for layout in layouts.values() for light in layout.lights]
-    return Interior(
-        plan,
-        tuple(shell(plan, finishes, thresholds=wood(style.tones))),
-        without_excess(placed, most_faces(plan), OPTIONAL),
-        (*lamps, *outside.lights),
-    )
-
-
-def _outside(plan: FloorPlan, rng: Rng, lighting: str) -> Daylight:
-    """The daylight and the view through the windows."""
-    return daylight(
-        rng,
-        lighting,
-        towards_deg=outward_deg(plan, rng),
-        height_m=float(rng.choice(FLOOR_HEIGHTS_M)),
-        kinds=PANORAMAS,
-    )
+    surfaces = shell(plan, finishes, thresholds=wood(style.tones))
+    return furnished_interior(plan, surfaces, layouts.values(), outside.lights, OPTIONAL)
 
 
 def _furnish(

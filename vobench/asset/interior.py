@@ -1,11 +1,12 @@
 """Interiors: a floor plan with its shell, its furniture and its lights."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from vobench.asset.floor_plan import FloorPlan
 from vobench.asset.placed_piece import PlacedPiece
 from vobench.asset.room import Instance, things
+from vobench.asset.room_layout import RoomLayout
 from vobench.scene.generated_place import GeneratedPlace
 from vobench.scene.light import Light
 
@@ -31,6 +32,24 @@ class Interior:
         spaced = [replace(thing, spacing_m=SHELL_SPACING_M) for thing in coarse]
         spaced += [replace(thing, spacing_m=PIECE_SPACING_M) for thing in fine]
         return GeneratedPlace(tuple(spaced), materials, self.lights)
+
+
+def furnished_interior(
+    plan: FloorPlan,
+    shell: Iterable[Instance],
+    layouts: Iterable[RoomLayout],
+    daylight: Sequence[Light],
+    optional: Sequence[str],
+) -> Interior:
+    """The interior of a plan whose rooms are furnished, with its lamps and the lights outside.
+
+    Pieces of the `optional` kinds are left out, in this order, if there are too many faces.
+    """
+    rooms = list(layouts)
+    placed = [piece for layout in rooms for piece in layout.placed]
+    lamps = [light for layout in rooms for light in layout.lights]
+    pieces = without_excess(placed, most_faces(plan), optional)
+    return Interior(plan, tuple(shell), pieces, (*lamps, *daylight))
 
 
 def most_faces(plan: FloorPlan) -> int:

@@ -6,7 +6,7 @@ Some have an alcove behind a wide opening, some have pillars, some have windows;
 import numpy as np
 
 from vobench.asset import fitting, furniture, picture
-from vobench.asset.daylight import Daylight, daylight, lamp_colour
+from vobench.asset.daylight import lamp_colour
 from vobench.asset.floor_plan import (
     DOOR_HIGH_M,
     SIDES,
@@ -31,23 +31,24 @@ from vobench.asset.furnishing import (
     add_sideboard,
 )
 from vobench.asset.furniture import Part, coated, matt, put, stood, wood
-from vobench.asset.interior import Interior, most_faces, without_excess
+from vobench.asset.interior import Interior, furnished_interior
 from vobench.asset.interior_shell import RoomFinish, shell
 from vobench.asset.palette import DEEP_PAINTS, PAINTS, WHITES, Style, office_style, plank_floor, plaster, tile_floor
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.placed_piece import CEILING, WALL
 from vobench.asset.room_fitting import door_fittings, skirtings
-from vobench.asset.room_layout import GAP_M, RoomLayout
+from vobench.asset.room_layout import GAP_M, RoomLayout, room_layouts
 from vobench.asset.shape import card
 from vobench.asset.small_lamp import add_floor_lamp
 from vobench.asset.tabletop import add_tabletop_items
 from vobench.asset.wall_decoration import add_sockets, framed_print
 from vobench.asset.window_dressing import dress_windows
-from vobench.asset.window_view import outward_deg
+from vobench.asset.window_view import view_outside
 from vobench.scene.material import Material
 from vobench.scene.mesh import quad
 
 PANORAMAS = ("city", "suburb", "country")
+FLOOR_HEIGHTS_M = (1.2, 4.0, 8.0)  # of the room above the ground
 OPTIONAL = ("socket", "mug", "plant", "picture", "carton", "noticeboard")
 LUX = 230.0  # of the lamps together, on the floor, about
 LEAST_FREE_SHARE = 0.42  # of the floor, which stays free of furniture
@@ -124,34 +125,20 @@ def generated_paper_room(seed: int, lighting: str) -> Interior:
     rng = np.random.default_rng([seed, 31])
     style = office_style(rng)
     finish = _finish(rng)
-    layouts = {
-        room.name: RoomLayout(plan, room, seed, np.random.default_rng([seed, 32, number]))
-        for number, room in enumerate(plan.rooms)
-    }
+    layouts = room_layouts(plan, seed, 32)
     door_fittings(plan, layouts, wood(one_of(rng, "walnut", "oak", "beech")), panels=bool(rng.random() < 0.4))
     lamp_rng = np.random.default_rng([seed, 33])
-    outside = _outside(plan, np.random.default_rng([seed, 34]), lighting)
+    outside_rng = np.random.default_rng([seed, 34])
+    outside = view_outside(plan, outside_rng, lighting, floor_heights_m=FLOOR_HEIGHTS_M, kinds=PANORAMAS)
     for layout in layouts.values():
         dress_windows(layout, style)
         _pillars(layout)
         _furnish(layout, style)
         _lamps(layout, lamp_rng)
         skirtings(layout)
-    placed = [piece for layout in layouts.values() for piece in layout.placed]
-    lamps = [light for layout in layouts.values() for light in layout.lights]
-    return Interior(
-        plan,
-        tuple(shell(plan, {room.name: finish for room in plan.rooms}, thresholds=wood(style.tones))),
-        without_excess(placed, most_faces(plan), OPTIONAL),
-        (*lamps, *outside.lights),
-    )
 
-
-def _outside(plan: FloorPlan, rng: Rng, lighting: str) -> Daylight:
-    """The daylight and the view through the windows."""
-    towards_deg = outward_deg(plan, rng) if plan.windows else float(rng.uniform(0, 360))
-    height_m = float(rng.choice([1.2, 4.0, 8.0]))
-    return daylight(rng, lighting, towards_deg=towards_deg, height_m=height_m, kinds=PANORAMAS)
+    surfaces = shell(plan, {room.name: finish for room in plan.rooms}, thresholds=wood(style.tones))
+    return furnished_interior(plan, surfaces, layouts.values(), outside.lights, OPTIONAL)
 
 
 # --- Surfaces ---

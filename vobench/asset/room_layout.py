@@ -362,3 +362,14 @@ class RoomLayout:
             self.lights.append(AreaLight(name, mesh, power_lm, colour=colour))
         else:
             self.placed.append(PlacedPiece(name, self.room.name, (Part(mesh, WHITE),), SHELL))
+
+
+def room_layouts(plan: FloorPlan, seed: int, stream: int) -> dict[str, RoomLayout]:
+    """An empty layout for each room of a plan, by the room's name.
+
+    The choices of each room have a random generator of their own; `stream` tells those of different places apart.
+    """
+    return {
+        room.name: RoomLayout(plan, room, seed, np.random.default_rng([seed, stream, number]))
+        for number, room in enumerate(plan.rooms)
+    }

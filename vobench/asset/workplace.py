@@ -5,19 +5,19 @@ from collections.abc import Mapping
 import numpy as np
 
 from vobench.asset import floor_plan
-from vobench.asset.daylight import Daylight, daylight
+from vobench.asset.daylight import Daylight
 from vobench.asset.floor_plan import SIDES, FloorPlan, Room, Side
 from vobench.asset.furniture import STEEL, coated, wood
-from vobench.asset.interior import Interior, most_faces, without_excess
+from vobench.asset.interior import Interior, furnished_interior
 from vobench.asset.interior_shell import RoomFinish, shell
 from vobench.asset.office_lamp import add_office_lamps
 from vobench.asset.office_room import FURNISH
 from vobench.asset.palette import Style, office_style
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.room_fitting import door_fittings, skirtings
-from vobench.asset.room_layout import RoomLayout
+from vobench.asset.room_layout import room_layouts
 from vobench.asset.window_dressing import dress_windows
-from vobench.asset.window_view import outward_deg
+from vobench.asset.window_view import view_outside
 from vobench.scene.material import Material
 
 PANORAMAS = ("city", "city", "city", "suburb")
@@ -39,11 +39,9 @@ def furnished_office(seed: int, lighting: str) -> Interior:
     rng = np.random.default_rng([seed, 11])
     style = office_style(rng)
     finishes = {room.name: _finish(rng, room, style) for room in plan.rooms}
-    layouts = {
-        room.name: RoomLayout(plan, room, seed, np.random.default_rng([seed, 12, number]))
-        for number, room in enumerate(plan.rooms)
-    }
-    outside = _outside(plan, np.random.default_rng([seed, 13]), lighting)
+    layouts = room_layouts(plan, seed, 12)
+    outside_rng = np.random.default_rng([seed, 13])
+    outside = view_outside(plan, outside_rng, lighting, floor_heights_m=FLOOR_HEIGHTS_M, kinds=PANORAMAS)
     desk_top = _desk_top(rng, style)
     lamp_kind = one_of(rng, "bars", "squares", "hanging")
 
@@ -55,25 +53,8 @@ def furnished_office(seed: int, lighting: str) -> Interior:
         add_office_lamps(layout, style, lamp_kind, is_on=lit_rooms[name])
         skirtings(layout, height_m=SKIRTING_M)
 
-    placed = [piece for layout in layouts.values() for piece in layout.placed]
-    lamps = [light for layout in layouts.values() for light in layout.lights]
-    return Interior(
-        plan,
-        tuple(shell(plan, finishes, thresholds=STEEL)),
-        without_excess(placed, most_faces(plan), OPTIONAL),
-        (*lamps, *outside.lights),
-    )
-
-
-def _outside(plan: FloorPlan, rng: Rng, lighting: str) -> Daylight:
-    """The daylight and the view through the windows."""
-    return daylight(
-        rng,
-        lighting,
-        towards_deg=outward_deg(plan, rng),
-        height_m=float(rng.choice(FLOOR_HEIGHTS_M)),
-        kinds=PANORAMAS,
-    )
+    surfaces = shell(plan, finishes, thresholds=STEEL)
+    return furnished_interior(plan, surfaces, layouts.values(), outside.lights, OPTIONAL)
 
 
 def _desk_top(rng: Rng, style: Style) -> Material:
