@@ -16,7 +16,7 @@ import numpy as np
 
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
-from vobench.rendering import mitsuba as llvm
+from vobench.rendering.mitsuba import wanted_variant
 from vobench.rendering.mitsuba_description import load
 from vobench.rendering.path import PathRenderer
 from vobench.rendering.renderer import single_instant
@@ -78,7 +78,7 @@ def compare(scene: Scene, samples: int, pictures: int) -> None:
         return renderer.radiance(LENS, single_instant(LENS, T_world_camera, t_ns=index))
 
     rows = [("Mitsuba itself", *seconds(direct, pictures)), ("vobench", *seconds(ours, pictures))]
-    print(f"{platform.machine()}, {scene.name}, {samples} paths a pixel, depth {MAX_DEPTH}, {llvm.VARIANT}")
+    print(f"{platform.machine()}, {scene.name}, {samples} paths a pixel, depth {MAX_DEPTH}, {wanted_variant()}")
     for name, wall_s, cpu_s in rows:
         print(f"{name:16s} wall {wall_s:6.2f} s   CPU {cpu_s:6.2f} s")
     print(f"ratio            wall {rows[1][1] / rows[0][1]:6.2f}     CPU {rows[1][2] / rows[0][2]:6.2f}")
