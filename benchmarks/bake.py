@@ -25,7 +25,8 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.rendering import bake as bake_module
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.illumination import Illumination
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import single_instant

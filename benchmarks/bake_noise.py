@@ -19,7 +19,8 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant

@@ -24,7 +24,9 @@ from render import QUICK
 
 from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.rendering.bake import BakedScene, bake, load_baked, save_baked
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_file import load_baked, save_baked
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.batch import depends_on_view
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer

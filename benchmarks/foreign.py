@@ -22,7 +22,8 @@ from vobench.analysis.scene_sheet import sheet
 from vobench.errors import VobenchError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.triangle import areas_m2
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import single_instant

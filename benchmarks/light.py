@@ -29,7 +29,9 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
-from vobench.rendering.bake import BakedScene, BakeSettings, bake, load_baked, save_baked
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_file import load_baked, save_baked
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.path import PathRenderer
 from vobench.rendering.raster import RasterRenderer

@@ -27,6 +27,7 @@ from vobench.errors import InputError
 from vobench.geometry import rig
 from vobench.geometry.camera import Pinhole
 from vobench.rendering import bake
+from vobench.rendering.baked_scene import BakeSettings
 from vobench.runner.executor import Serial
 from vobench.runner.finished_trial import read_finished_trial, read_simulated_case
 from vobench.runner.folder import RunFolder
@@ -86,7 +87,7 @@ def small_lens() -> None:
 def coarse_light() -> None:
     """Light that is computed in half a second: no two cases here differ by how finely it is."""
     whole = bake.bake
-    bake.bake = lambda scene, _, tell: whole(scene, bake.BakeSettings(0.1, 4, 0.3, 64, 4), tell)
+    bake.bake = lambda scene, _, tell: whole(scene, BakeSettings(0.1, 4, 0.3, 64, 4), tell)
 
 
 def changed(tree: Any, changes: Mapping[str, Any]) -> Any:

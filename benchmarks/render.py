@@ -22,7 +22,8 @@ from vobench.geometry import se3
 from vobench.geometry.camera import KannalaBrandt
 from vobench.geometry.rig import LENSES, Rig, stereo_rig
 from vobench.geometry.se3 import Array
-from vobench.rendering.bake import BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakeSettings
 from vobench.rendering.pyrender_engine import PyrenderRenderer
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Renderer, View, single_instant

@@ -18,7 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from vobench.geometry.camera import Pinhole
-from vobench.rendering.bake import BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakeSettings
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import single_instant

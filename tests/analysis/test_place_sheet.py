@@ -18,7 +18,7 @@ from vobench.analysis.place_sheet import (
 from vobench.analysis.scene_survey import scene_survey
 from vobench.asset.shape import at, block
 from vobench.errors import SuiteError, UnknownNameError
-from vobench.rendering.bake import BakeSettings
+from vobench.rendering.baked_scene import BakeSettings
 from vobench.scene.mesh import flipped, moved
 from vobench.scene.scene import triangles
 from vobench.scene.triangles import Thing

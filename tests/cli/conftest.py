@@ -17,7 +17,7 @@ import pytest
 from vobench import cli, stop
 from vobench.cli import main
 from vobench.rendering import bake, raster
-from vobench.rendering.bake import BakeSettings
+from vobench.rendering.baked_scene import BakeSettings
 
 SUITE = """name: tiny
 scenes: [closet]

@@ -18,6 +18,7 @@ from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.baked_scene import BakedScene, Patches
+from vobench.rendering.context import create_context
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.rendering.sun_tiles import FaceParts
@@ -27,6 +28,14 @@ from vobench.scene.scene import Scene, triangles
 
 EvenLight = Callable[..., BakedScene]
 Draw = Callable[[BakedScene], RasterRenderer]
+
+
+@pytest.fixture(scope="module")
+def gl_context() -> Iterator[None]:
+    """An OpenGL context that is current during the tests of a file."""
+    context = create_context()
+    yield
+    context.release()
 
 
 def light_evenly(scene: Scene, *, illuminance_lx: float = 100.0, level: Level = STEADY) -> BakedScene:

@@ -6,7 +6,8 @@ import pytest
 from tests.rendering.receivers import receivers, summed
 from tests.rendering.rectangles import rectangle, room
 from vobench.rendering.area_emitter import MeshPanel, Panel, panel_emitter
-from vobench.rendering.bake import BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakeSettings
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import AreaLight
 from vobench.scene.material import Material

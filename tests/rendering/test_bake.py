@@ -12,11 +12,8 @@ from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
-from vobench.rendering.bake import (
-    BakedScene,
-    BakeSettings,
-    bake,
-)
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.cosine_sampling import cosine_weighted
 from vobench.rendering.embree import Hits
 from vobench.rendering.geometry import offset_from_surface

@@ -83,7 +83,7 @@ def test_missing_libraries_are_named_with_the_line_that_installs_them(monkeypatc
     monkeypatch.delattr("OpenGL.GL")
     sentence = refusal()
     assert "missing libEGL, libGL, libOpenGL" in sentence
-    assert sentence.endswith(context.EGL_REMEDY)
+    assert sentence.endswith(gl_library.EGL_REMEDY)
 
 
 def test_a_pyopengl_that_is_too_old_is_named_with_the_command_that_renews_it(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -136,4 +136,4 @@ def test_a_display_that_fails_is_one_line_too(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(context, "display_of", fail)
     sentence = refusal()
     assert "reports AssertionError: eglInitialize returned 0" in sentence
-    assert sentence.endswith(context.EGL_REMEDY)
+    assert sentence.endswith(gl_library.EGL_REMEDY)

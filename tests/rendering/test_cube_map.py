@@ -1,7 +1,5 @@
 """The levels of a prefiltered cube map show the surroundings, more blurred with each level."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ pytest.importorskip("OpenGL.GL")
 
 from OpenGL import GL
 
-from vobench.rendering.context import create_context
 from vobench.rendering.cube_map import CAPABILITIES, PrefilteredCubeMap
 from vobench.rendering.probe import FACES
 
@@ -18,12 +15,9 @@ ROUGHNESS = (0.0, 0.1, 0.4)
 
 
 @pytest.fixture(autouse=True, scope="module")
-def context() -> Iterator[None]:
-    context = create_context()
+def capabilities(gl_context: None) -> None:
     for capability in CAPABILITIES:
         GL.glEnable(capability)
-    yield
-    context.release()
 
 
 def faces_of(cube: PrefilteredCubeMap, level: int) -> np.ndarray:

@@ -10,7 +10,8 @@ from tests.rendering.parts import light_at
 from tests.rendering.rectangles import Rectangle, rectangle
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
-from vobench.rendering.bake import BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakeSettings
 from vobench.scene.light import SUN_RADIUS_RAD, Light, Sky, Sun
 from vobench.scene.material import Material, pane_reflectance
 from vobench.scene.mesh import quad, two_sided

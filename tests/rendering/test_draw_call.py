@@ -1,6 +1,5 @@
 """Draw calls show what their batches, skies and samples are, at the luminance that light and material give them."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,6 @@ from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.background import StandardSky, even_sky
 from vobench.rendering.batch import Geometry, geometry
-from vobench.rendering.context import create_context
 from vobench.rendering.draw_call import DrawCalls
 from vobench.rendering.gl_texture import LightTexture
 from vobench.rendering.render_target import RenderTarget, render_target
@@ -23,6 +21,8 @@ from vobench.rendering.view import PinholeView, pinhole_view
 from vobench.scene.material import LUMINANCE, Material, Rgb
 from vobench.scene.mesh import quad
 from vobench.scene.triangles import Thing, triangle_table
+
+pytestmark = pytest.mark.usefixtures("gl_context")
 
 CAMERA = Pinhole(8, 6, 8.0, 8.0, 3.5, 2.5)
 AHEAD = looking(pitch_deg=0, position_m=(0, 0, 0))
@@ -80,13 +80,6 @@ def stage(*things: Thing, weights: Rgb | None = LUMINANCE, in_colour: bool = Fal
     light = LightTexture(np.full((1, 1), ILLUMINANCE_LX, np.float32))
     target = render_target(CAMERA.width_px, CAMERA.height_px, ROTATED_GRID, weights, in_colour=in_colour)
     return Stage(scene, DrawCalls(scene, light.id, {}), target, light)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def context() -> Iterator[None]:
-    context = create_context()
-    yield
-    context.release()
 
 
 def test_a_surface_has_the_luminance_of_lambert() -> None:

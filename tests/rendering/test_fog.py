@@ -10,7 +10,7 @@ from vobench.geometry.camera import KannalaBrandt, Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.background import Background
-from vobench.rendering.bake import BakedScene
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.illumination import AmbientLight
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.rendering.sample_pattern import ROTATED_GRID

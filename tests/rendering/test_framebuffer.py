@@ -10,7 +10,6 @@ pytest.importorskip("OpenGL.GL")
 from OpenGL import GL
 
 from vobench.errors import RenderError
-from vobench.rendering.context import create_context
 from vobench.rendering.framebuffer import framebuffer, layered_framebuffer
 from vobench.rendering.gl_state import set_initial_state
 from vobench.rendering.sample_pattern import PIXEL_CENTRE, ROTATED_GRID
@@ -21,11 +20,8 @@ TOP_LEFT = (0, 2, 0, 1)  # columns 0 to 1 of row 0
 
 
 @pytest.fixture(autouse=True, scope="module")
-def context() -> Iterator[None]:
-    context = create_context()
+def initial_state(gl_context: None) -> None:
     set_initial_state()
-    yield
-    context.release()
 
 
 @pytest.fixture(autouse=True)

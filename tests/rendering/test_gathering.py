@@ -8,7 +8,8 @@ from scipy.sparse import csr_matrix
 
 from tests.rendering.rectangles import rectangle, room
 from vobench.geometry.se3 import Array
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.gathering import Smoothing
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import Sun

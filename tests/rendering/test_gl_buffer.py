@@ -1,7 +1,5 @@
 """Vertex arrays draw the triangles that they are asked for, and uniform buffers give shaders one of their values."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,6 @@ pytest.importorskip("OpenGL.GL")
 from OpenGL import GL
 from OpenGL.GL import shaders
 
-from vobench.rendering.context import create_context
 from vobench.rendering.framebuffer import Framebuffer, framebuffer
 from vobench.rendering.gl_buffer import UniformBuffer, VertexArray
 
@@ -43,14 +40,11 @@ OFFSETS = np.array([10.0, 20.0], np.float32).view([("offset", np.float32)])
 
 
 @pytest.fixture(autouse=True, scope="module")
-def context() -> Iterator[None]:
-    context = create_context()
+def program(gl_context: None) -> None:
     GL.glBindVertexArray(GL.glGenVertexArrays(1))
     vertex = shaders.compileShader(VERTEX_SHADER, GL.GL_VERTEX_SHADER)
     fragment = shaders.compileShader(FRAGMENT_SHADER, GL.GL_FRAGMENT_SHADER)
     GL.glUseProgram(shaders.compileProgram(vertex, fragment))
-    yield
-    context.release()
 
 
 @pytest.fixture

@@ -7,15 +7,9 @@ pytest.importorskip("OpenGL.GL")
 from OpenGL import GL
 
 from vobench.rendering import gl_feature
-from vobench.rendering.context import create_context
 from vobench.rendering.gl_feature import missing_features
 
-
-@pytest.fixture(autouse=True, scope="module")
-def context():
-    context = create_context()
-    yield
-    context.release()
+pytestmark = pytest.mark.usefixtures("gl_context")
 
 
 def test_the_driver_of_this_machine_lacks_nothing() -> None:

@@ -1,6 +1,6 @@
 """Every change of OpenGL's state is undone, also after an error."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 
 import pytest
@@ -9,7 +9,6 @@ pytest.importorskip("OpenGL.GL")
 
 from OpenGL import GL
 
-from vobench.rendering.context import create_context
 from vobench.rendering.gl_state import blending, disabled, set_initial_state, strictly_nearer, without_depth_writes
 
 CAPABILITIES = (GL.GL_BLEND, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE, GL.GL_SCISSOR_TEST)
@@ -23,11 +22,8 @@ CHANGES: dict[str, Callable[[], AbstractContextManager[None]]] = {
 
 
 @pytest.fixture(autouse=True, scope="module")
-def context() -> Iterator[None]:
-    context = create_context()
+def initial_state(gl_context: None) -> None:
     set_initial_state()
-    yield
-    context.release()
 
 
 def state() -> dict[str, object]:

@@ -1,7 +1,5 @@
 """Textures have the values, the channels and the size that they were given."""
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -9,19 +7,13 @@ pytest.importorskip("OpenGL.GL")
 
 from OpenGL import GL
 
-from vobench.rendering.context import create_context
-from vobench.rendering.gl_texture import LightTexture, PanoramaTexture, SurfaceTexture
+from vobench.rendering.gl_texture import LightTexture, PanoramaTexture, SurfaceTexture, TiledLightTexture
 from vobench.scene.material import linear
 from vobench.scene.panorama import PanoramaMap
 
+pytestmark = pytest.mark.usefixtures("gl_context")
+
 COLOURS = np.arange(2 * 3 * 3, dtype=np.float32).reshape(2, 3, 3) / 8
-
-
-@pytest.fixture(autouse=True, scope="module")
-def context() -> Iterator[None]:
-    context = create_context()
-    yield
-    context.release()
 
 
 def texels(pixel_format: int = GL.GL_RGBA) -> np.ndarray:
@@ -52,6 +44,17 @@ def test_an_update_replaces_the_values_and_the_number_of_channels() -> None:
     texture = LightTexture(COLOURS[..., 0])
     texture.update(COLOURS)
     np.testing.assert_array_equal(texels(GL.GL_RGB), COLOURS)
+
+
+def test_only_the_given_parts_of_a_tiled_light_map_are_replaced() -> None:
+    texture = TiledLightTexture(3, 2)
+    whole = (slice(0, 2), slice(0, 3))
+    right = (slice(1, 2), slice(1, 3))
+    texture.replace(COLOURS, [whole])
+    texture.replace(COLOURS + 1, [right])
+    expected = COLOURS.copy()
+    expected[right] += 1
+    np.testing.assert_array_equal(texels(GL.GL_RGB), expected)
 
 
 def test_a_surface_is_stored_as_linear_values_and_opacity_as_it_is() -> None:

@@ -9,7 +9,8 @@ from tests.rendering.parts import light_at
 from vobench.asset.shape import block
 from vobench.asset.texture import Procedural
 from vobench.geometry import se3
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import NS_PER_S, Dimmer, Flicker, Light, PointLight, Sun, Switched
 from vobench.scene.material import Material

@@ -13,7 +13,8 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.triangle import areas_m2
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.mover_light import occluder
 from vobench.rendering.renderer import single_instant

@@ -13,7 +13,8 @@ from tests.rendering.test_illumination import BULB, CRATE, DIRECT, PANEL, PLACES
 from tests.rendering.test_mover_light import CAMERA
 from vobench.geometry import se3
 from vobench.geometry.rig import looking
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.context import create_context
 from vobench.rendering.illumination import Illumination
 from vobench.rendering.mover_shade import ShadedLight, Views

@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 
 from tests.rendering.rectangles import rectangle, sheet
-from vobench.rendering.bake import BakedScene, BakeSettings, bake, bodies
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.face_response import response
 from vobench.rendering.indirect_light import Gatherer
 from vobench.rendering.photons import ALL_PHOTONS_SHARE, LEAST_EFFORT, TYPICAL_COSINE, Reflectors
-from vobench.rendering.static_scene import static_points
+from vobench.rendering.static_scene import bodies, static_points
 from vobench.rendering.unwrap import unwrap
 from vobench.scene.light import PointLight, Sun
 from vobench.scene.material import Material, fresnel

@@ -1,24 +1,15 @@
 """A render target has the framebuffers that a picture needs, in grey or in colour."""
 
-from collections.abc import Iterator
-
 import pytest
 
 pytest.importorskip("OpenGL.GL")
 
-from vobench.rendering.context import create_context
 from vobench.rendering.render_target import MIRRORS, render_target
 from vobench.rendering.sample_pattern import HALVES, ROTATED_GRID
 from vobench.scene.material import LUMINANCE
 
+pytestmark = pytest.mark.usefixtures("gl_context")
 RED = (1.0, 0.0, 0.0)
-
-
-@pytest.fixture(autouse=True, scope="module")
-def context() -> Iterator[None]:
-    context = create_context()
-    yield
-    context.release()
 
 
 def test_there_is_a_framebuffer_for_the_picture_and_one_for_each_mirror_in_a_mirror() -> None:

@@ -11,7 +11,8 @@ from vobench.asset.texture import Procedural
 from vobench.errors import RenderError
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
-from vobench.rendering.bake import BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakeSettings
 from vobench.rendering.renderer import single_instant
 from vobench.rendering.seen_light import SeenLight, read_seen_light, seen_light
 from vobench.scene.light import PointLight, Sky, Steady

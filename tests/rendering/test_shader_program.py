@@ -13,8 +13,9 @@ from OpenGL import GL
 
 from vobench.errors import MissingDependencyError
 from vobench.rendering import shader_program
-from vobench.rendering.context import SOFTWARE_REMEDY, create_context
+from vobench.rendering.context import create_context
 from vobench.rendering.framebuffer import framebuffer
+from vobench.rendering.gl_library import SOFTWARE_REMEDY
 from vobench.rendering.shader_program import ShaderProgram, shader_source
 
 VERTEX_SHADER = """#version 410 core

@@ -7,7 +7,8 @@ import pytest
 
 from vobench.asset.shape import at, block
 from vobench.asset.texture import Procedural
-from vobench.rendering.bake import BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakeSettings
 from vobench.rendering.geometry import RayCaster, reversed_faces
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import PointLight

@@ -12,7 +12,8 @@ from vobench.analysis.scene_plan import CELL_HEIGHT_PX, CELL_WIDTH_PX, Rgb8, pla
 from vobench.analysis.scene_sheet import FONT_SCALE, VIEW_PITCH_DEG, VIEW_WHITE
 from vobench.analysis.scene_survey import EYE_HEIGHT_M, SceneSurvey, scene_survey
 from vobench.geometry.camera import Pinhole
-from vobench.rendering.bake import BakedScene, BakeSettings, bake
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Renderer, single_instant

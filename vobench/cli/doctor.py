@@ -19,7 +19,8 @@ from vobench.cli.progress import Bars
 from vobench.errors import MissingDependencyError
 from vobench.estimator.program import sandbox_here
 from vobench.rendering import mitsuba
-from vobench.rendering.context import DEVICE_VARIABLE, EGL_PACKAGES, EGL_REMEDY
+from vobench.rendering.egl_device import DEVICE_VARIABLE
+from vobench.rendering.gl_library import EGL_PACKAGES, EGL_REMEDY
 from vobench.runner.key import cache_folder
 from vobench.runner.store import why_unwritable
 

@@ -10,7 +10,6 @@ from vobench.rendering import freed_memory
 from vobench.rendering.albedo import albedo
 from vobench.rendering.array_types import Floats, Indices
 from vobench.rendering.atlas import Atlas
-from vobench.rendering.baked_file import load_baked, save_baked
 from vobench.rendering.baked_scene import INDIRECT_RAYS, BakedScene, BakeSettings, Patches, SunTrack
 from vobench.rendering.bounce import bounced
 from vobench.rendering.direct_light import direct_light
@@ -31,9 +30,6 @@ from vobench.scene.light import AreaLight, Sky
 from vobench.scene.material import LUMINANCE
 from vobench.scene.scene import Scene
 from vobench.scene.triangles import Triangles
-
-# The other rooms import what they need of a bake from here.
-__all__ = ["BakeSettings", "BakedScene", "bake", "bodies", "load_baked", "save_baked"]
 
 Report = Callable[[float], object]
 Instant = tuple[int, float]  # the index of a light, and a time in ns

@@ -10,25 +10,11 @@ from vobench.errors import MissingDependencyError
 from vobench.rendering.egl_device import DEVICE_VARIABLE, EglDevice, devices, display_of, ordered
 from vobench.rendering.gl_feature import missing_features
 from vobench.rendering.gl_library import (
-    EGL_PACKAGES,
-    EGL_REMEDY,
     SOFTWARE_REMEDY,
     cannot_draw,
     error_reason,
     require_pyopengl,
 )
-
-# The other rooms import what they tell users about drawing from here.
-__all__ = [
-    "DEVICE_VARIABLE",
-    "EGL_PACKAGES",
-    "EGL_REMEDY",
-    "Context",
-    "DriverFacts",
-    "create_context",
-    "devices",
-    "driver_facts",
-]
 
 
 @dataclass(frozen=True, slots=True)

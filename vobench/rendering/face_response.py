@@ -61,7 +61,7 @@ def response(
         scatters=np.array([_is_body(material) for material in materials_of_things])[thing],
         eta=np.array([_coat_eta(material) for material in materials_of_things], np.float32)[thing],
         tint=np.array(tints, np.float32)[thing],
-        metal=np.array([_metal(material) for material in materials_of_things], np.float32)[thing],
+        metal=np.array([metal_reflectance(material) for material in materials_of_things], np.float32)[thing],
         roughness=np.array(roughnesses, np.float32)[thing],
         lamp=np.append(faces.lamp, -1),
         shows_lamps=shows_lamps,
@@ -79,8 +79,8 @@ def _coat_eta(material: Material | None) -> float:
     return material.eta
 
 
-def _metal(material: Material | None) -> float:
-    """The share of light that a mirror, or the bare metal of a body, reflects."""
+def metal_reflectance(material: Material | None) -> float:
+    """The luminous reflectance of a mirror, or of the bare metal of a body; 0 for other materials."""
     if material is None:
         return 0.0
     if material.kind == "mirror":

@@ -1,5 +1,7 @@
 """OpenGL textures: the light map, the surfaces of materials, and panoramas."""
 
+import ctypes
+from collections.abc import Iterable
 from typing import Any
 
 import cv2
@@ -49,6 +51,29 @@ class LightTexture:
             _upload(GL.GL_RGBA32F, GL.GL_RGB, values, GL.GL_FLOAT)
         _set_swizzle(is_grey)
         _set_sampling(GL.GL_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
+
+
+class TiledLightTexture:
+    """A texture of linear float32 colours (height, width, 3) without mipmaps, of which parts can be replaced."""
+
+    def __init__(self, width: int, height: int) -> None:
+        self.id = GL.glGenTextures(1)
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
+        GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, GL.GL_RGBA32F, width, height, 0, GL.GL_RGB, GL.GL_FLOAT, None)
+        _set_sampling(GL.GL_LINEAR, GL.GL_LINEAR, GL.GL_CLAMP_TO_EDGE)
+
+    def replace(self, values: Float32s, parts: Iterable[tuple[slice, slice]]) -> None:
+        """Upload the given rows and columns of a map (height, width, 3), a contiguous array."""
+        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
+        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
+        GL.glPixelStorei(GL.GL_UNPACK_ROW_LENGTH, values.shape[1])
+        for rows, columns in parts:
+            part = values[rows, columns]
+            height, width = part.shape[:2]
+            first_value = ctypes.c_void_p(part.ctypes.data)
+            place = (columns.start, rows.start, width, height)
+            GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, *place, GL.GL_RGB, GL.GL_FLOAT, first_value)
+        GL.glPixelStorei(GL.GL_UNPACK_ROW_LENGTH, 0)
 
 
 class SurfaceTexture:

@@ -23,7 +23,7 @@ LEAST_NEARNESS = _float32(1e-6)  # a point counts as at least this near, so that
 CLEAR_M = _float32(0.004)  # the distance towards the light at which a stationary point looks for bodies
 OWN_M = _float32(0.025)  # the same for a point on a body, whose shadow map shows the body coarsely
 STEEPEST = _float32(0.999)  # the largest sine of the half-angle of a cone, for points near the emitter
-UNNOTICED = _float32(1 / 400)  # the largest share of the light at a point whose loss is invisible
+NEGLIGIBLE_LOSS = _float32(1 / 400)  # the largest share of the light at a point whose loss is invisible
 SMALLEST_M2 = _float32(1e-6)  # the smallest squared distance of a sample
 PART_MARGIN = _float32(1.1)  # the radius around a part of a body in which its shadow map may show the part
 TILE = 32  # the side in texels of the tiles of the light map that are marked as changed
@@ -380,7 +380,7 @@ def take_shaded(
                 continue
             share = _hidden_light(places_m, normals, site, emitter, maps, pair_count, pair_sample, pair_body)
             light_lx = direct_lx[site] * share
-            if light_lx <= UNNOTICED * (steady_lx[site] + light_lx):
+            if light_lx <= NEGLIGIBLE_LOSS * (steady_lx[site] + light_lx):
                 continue
             for row in range(rows[site], rows[site] + width_px[site]):
                 for column in range(columns[site], columns[site] + width_px[site]):

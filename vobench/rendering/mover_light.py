@@ -12,13 +12,14 @@ from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2, face_normals
 from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
-from vobench.rendering.bake import BakedScene, bodies
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.emitter import Emitter
 from vobench.rendering.face_response import response
 from vobench.rendering.geometry import BoundingSphere, are_panes, sample_points, tangents
 from vobench.rendering.indirect_light import Gatherer
 from vobench.rendering.light_emitter import emitters
 from vobench.rendering.solid_angle import rectangle
+from vobench.rendering.static_scene import bodies
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_owner import Owners
 from vobench.rendering.visibility import Visibility

@@ -1,18 +1,17 @@
 """The light map as it is drawn: that of the stationary scene, with the shadows of movers and the light on them."""
 
-import ctypes
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import cast
 
 import numpy as np
-from OpenGL import GL
 
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
-from vobench.rendering.bake import BakedScene
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.batch import morton
 from vobench.rendering.culling import bounds
 from vobench.rendering.geometry import BoundingSphere
+from vobench.rendering.gl_texture import TiledLightTexture
 from vobench.rendering.mover_kernels import (
     TILE,
     EmitterAt,
@@ -148,32 +147,6 @@ def sky_shares(movers: MoverLight, sampled: Sequence[SampledEmitter], sites: Sit
     return np.repeat(shares.T, BLOCK, axis=1)[:, : len(sites.texels)]
 
 
-class _LightTexture:
-    """A light map (H, W, 3) as a texture in colour, of which tiles can be replaced."""
-
-    def __init__(self, width: int, height: int) -> None:
-        self.id = GL.glGenTextures(1)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
-        GL.glTexImage2D(GL.GL_TEXTURE_2D, 0, GL.GL_RGBA32F, width, height, 0, GL.GL_RGB, GL.GL_FLOAT, None)
-        for side in (GL.GL_TEXTURE_MIN_FILTER, GL.GL_TEXTURE_MAG_FILTER):
-            GL.glTexParameteri(GL.GL_TEXTURE_2D, side, GL.GL_LINEAR)
-        for axis in (GL.GL_TEXTURE_WRAP_S, GL.GL_TEXTURE_WRAP_T):
-            GL.glTexParameteri(GL.GL_TEXTURE_2D, axis, GL.GL_CLAMP_TO_EDGE)
-
-    def replace(self, values: Floats, tiles: Mask) -> None:
-        """Upload the marked tiles of a map (H, W, 3), a contiguous float32 array."""
-        GL.glBindTexture(GL.GL_TEXTURE_2D, self.id)
-        GL.glPixelStorei(GL.GL_UNPACK_ALIGNMENT, 1)
-        GL.glPixelStorei(GL.GL_UNPACK_ROW_LENGTH, values.shape[1])
-        for rows, columns in tile_runs(tiles, *values.shape[:2]):
-            part = values[rows, columns]
-            height, width = part.shape[:2]
-            first_value = ctypes.c_void_p(part.ctypes.data)
-            place = (columns.start, rows.start, width, height)
-            GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, *place, GL.GL_RGB, GL.GL_FLOAT, first_value)
-        GL.glPixelStorei(GL.GL_UNPACK_ROW_LENGTH, 0)
-
-
 def tile_runs(tiles: Mask, height: int, width: int) -> Iterator[tuple[slice, slice]]:
     """The rows and columns of a map (height, width) in each run of marked tiles beside one another."""
     for tile_row in np.flatnonzero(tiles.any(1)).tolist():
@@ -224,7 +197,7 @@ class ShadedLight:
         self._drawn = np.zeros((height, width, 3), np.float32)
         self._differs = np.zeros(tiles, bool)  # the tiles in which `_drawn` is not `_base`
         self._is_new = np.zeros(tiles, bool)  # the tiles that are to be uploaded
-        self._texture = _LightTexture(width, height)
+        self._texture = TiledLightTexture(width, height)
         self.id = self._texture.id
         self._key: object = None
         self._moment: _Moment | None = None
@@ -252,7 +225,7 @@ class ShadedLight:
         self._moment = None
 
     def _upload(self) -> None:
-        self._texture.replace(self._drawn, self._is_new)
+        self._texture.replace(self._drawn, tile_runs(self._is_new, *self._drawn.shape[:2]))
         self._is_new[:] = False
 
     def shade(

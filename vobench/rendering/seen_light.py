@@ -13,6 +13,7 @@ from vobench.rendering.array_types import Floats, Mask, Rows
 from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.cutout import CutOuts
 from vobench.rendering.embree import Hits
+from vobench.rendering.face_response import metal_reflectance
 from vobench.rendering.geometry import RayCaster, face_materials, take
 from vobench.scene.light import AreaLight, Light, Sky
 from vobench.scene.material import LUMINANCE, Material, fresnel, linear, pane_reflectance, under_coat
@@ -128,7 +129,7 @@ class _Surfaces:
         self._kind = np.array([material.kind if material else "" for material in materials])[thing]
         self._eta = np.array([material.eta if material else 1.0 for material in materials])[thing]
         self._tint = np.array([material.tint if material else 0.0 for material in materials])[thing]
-        self._metal = np.array([_metal_reflectance(material) for material in materials])[thing]
+        self._metal = np.array([metal_reflectance(material) for material in materials])[thing]
 
     def hits(self, rays: _Rays) -> Hits:
         """The nearest face along each ray."""
@@ -218,17 +219,6 @@ class _Surfaces:
         places_m = rays.origins_m + distance_m * rays.directions
         following = _Rays(rays.pixel, places_m + STEP_M * directions, directions, rays.share * share)
         return following.take(np.flatnonzero(following.share > FAINTEST))
-
-
-def _metal_reflectance(material: Material | None) -> float:
-    """The luminous reflectance of a mirror or a metal; 0 for other materials."""
-    if material is None:
-        return 0.0
-    if material.kind == "mirror":
-        return material.tint
-    if material.kind != "body":
-        return 0.0
-    return material.metal * float(np.array(material.colour) @ LUMINANCE)
 
 
 def _reflectance_at(material: Material, places: Array) -> Array:

@@ -12,8 +12,10 @@ from vobench.errors import VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.se3 import Array
-from vobench.rendering.bake import BakeSettings, bake
-from vobench.rendering.context import DriverFacts, devices, driver_facts
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakeSettings
+from vobench.rendering.context import DriverFacts, driver_facts
+from vobench.rendering.egl_device import devices
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.light import PointLight

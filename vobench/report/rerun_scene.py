@@ -12,7 +12,8 @@ from pydantic import ValidationError
 
 from vobench.errors import VobenchError
 from vobench.geometry.se3 import Array
-from vobench.rendering.bake import BakedScene, load_baked
+from vobench.rendering.baked_file import load_baked
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.illumination import Illumination
 from vobench.rendering.texel_owner import owners
 from vobench.report.entity import SCENE

@@ -59,7 +59,9 @@ def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
 
     Raises MissingDependencyError if this machine cannot render, before any light is computed.
     """
-    from vobench.rendering.bake import BakeSettings, bake, save_baked
+    from vobench.rendering.bake import bake
+    from vobench.rendering.baked_file import save_baked
+    from vobench.rendering.baked_scene import BakeSettings
     from vobench.rendering.raster import require_drawing
     from vobench.suite.scene_build import build
     from vobench.suite.white import look_around
@@ -95,7 +97,7 @@ def open_renderer(
         if white_cd_m2 is None:
             raise ValueError("the engine pyrender needs white_cd_m2")
         return PyrenderRenderer(scene, white_cd_m2=white_cd_m2)
-    from vobench.rendering.bake import load_baked
+    from vobench.rendering.baked_file import load_baked
     from vobench.rendering.raster import RasterRenderer
 
     if light is None:

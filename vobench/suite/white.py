@@ -8,7 +8,7 @@ import numpy as np
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Mask
-from vobench.rendering.bake import BakedScene
+from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.seen_light import SeenLight, read_seen_light, seen_light
 from vobench.suite.scene_build import listed_lights
