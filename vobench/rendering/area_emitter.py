@@ -1,5 +1,6 @@
 """Emitters with an area: rectangular panels, and lamps of any shape."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,14 +88,7 @@ class Panel(Emitter):
         intensity_cd = float(self.light.luminance_cd_m2 * area_m2)  # straight ahead
         lifted_m = face.corner_m + RAY_OFFSET_M * face.normal
         panel = (lifted_m, face.edge_u_m, face.edge_v_m, face.normal, intensity_cd)
-
-        def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            vectors_m = np.empty((len(texels), 3), np.float32)
-            strength = np.empty(len(texels), np.float32)
-            aim_at_area(texels.points_m, *panel, a, b, vectors_m, strength)
-            return vectors_m, strength
-
-        return aim
+        return _aim_by(aim_at_area, texels.points_m, panel)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -119,18 +113,23 @@ class MeshPanel(Emitter):
         lifted_m = self.corners_m + RAY_OFFSET_M * normals[:, None]
         ends_m2 = np.cumsum(areas_m2(self.corners_m))
         mesh = (lifted_m, normals, ends_m2, float(self.light.luminance_cd_m2))
-
-        def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-            vectors_m = np.empty((len(texels), 3), np.float32)
-            strength = np.empty(len(texels), np.float32)
-            aim_at_triangles(texels.points_m, *mesh, a, b, vectors_m, strength)
-            return vectors_m, strength
-
-        return aim
+        return _aim_by(aim_at_triangles, texels.points_m, mesh)
 
     def width_rad(self, points_m: Floats) -> Floats:
         """The width of its bounding sphere."""
         return sphere_width_rad(self.ball, points_m)
+
+
+def _aim_by(kernel: Callable[..., None], points_m: Floats, emitter: Sequence[object]) -> Aim:
+    """The aim of points (P, 3) at places that a kernel chooses on an emitter, given to it by its settings."""
+
+    def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
+        vectors_m = np.empty((len(points_m), 3), np.float32)
+        strength = np.empty(len(points_m), np.float32)
+        kernel(points_m, *emitter, a, b, vectors_m, strength)
+        return vectors_m, strength
+
+    return aim
 
 
 def panel_emitter(light: AreaLight) -> Panel | MeshPanel:
