@@ -4,6 +4,7 @@ Many tests start processes with an empty cache. They share the machine code of c
 a second or more of each process.
 """
 
+import gc
 import os
 from pathlib import Path
 
@@ -13,8 +14,20 @@ from hypothesis import settings
 from vobench import trust
 
 os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "kernels"))
+gc.disable()  # it is enabled again after collection, during which it would find nothing
 settings.register_profile("steady", derandomize=True, max_examples=40, deadline=None)
 settings.load_profile("steady")
+
+
+def pytest_xdist_auto_num_workers() -> int:
+    """One process of tests more than there are cores, since some tests wait most of their time."""
+    return (os.cpu_count() or 1) + 1
+
+
+def pytest_collection_finish() -> None:
+    """Start the garbage collector, but not on what was collected, since that lives to the end."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -180,6 +180,7 @@ class Recording:
 
 
 LEAST_BASELINE_M = 1e-6
+NM_DIGITS = 9  # of a distance in metres
 UNRECTIFIABLE = (
     "The pair cannot be rectified: the right camera is not to the right of the left one, or looks another way."
 )
@@ -240,7 +241,7 @@ def _pair_notes(rig: Rig, calibration: str) -> Notes:
     if not rig.baseline_m > LEAST_BASELINE_M:
         raise InputError(
             f"the left and the right camera should be more than {LEAST_BASELINE_M:g} m apart, "
-            f"but are {rig.baseline_m:g} m apart: {calibration}"
+            f"but are {round(rig.baseline_m, NM_DIGITS):g} m apart: {calibration}"
         )
     is_rectifiable = rectification(rig) is not None
     return () if is_rectifiable else (UNRECTIFIABLE,)
