@@ -67,7 +67,7 @@ def python(tmp_path, monkeypatch):
     """A program that has imported vobench, in a folder of its own."""
     (tmp_path / "mine").mkdir()
     monkeypatch.chdir(tmp_path / "mine")
-    python_gate = trust.Gate(trust._ignore, trusted_folders=lambda: (Path.cwd(),), hash_folder=lambda: None)
+    python_gate = trust.Gate(trust._announce_nothing, trusted_folders=lambda: (Path.cwd(),), hash_folder=lambda: None)
     monkeypatch.setattr(trust, "_gates", [python_gate])
 
 

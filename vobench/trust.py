@@ -32,11 +32,13 @@ class TrustPolicy:
 
 @dataclass(slots=True)
 class Gate:
-    """The check that a process makes before a maker runs.
+    """What a process has to know to check a maker before it runs.
 
-    `announce` is called with a sentence that names the maker, once for each maker.
-    `trusted_folders` and `hash_folder` return the folders of `TrustPolicy`.
-    `announced` are the makers that have been announced.
+    `announce` is called once for each maker, with a sentence that names it.
+    `trusted_folders` and `hash_folder` return the folders of `TrustPolicy`. They are called for each check, because the
+    working folder may change.
+    `trusts_new` and `trusted_versions` are as in `TrustPolicy`.
+    `announced` are the paths of the makers that have been announced.
     """
 
     announce: Callable[[str], object]
@@ -47,12 +49,18 @@ class Gate:
     announced: set[Path] = field(default_factory=set)
 
 
-def _ignore(_: str) -> None:
+def _announce_nothing(_: str) -> None:
     """Do not announce makers."""
 
 
-# The last one is in force. The first one is for Python programs that import vobench.
-_gates = [Gate(_ignore, trusted_folders=lambda: (Path.cwd(),), hash_folder=lambda: None)]
+# A stack of gates, of which the last is in force. A `gate` block adds its gate when it begins and removes it when it
+# ends. The first gate is never removed. It applies in Python programs that import vobench: they trust the makers below
+# the working folder, and no hashes are stored.
+_gates = [Gate(_announce_nothing, trusted_folders=lambda: (Path.cwd(),), hash_folder=lambda: None)]
+
+
+def _current_gate() -> Gate:
+    return _gates[-1]
 
 
 @contextmanager
@@ -62,9 +70,9 @@ def gate(
     trusted_folders: Callable[[], Iterable[Path]],
     hash_folder: Callable[[], Path | None],
 ) -> Iterator[None]:
-    """A block, such as a command, in which makers are announced before they run, and untrusted ones are refused.
+    """Put a new gate in force during a `with` block, such as a command of the command line.
 
-    The arguments are those of `Gate`.
+    The arguments are those of `Gate`. After the block, the gate from before it is in force again.
     """
     _gates.append(Gate(announce, trusted_folders, hash_folder))
     try:
@@ -74,18 +82,18 @@ def gate(
 
 
 def trust_new() -> None:
-    """Trust every maker that the current command runs, and remember its hash."""
-    _gates[-1].trusts_new = True
+    """Trust every maker that runs while the current gate is in force, and store the hash of its code."""
+    _current_gate().trusts_new = True
 
 
 def trust_version(sources: Iterable[bytes]) -> None:
-    """Trust one version of a maker in this process. `sources` are those of `admit`."""
-    _gates[-1].trusted_versions.add(_version(sources))
+    """Trust one version of a maker while the current gate is in force. `sources` are those of `admit`."""
+    _current_gate().trusted_versions.add(_version_hash(sources))
 
 
 def policy() -> TrustPolicy:
-    """The policy in force, for processes that work for this one."""
-    current = _gates[-1]
+    """The policy in force, which can be sent to a worker process."""
+    current = _current_gate()
     return TrustPolicy(
         trusted_folders=tuple(folder.resolve() for folder in current.trusted_folders()),
         hash_folder=current.hash_folder(),
@@ -95,42 +103,51 @@ def policy() -> TrustPolicy:
 
 
 def adopt(policy: TrustPolicy) -> None:
-    """Apply the policy of another process, which has already announced the makers."""
-    _gates[:] = [
-        Gate(
-            _ignore,
-            trusted_folders=lambda: policy.trusted_folders,
-            hash_folder=lambda: policy.hash_folder,
-            trusts_new=policy.trusts_new,
-            trusted_versions=set(policy.trusted_versions),
-        )
-    ]
+    """Replace all gates of this process, a worker, by one with the policy of the process that it works for.
+
+    The gate announces nothing, because the other process has announced the makers.
+    """
+    adopted = Gate(
+        _announce_nothing,
+        trusted_folders=lambda: policy.trusted_folders,
+        hash_folder=lambda: policy.hash_folder,
+        trusts_new=policy.trusts_new,
+        trusted_versions=set(policy.trusted_versions),
+    )
+    _gates[:] = [adopted]
 
 
 def admit(maker: Path, sources: Iterable[bytes], scene_name: str, *, is_contained: bool) -> None:
-    """Announce a maker that is about to run.
+    """Check whether a maker may run, and announce it.
 
-    `sources` are the maker's code and the code beside it. They are read only if trust is required.
-    `is_contained` is whether a sandbox hides the user's files from the maker.
-    Raises SuiteError if it does not, and the user does not trust the maker.
+    `sources` are the maker's code and the code beside it. They are read only if the user's trust is required.
+    `is_contained` is whether the maker runs in a sandbox, which hides the user's files from it.
+    Raises SuiteError if the maker may not run.
     """
-    current = _gates[-1]
+    current = _current_gate()
     path = maker.resolve()
-    is_in_trusted_folder = any(path.is_relative_to(folder.resolve()) for folder in current.trusted_folders())
-    if not is_contained and not is_in_trusted_folder:
+    if not is_contained and not _is_in_trusted_folder(current, path):
         _require_trust(current, path, sources)
     if path not in current.announced:
         current.announced.add(path)
         current.announce(f"scene {scene_name} runs the program {maker}")
 
 
+def _is_in_trusted_folder(current: Gate, maker: Path) -> bool:
+    return any(maker.is_relative_to(folder.resolve()) for folder in current.trusted_folders())
+
+
 def _require_trust(current: Gate, maker: Path, sources: Iterable[bytes]) -> None:
-    """Raise SuiteError if the user does not trust this version of a maker. A newly trusted version is remembered."""
-    version = _version(sources)
+    """Raise SuiteError if the user does not trust this version of a maker.
+
+    If new makers are trusted, the version is trusted from now on, and its hash is stored.
+    """
+    version = _version_hash(sources)
+    if version in current.trusted_versions:
+        return
     hash_folder = current.hash_folder()
     hash_file = hash_folder / version if hash_folder else None
-    is_remembered = hash_file is not None and hash_file.is_file()
-    if version in current.trusted_versions or is_remembered:
+    if hash_file is not None and hash_file.is_file():
         return
     if not current.trusts_new:
         raise SuiteError(
@@ -145,8 +162,11 @@ def _require_trust(current: Gate, maker: Path, sources: Iterable[bytes]) -> None
             hash_file.write_text(f"{maker}\n", encoding="utf-8")
 
 
-def _version(sources: Iterable[bytes]) -> str:
-    """A hash of a maker's code and the code beside it."""
+def _version_hash(sources: Iterable[bytes]) -> str:
+    """The hash that identifies one version of a maker: of its code and the code beside it.
+
+    Each file is hashed first, so that the same bytes in other files give another hash.
+    """
     version = hashlib.sha256()
     for source in sources:
         version.update(hashlib.sha256(source).digest())

@@ -23,7 +23,7 @@ def make(seed):
 @pytest.fixture
 def strange(tmp_path, monkeypatch):
     """The maker of somebody else, on a machine without a sandbox, for a program in another folder."""
-    python_gate = trust.Gate(trust._ignore, trusted_folders=lambda: (Path.cwd(),), hash_folder=lambda: None)
+    python_gate = trust.Gate(trust._announce_nothing, trusted_folders=lambda: (Path.cwd(),), hash_folder=lambda: None)
     monkeypatch.setattr(trust, "_gates", [python_gate])
     monkeypatch.setattr(maker_file, "_is_contained", lambda: False)
     (tmp_path / "mine").mkdir()

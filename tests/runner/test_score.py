@@ -14,7 +14,7 @@ from vobench.runner.folder import ORACLE, TRUTH_COPY
 from vobench.runner.score import (
     LEAST_DIVERGED_M,
     NO_SCALE,
-    OF_NO_SCALE,
+    NO_SCALE_METRICS,
     STILL_M,
     STILL_RAD,
     drift_m,
@@ -26,7 +26,7 @@ from vobench.runner.score import (
     senses_exactly,
     stands_still,
     status_of,
-    status_of_handed,
+    status_with_dropped_frames,
 )
 from vobench.sensor.imu import IMUS
 from vobench.suite.suite import read_plan
@@ -183,7 +183,7 @@ def test_an_estimate_without_a_scale_is_aligned_with_one_and_its_drift_is_measur
 
 
 def test_metrics_of_an_estimate_without_a_scale_are_those_of_every_score_and_the_drift_of_the_scale():
-    ids = {metric.id for metric in OF_NO_SCALE}
+    ids = {metric.id for metric in NO_SCALE_METRICS}
     assert "scale_drift" in ids
     assert ids - {"scale_drift"} == {metric.id for metric in DEFINITIONS.values() if not metric.full}
 
@@ -193,13 +193,13 @@ def test_dropped_frames_do_not_count_as_lost_and_are_counted_in_the_reason():
     dropped = T_NS[-5:].tolist()
     est = kept(gt, slice(0, POSES - 5))
     assert status_of(DONE, score_estimate(est, gt, ()), gt)[0] != "ok"
-    assert status_of_handed(est, gt, (), dropped) == ("partial", f"it was too late for 5 of {POSES} frames")
+    assert status_with_dropped_frames(est, gt, (), dropped) == ("partial", f"it was too late for 5 of {POSES} frames")
 
 
 def test_a_frame_that_was_sent_and_has_no_pose_is_said_beside_the_dropped_ones():
     gt = straight(1.0)
     rows = np.delete(np.arange(POSES - 5), [7])
-    status, reason = status_of_handed(kept(gt, rows), gt, (), T_NS[-5:].tolist())
+    status, reason = status_with_dropped_frames(kept(gt, rows), gt, (), T_NS[-5:].tolist())
     assert status == "partial"
     assert reason == f"it was too late for 5 of {POSES} frames; no pose for 1 of {POSES - 5} frames; the first is 7"
 
@@ -207,7 +207,7 @@ def test_a_frame_that_was_sent_and_has_no_pose_is_said_beside_the_dropped_ones()
 def test_a_divergence_in_real_time_is_one():
     gt = straight(1.0)
     est = straight(1.0, scale=scale_for_ate(2.0))
-    assert status_of_handed(est, gt, (), T_NS[:1].tolist())[0] == "diverged"
+    assert status_with_dropped_frames(est, gt, (), T_NS[:1].tolist())[0] == "diverged"
 
 
 def test_revised_poses_are_scored_where_there_are_some(tmp_path):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 FRAMES = "frames.csv"
 TIMES = "times.csv"
-# The tables in the store that are joined: one of the sequence, and one of the estimate.
+# The tables in the store that `write_frames` joins. The first belongs to a sequence, the second to an estimate.
 EXPOSURES = "exposures.csv"
 ANSWERS = "answers.csv"
 GROUND_TRUTH = "ground_truth.tum"
@@ -73,11 +73,15 @@ def write_frames(sequence: Path, estimate: Path, scored: "Score | None", folder:
 
 
 def _errors(scored: "Score") -> Mapping[str, Mapping[str, float]]:
-    """The errors of each pose, by the stamp of its frame."""
-    stamps = map(str, scored.gt_t_ns.tolist())
-    errors = zip(scored.ate_trans_m.tolist(), scored.ate_rot_deg.tolist(), strict=True)
-    rows = (dict(zip(ERROR_COLUMNS, pair, strict=True)) for pair in errors)
-    return dict(zip(stamps, rows, strict=True))
+    """The cells of ERROR_COLUMNS of each pose, by the stamp of its frame as it is written in the tables."""
+    stamps_ns = scored.gt_t_ns.tolist()
+    position_errors_m = scored.ate_trans_m.tolist()
+    rotation_errors_deg = scored.ate_rot_deg.tolist()
+
+    errors = {}
+    for t_ns, *pose_errors in zip(stamps_ns, position_errors_m, rotation_errors_deg, strict=True):
+        errors[str(t_ns)] = dict(zip(ERROR_COLUMNS, pose_errors, strict=True))
+    return errors
 
 
 def read_frames(folder: Path) -> list[FrameRow]:
@@ -101,7 +105,7 @@ def read_frames(folder: Path) -> list[FrameRow]:
 
 
 def _known_cells(row: Mapping[str, str]) -> dict[str, str | None]:
-    """The cells of a row by column. An empty cell of a number is None."""
+    """The cells of a row by column. Empty and missing cells are None, or "" in a column of text."""
     cells: dict[str, str | None] = {}
     for column in fields(FrameRow):
         empty = "" if column.type is str else None
@@ -115,7 +119,7 @@ def _adapter() -> TypeAdapter[list[FrameRow]]:
 
 
 class TableWriter:
-    """Writes the rows of a CSV file that is open. No cell is a formula for spreadsheets."""
+    """Writes the rows of an open CSV file. No spreadsheet executes a cell as a formula."""
 
     def __init__(self, file: TextIO, columns: Iterable[str]) -> None:
         self._table = csv.DictWriter(file, tuple(columns), lineterminator="\n")
@@ -140,5 +144,8 @@ def read_table(path: Path) -> list[dict[str, str]]:
 
 
 def _values(row: Mapping[str, str]) -> dict[str, str]:
-    """The values in the cells of a row. A row that is too short or too long has cells that are no text."""
+    """The values in the cells of a row.
+
+    The reader adds None or a list to a row that is too short or too long. Such cells are returned as they are.
+    """
     return {column: value_in(text) if isinstance(text, str) else text for column, text in row.items()}

@@ -23,7 +23,6 @@ from vobench.runner.frames import FRAMES, GROUND_TRUTH, read_table
 from vobench.runner.ground_truth import scored_truth
 from vobench.runner.motion import body_motion
 from vobench.runner.score import (
-    MOTION_SENSORS,
     drift_m,
     judged_claims,
     scale_of,
@@ -31,7 +30,7 @@ from vobench.runner.score import (
     score_revised,
     senses_exactly,
     status_of,
-    status_of_handed,
+    status_with_dropped_frames,
 )
 from vobench.runner.simulate import frames_of
 from vobench.suite.case import Case
@@ -43,6 +42,7 @@ from vobench.trajectory.tum import format_tum, parse_tum
 RELATIVE = 1e-6
 ABSOLUTE = 1e-9
 SAME_TRUTH_M = 1e-6
+MOTION_SENSORS = ("encoders", "imu")  # those that can be exact
 # The statuses that follow from the estimate. The cause of a crash does not.
 OF_ESTIMATE = (*SURVIVED, "lost", "diverged")
 # The settings of a case on which its path does not depend.
@@ -180,7 +180,7 @@ def _status(
         return stated.status, stated.reason
     dropped = [int(row["t_ns"]) for row in rows if row.get("status") == DROPPED]
     if dropped:
-        return status_of_handed(est, gt, stated.claims, dropped)
+        return status_with_dropped_frames(est, gt, stated.claims, dropped)
     return status_of(EstimatorOutcome(kind=FINISHED, reason=""), scored, gt)
 
 

@@ -1,6 +1,6 @@
-"""Scores the estimate of a trial, and determines the status of the trial."""
+"""The score of a trial's estimate, and the status of the trial."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -25,39 +25,54 @@ from vobench.trajectory.tum import parse_tum
 if TYPE_CHECKING:
     from vobench.suite.plan import AnyCase, Trial
 
-# The truth against which a trial is scored has one pose for each frame.
+# The ground truth of a trial has one pose for each frame.
 SETTINGS = ScoreSettings(coverage_of="frames")
+
+# Estimators with this claim estimate no scale. Their estimates are aligned with a scale, and the scale drift is scored.
 NO_SCALE = "Sim(3)"
-NO_POSE_RIGHT = 0.5  # the lost-aware score of an estimate that survives with every pose wrong
-# Metrics of an estimate without a scale: those of every score, and how its scale drifts.
-OF_NO_SCALE = tuple(metric for metric in DEFINITIONS.values() if not metric.full or metric.id == "scale_drift")
 NO_SCALE_SETTINGS = replace(SETTINGS, alignment="sim3", full=True)
-# The jitter of trackers at rest. These are limits of extents, because path lengths add up the jitter.
+NO_SCALE_METRICS = tuple(metric for metric in DEFINITIONS.values() if not metric.full or metric.id == "scale_drift")
+
+# A camera is stationary if its distance and rotation from its first pose stay within these limits, which allow for the
+# jitter of a tracker. The length of the path is no criterion, because it sums the jitter.
 STILL_M = 2e-3
 STILL_RAD = np.deg2rad(0.2)
-LEAST_DIVERGED_M = 1e-3
-MOTION_SENSORS = ("encoders", "imu")
-EXACT_TICK = 3.5  # in floors; with 1 - (1 - 1 / 3.5)² = 0.49 of the steps within the floor
+
+LEAST_DIVERGED_M = 1e-3  # a smaller ATE is never a divergence, however short the path is
+NO_POSE_RIGHT = 0.5  # the lost-aware score of an estimate with full coverage and no correct pose
+
+# Encoders are exact if at least about half of their steps are within FLOOR_M of the true ones, because then the
+# integrated motion looks like a copy of the truth. The error of a step is the difference of two rounding errors. Each
+# is uniform over one tick, so the share of steps within FLOOR_M is 1 - (1 - FLOOR_M / tick)². It is 49 % for this tick.
+MAX_EXACT_TICK_M = 3.5 * FLOOR_M
 
 
 def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) -> None:
-    """Score the estimate of a trial against the truth of its sequence, and write the score and the table of frames."""
-    exact = (sequence / GROUND_TRUTH).read_text(encoding="utf-8")
-    # The truth is read from the text in the run, so that everybody can reproduce the score.
-    gt = parse_tum(scored_truth(exact, trial.case), name=GROUND_TRUTH)
+    """Score an estimate against the truth of its sequence. The score and the table of frames are written to `folder`.
+
+    `sequence` and `estimate` are the folders with the results of the earlier tasks.
+    """
+    case = trial.case
     claims = trial.estimator_entry.claims
+    sensors = trial.estimator_entry.manifest.needs
+
+    # The scored truth goes through the text that the run contains, so that anyone can reproduce the score.
+    exact_tum = (sequence / GROUND_TRUTH).read_text(encoding="utf-8")
+    gt = parse_tum(scored_truth(exact_tum, case), name=GROUND_TRUTH)
     est = read_tum(estimate / ESTIMATE)
     scored = score_estimate(est, gt, claims)
-    stamps = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
-    dropped = [stamps[row["frame"]] for row in read_table(estimate / ANSWERS) if row["status"] == DROPPED]
+
+    frame_stamps = {row["frame"]: int(row["t_ns"]) for row in read_table(sequence / EXPOSURES)}
+    dropped = _dropped_stamps(estimate, frame_stamps)
     outcome = read_outcome(estimate)
-    status, reason = status_of(outcome, scored, gt)
     if dropped and outcome.kind == FINISHED:
-        status, reason = status_of_handed(est, gt, claims, dropped)
-    is_exactly_sensed = senses_exactly(trial.case, trial.estimator_entry.manifest.needs)
-    score = TrialScore(
-        case=trial.case.name,
-        variant=trial.case.variant,
+        status, reason = status_with_dropped_frames(est, gt, claims, dropped)
+    else:
+        status, reason = status_of(outcome, scored, gt)
+
+    trial_score = TrialScore(
+        case=case.name,
+        variant=case.variant,
         estimator=trial.estimator_entry.label,
         repeat=trial.repeat,
         status=status,
@@ -67,40 +82,55 @@ def score_trial(trial: "Trial", sequence: Path, estimate: Path, folder: Path) ->
         path_m=float(gt.distances_m()[-1]),
         score=scored.as_dict() if scored else None,
         drift_m=drift_m(est, gt, scored),
-        claims=judged_claims(claims, est, gt, is_exactly_sensed=is_exactly_sensed),
-        sensors=trial.estimator_entry.manifest.needs,
-        consistency=trial_consistency(estimate, gt, est, start_ns=min(stamps.values()), scale=scale_of(scored)),
+        claims=judged_claims(claims, est, gt, is_exactly_sensed=senses_exactly(case, sensors)),
+        sensors=sensors,
+        consistency=trial_consistency(estimate, gt, est, start_ns=min(frame_stamps.values()), scale=scale_of(scored)),
         revised=_revised_score(estimate, gt, claims),
         sandbox=outcome.sandbox,
     )
-    write_json(folder / SCORE, score.model_dump(mode="json"))
+    write_json(folder / SCORE, trial_score.model_dump(mode="json"))
     write_frames(sequence, estimate, scored, folder)
 
 
-def senses_exactly(case: "AnyCase | None", sensors: Sequence[str]) -> bool:
-    """Whether sensors other than cameras measure the motion of a case so well that it can be integrated to rounding.
+def _dropped_stamps(estimate: Path, frame_stamps: Mapping[str, int]) -> list[int]:
+    """The stamps (ns) of the frames that were dropped because the estimator was too slow for real time."""
+    frames = [answer["frame"] for answer in read_table(estimate / ANSWERS) if answer["status"] == DROPPED]
+    return [frame_stamps[frame] for frame in frames]
 
-    That is so for an IMU without noise, and for wheels with ticks so short that half of the steps, whose errors are
-    differences of two roundings, are within the floor of a truth copy. It is False for recordings.
+
+def senses_exactly(case: "AnyCase | None", sensors: Sequence[str]) -> bool:
+    """Whether an estimator can integrate the exact motion of a case from its IMU or its encoders, without cameras.
+
+    `sensors` are the sensors that the estimator uses. False for recordings, whose sensors always have errors.
     """
-    if not isinstance(case, Case) or not set(sensors) & set(MOTION_SENSORS):
+    if not isinstance(case, Case):
         return False
+    if "imu" in sensors and _has_exact_imu(case):
+        return True
+    return "encoders" in sensors and _has_exact_encoders(case)
+
+
+def _has_exact_imu(case: Case) -> bool:
+    """Whether a case has an IMU without noise."""
     imu = case.rig.imu
+    return imu is not None and imu.gyro.noise == 0 and imu.accel.noise == 0
+
+
+def _has_exact_encoders(case: Case) -> bool:
+    """Whether a case has wheel encoders whose ticks are shorter than MAX_EXACT_TICK_M."""
     wheels = case.build_rig().wheels
-    has_exact_imu = imu is not None and imu.gyro.noise == 0 and imu.accel.noise == 0
-    has_exact_wheels = False
-    if wheels is not None:
-        tick_m = 2 * np.pi * wheels.radius_m / wheels.ticks_per_revolution
-        has_exact_wheels = tick_m < EXACT_TICK * FLOOR_M
-    return ("imu" in sensors and has_exact_imu) or ("encoders" in sensors and has_exact_wheels)
+    if wheels is None:
+        return False
+    tick_m = 2 * np.pi * wheels.radius_m / wheels.ticks_per_revolution
+    return tick_m < MAX_EXACT_TICK_M
 
 
 def judged_claims(
     claims: Sequence[str], est: Trajectory, gt: Trajectory, *, is_exactly_sensed: bool
 ) -> tuple[str, ...]:
-    """The claims of a manifest, and TRUTH_COPY if the estimate is the truth and nothing has measured it so well.
+    """The claims of a manifest, and TRUTH_COPY if the estimate equals the truth without a legitimate reason.
 
-    Oracles, which use the truth openly, have a claim of their own.
+    Legitimate reasons are that the estimator is an oracle, or that the sensors are exact.
     """
     manifest_claims = tuple(claim for claim in claims if claim != TRUTH_COPY)
     if ORACLE in claims or is_exactly_sensed:
@@ -111,13 +141,16 @@ def judged_claims(
 
 
 def _revised_score(estimate: Path, gt: Trajectory, claims: Sequence[str]) -> dict[str, Any] | None:
-    """The score of the poses that an estimator revised at the end; None if there are none."""
+    """The score of the revised poses as plain values; None if there are none."""
     revised = score_revised(estimate, gt, claims)
     return revised.as_dict() if revised else None
 
 
 def score_revised(folder: Path, gt: Trajectory, claims: Sequence[str]) -> Score | None:
-    """The score of the revised poses in a trial's folder; None if there are none."""
+    """The score of the poses that an estimator revised after the last frame; None if there are none.
+
+    `folder` is the folder of the trial's estimate.
+    """
     path = folder / REVISED
     if not path.is_file():
         return None
@@ -130,18 +163,21 @@ def scale_of(scored: Score | None) -> float:
 
 
 def drift_m(est: Trajectory, gt: Trajectory, scored: Score | None) -> float | None:
-    """The largest distance of a scored estimate from its start if the truth is stationary; None otherwise."""
+    """The drift of an estimate while the camera is stationary: its largest distance from its start.
+
+    None if the camera moves, or if the estimate has no score.
+    """
     if scored is None or not stands_still(gt):
         return None
     return extent_m(est)
 
 
 def stands_still(gt: Trajectory) -> bool:
-    """Whether the truth stays within 2 mm and 0.2° of its first pose, so that relative errors are meaningless."""
+    """Whether the true camera is stationary, so that errors relative to the path are meaningless."""
     R_world_frame = gt.T_world_frame[:, :3, :3]
     R_first_world = se3.inverse(gt.T_world_frame[:1])[:, :3, :3]
-    turned_rad = se3.rotation_angle(R_first_world @ R_world_frame)
-    return bool(extent_m(gt) <= STILL_M and np.max(turned_rad) <= STILL_RAD)
+    angles_rad = se3.rotation_angle(R_first_world @ R_world_frame)
+    return bool(extent_m(gt) <= STILL_M and np.max(angles_rad) <= STILL_RAD)
 
 
 def extent_m(trajectory: Trajectory) -> float:
@@ -153,17 +189,20 @@ def extent_m(trajectory: Trajectory) -> float:
 def score_estimate(est: Trajectory, gt: Trajectory, claims: Sequence[str]) -> Score | None:
     """The score of an estimate; None if it has no pose at a frame whose truth is known.
 
-    An estimate with the claim Sim(3), which has no scale, is aligned with a scale, and the drift of it is measured.
+    With the claim NO_SCALE, the estimate is aligned with a scale, and the scale drift is one of the metrics.
     """
     if not np.isin(est.t_ns, gt.t_ns).any():
         return None
     if NO_SCALE not in claims:
         return score(gt, est, settings=SETTINGS)
-    return score(gt, est, settings=NO_SCALE_SETTINGS, metrics=OF_NO_SCALE)
+    return score(gt, est, settings=NO_SCALE_SETTINGS, metrics=NO_SCALE_METRICS)
 
 
 def status_of(outcome: EstimatorOutcome, scored: Score | None, gt: Trajectory) -> tuple[TrialStatus, str]:
-    """The status of a trial and its reason. The worst status that applies is used, first of all a failed process."""
+    """The status of a trial and its reason.
+
+    A failed process comes first. Otherwise the worst status that applies is returned.
+    """
     if outcome.kind != FINISHED:
         return outcome.kind, outcome.reason  # type: ignore[return-value]  # EstimatorFailure's kinds are statuses
     if scored is None:
@@ -183,7 +222,10 @@ def status_of(outcome: EstimatorOutcome, scored: Score | None, gt: Trajectory) -
 
 
 def _divergence(scored: Score, gt: Trajectory) -> str:
-    """Why an estimate counts as diverged: its error exceeds the path, or no pose is right; empty if it does not."""
+    """Why an estimate is diverged, or an empty string if it is not.
+
+    It is diverged if its error exceeds the length of the path, or if no pose is correct.
+    """
     if stands_still(gt):
         return ""
     ate = scored.metric("ate_trans")
@@ -195,15 +237,21 @@ def _divergence(scored: Score, gt: Trajectory) -> str:
     return ""
 
 
-def status_of_handed(
+def status_with_dropped_frames(
     est: Trajectory, gt: Trajectory, claims: Sequence[str], dropped: Sequence[int]
 ) -> tuple[TrialStatus, str]:
-    """The status of a trial in real time and its reason, from the frames that were not dropped."""
-    is_sent = ~np.isin(gt.t_ns, dropped)
-    sent = Trajectory(gt.t_ns[is_sent], gt.T_world_frame[is_sent])
-    scored = score_estimate(est, sent, claims)
-    status, reason = status_of(EstimatorOutcome(kind=FINISHED, reason=""), scored, sent)
+    """The status of a trial in real time and its reason. It is judged by the frames that the estimator received.
+
+    `dropped` are the stamps (ns) of the other frames. A trial that survives is partial because of them.
+    """
+    is_received = ~np.isin(gt.t_ns, dropped)
+    received_gt = Trajectory(gt.t_ns[is_received], gt.T_world_frame[is_received])
+    scored = score_estimate(est, received_gt, claims)
+    status, reason = status_of(EstimatorOutcome(kind=FINISHED, reason=""), scored, received_gt)
     if status not in SURVIVED:
         return status, reason
-    late = f"it was too late for {len(dropped)} of {len(gt)} frames"
-    return "partial", f"{late}; {reason}" if reason else late
+
+    too_late = f"it was too late for {len(dropped)} of {len(gt)} frames"
+    if reason:
+        return "partial", f"{too_late}; {reason}"
+    return "partial", too_late

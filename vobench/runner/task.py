@@ -52,9 +52,10 @@ UNLIT: dict[str, Any] = {
     "sky": {"level"},
     "fog": True,
 }
+# The libraries whose versions can change the light of a scene.
+BAKE_LIBRARIES = ("numpy", "scipy", "embreex", "xatlas", "pillow", "trimesh", "opencv-python-headless")
 
-
-NO_LIMIT = 0
+NO_LIMIT = 0  # of threads
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,43 +90,53 @@ def plan(suite: Plan, recordings: "Mapping[str, Recording]") -> list[Task]:
 
     `recordings` maps recorded cases by name to their recordings. Nothing is simulated, and only code is hashed.
     """
-    tasks = dict[str, Task]()
+    tasks = dict[str, Task]()  # by key
 
-    def add(*made: Task) -> str:
-        keys = [task.key for task in made]
-        for key, task in zip(keys, made, strict=True):
-            tasks.setdefault(key, task)
-        return keys[-1]
+    def add(task: Task) -> str:
+        """Add a task, unless there is one with the same key already, and return its key."""
+        key = task.key
+        tasks.setdefault(key, task)
+        return key
 
-    code = {estimator_entry.label: estimator_code(estimator_entry) for estimator_entry in suite.estimator_entries}
+    codes = {entry.label: estimator_code(entry) for entry in suite.estimator_entries}
     for case in suite.cases:
-        sequence = add(*sequence_tasks(case, recordings.get(case.name)))
+        recording = recordings.get(case.name)
+        keys = [add(task) for task in sequence_tasks(case, recording)]
+        sequence = keys[-1]  # the key before it, if there is one, is that of the light
         for trial in suite.trials(case):
-            add(score_task(trial, sequence, add(estimate_task(trial, sequence, code[trial.estimator_entry.label]))))
+            code = codes[trial.estimator_entry.label]
+            estimate = add(estimate_task(trial, sequence, code))
+            add(score_task(trial, sequence, estimate))
     return list(tasks.values())
 
 
 def sequence_tasks(case: AnyCase, recording: "Recording | None" = None) -> list[Task]:
-    """The tasks that create the sequence of a case.
+    """The tasks that create the sequence of a case. The last one is the task of the sequence.
 
-    If its engine needs the light of the scene, that task comes first.
+    If the rendering engine needs the light of the scene, the task that computes it comes first.
     `recording` is the recording of a recorded case if it has been read already.
     """
     if isinstance(case, RecordedCase):
         return [_import_task(case, recording)]
     needs_light = case.rendering.needs_bake or case.scene.white_cd_m2 is None
-    before = [bake_task(case.scene)] if needs_light else []
-    needs = tuple(task.key for task in before)
-    used = library_versions(*libraries(case.rendering))
-    inputs = {"case": content(case), **_made_by("sequence", needs), "libraries": used}
-    return [*before, Task("sequence", case, inputs, needs)]
+    light_tasks = [bake_task(case.scene)] if needs_light else []
+    needs = tuple(task.key for task in light_tasks)
+    inputs = {
+        "case": content(case),
+        **_stage_inputs("sequence", needs),
+        "libraries": library_versions(*libraries(case.rendering)),
+    }
+    return [*light_tasks, Task("sequence", case, inputs, needs)]
 
 
 def bake_task(spec: SceneFile) -> Task:
     """The task that computes the light of a scene, which does not depend on the levels of lights."""
-    scene = scene_content(spec, exclude=UNLIT)
-    libraries = library_versions("numpy", "scipy", "embreex", "xatlas", "pillow", "trimesh", "opencv-python-headless")
-    inputs = {"scene": scene, **_made_by("bake"), **_generator_code(spec), "libraries": libraries}
+    inputs = {
+        "scene": scene_content(spec, exclude=UNLIT),
+        **_stage_inputs("bake"),
+        **_generator_code(spec),
+        "libraries": library_versions(*BAKE_LIBRARIES),
+    }
     return Task("bake", spec, inputs, ())
 
 
@@ -147,8 +158,11 @@ def _import_task(case: RecordedCase, recording: "Recording | None") -> Task:
 
     if recording is None:
         recording = import_recording.read_case(case)
-    libraries = library_versions(*import_recording.LIBRARIES)
-    inputs = {**import_recording.content(case, recording), **_made_by("import"), "libraries": libraries}
+    inputs = {
+        **import_recording.content(case, recording),
+        **_stage_inputs("import"),
+        "libraries": library_versions(*import_recording.LIBRARIES),
+    }
     return Task("import", case, inputs, ())
 
 
@@ -185,7 +199,7 @@ def score_task(trial: Trial, sequence: str, estimate: str) -> Task:
         "sensors": trial.estimator_entry.manifest.needs,
         **_noise(trial.case),
         "repeat": trial.repeat,
-        **_made_by("score", (sequence, estimate)),
+        **_stage_inputs("score", (sequence, estimate)),
         "libraries": library_versions("numpy", "scipy"),
     }
     return Task("score", trial, inputs, (sequence, estimate))
@@ -199,7 +213,8 @@ def _noise(case: AnyCase) -> dict[str, Any]:
     return {"truth_noise": asdict(case.truth_noise), "seed": case.seed, "first": first_frame}
 
 
-def _made_by(stage: Stage, needs: tuple[str, ...] = ()) -> dict[str, Any]:
+def _stage_inputs(stage: Stage, needs: tuple[str, ...] = ()) -> dict[str, Any]:
+    """The inputs that all tasks of a stage have: the keys of the tasks that they need, and the code of the stage."""
     return {"needs": needs, "code": code_digest(*ENTRIES[stage]), **_portable()}
 
 
@@ -211,13 +226,14 @@ def _portable() -> dict[str, bool]:
 def missing(tasks: Iterable[Task], root: Path) -> list[Task]:
     """The tasks to perform, in order. Tasks with a stored result, and light that no sequence needs, are omitted."""
     needed = set[str]()
-    to_make = list[Task]()
+    to_perform = list[Task]()
+    # From last to first, so that the sequences that need a light are known before the task of that light is reached.
     for task in reversed(list(tasks)):
         is_needed = task.stage != "bake" or task.key in needed
         if is_needed and not is_done(task, root):
             needed.update(task.needs)
-            to_make.append(task)
-    return to_make[::-1]
+            to_perform.append(task)
+    return to_perform[::-1]
 
 
 def is_done(task: Task, root: Path) -> bool:
