@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Pixels
+from vobench.rendering.compiled import compiled
 from vobench.scene.scene import Mover
 
 
@@ -88,9 +89,22 @@ def rays_in(T_body_camera: Array, directions: Array) -> tuple[Array, Array]:
 
 def turn(T_a_b: Array, vectors: Array) -> Array:
     """Directions (R, 3) in b as directions in a."""
-    R = T_a_b[..., :3, :3]
-    # Not by BLAS: its threads spin on products as narrow as these.
-    return np.asarray(np.einsum("ij,rj->ri" if R.ndim == 2 else "rij,rj->ri", R, vectors))
+    rotations = T_a_b[..., :3, :3].reshape(-1, 3, 3)
+    turned = np.empty((len(vectors), 3))
+    _turn_rows(rotations, vectors, turned)
+    return turned
+
+
+@compiled
+def _turn_rows(rotations: Array, vectors: Array, turned: Array) -> None:
+    """Turn vectors (R, 3) by rotations (R, 3, 3), or all by one (1, 3, 3)."""
+    for row in range(len(vectors)):
+        rotation = rotations[0] if len(rotations) == 1 else rotations[row]
+        x = vectors[row, 0]
+        y = vectors[row, 1]
+        z = vectors[row, 2]
+        for axis in range(3):
+            turned[row, axis] = rotation[axis, 0] * x + rotation[axis, 1] * y + rotation[axis, 2] * z
 
 
 def moved(T_a_b: Array, points: Array) -> Array:
