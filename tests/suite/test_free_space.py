@@ -14,7 +14,6 @@ from vobench.scene.scene import Scene, triangles
 from vobench.scene.triangles import Thing
 from vobench.suite.free_space import (
     CELL_M,
-    FLOOR_STEP_M,
     MOST_LENGTH_M,
     MOST_RADIUS_M,
     RATE_HZ,
@@ -25,6 +24,7 @@ from vobench.suite.free_space import (
     floor_map,
     largest_free_circle,
 )
+from vobench.suite.level_floor import FLOOR_STEP_M
 
 GREY = {"grey": Material(colour=(0.5, 0.5, 0.5))}
 

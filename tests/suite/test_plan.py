@@ -110,5 +110,5 @@ def test_trials_have_the_names_of_their_estimator_and_case(bent):
 
 def test_mistakes_in_a_plan_begin_with_none(bent):
     plan = bent()
-    assert plan.mistakes().found == []
+    assert plan.mistakes().recorded == []
     assert plan.mistakes().source is plan.source

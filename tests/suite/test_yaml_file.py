@@ -110,7 +110,7 @@ def test_what_is_right_in_a_wrong_file_is_read(tmp_path):
     reading = read_all(tmp_path / "file.yaml", File)
     assert sorted(m.places[0].key for m in reading.mistakes) == ["chips.b.prnu", "lens", "name", "times_s.1"]
     assert (reading.model.chips, reading.model.times_s, reading.model.seed) == ({"a": Chip()}, (1.0, 3.0), 0)
-    assert reading.source.written(("times_s", 1)) == ("times_s", 2)
+    assert reading.source.original_keys(("times_s", 1)) == ("times_s", 2)
     assert not hasattr(reading.model, "name")
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from vobench.errors import FilePlace, InputError, Mistake, SuiteError
 from vobench.suite.yaml_parser import parse_text
-from vobench.suite.yaml_source import Mistakes, YamlFile, line_of, plain_tree, without_nothing
+from vobench.suite.yaml_source import Mistakes, YamlFile, line_of, plain_tree, without_empty_keys
 
 TEXT = """name: tiny
 scenes: [closet, attic]
@@ -66,7 +66,7 @@ def test_a_file_goes_over_what_it_includes_and_removes_keys_without_a_value():
 
 def test_values_that_replace_the_files_have_no_line_of_their_own():
     changed = file()
-    changed.marked["rigs"]["up"] = {"pitch_deg": 3}
+    changed.parsed["rigs"]["up"] = {"pitch_deg": 3}
     try:
         place = changed.place(("rigs", "up", "pitch_deg"))
     finally:
@@ -75,23 +75,23 @@ def test_values_that_replace_the_files_have_no_line_of_their_own():
 
 
 def test_entries_have_their_number_in_the_file():
-    partial = file(kept={"scenes": (1,)})
-    assert partial.written(("scenes", 0)) == ("scenes", 1)
-    assert partial.written(("scenes", 0, "name")) == ("scenes", 1, "name")
-    assert partial.written(("rigs", "down")) == ("rigs", "down")
-    assert partial.written(("scenes",)) == ("scenes",)
-    assert partial.written(()) == ()
+    partial = file(remaining={"scenes": (1,)})
+    assert partial.original_keys(("scenes", 0)) == ("scenes", 1)
+    assert partial.original_keys(("scenes", 0, "name")) == ("scenes", 1, "name")
+    assert partial.original_keys(("rigs", "down")) == ("rigs", "down")
+    assert partial.original_keys(("scenes",)) == ("scenes",)
+    assert partial.original_keys(()) == ()
 
 
 def test_a_mistake_gets_the_place_of_the_keys_in_front_of_its_own():
     inner = Mistake("is wrong", (FilePlace("scene.yaml", 4),))
-    (placed,) = file().placed(SuiteError(inner), "scenes", 1)
+    (placed,) = file().located_mistakes(SuiteError(inner), "scenes", 1)
     assert [str(place) for place in placed.places] == ["file.yaml:2: scenes.1", "scene.yaml:4"]
 
 
 def test_without_keys_only_a_mistake_without_a_place_gets_the_file():
     inner = Mistake("is wrong", (FilePlace("scene.yaml", 4),))
-    bare, placed = file().placed(SuiteError("is bare", inner))
+    bare, placed = file().located_mistakes(SuiteError("is bare", inner))
     assert [str(place) for place in bare.places] == ["file.yaml"]
     assert placed == inner
 
@@ -113,7 +113,7 @@ def test_a_block_without_a_mistake_adds_none_and_other_errors_pass():
     mistakes.require_none()
     with pytest.raises(ZeroDivisionError), mistakes.at("name"):
         raise ZeroDivisionError
-    assert mistakes.found == []
+    assert mistakes.recorded == []
 
 
 def test_a_mistake_without_a_line_comes_first():
@@ -130,4 +130,4 @@ def test_a_plain_tree_has_types_of_python_and_no_keys_that_are_no_text():
 
 def test_keys_without_a_value_go_at_every_level_but_entries_of_lists_stay():
     tree = {"a": None, "b": {"c": None, "d": 0}, "e": [None, {"f": None}], "g": ({"h": None},)}
-    assert without_nothing(tree) == {"b": {"d": 0}, "e": [None, {}], "g": [{}]}
+    assert without_empty_keys(tree) == {"b": {"d": 0}, "e": [None, {}], "g": [{}]}

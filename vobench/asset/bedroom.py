@@ -14,7 +14,20 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 BED_LENGTH_M = 2.08
+MATTRESS_MIDDLE_M = 0.4  # height of its middle
+TWIN_PILLOWS_FROM_M = 1.2  # width of a bed from which on it has two pillows
+BLANKET_COLOURS = ("#b4533a", "#d39a3c", "#6b4353", "#27445c", "#d8c3a0")
+BEDSIDE_DEPTH_M = 0.38
+WARDROBE_DEPTH_M = 0.58
+PLINTH_M = 0.06  # height
+DOOR_WIDTH_M = 0.48  # of a wardrobe, at least about that
+BOX_COLOURS = ("#a67d52", "#8a9a7b", "#c9c2b4")
+ACCENT_COLOURS = ("#d39a3c", "#b4533a", "#27445c", "#f1ece0")
 RACK_M = 0.5  # the height of the board of a coat rack above the middle of the coats
+HOOK_PITCH_M = 0.18  # between hooks, at least about that
+COAT_COLOURS = ("#27445c", "#3a3c3e", "#6b4353", "#6a6a4c", "#8f6b4d")
+SHOE_CABINET_DEPTH_M = 0.26
+SHOE_COLOURS = ("#2b2622", "#5a3a26", "#c9c5bb", "#3a4a5a")
 
 
 def bed(
@@ -27,13 +40,13 @@ def bed(
     """A made bed with its headboard at the wall, pillows, a duvet that hangs over its sides, and a blanket."""
     parts = _bed_frame(rng, width_m, wood(tones))
     mattress = cushion((BED_LENGTH_M - 0.1, width_m - 0.06, 0.22), power=9, cells=4)
-    parts.append(put(mattress, cloth(linen), x=BED_LENGTH_M / 2 + 0.01, z=0.4))
+    parts.append(put(mattress, cloth(linen), x=BED_LENGTH_M / 2 + 0.01, z=MATTRESS_MIDDLE_M))
     parts += _pillows(rng, width_m, cloth(linen))
     parts.append(put(_quilt(rng, width_m), cloth(cover)))
 
     has_blanket = rng.random() < 0.5
     if has_blanket:
-        colour = one_of(rng, "#b4533a", "#d39a3c", "#6b4353", "#27445c", "#d8c3a0")
+        colour = one_of(rng, *BLANKET_COLOURS)
         blanket = _quilt(rng, width_m + 0.02, first_m=1.45, last_m=1.95, rise_m=0.014)
         parts.append(put(blanket, cloth(colour)))
     return parts
@@ -61,7 +74,7 @@ def _bed_frame(rng: Rng, width_m: float, look: Material) -> list[Part]:
 
 def _pillows(rng: Rng, width_m: float, linen: Material) -> list[Part]:
     """Two pillows side by side, or one on a narrow bed, which lean against the headboard."""
-    count = 1 if width_m < 1.2 else 2
+    count = 1 if width_m < TWIN_PILLOWS_FROM_M else 2
     pillow_width_m = 0.68 if width_m > 1.3 else 0.55
     pillow = cushion((0.42, pillow_width_m, 0.16), power=2.8, cells=4)
     parts = []
@@ -69,36 +82,41 @@ def _pillows(rng: Rng, width_m: float, linen: Material) -> list[Part]:
         from_middle = index - (count - 1) / 2
         y = from_middle * 0.5 * width_m
         lean_deg = rng.uniform(-24, -14)
-        parts.append(put(pillow, linen, 0.3, y, 0.585, pitch=lean_deg, yaw=rng.normal(0, 4)))
+        yaw_deg = rng.normal(0, 4)
+        parts.append(put(pillow, linen, 0.3, y, 0.585, pitch=lean_deg, yaw=yaw_deg))
     return parts
 
 
 def _quilt(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2.07, rise_m: float = 0.0) -> "Trimesh":
     """A duvet or blanket over a mattress from `first_m` to `last_m`: it lies on top, and hangs down at both sides."""
+    # The profile of one half across the bed, from the middle to the lower edge. The other half mirrors it.
     half_m = width_m / 2
+    half_across_m = np.array([0.2 * half_m, 0.6 * half_m, half_m - 0.02, half_m + 0.03, half_m + 0.035])
+    half_height_m = np.array([0.57, 0.565, 0.545, 0.42, 0.3])
+    across_m = np.concatenate([-half_across_m[::-1], half_across_m])
+    height_m = np.concatenate([half_height_m[::-1], half_height_m]) + rise_m
     along_m = np.linspace(first_m, last_m, 15)
-    # The profile across the bed, from the lower edge on one side to that on the other.
-    left_m = [-half_m - 0.035, -half_m - 0.03, -half_m + 0.02, -0.6 * half_m, -0.2 * half_m]
-    right_m = [0.2 * half_m, 0.6 * half_m, half_m - 0.02, half_m + 0.03, half_m + 0.035]
-    across_m = np.array([*left_m, *right_m])
-    height_m = np.array([0.3, 0.42, 0.545, 0.565, 0.57, 0.57, 0.565, 0.545, 0.42, 0.3]) + rise_m
-
     x, y = np.meshgrid(along_m, across_m, indexing="ij")
-    phases = rng.uniform(0, 6, 3)
-    folds = 0.008 * np.sin(9 * x + 4 * y + phases[0]) + 0.006 * np.sin(17 * y - 6 * x + phases[1])
-    is_edge = (along_m < first_m + 0.05) | (along_m > last_m - 0.05)
-    z = np.broadcast_to(height_m, x.shape) + folds - 0.03 * is_edge[:, None]
 
+    # Two waves across the quilt are its folds, and the ends lie lower.
+    phases_rad = rng.uniform(0, 6, 3)
+    long_fold_m = 0.008 * np.sin(9 * x + 4 * y + phases_rad[0])
+    short_fold_m = 0.006 * np.sin(17 * y - 6 * x + phases_rad[1])
+    is_end = (along_m < first_m + 0.05) | (along_m > last_m - 0.05)
+    end_m = 0.03 * is_end
+    z = np.broadcast_to(height_m, x.shape) + (long_fold_m + short_fold_m) - end_m[:, None]
+
+    # What hangs down at the sides waves towards the bed and away from it.
     is_hanging = np.abs(y) > half_m
-    waves = 0.012 * np.sin(14 * x + phases[2]) * np.sign(y)
-    y = y + np.where(is_hanging, waves, 0)
-    return two_sided(sheet(np.stack([x, y, z], axis=-1)))
+    wave_m = 0.012 * np.sin(14 * x + phases_rad[2]) * np.sign(y)
+    waved_y = y + np.where(is_hanging, wave_m, 0)
+    return two_sided(sheet(np.stack([x, waved_y, z], axis=-1)))
 
 
 def bedside_table(rng: Rng, width_m: float = 0.45, tones: str = "oak") -> list[Part]:
     """A small cupboard with a drawer above an open shelf, 0.5 m high."""
     look = wood(tones)
-    depth_m = 0.38
+    depth_m = BEDSIDE_DEPTH_M
     middle_x = depth_m / 2
     u = rng.uniform(0, 2)
 
@@ -123,17 +141,17 @@ def wardrobe(
 ) -> list[Part]:
     """A wardrobe with doors, painted in a colour or of wood, often with a box on top."""
     look = coated(colour, roughness=0.35) if colour else wood(tones)
-    depth_m = 0.58
-    body_m = (depth_m - 0.02, width_m, height_m - 0.06)
-    plinth_m = (depth_m - 0.06, width_m - 0.02, 0.06)
+    depth_m = WARDROBE_DEPTH_M
+    body_m = (depth_m - 0.02, width_m, height_m - PLINTH_M)
+    plinth_m = (depth_m - 0.06, width_m - 0.02, PLINTH_M)
     cornice_m = (depth_m + 0.01, width_m + 0.02, 0.03)
     parts = [
-        stood(body_m, look, depth_m / 2 - 0.01, z=0.06, bevel=0.003),
+        stood(body_m, look, depth_m / 2 - 0.01, z=PLINTH_M, bevel=0.003),
         stood(plinth_m, DARK, depth_m / 2 - 0.02),
         stood(cornice_m, look, depth_m / 2, z=height_m - 0.03, bevel=0.004),
     ]
 
-    door_count = max(2, round(width_m / 0.48))
+    door_count = max(2, round(width_m / DOOR_WIDTH_M))
     door_m = width_m / door_count
     front_m = (0.02, door_m - 0.006, height_m - 0.11)
     grip = tube(mm("0 0 -90, 28 0 -90, 28 0 90, 0 0 90"), 0.006, sections=6)
@@ -146,7 +164,7 @@ def wardrobe(
 
     has_box = rng.random() < 0.4
     if has_box:
-        box_colour = one_of(rng, "#a67d52", "#8a9a7b", "#c9c2b4")
+        box_colour = one_of(rng, *BOX_COLOURS)
         parts.append(stood((0.4, 0.5, 0.24), cloth(box_colour), 0.28, 0.2 * width_m, height_m))
     return parts
 
@@ -160,14 +178,14 @@ def armchair(rng: Rng, colour: str = "#8a9a7b", tones: str = "oak") -> list[Part
 
     arm_rest = cushion((0.64, 0.11, 0.3), power=6, cells=4)
     parts += [put(arm_rest, cover, 0.02, side * 0.34, 0.47) for side in SIDES]
+    leg = lathe(mm("0 0, 14 0, 22 280, 0 280"), sections=10)
     for x in (-0.26, 0.28):
         for side in SIDES:
-            leg = lathe(mm("0 0, 14 0, 22 280, 0 280"), sections=10)
             parts.append(put(leg, wood(tones), x, side * 0.29))
 
     has_cushion = rng.random() < 0.6
     if has_cushion:
-        accent = cloth(one_of(rng, "#d39a3c", "#b4533a", "#27445c", "#f1ece0"))
+        accent = cloth(one_of(rng, *ACCENT_COLOURS))
         small = cushion((0.12, 0.4, 0.38), power=2.8, cells=5)
         parts.append(put(small, accent, -0.16, z=0.62, pitch=-16))
     return parts
@@ -177,7 +195,7 @@ def coat_rack(rng: Rng, width_m: float = 0.9, tones: str = "oak") -> list[Part]:
     """A board with hooks and coats on a wall; with the coats, it reaches from -0.65 m to 0.65 m about z = 0."""
     board = stood((0.02, width_m, 0.1), wood(tones), 0.011, z=RACK_M - 0.05, bevel=0.004)
 
-    hook_count = max(3, round(width_m / 0.18))
+    hook_count = max(3, round(width_m / HOOK_PITCH_M))
     hooks_y = (np.arange(hook_count) + 0.5) * width_m / hook_count - width_m / 2
     hook = tube(spline(mm("15 0 20, 60 0 10, 70 0 40"), 6), 0.006, sections=6)
     hooks = [moved(hook, at(0, y, RACK_M)) for y in hooks_y.tolist()]
@@ -187,7 +205,7 @@ def coat_rack(rng: Rng, width_m: float = 0.9, tones: str = "oak") -> list[Part]:
         is_used = rng.random() < 0.8
         if is_used:
             coat = _coat(rng)
-            colour = one_of(rng, "#27445c", "#3a3c3e", "#6b4353", "#6a6a4c", "#8f6b4d")
+            colour = one_of(rng, *COAT_COLOURS)
             parts.append(put(coat, cloth(colour), 0, y, RACK_M))
     return parts
 
@@ -196,19 +214,19 @@ def _coat(rng: Rng) -> "Trimesh":
     """A coat on a hook: a closed surface in folds, narrow at its collar."""
     length_m = rng.uniform(0.75, 1.05)
     down = np.linspace(0, 1, 6)[:, None]  # from the collar to the hem
-    angle = np.linspace(0, 2 * np.pi, 19)[None]
-    width = 0.35 + 0.65 * np.minimum(1, 3.2 * down)
-    folds = 1 + 0.16 * down * np.sin(5 * angle + rng.uniform(0, 6))
-    x = 0.085 + 0.062 * width * folds * np.cos(angle)
-    y = 0.155 * width * folds * np.sin(angle)
-    z = 0.02 - length_m * down + 0 * angle
-    return two_sided(sheet(np.stack([x, y, z], axis=-1)))
+    angle_rad = np.linspace(0, 2 * np.pi, 19)[None]
+    width_share = 0.35 + 0.65 * np.minimum(1, 3.2 * down)  # it is at its widest below the shoulders
+    folds = 1 + 0.16 * down * np.sin(5 * angle_rad + rng.uniform(0, 6))
+    x_m = 0.085 + 0.062 * width_share * folds * np.cos(angle_rad)
+    y_m = 0.155 * width_share * folds * np.sin(angle_rad)
+    z_m = np.broadcast_to(0.02 - length_m * down, x_m.shape)
+    return two_sided(sheet(np.stack([x_m, y_m, z_m], axis=-1)))
 
 
 def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> list[Part]:
     """A narrow cupboard with two tilting fronts, 0.28 m deep and 0.85 m high."""
     paint = coated(colour, roughness=0.35)
-    depth_m = 0.26
+    depth_m = SHOE_CABINET_DEPTH_M
     body_m = (depth_m, width_m, 0.85)
     top_m = (depth_m + 0.03, width_m + 0.01, 0.02)
     front_m = (0.018, width_m - 0.02, 0.385)
@@ -226,7 +244,7 @@ def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> lis
 
 def shoes(rng: Rng) -> list[Part]:
     """A pair of shoes."""
-    colour = one_of(rng, "#2b2622", "#5a3a26", "#c9c5bb", "#3a4a5a")
+    colour = one_of(rng, *SHOE_COLOURS)
     leather = coated(colour, roughness=0.4)
     upper = cushion((0.27, 0.1, 0.1), power=3.0, cells=4)
     sole = block((0.28, 0.1, 0.02), bevel_m=0.008)

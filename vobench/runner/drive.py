@@ -238,7 +238,7 @@ def drive_trajectory(plan: Plan, name: str) -> TrajectoryDrive:
     mistakes.require_none()
 
     check_cases(cases, motion, mistakes)
-    refusals = dict.fromkeys(str(mistake) for mistake in mistakes.found)
+    refusals = dict.fromkeys(str(mistake) for mistake in mistakes.recorded)
     scenes = {case.scene.place_name: case.scene for case in cases}
     place = cases[0].scene if len(scenes) == 1 else None
     return TrajectoryDrive(name, cases[0], motion, motion.at_frames(), tuple(refusals), place)

@@ -16,7 +16,7 @@ from vobench.suite.axis import AXES
 from vobench.suite.case import Case
 from vobench.suite.estimator_entry import EstimatorEntry
 from vobench.suite.yaml_file import plain
-from vobench.suite.yaml_source import without_nothing
+from vobench.suite.yaml_source import without_empty_keys
 
 SUITE_FILE = "suite.yaml"
 POSES_FILE = "poses.tum"
@@ -42,7 +42,7 @@ def write_case(
         "summary": summary,
         "seed": case.seed,
         "scenes": [scene],
-        "lightings": {variant["lighting"]: without_nothing(plain(case)["lighting"])},
+        "lightings": {variant["lighting"]: without_empty_keys(plain(case)["lighting"])},
         "rigs": {variant["rig"]: special_settings(case.rig)},
         "trajectories": {variant["trajectory"]: _write_trajectory_file(case, folder)},
         "cameras": {variant["camera"]: special_settings(case.camera)},
@@ -81,12 +81,12 @@ def _write_trajectory_file(case: Case, folder: Path) -> Any:
     trajectory = {key: value for key, value in plain(case)["trajectory"].items() if hasattr(spec, key)}
     if isinstance(spec, Replay):
         trajectory |= {key: getattr(spec, key) for key in REPLAY_SOURCE_KEYS}
-    return _special(spec, without_nothing(trajectory))
+    return _special(spec, without_empty_keys(trajectory))
 
 
 def special_settings(settings: Any) -> Any:
     """The settings that differ from the defaults, as plain values that read as the same settings again."""
-    return _special(settings, without_nothing(plain(settings)))
+    return _special(settings, without_empty_keys(plain(settings)))
 
 
 def _special(settings: Any, tree: Any) -> Any:
@@ -128,7 +128,7 @@ def _estimator(estimator_entry: EstimatorEntry) -> Any:
         entry["params"] = estimator_entry.params
     if limits:
         entry["limits"] = limits
-    return without_nothing(entry)
+    return without_empty_keys(entry)
 
 
 def _write_yaml(path: Path, tree: Any) -> None:

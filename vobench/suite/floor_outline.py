@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from vobench.geometry.se3 import Array
 from vobench.scene.scene import triangles
 from vobench.scene.triangles import Triangles
-from vobench.suite.free_space import floor_height_m
+from vobench.suite.level_floor import floor_height_m
 from vobench.suite.scene_build import build
 from vobench.suite.scene_spec import SceneFile
 

@@ -3,40 +3,27 @@
 Most places have a level floor. Outdoors the ground may be uneven: then its height is found in every cell of the map.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from vobench.errors import SuiteError
 from vobench.geometry.se3 import Array
-from vobench.geometry.triangle import areas_m2
 from vobench.motion.spline import Pose, PoseSpline
 from vobench.motion.wander import Clearance
+from vobench.rendering.array_types import Mask
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.scene import Scene, triangles
 from vobench.scene.triangles import Triangles
-
-Mask = NDArray[np.bool_]
-
-# The floor consists of nearly level faces at the same height, up to FLOOR_STEP_M.
-LEVEL = 0.99  # cosine of the steepest level face
-FLOOR_STEP_M = 0.02
-FLOOR_SHARE = 0.4  # the smallest area of the floor, relative to the largest level area at any height
-
-# The ground is uneven if so small a share of the largest thing that faces up is at any one height.
-UNEVEN_SHARE = 0.2
-GENTLE = 0.97  # cosine of the steepest ground on which a body moves, 14 degrees
-GROUND_STEP_M = 0.06  # from the ground up to what lies on it and is no obstacle, such as a path
-GROUND_AREA_SHARE = 0.05  # of the largest uneven thing, which another one has to have to belong to the ground
-GROUND_EXTENT_SHARE = 0.3  # of its extent in plan, likewise: a tree may have many level leaves
+from vobench.suite.level_floor import FLOOR_STEP_M, level_floor
+from vobench.suite.uneven_ground import ground_heights_m, uneven_ground
 
 # The map of the floor, and the height of a body.
 CELL_M = 0.1
 MOST_CELLS = 600  # the largest number of cells along one side
 BODY_M = 0.6
+GROUND_STEP_M = 0.06  # from uneven ground up to what lies on it and is no obstacle, such as a path
 WALL_HEIGHTS_M = (0.1, 0.35, 0.6, 0.9, 1.2, 1.5, 1.8)  # where horizontal rays look for walls, up to a body's height
 SIDES = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0]])  # (4, 3) unit directions
 
@@ -66,7 +53,8 @@ class FreeCircle:
 class FloorMap:
     """A grid on the floor: cell centres x (W,) and y (H,), and which cells (H, W) are free.
 
-    ground_m: the height (H, W) of uneven ground; None for a level floor, which is at floor_m.
+    `floor_m` is the height of a level floor, or the median height of uneven ground.
+    `ground_m` is the height (H, W) of uneven ground; None for a level floor.
     """
 
     x_m: Array
@@ -97,10 +85,7 @@ class FloorMap:
         return distances_m
 
     def largest_circle(self) -> FreeCircle | None:
-        """The largest circle around the centre of a cell that contains free cells only.
-
-        On uneven ground, its floor is the highest ground in it, so that nothing on a level path is below the ground.
-        """
+        """The largest circle around the centre of a cell that contains free cells only; None if no cell is free."""
         distances_m = self._distances_m()
         row, column = np.unravel_index(distances_m.argmax(), distances_m.shape)
         radius_m = float(distances_m[row, column])
@@ -108,194 +93,186 @@ class FloorMap:
             return None
         x_m = float(self.x_m[column])
         y_m = float(self.y_m[row])
-        floor_m = self.floor_m
-        if self.ground_m is not None:
-            distance_m = np.hypot(self.x_m - x_m, self.y_m[:, None] - y_m)
-            floor_m = float(self.ground_m[distance_m <= min(radius_m, MOST_RADIUS_M)].max())
-        return FreeCircle(x_m, y_m, floor_m, radius_m)
+        return FreeCircle(x_m, y_m, self._highest_floor_m(x_m, y_m, radius_m), radius_m)
+
+    def _highest_floor_m(self, x_m: float, y_m: float, radius_m: float) -> float:
+        """The highest floor in a free circle, so that nothing on a level path is below the ground."""
+        if self.ground_m is None:
+            return self.floor_m
+        distance_m = np.hypot(self.x_m - x_m, self.y_m[:, None] - y_m)  # (H, W)
+        is_in_reach = distance_m <= min(radius_m, MOST_RADIUS_M)
+        return float(self.ground_m[is_in_reach].max())
+
+
+@dataclass(frozen=True, slots=True)
+class _Grid:
+    """The cells of a map: the x (W,) and the y (H,) of their centres, and the side of a cell."""
+
+    x_m: Array
+    y_m: Array
+    cell_m: float
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The numbers of rows and columns (H, W)."""
+        return len(self.y_m), len(self.x_m)
+
+    @property
+    def centres_m(self) -> Array:
+        """The centres (H * W, 2) of the cells, row by row."""
+        return np.stack(np.meshgrid(self.x_m, self.y_m), -1).reshape(-1, 2)
 
 
 def largest_free_circle(faces: Triangles, caster: RayCaster) -> FreeCircle | None:
-    """The largest circle on the floor with nothing above it up to the height of a body; None if there is none.
-
-    The floor is at the lowest height with a large level area, because roofs and upper storeys may be larger.
-    """
+    """The largest circle on the floor with nothing above it up to the height of a body; None if there is none."""
     floor = floor_map(faces, caster)
     return floor.largest_circle() if floor else None
 
 
 def floor_map(faces: Triangles, caster: RayCaster, *, body_m: float = BODY_M) -> FloorMap | None:
     """The map of the floor or ground for a body of some height; None if the scene has neither."""
-    is_ground = _uneven_ground(faces)
+    is_ground = uneven_ground(faces)
     if is_ground.any():
-        return _ground_map(faces, caster, is_ground, body_m=body_m)
-    is_level = _is_level(faces)
-    if not is_level.any():
+        grid = _grid_over(faces.corners_m[is_ground])
+        heights_m = ground_heights_m(faces, is_ground, grid.centres_m)
+        if np.isnan(heights_m).all():
+            return None
+        return _map_of_uneven_ground(grid, heights_m, faces, caster, body_m=body_m)
+
+    floor = level_floor(faces)
+    if floor is None:
         return None
-    level_corners_m = faces.corners_m[is_level]  # (F, 3, 3)
-    height_steps = _height_steps(level_corners_m)
-    floor_m = _floor_height_m(level_corners_m, height_steps)
-
-    # The grid covers the bounds of all faces at the floor's height.
-    is_floor_face = np.abs(height_steps * FLOOR_STEP_M - floor_m) < FLOOR_STEP_M
-    floor_corners_m = level_corners_m[is_floor_face].reshape(-1, 3)
-    low_m = floor_corners_m.min(0)[:2]
-    high_m = floor_corners_m.max(0)[:2]
-    cell_m = max(CELL_M, float((high_m - low_m).max()) / MOST_CELLS)
-    x_m = np.arange(low_m[0] + cell_m / 2, high_m[0], cell_m)
-    y_m = np.arange(low_m[1] + cell_m / 2, high_m[1], cell_m)
-    if not x_m.size or not y_m.size:
+    grid = _grid_over(floor.corners_m)
+    if 0 in grid.shape:
         return None
-
-    # A cell is free if a ray down from the height of a body hits the floor first, and if no wall is near.
-    centres_m = np.stack(np.meshgrid(x_m, y_m), -1).reshape(-1, 2)  # (H * W, 2)
-    starts_m = at_height(centres_m, floor_m + body_m)
-    hits = caster.hits(starts_m, downward_directions(len(starts_m)))
-    meets_floor = np.abs(hits.distance - body_m) < FLOOR_STEP_M
-    is_free = meets_floor & (faces.plane[hits.face, 2] > 0)
-    heights_m = [height_m for height_m in WALL_HEIGHTS_M if height_m <= body_m]
-    floors_m = np.full(int(is_free.sum()), floor_m)
-    is_free[is_free] = _away_from_walls(centres_m[is_free], floors_m, cell_m, faces, caster, heights_m=heights_m)
-    return FloorMap(x_m, y_m, is_free.reshape(len(y_m), len(x_m)), floor_m, cell_m)
+    return _map_of_level_floor(grid, floor.height_m, faces, caster, body_m=body_m)
 
 
-def _uneven_ground(faces: Triangles) -> Mask:
-    """Whether each face belongs to uneven ground; all False if the ground is level.
-
-    The ground is the stationary thing with the largest area that faces up and is gentle, and others like it.
-    """
-    is_gentle = (faces.plane[:, 2] > GENTLE) & (faces.mover < 0) & (faces.thing >= 0)
-    things = faces.thing[is_gentle]
-    if not len(things):
-        return is_gentle
-    area_m2 = areas_m2(faces.corners_m[is_gentle])
-    height_steps = _height_steps(faces.corners_m[is_gentle])
-
-    area_of_thing_m2 = np.bincount(things, area_m2)
-    largest = int(area_of_thing_m2.argmax())
-    if not _is_uneven(height_steps[things == largest], area_m2[things == largest]):
-        return np.zeros(len(faces.thing), bool)
-    ground = []
-    corners_m = faces.corners_m[is_gentle]
-    least_extent_m = GROUND_EXTENT_SHARE * _extent_m(corners_m[things == largest])
-    for thing in np.flatnonzero(area_of_thing_m2 > GROUND_AREA_SHARE * area_of_thing_m2[largest]).tolist():
-        is_of_thing = things == thing
-        is_wide = _extent_m(corners_m[is_of_thing]) > least_extent_m
-        if is_wide and _is_uneven(height_steps[is_of_thing], area_m2[is_of_thing]):
-            ground.append(thing)
-    is_ground: Mask = is_gentle & np.isin(faces.thing, ground)
-    return is_ground
-
-
-def _extent_m(corners_m: Array) -> float:
-    """The longer side of the box in plan around faces (F, 3, 3)."""
+def _grid_over(corners_m: Array) -> _Grid:
+    """The grid over the bounds of faces (F, 3, 3). It has no cells if they are narrower than half a cell."""
     points_m = corners_m.reshape(-1, 3)[:, :2]
-    return float((points_m.max(0) - points_m.min(0)).max())
-
-
-def _is_uneven(height_steps: NDArray[np.int_], area_m2: Array) -> bool:
-    """Whether no height step has a large share of the area (F,) of faces."""
-    by_height_m2 = np.bincount(height_steps - height_steps.min(), area_m2)
-    return bool(by_height_m2.max() < UNEVEN_SHARE * by_height_m2.sum())
-
-
-def _ground_map(faces: Triangles, caster: RayCaster, is_ground: Mask, *, body_m: float) -> FloorMap | None:
-    """The map of uneven ground, which consists of some of the faces (F,)."""
-    ground_corners_m = faces.corners_m[is_ground].reshape(-1, 3)
-    low_m = ground_corners_m.min(0)[:2]
-    high_m = ground_corners_m.max(0)[:2]
-    cell_m = max(CELL_M, float((high_m - low_m).max()) / MOST_CELLS)
+    low_m = points_m.min(0)
+    high_m = points_m.max(0)
+    longer_side_m = float((high_m - low_m).max())
+    cell_m = max(CELL_M, longer_side_m / MOST_CELLS)
     x_m = np.arange(low_m[0] + cell_m / 2, high_m[0], cell_m)
     y_m = np.arange(low_m[1] + cell_m / 2, high_m[1], cell_m)
-    centres_m = np.stack(np.meshgrid(x_m, y_m), -1).reshape(-1, 2)  # (H * W, 2)
-
-    ground_caster = RayCaster(faces, np.flatnonzero(is_ground))
-    top_m = float(ground_corners_m[:, 2].max()) + 1.0
-    to_ground = ground_caster.hits(at_height(centres_m, top_m), downward_directions(len(centres_m)))
-    has_ground = to_ground.face >= 0
-    if not has_ground.any():
-        return None
-    heights_m = np.where(has_ground, top_m - to_ground.distance, 0.0)
-
-    # A cell is free if a ray down from the height of a body meets the ground first, and if no wall is near.
-    starts_m = np.column_stack([centres_m, heights_m + body_m])
-    hits = caster.hits(starts_m, downward_directions(len(starts_m)))
-    is_free = has_ground & (np.abs(hits.distance - body_m) < GROUND_STEP_M)
-    wall_heights_m = [height_m for height_m in WALL_HEIGHTS_M if height_m <= body_m]
-    is_free[is_free] = _away_from_walls(
-        centres_m[is_free], heights_m[is_free], cell_m, faces, caster, heights_m=wall_heights_m
-    )
-    shape = (len(y_m), len(x_m))
-    # Cells without ground get the height of the nearest one that has some, so that heights can be interpolated.
-    nearest = scipy.ndimage.distance_transform_edt(
-        ~has_ground.reshape(shape), return_distances=False, return_indices=True
-    )
-    ground_m = heights_m.reshape(shape)[tuple(nearest)]
-    return FloorMap(x_m, y_m, is_free.reshape(shape), float(np.median(heights_m[has_ground])), cell_m, ground_m)
+    return _Grid(x_m, y_m, cell_m)
 
 
-def floor_height_m(faces: Triangles) -> float | None:
-    """The height of the floor of a scene; None if the scene has no level face."""
-    level_corners_m = faces.corners_m[_is_level(faces)]  # (F, 3, 3)
-    if not len(level_corners_m):
-        return None
-    return _floor_height_m(level_corners_m, _height_steps(level_corners_m))
-
-
-def _is_level(faces: Triangles) -> Mask:
-    """Whether each face is stationary, nearly level, and faces up."""
-    is_level: Mask = (faces.plane[:, 2] > LEVEL) & (faces.mover < 0)
-    return is_level
-
-
-def _height_steps(level_corners_m: Array) -> NDArray[np.int_]:
-    """The heights (F,) of level faces (F, 3, 3) in units of FLOOR_STEP_M."""
-    heights_m = level_corners_m.mean(1)[:, 2]
-    steps: NDArray[np.int_] = np.rint(heights_m / FLOOR_STEP_M).astype(int)
-    return steps
-
-
-def _floor_height_m(level_corners_m: Array, height_steps: NDArray[np.int_]) -> float:
-    """The lowest height at which level faces (F, 3, 3) have a large enough area.
-
-    `height_steps` (F,) are the heights of the faces in units of FLOOR_STEP_M.
-    """
-    lowest_step = height_steps.min()
-    area_by_step_m2 = np.bincount(height_steps - lowest_step, areas_m2(level_corners_m))
-    large_steps = np.flatnonzero(area_by_step_m2 > FLOOR_SHARE * area_by_step_m2.max())
-    return float((large_steps[0] + lowest_step) * FLOOR_STEP_M)
-
-
-def at_height(places_m: Array, z_m: float) -> Array:
-    """Points (N, 3) at one height above places (N, 2)."""
-    return np.column_stack([places_m, np.full(len(places_m), z_m)])
-
-
-def _away_from_walls(
-    centres_m: Array,
-    floors_m: Array,
-    cell_m: float,
+def _map_of_level_floor(
+    grid: _Grid,
+    floor_m: float,
     faces: Triangles,
     caster: RayCaster,
     *,
-    heights_m: Sequence[float],
-) -> Mask:
-    """Whether each cell (N, 2) has no wall within the width of a cell at some heights, and is not inside of a thing.
+    body_m: float,
+) -> FloorMap:
+    """The map of a floor at one height."""
+    centres_m = grid.centres_m
+    is_free = _is_free(
+        centres_m,
+        np.full(len(centres_m), floor_m),
+        faces,
+        caster,
+        cell_m=grid.cell_m,
+        body_m=body_m,
+        step_m=FLOOR_STEP_M,
+        needs_upward_face=True,
+    )
+    return FloorMap(grid.x_m, grid.y_m, is_free.reshape(grid.shape), floor_m, grid.cell_m)
 
-    floors_m (N,) are the heights of the floor there. A point is inside of a thing if rays to all four sides hit the
+
+def _map_of_uneven_ground(
+    grid: _Grid,
+    heights_m: Array,
+    faces: Triangles,
+    caster: RayCaster,
+    *,
+    body_m: float,
+) -> FloorMap:
+    """The map of ground with a height (H * W,) in each cell, NaN where there is none."""
+    has_ground = ~np.isnan(heights_m)
+    is_free = np.zeros(len(heights_m), bool)
+    is_free[has_ground] = _is_free(
+        grid.centres_m[has_ground],
+        heights_m[has_ground],
+        faces,
+        caster,
+        cell_m=grid.cell_m,
+        body_m=body_m,
+        step_m=GROUND_STEP_M,
+        needs_upward_face=False,
+    )
+    # Cells without ground get the height of the nearest one that has some, so that heights can be interpolated.
+    nearest = scipy.ndimage.distance_transform_edt(
+        ~has_ground.reshape(grid.shape), return_distances=False, return_indices=True
+    )
+    ground_m = heights_m.reshape(grid.shape)[tuple(nearest)]
+    median_m = float(np.median(heights_m[has_ground]))
+    return FloorMap(grid.x_m, grid.y_m, is_free.reshape(grid.shape), median_m, grid.cell_m, ground_m)
+
+
+def _is_free(
+    centres_m: Array,
+    floors_m: Array,
+    faces: Triangles,
+    caster: RayCaster,
+    *,
+    cell_m: float,
+    body_m: float,
+    step_m: float,
+    needs_upward_face: bool,
+) -> Mask:
+    """Whether a body fits into each cell (N, 2): nothing is above the floor (N,), and no wall is near.
+
+    A ray down from the height of a body has to meet the floor, or something that is at most `step_m` away from it.
+    `needs_upward_face` excludes the backs of faces, such as the inside of the bottom of a box.
+    """
+    starts_m = np.column_stack([centres_m, floors_m + body_m])
+    hits = caster.hits(starts_m, downward_directions(len(starts_m)))
+    is_free: Mask = np.abs(hits.distance - body_m) < step_m
+    if needs_upward_face:
+        is_free = is_free & (faces.plane[hits.face, 2] > 0)
+    is_free[is_free] = _is_away_from_walls(
+        centres_m[is_free], floors_m[is_free], faces, caster, cell_m=cell_m, body_m=body_m
+    )
+    return is_free
+
+
+def _is_away_from_walls(
+    centres_m: Array,
+    floors_m: Array,
+    faces: Triangles,
+    caster: RayCaster,
+    *,
+    cell_m: float,
+    body_m: float,
+) -> Mask:
+    """Whether each cell (N, 2) has no wall within the width of a cell, and is not inside of a thing.
+
+    `floors_m` (N,) are the heights of the floor there. A point is inside of a thing if rays to all four sides hit the
     backs of faces.
     """
     is_clear = np.ones(len(centres_m), bool)
+    heights_m = [height_m for height_m in WALL_HEIGHTS_M if height_m <= body_m]
     for height_m in heights_m:
         starts_m = np.column_stack([centres_m, floors_m + height_m])
         is_inside = np.ones(len(centres_m), bool)
         for direction in SIDES:
             hits = caster.hits(starts_m, np.tile(direction, (len(starts_m), 1)))
             is_hit = hits.face >= 0
-            is_clear &= ~is_hit | (hits.distance > cell_m)
-            is_inside &= is_hit & (faces.plane[hits.face, :3] @ direction > 0)
+            is_near = is_hit & (hits.distance <= cell_m)
+            is_back = is_hit & (faces.plane[hits.face, :3] @ direction > 0)
+            is_clear &= ~is_near
+            is_inside &= is_back
         is_clear &= ~is_inside
     return is_clear
+
+
+def at_height(places_m: Array, z_m: float) -> Array:
+    """Points (N, 3) at one height above places (N, 2)."""
+    return np.column_stack([places_m, np.full(len(places_m), z_m)])
 
 
 def downward_directions(count: int) -> Array:

@@ -59,7 +59,7 @@ class ScenarioCases:
     def _dealer(self) -> Dealer | None:
         """What deals units to scenarios; None if the suite does not spread them, or has mistakes."""
         spread = self.suite.spread
-        if spread is None or not self.suite.scenarios or self.mistakes.found:
+        if spread is None or not self.suite.scenarios or self.mistakes.recorded:
             return None
         with self.mistakes.at("spread"):
             for axis in UNIT_AXES:

@@ -20,7 +20,7 @@ NAMED_SECTIONS = {"lamps": "", "boxes": "box", "boards": "board", "furniture": "
 
 def check_scene(spec: SceneFile, mistakes: Mistakes) -> None:
     """Find the mistakes in a scene, whose sections and entries may be incomplete, and add them to `mistakes`."""
-    is_complete = not mistakes.found
+    is_complete = not mistakes.recorded
     _check_materials(spec, mistakes)
     if is_complete:
         with mistakes.at():
@@ -32,7 +32,7 @@ def check_scene(spec: SceneFile, mistakes: Mistakes) -> None:
 
 
 def _check_materials(spec: SceneFile, mistakes: Mistakes) -> None:
-    written = mistakes.source.marked.get("materials", {})
+    written = mistakes.source.parsed.get("materials", {})
     if not isinstance(written, dict):
         return
     known = [*{**written, **dict.fromkeys(FINISHES)}]
@@ -168,5 +168,5 @@ def _room_names(room: RoomSpec | None) -> Iterator[str]:
 
 
 def _generated_name(prefix: str, section: str, index: int, source: YamlFile) -> str:
-    number: Any = source.written((section, index))[1]  # as in the file
+    number: Any = source.original_keys((section, index))[1]  # as in the file
     return f"{prefix}_{number}"

@@ -53,8 +53,8 @@ def _override_light(light: Light, override: LightOverride) -> Light:
 
 def require_possible(name: str, scene: YamlFile) -> None:
     """Raise SuiteError if no light of a scene, which was read only in part, can have this name."""
-    written_names = [*_written_names(scene.marked)]
-    daylight_names = [light for light in (SUN, SKY) if light in scene.marked]
+    written_names = [*_written_names(scene.parsed)]
+    daylight_names = [light for light in (SUN, SKY) if light in scene.parsed]
     known_names = [*written_names, *daylight_names]
     thing_name = name.partition(".")[0]
     if thing_name not in known_names and not name.startswith(GENERATED_NAMES):

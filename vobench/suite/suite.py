@@ -44,7 +44,7 @@ def _require_axes(content: Mapping[str, Any], mistakes: Mistakes) -> None:
     for key in content:
         intended_keys.update(get_close_matches(str(key), hints(Suite), n=1))
     missing = missing_axis(intended_keys)
-    if mistakes.found and missing:
+    if mistakes.recorded and missing:
         raise SuiteError(missing)
 
 
@@ -79,7 +79,7 @@ def _variants(suite: Suite, axis_reader: AxisReader, axes: Axes) -> list[Variant
     if suite.spread is None:
         return axis_reader.variants(axes)
     variants = list[Variant]()
-    if not suite.scenarios and not axis_reader.mistakes.found:
+    if not suite.scenarios and not axis_reader.mistakes.recorded:
         with axis_reader.mistakes.at("spread"):
             variants = axis_reader.spread_variants(axes, suite.spread)
     return variants

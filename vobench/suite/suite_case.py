@@ -79,7 +79,7 @@ class AxisReader:
     def _check_lightings(self, scene: SceneFile, scene_mistakes: Mistakes) -> None:
         """Find lightings that name a light which the scene does not have, before anything is simulated."""
         lightings = self.suite.lightings
-        is_scene_complete = not scene_mistakes.found
+        is_scene_complete = not scene_mistakes.recorded
         lights: tuple[Light, ...] = ()
         if is_scene_complete:
             names = {name for overrides in lightings.values() for name in overrides}
@@ -152,7 +152,7 @@ class AxisReader:
                 trajectories[own_name] = USUAL_DRIVE
                 continue
             with self.mistakes.at("scenes", self.entry_of[name]):
-                if not self.mistakes.found:
+                if not self.mistakes.recorded:
                     trajectories[own_name] = circular_path(build(scene, {}))
         return trajectories
 

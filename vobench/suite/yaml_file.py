@@ -97,7 +97,7 @@ def _describe_content(tree: Any) -> str:
 def _read_with_included(path: Path, kind: Kind, including: tuple[Path, ...]) -> tuple[YamlFile, list[Mistake]]:
     """The content of a file merged with the file that it includes, and the duplicate keys of both."""
     source, duplicates = _read_mapping(path)
-    name = source.marked.get(INCLUDE)
+    name = source.parsed.get(INCLUDE)
     if not isinstance(name, str):
         return source, duplicates
     resolved_path = path.resolve()
@@ -107,16 +107,16 @@ def _read_with_included(path: Path, kind: Kind, including: tuple[Path, ...]) -> 
             raise SuiteError(f"a {kind} cannot include itself: {included_path}")
         included, more_duplicates = _read_with_included(included_path, kind, (resolved_path, *including))
     except VobenchError as error:
-        raise SuiteError(*source.placed(error, INCLUDE)) from None
+        raise SuiteError(*source.located_mistakes(error, INCLUDE)) from None
     return replace(source, included=included), [*duplicates, *more_duplicates]
 
 
 def _changed(source: YamlFile, changes: Mapping[str, str]) -> YamlFile:
     """The content of a file with other values. Raises SuiteError for an impossible key or value."""
-    tree = _shallow_copy(source.marked)
+    tree = _shallow_copy(source.parsed)
     for dotted_keys, value in changes.items():
         _set_value(tree, dotted_keys, value)
-    return replace(source, marked=tree)
+    return replace(source, parsed=tree)
 
 
 def _shallow_copy(section: Any) -> Any:
@@ -165,7 +165,7 @@ def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistak
     """The content of a file as settings, as far as it is correct."""
     unread = dict[Keys, str]()
     for file in source.files:
-        unread.update(_not_in_json(file.marked, ()))
+        unread.update(_not_in_json(file.parsed, ()))
     all_mistakes = list(mistakes)
     all_mistakes += [Mistake(sentence, (source.place(keys),)) for keys, sentence in unread.items()]
 
@@ -179,9 +179,9 @@ def _checked_reading(model: type[Model], source: YamlFile, mistakes: list[Mistak
         wrong_places += [pydantic_location(each) for each in error.errors()]
         all_mistakes += validation_mistakes(source, error, json_schema(model), unread)
 
-    sections, kept = _intact_sections(model, data, wrong_places)
+    sections, remaining = _intact_sections(model, data, wrong_places)
     partial = _partial_model(model, sections)
-    return FileReading(partial, replace(source, kept=kept), tuple(sorted(all_mistakes, key=line_of)))
+    return FileReading(partial, replace(source, remaining=remaining), tuple(sorted(all_mistakes, key=line_of)))
 
 
 def _not_in_json(tree: Any, keys: Keys) -> Iterator[tuple[Keys, str]]:
@@ -206,7 +206,7 @@ def _intact_sections(
 ) -> tuple[dict[str, Any], dict[str, tuple[int, ...]]]:
     """The sections of a file without wrong entries, and for each list, the indices of the entries that remain."""
     sections = dict[str, Any]()
-    kept = dict[str, tuple[int, ...]]()
+    remaining = dict[str, tuple[int, ...]]()
     known = hints(model)
     for key in data.keys() & known.keys():
         value = data[key]
@@ -214,11 +214,11 @@ def _intact_sections(
         if isinstance(value, dict):
             value = {name: entry for name, entry in value.items() if name not in wrong_entries}
         elif isinstance(value, list):
-            kept[key] = tuple(index for index in range(len(value)) if index not in wrong_entries)
-            value = [value[index] for index in kept[key]]
+            remaining[key] = tuple(index for index in range(len(value)) if index not in wrong_entries)
+            value = [value[index] for index in remaining[key]]
         with suppress(ValidationError):  # its mistakes have been recorded already
             sections[key] = TypeAdapter(known[key]).validate_json(json.dumps(value), strict=True)
-    return sections, kept
+    return sections, remaining
 
 
 def _partial_model(model: type[Model], sections: Mapping[str, Any]) -> Model:

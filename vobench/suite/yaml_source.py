@@ -13,25 +13,17 @@ Keys = tuple[int | str, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class _FoundPlace:
-    """A place in a file, and how many of the requested keys lead to it."""
-
-    depth: int
-    place: FilePlace
-
-
-@dataclass(frozen=True, slots=True)
 class YamlFile:
     """The content of a YAML file, and the line of each key.
 
-    `marked` is the tree that was parsed.
-    `kept` has the original indices of the entries of each list from which entries were removed.
+    `parsed` is the tree from the parser, whose mappings and lists have line numbers.
+    `remaining` has, for each list from which entries were removed, the original indices of the entries that remain.
     `included` is the file that this one includes. Its keys apply if this file does not have them.
     """
 
     path: Path
-    marked: Any
-    kept: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    parsed: Any
+    remaining: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
     included: "YamlFile | None" = None
 
     @property
@@ -40,10 +32,11 @@ class YamlFile:
 
         A key without a value removes the key of the included file.
         """
-        own = plain_tree(self.marked)
+        content = plain_tree(self.parsed)
         if self.included is None:
-            return own
-        return without_nothing(merged_over(self.included.plain, own))
+            return content
+        merged = merged_over(self.included.plain, content)
+        return without_empty_keys(merged)
 
     @property
     def files(self) -> "tuple[YamlFile, ...]":
@@ -52,63 +45,85 @@ class YamlFile:
             return (self,)
         return self, *self.included.files
 
-    def placed(self, error: VobenchError, *keys: int | str) -> tuple[Mistake, ...]:
+    def located_mistakes(self, error: VobenchError, *keys: int | str) -> tuple[Mistake, ...]:
         """The mistakes of an error, with the place of the given keys in front of their places.
 
         Without keys, a mistake without a place gets this file as its place.
         """
-        place = self.place(self.written(keys))
+        place = self.place(self.original_keys(keys))
         mistakes = list[Mistake]()
         for mistake in error.mistakes:
-            if keys or not mistake.places:
+            needs_place = bool(keys) or not mistake.places
+            if needs_place:
                 mistakes.append(replace(mistake, places=(place, *mistake.places)))
             else:
                 mistakes.append(mistake)
         return tuple(mistakes)
 
     def place(self, keys: Keys) -> FilePlace:
-        """The place of the last of the given keys that exists in this file or an included one."""
-        found_places = [file._find_place(keys) for file in self.files]
-        return max(found_places, key=lambda found: found.depth).place
+        """The place of the last of the given keys that exists, in this file or the included one that has most of them.
 
-    def _find_place(self, keys: Keys) -> _FoundPlace:
-        """The place of the last of the given keys that exists in this file."""
-        tree = self.marked
-        line: int | None = None
-        written_keys = list[int | str]()
-        depth = 0
-        for key in keys:
-            if _is_single_value_for_list(tree, key):
-                continue
-            written_keys.append(key)
-            if _has_entry(tree, key):
-                line = _line_of_entry(tree, key) or line
-                tree = tree[key]
-                depth = len(written_keys)
-            else:
-                tree = None
-        value = tree if isinstance(tree, str | bool | int | float) else None
-        return _FoundPlace(depth, FilePlace(str(self.path), line, key=".".join(map(str, written_keys)), value=value))
+        The place names all of the keys, so that a missing key is part of the message.
+        """
+        deepest = max((_KeyPath(file, keys) for file in self.files), key=lambda key_path: key_path.depth)
+        return deepest.place
 
-    def written(self, keys: Keys) -> Keys:
-        """The keys with the original indices of list entries."""
+    def original_keys(self, keys: Keys) -> Keys:
+        """The keys with the index that a list entry had before other entries were removed."""
         if len(keys) < 2:
             return keys
         section, index, *rest = keys
-        if isinstance(index, int) and section in self.kept:
-            return section, self.kept[str(section)][index], *rest
+        if isinstance(index, int) and section in self.remaining:
+            original_index = self.remaining[str(section)][index]
+            return section, original_index, *rest
         return keys
 
 
+class _KeyPath:
+    """The way through one file along some keys, as far as the file has them.
+
+    `depth` is the number of keys up to the last one that exists.
+    """
+
+    def __init__(self, file: YamlFile, keys: Keys) -> None:
+        self.depth = 0
+        self._file = file.path
+        self._line: int | None = None  # of the last key that exists
+        self._keys = list[int | str]()
+        self._tree = file.parsed  # the value at the last key; None if the file does not have that key
+        for key in keys:
+            # A single value may stand for a list of one entry. The file has no index there, and the place gets none.
+            if not _is_single_value_for_list(self._tree, key):
+                self._follow(key)
+
+    def _follow(self, key: int | str) -> None:
+        """Go on to the value at a key."""
+        self._keys.append(key)
+        if not _has_entry(self._tree, key):
+            self._tree = None
+            return
+        self.depth = len(self._keys)
+        self._line = _line_of_entry(self._tree, key) or self._line
+        self._tree = self._tree[key]
+
+    @property
+    def place(self) -> FilePlace:
+        """The place in the file, with the value there if it is neither a mapping nor a list."""
+        dotted_keys = ".".join(str(key) for key in self._keys)
+        value = self._tree if isinstance(self._tree, str | bool | int | float) else None
+        return FilePlace(str(self._file), self._line, key=dotted_keys, value=value)
+
+
 def _is_single_value_for_list(tree: Any, key: int | str) -> bool:
-    """Whether a key is the index of a list entry, but the file has a single value instead of a list."""
+    """Whether a key is the index of a list entry, but the file has a single value or a mapping instead of a list."""
     if not isinstance(key, int):
         return False
-    is_other_mapping = isinstance(tree, dict) and key not in tree
-    return is_other_mapping or isinstance(tree, str | int)
+    is_mapping_without_key = isinstance(tree, dict) and key not in tree
+    return is_mapping_without_key or isinstance(tree, str | int)
 
 
 def _has_entry(tree: Any, key: int | str) -> bool:
+    """Whether a mapping or a list has an entry at a key or an index."""
     if isinstance(tree, dict):
         return key in tree
     return isinstance(tree, list) and isinstance(key, int) and key < len(tree)
@@ -131,7 +146,7 @@ class Mistakes:
     """Collects the mistakes in a file, so that all of them are reported at once."""
 
     source: YamlFile
-    found: list[Mistake] = field(default_factory=list)
+    recorded: list[Mistake] = field(default_factory=list)
 
     @contextmanager
     def at(self, *keys: int | str) -> Iterator[None]:
@@ -142,22 +157,25 @@ class Mistakes:
         try:
             yield
         except VobenchError as error:
-            self.found.extend(self.source.placed(error, *keys))
+            self.recorded.extend(self.source.located_mistakes(error, *keys))
 
     def require_none(self) -> None:
         """Raise SuiteError with all distinct mistakes, in the order of the file, if there are any."""
-        distinct = {str(mistake): mistake for mistake in self.found}.values()
-        if distinct:
-            raise SuiteError(*sorted(distinct, key=line_of))
+        if not self.recorded:
+            return
+        by_message = {str(mistake): mistake for mistake in self.recorded}
+        raise SuiteError(*sorted(by_message.values(), key=line_of))
 
 
 def line_of(mistake: Mistake) -> int:
     """The line of a mistake in the requested file; 0 if it has none."""
-    return mistake.places[0].line or 0 if mistake.places else 0
+    if not mistake.places:
+        return 0
+    return mistake.places[0].line or 0
 
 
 def plain_tree(tree: Any) -> Any:
-    """A tree in Python's built-in types, without keys that are not text and values that JSON cannot represent."""
+    """A tree in Python's built-in types. Keys that are not text are removed; values of other types become None."""
     if isinstance(tree, dict):
         return {str(key): plain_tree(value) for key, value in tree.items() if isinstance(key, str)}
     if isinstance(tree, list):
@@ -168,11 +186,11 @@ def plain_tree(tree: Any) -> Any:
     return None
 
 
-def without_nothing(tree: Any) -> Any:
-    """A tree without keys that have no value, because YAML treats them like missing keys."""
+def without_empty_keys(tree: Any) -> Any:
+    """A tree without keys that have no value, which count as missing."""
     if isinstance(tree, dict):
-        with_value = {key: without_nothing(value) for key, value in tree.items()}
+        with_value = {key: without_empty_keys(value) for key, value in tree.items()}
         return {key: value for key, value in with_value.items() if value is not None}
     if isinstance(tree, list | tuple):
-        return [without_nothing(value) for value in tree]
+        return [without_empty_keys(value) for value in tree]
     return tree
