@@ -7,7 +7,7 @@ from vobench.report.board_metric import METRICS
 from vobench.report.breakdown import BreakdownCurve, breakdown_curves
 from vobench.report.cell import CaseFacts, Cell, make_cell, trials_by_cell
 from vobench.report.division import divisions, truth_copy_remarks, with_truth_copies
-from vobench.report.frame_statistics import Answered, EstimatorStatistics
+from vobench.report.frame_statistics import EstimatorStatistics, StatisticsByCell
 from vobench.report.pair_sentence import named_pairs
 from vobench.report.total import Total, rank_division
 from vobench.runner.environment import Environment
@@ -68,7 +68,7 @@ class Board:
 
 def make_board(
     scores: Iterable[TrialScore],
-    answered: Answered,
+    answered: StatisticsByCell,
     facts: Mapping[str, CaseFacts] | None = None,
     *,
     title: str = "",
@@ -136,7 +136,7 @@ def _corrected(cell: Cell, refuted: Collection[str]) -> Cell:
     return replace(cell, claims=(*cell.claims, NOT_DETERMINISTIC))
 
 
-def make_cells(trials: Iterable[TrialScore], answered: Answered, facts: Mapping[str, CaseFacts]) -> list[Cell]:
+def make_cells(trials: Iterable[TrialScore], answered: StatisticsByCell, facts: Mapping[str, CaseFacts]) -> list[Cell]:
     """One cell for each case and estimator, in order of their names. A truth copy is one in all of its cells."""
     marked_trials = with_truth_copies(list(trials))
     cells = []

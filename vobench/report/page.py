@@ -15,7 +15,7 @@ from vobench.report.board_metric import METRICS
 from vobench.report.case_facts import case_facts, design_remarks
 from vobench.report.cell import CaseFacts, trials_by_cell
 from vobench.report.determinism import determinism_remarks, repeated_answers
-from vobench.report.frame_statistics import Answered, EstimatorStatistics, summarize_frames
+from vobench.report.frame_statistics import EstimatorStatistics, StatisticsByCell, summarize_frames
 from vobench.report.json_file import read_object
 from vobench.report.leaderboard import Board
 from vobench.report.page_data import page_data
@@ -49,7 +49,7 @@ def run_board(folder: RunFolder, scores: list[TrialScore]) -> Board:
     return _board(folder, scores, _answered(_cell_frames(folder, scores)))
 
 
-def _board(folder: RunFolder, scores: list[TrialScore], answered: Answered) -> Board:
+def _board(folder: RunFolder, scores: list[TrialScore], answered: StatisticsByCell) -> Board:
     facts = _facts(folder, scores)
     repeated = repeated_answers(folder, scores)
     title = folder.path.resolve().parent.name
@@ -80,7 +80,7 @@ def _base_seed(folder: RunFolder) -> int:
     return base_seed if isinstance(base_seed, int) else 0
 
 
-def _answered(frames: Iterator[CellFrames] | list[CellFrames]) -> Answered:
+def _answered(frames: Iterator[CellFrames] | list[CellFrames]) -> StatisticsByCell:
     return {(cell.case, cell.estimator): cell.statistics for cell in frames}
 
 

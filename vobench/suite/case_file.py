@@ -21,7 +21,8 @@ from vobench.suite.yaml_source import without_empty_keys
 SUITE_FILE = "suite.yaml"
 POSES_FILE = "poses.tum"
 UNNAMED = "it"  # the name of a variant for which the case has no name
-REPLAY_SOURCE_KEYS = ("file", "times", "recorded_hz", "axes")  # the keys that say how a replayed trajectory is read
+# How the written poses of a replayed trajectory are read: they have stamps and are those of the body.
+WRITTEN_POSES: dict[str, Any] = {"file": POSES_FILE, "times": None, "recorded_hz": None, "axes": "body"}
 KIND_KEY = "kind"  # says which settings follow, so it is written in any case
 LINE_WIDTH = 120
 
@@ -73,15 +74,15 @@ def _write_scene_files(case: Case, folder: Path) -> Any:
 
 
 def _write_trajectory_file(case: Case, folder: Path) -> Any:
-    """Write the replayed poses, if any, in body axes with stamps, and return the settings of the trajectory."""
+    """Write the replayed poses, if any, and return the settings of the trajectory."""
     spec = case.trajectory
+    # A trajectory by itself would have keys that belong to other kinds of movers, so the case is converted as a whole.
+    settings = plain(case)["trajectory"]
     if isinstance(spec, Replay) and case.replayed is not None:
         (folder / POSES_FILE).write_text(case.replayed, encoding="utf-8")
-        spec = replace(spec, file=POSES_FILE, times=None, recorded_hz=None, axes="body")
-    trajectory = {key: value for key, value in plain(case)["trajectory"].items() if hasattr(spec, key)}
-    if isinstance(spec, Replay):
-        trajectory |= {key: getattr(spec, key) for key in REPLAY_SOURCE_KEYS}
-    return _special(spec, without_empty_keys(trajectory))
+        spec = replace(spec, **WRITTEN_POSES)
+        settings = settings | WRITTEN_POSES
+    return _special(spec, without_empty_keys(settings))
 
 
 def special_settings(settings: Any) -> Any:
