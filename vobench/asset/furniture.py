@@ -91,6 +91,34 @@ WHITE = coated("#dcdbd6")
 CREAM = coated("#e6e1d3")
 PAGE = matt("#e9e4d8")
 
+A4_LONG_M = 0.297  # ISO 216
+A4_SHORT_M = 0.21
+DESK_TOP_M = 0.026  # thickness
+CASTORS = 5  # of a swivel chair
+CASTOR_RADIUS_M = 0.3  # distance of the castors from the column
+SHELF_BOARD_M = 0.022  # thickness of the uprights
+SHELF_ROW_M = 0.37  # height of a row, about
+WIDEST_BAY_M = 1.1
+BINDER_HEIGHT_M = 0.3  # higher books are binders
+BINDER_DEPTH_M = 0.24
+BOOK_GAP_M = 0.0012  # between neighbours
+SCREEN_ASPECT = 0.58  # height of a display over its width
+SCREEN_CD_M2 = (176.0, 180.0, 188.0)  # luminance of white, a little bluish
+KEY_PITCH_M = 0.019  # 19 mm from key to key, as on most keyboards
+KEY_ROWS = 5
+KEY_COLUMNS = 23
+GAP_COLUMNS = (14, 18)  # before the cursor keys, and before the number pad
+CABLE_RADIUS_M = 0.0045
+CABLES = 3
+CRATE_PLANK_M = 0.14  # width of a plank, about
+CRATE_LID_BOARDS = 5
+SOFA_SEATS = 3
+ARMREST_M = 0.18  # width
+CRUMPLED_PAGES = 7
+PLINTH_M = 0.06  # height of the plinth of a cabinet
+BENCH_TOP_M = 0.05  # thickness
+BENCH_PLANKS = 4
+
 
 def wood(kind: str) -> Material:
     """Lacquered wood. `kind` is one of the woods in `picture.TONES`."""
@@ -146,94 +174,96 @@ def desk(
 ) -> list[Part]:
     """A table top on two steel legs, with a pedestal of three drawers and a cable tray."""
     leg_y = width_m / 2 - 0.12
-    d = depth_m
-    h = height_m
-    top_m = (d, width_m, 0.026)
-    parts = [stood(top_m, wood(tones), 0, 0, h - 0.026, bevel=0.004, u=rng.uniform(0, 2))]
+    top_m = (depth_m, width_m, DESK_TOP_M)
+    parts = [stood(top_m, wood(tones), z=height_m - DESK_TOP_M, bevel=0.004, u=rng.uniform(0, 2))]
 
-    foot_m = (d - 0.08, 0.06, 0.03)
-    post_m = (0.06, 0.08, h - 0.08)
-    bearer_m = (d - 0.14, 0.06, 0.024)
+    foot_m = (depth_m - 0.08, 0.06, 0.03)
+    post_m = (0.06, 0.08, height_m - 0.08)
+    bearer_m = (depth_m - 0.14, 0.06, 0.024)
     for y in (-leg_y, leg_y):
         parts.append(stood(foot_m, BLACK, 0, y))
         parts.append(stood(post_m, BLACK, 0, y, 0.03))
-        parts.append(stood(bearer_m, BLACK, 0, y, h - 0.05))
+        parts.append(stood(bearer_m, BLACK, 0, y, height_m - 0.05))
 
     rail_m = (0.03, 2 * leg_y, 0.05)
     tray_profile = mm("0 0, 100 0, 100 60, 97 60, 97 3, 3 3, 3 60, 0 60")
     tray = extrusion(tray_profile, 1.4 * leg_y)
-    parts.append(stood(rail_m, BLACK, 0, 0, h - 0.08))
-    parts.append(put(tray, DARK, 0.06 - d / 2, 0.7 * leg_y, h - 0.16, roll=90))
+    parts.append(stood(rail_m, BLACK, z=height_m - 0.08))
+    parts.append(put(tray, DARK, 0.06 - depth_m / 2, 0.7 * leg_y, height_m - 0.16, roll=90))
 
-    pedestal_m = (d - 0.22, 0.4, 0.54)
+    pedestal_m = (depth_m - 0.22, 0.4, 0.54)
     pedestal_y = (leg_y - 0.26) * rng.choice([-1, 1])
     parts.append(stood(pedestal_m, GREY, -0.02, pedestal_y, 0.06))
     grip_path = spline(mm("0 -70 0, 28 -55 0, 28 55 0, 0 70 0"), 12)
     grip = tube(grip_path, 0.005)
     front_m = (0.016, 0.385, 0.165)
-    for z in (0.075, 0.25, 0.425):
-        parts.append(stood(front_m, GREY, d / 2 - 0.125, pedestal_y, z, bevel=0.004))
-        parts.append(put(grip, STEEL, d / 2 - 0.118, pedestal_y, z + 0.12))
+    for drawer_z in (0.075, 0.25, 0.425):
+        parts.append(stood(front_m, GREY, depth_m / 2 - 0.125, pedestal_y, drawer_z, bevel=0.004))
+        parts.append(put(grip, STEEL, depth_m / 2 - 0.118, pedestal_y, drawer_z + 0.12))
     return parts
 
 
 def chair(rng: Rng, colour: str = NAVY) -> list[Part]:
     """A swivel chair on five castors; a person on it looks along x."""
-    turn_deg = rng.uniform(0, 72)
+    castor_angle_deg = 360 / CASTORS
+    first_castor_deg = rng.uniform(0, castor_angle_deg)
     column = lathe(mm("0 70, 40 70, 35 120, 30 220, 18 230, 18 420, 0 420"))
     parts = [put(column, BLACK)]
 
     castor = lathe(mm("0 -22, 24 -22, 30 -14, 30 14, 24 22, 0 22"), sections=16)
     leg_path = spline(mm("20 0 100, 160 0 95, 300 0 65"), 6)
     leg = tube(leg_path, 0.017)
-    for angle in np.deg2rad(turn_deg + 72 * np.arange(5)):
-        x = 0.3 * np.cos(angle)
-        y = 0.3 * np.sin(angle)
-        parts.append(put(leg, BLACK, yaw=np.rad2deg(angle)))
-        heading = rng.uniform(0, 360)
-        parts.append(put(castor, DARK, x, y, 0.03, yaw=heading, roll=90))
+    for angle_rad in np.deg2rad(first_castor_deg + castor_angle_deg * np.arange(CASTORS)):
+        x = CASTOR_RADIUS_M * np.cos(angle_rad)
+        y = CASTOR_RADIUS_M * np.sin(angle_rad)
+        parts.append(put(leg, BLACK, yaw=np.rad2deg(angle_rad)))
+        heading_deg = rng.uniform(0, 360)
+        parts.append(put(castor, DARK, x, y, 0.03, yaw=heading_deg, roll=90))
 
     fabric = cloth(colour)
     seat = cushion((0.48, 0.5, 0.085), power=4.5)
     back = cushion((0.075, 0.46, 0.58), power=4.5)
     support_path = spline(mm("-20 0 430, -240 0 440, -290 0 580, -285 0 850"), 12)
-    parts.append(put(seat, fabric, 0.02, 0, 0.475))
-    parts.append(put(back, fabric, -0.235, 0, 0.86, pitch=-9))
+    seat_plate_m = (0.3, 0.24, 0.02)
+    parts.append(put(seat, fabric, 0.02, z=0.475))
+    parts.append(put(back, fabric, -0.235, z=0.86, pitch=-9))
     parts.append(put(tube(support_path, 0.018), BLACK))
-    parts.append(stood((0.3, 0.24, 0.02), BLACK, 0, 0, 0.415))
+    parts.append(stood(seat_plate_m, BLACK, z=0.415))
 
     armrest = cushion((0.25, 0.075, 0.03), cells=4)
     arm_points = mm("-40 200 435, -40 300 460, -40 295 660")
-    for side in (-1, 1):
+    for side in SIDES:
         arm_path = spline(arm_points * [1, side, 1], 10)
         parts.append(put(tube(arm_path, 0.013), BLACK))
         parts.append(put(armrest, BLACK, -0.01, side * 0.295, 0.675))
     return parts
 
 
-def _book(spines: Spines, k: int, depth_m: float) -> MeshArrays:
+def _book(spines: Spines, number: int, depth_m: float) -> MeshArrays:
     """A closed book with its spine towards x.
 
-    The texture of spine and covers is from the book's cell of the picture; pages are the colour of the lowest row.
+    `number` is that of its spine in the picture. The texture of spine and covers is from the cell of that spine; the
+    colour of the pages is from the lowest row of the picture.
     """
-    u0, u1, v0, v1 = spines.cells[k]
-    thickness, height = spines.sizes_m[k]
-    closed = block_arrays((depth_m, thickness, height), bevel_m=0)
-    mesh = closed.moved(at(0, 0, height / 2))
+    u_left, u_right, v_top, v_bottom = spines.cells[number]
+    thickness_m, height_m = spines.sizes_m[number]
+    closed = block_arrays((depth_m, thickness_m, height_m), bevel_m=0)
+    book = closed.moved(at(0, 0, height_m / 2))
 
-    share_y = mesh.vertices_m[:, 1] / thickness + 0.5
-    share_z = mesh.vertices_m[:, 2] / height
-    spine_u = u0 + share_y * (u1 - u0)
-    spine_v = v1 - share_z * (v1 - v0)
+    share_y = book.vertices_m[:, 1] / thickness_m + 0.5
+    share_z = book.vertices_m[:, 2] / height_m
+    spine_u = u_left + share_y * (u_right - u_left)
+    spine_v = v_bottom - share_z * (v_bottom - v_top)
     spine_uv = np.stack([spine_u, spine_v], axis=-1)
-    middle_u = (u0 + u1) / 2
-    cover_uv = [middle_u, v0 + 0.993 * (v1 - v0)]
+    # All of a cover and all pages have the colour of one point, near the bottom of the cell and of the picture.
+    middle_u = (u_left + u_right) / 2
+    cover_uv = [middle_u, v_top + 0.993 * (v_bottom - v_top)]
     paper_uv = [middle_u, 0.997]
 
-    is_spine = mesh.normals[:, :1] > 0.5
-    is_cover = np.abs(mesh.normals[:, 1:2]) > 0.5
+    is_spine = book.normals[:, :1] > 0.5
+    is_cover = np.abs(book.normals[:, 1:2]) > 0.5
     cover_or_paper_uv = np.where(is_cover, cover_uv, paper_uv)
-    return replace(mesh, uv=np.where(is_spine, spine_uv, cover_or_paper_uv))
+    return replace(book, uv=np.where(is_spine, spine_uv, cover_or_paper_uv))
 
 
 def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> MeshArrays:
@@ -241,47 +271,53 @@ def _books(rng: Rng, spines: Spines, width_m: float, height_m: float) -> MeshArr
 
     Books that are neighbours in the picture mostly stand side by side, and a few lean.
     """
-    fitting = [k for k, (_, book_height) in enumerate(spines.sizes_m) if book_height < height_m - 0.01]
+    fitting = _fitting_books(spines, height_m - 0.01)
     y = -width_m / 2
-    end = width_m / 2 - rng.choice([0.0, 0.05, 0.3])
+    free_m = rng.choice([0.0, 0.05, 0.3])  # at the end of the row
+    end = width_m / 2 - free_m
     meshes = []
 
-    k = int(rng.integers(len(fitting)))
+    nth = int(rng.integers(len(fitting)))
     while True:
         starts_new_run = rng.random() < 0.12
-        k = int(rng.integers(len(fitting))) if starts_new_run else (k + 1) % len(fitting)
-        thickness, height = spines.sizes_m[fitting[k]]
-        leans = rng.random() < 0.05
-        lean_deg = rng.uniform(5, 11) if leans else 0.0
-        overhang = height * float(np.sin(np.deg2rad(lean_deg)))
-        step = thickness + 0.0012 + overhang
-        if y + step > end:
+        nth = int(rng.integers(len(fitting))) if starts_new_run else (nth + 1) % len(fitting)
+        thickness_m, book_height_m = spines.sizes_m[fitting[nth]]
+        is_leaning = rng.random() < 0.05
+        lean_deg = rng.uniform(5, 11) if is_leaning else 0.0
+        overhang_m = book_height_m * float(np.sin(np.deg2rad(lean_deg)))
+        step_m = thickness_m + BOOK_GAP_M + overhang_m
+        if y + step_m > end:
             break
 
-        is_binder = height > 0.3
-        depth = 0.24 if is_binder else 0.72 * height
-        book = _book(spines, fitting[k], depth)
-        x = -depth / 2 - rng.uniform(0, 0.025)
-        meshes.append(book.moved(at(x, y + step / 2, 0, roll=lean_deg)))
-        y += step
+        is_binder = book_height_m > BINDER_HEIGHT_M
+        depth_m = BINDER_DEPTH_M if is_binder else 0.72 * book_height_m
+        book = _book(spines, fitting[nth], depth_m)
+        x = -depth_m / 2 - rng.uniform(0, 0.025)
+        meshes.append(book.moved(at(x, y + step_m / 2, 0, roll=lean_deg)))
+        y += step_m
 
-    if width_m / 2 - end > 0.2:
+    has_space_for_pile = width_m / 2 - end > 0.2
+    if has_space_for_pile:
         pile = _pile(rng, spines, 3)
         meshes.append(pile.moved(at(-0.12, end + 0.15)))
     return joined_arrays(meshes)
 
 
+def _fitting_books(spines: Spines, height_m: float) -> list[int]:
+    """The numbers of the books that are lower than a height."""
+    return [number for number, (_, book_height_m) in enumerate(spines.sizes_m) if book_height_m < height_m]
+
+
 def _pile(rng: Rng, spines: Spines, count: int) -> MeshArrays:
     """A stack of books, each rotated a little."""
-    books = [k for k, (_, height) in enumerate(spines.sizes_m) if height < 0.3]
     z = 0.0
     meshes = []
-    for k in rng.choice(books, count, replace=False):
-        thickness, height = spines.sizes_m[k]
-        upright = _book(spines, int(k), 0.7 * height)
-        lying = upright.moved(at(0, height / 2, thickness / 2, roll=90))
+    for number in rng.choice(_fitting_books(spines, BINDER_HEIGHT_M), count, replace=False):
+        thickness_m, height_m = spines.sizes_m[number]
+        upright = _book(spines, int(number), 0.7 * height_m)
+        lying = upright.moved(at(0, height_m / 2, thickness_m / 2, roll=90))
         meshes.append(lying.moved(at(0, 0, z, yaw=rng.normal(0, 7))))
-        z += thickness
+        z += thickness_m
     return joined_arrays(meshes)
 
 
@@ -303,35 +339,35 @@ def shelf(
 ) -> list[Part]:
     """An open bookcase with books, binders and boxes; its bays are at most 1.1 m wide."""
     board = wood(tones)
-    rows = max(2, round(height_m / 0.37))
-    bays = int(np.ceil(width_m / 1.1))
-    bay_m = (width_m - 0.022) / bays
+    rows = max(2, round(height_m / SHELF_ROW_M))
+    bays = int(np.ceil(width_m / WIDEST_BAY_M))
+    bay_m = (width_m - SHELF_BOARD_M) / bays
     row_m = (height_m - 0.1) / rows
-    half = (width_m - 0.022) / 2
+    half_m = (width_m - SHELF_BOARD_M) / 2
 
     parts = []
-    upright_m = (depth_m, 0.022, height_m)
+    upright_m = (depth_m, SHELF_BOARD_M, height_m)
     for bay in range(bays + 1):
-        y = bay * bay_m - half
+        y = bay * bay_m - half_m
         parts.append(stood(upright_m, board, 0, y, u=bay, bevel=0.002))
     back_m = (0.008, width_m - 0.03, height_m - 0.04)
     top_m = (depth_m, width_m, 0.024)
-    parts.append(stood(back_m, board, 0.005 - depth_m / 2, 0, 0.02, bevel=0))
-    parts.append(stood(top_m, board, 0.002, 0, height_m - 0.02, bevel=0.002))
+    parts.append(stood(back_m, board, 0.005 - depth_m / 2, z=0.02, bevel=0))
+    parts.append(stood(top_m, board, 0.002, z=height_m - 0.02, bevel=0.002))
 
     spines = picture.spines(seed)
     books = []
-    plank_m = (depth_m - 0.012, bay_m - 0.022, 0.02)
+    plank_m = (depth_m - 0.012, bay_m - SHELF_BOARD_M, 0.02)
     box_m = (0.24, 0.3 * bay_m, 0.16)
     for bay, row in product(range(bays), range(rows)):
-        y = bay * bay_m + bay_m / 2 - half
+        y = bay * bay_m + bay_m / 2 - half_m
         z = 0.06 + row * row_m
         start_u = rng.uniform(0, 2)
         parts.append(stood(plank_m, board, 0, y, z - 0.02, bevel=0.002, u=start_u))
         has_boxes = rng.random() < 0.12
         if has_boxes:
             cardboard = matt(one_of(rng, SAGE, SAND, NAVY))
-            for side in (-1, 1):
+            for side in SIDES:
                 box_y = y + side * 0.2 * bay_m
                 parts.append(stood(box_m, cardboard, depth_m / 2 - 0.15, box_y, z))
         else:
@@ -343,13 +379,14 @@ def shelf(
 def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> list[Part]:
     """Overlapping sheets of A4 paper, each with one raised corner."""
     u, v = np.meshgrid(np.linspace(0, 1, 6), np.linspace(1, 0, 7))
-    corner = np.clip(u + v - 1.3, 0, 1) ** 2
-    page_x = 0.297 * (v - 0.5)
-    page_y = 0.21 * (u - 0.5)
+    raised_share = np.clip(u + v - 1.3, 0, 1) ** 2  # 0 but near one corner
+    page_x = A4_LONG_M * (v - 0.5)
+    page_y = A4_SHORT_M * (u - 0.5)
     sheets = []
-    for k in range(count):
-        page_z = 0.0006 * (k + 1) + 0.012 * rng.random() * corner
+    for number in range(count):
+        page_z = 0.0006 * (number + 1) + 0.012 * rng.random() * raised_share
         points_m = np.stack([page_x, page_y, page_z], axis=-1)
+        # The picture has three columns and two rows of pages.
         column = rng.integers(3)
         row = rng.integers(2)
         cells = np.stack([column + u, row + v], axis=-1).reshape(-1, 2)
@@ -361,40 +398,40 @@ def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> l
 
 def monitor(rng: Rng, width_m: float = 0.6, seed: int = 0) -> list[Part]:
     """A display on a foot, switched on and slightly tilted."""
-    h = width_m * 0.58
-    tilt = rng.uniform(-4, 0)
+    height_m = width_m * SCREEN_ASPECT
+    tilt_deg = rng.uniform(-4, 0)
     glow = replace(
         BLACK,
         roughness=0.12,
-        emission_cd_m2=(176.0, 180.0, 188.0),
+        emission_cd_m2=SCREEN_CD_M2,
         emission_texture=picture.screen(seed),
     )
-    z = 0.066 + h / 2
-    stand_mm = 1000 * z
+    middle_z = 0.066 + height_m / 2
+    stand_mm = 1000 * middle_z
     stand_profile = mm(f"0 0, 115 0, 115 6, 30 12, 18 20, 18 {stand_mm}, 0 {stand_mm}")
     stand = lathe(stand_profile, sections=32)
-    bezel = block((0.022, width_m, h), bevel_m=0.004)
+    bezel = block((0.022, width_m, height_m), bevel_m=0.004)
     mount = block((0.03, 0.3, 0.2), bevel_m=0.012)
-    screen = moved(card((width_m - 0.014, h - 0.018)), at(0.0115))
+    screen = moved(card((width_m - 0.014, height_m - 0.018)), at(0.0115))
     return [
         put(stand, BLACK, -0.03),
-        put(bezel, BLACK, 0.02, 0, z, pitch=tilt),
-        put(mount, BLACK, 0, 0, z, pitch=tilt),
-        put(screen, glow, 0.02, 0, z + 0.002, pitch=tilt),
+        put(bezel, BLACK, 0.02, z=middle_z, pitch=tilt_deg),
+        put(mount, BLACK, z=middle_z, pitch=tilt_deg),
+        put(screen, glow, 0.02, z=middle_z + 0.002, pitch=tilt_deg),
     ]
 
 
 def keyboard(_: Rng) -> list[Part]:
-    """A keyboard of five rows, with a gap before the number pad."""
+    """A keyboard of five rows, with gaps before the cursor keys and the number pad."""
     key = block_arrays((0.016, 0.016, 0.008), bevel_m=0)
     space_bar = block_arrays((0.016, 0.111, 0.008), bevel_m=0)
     keys = []
-    for row, column in product(range(5), range(23)):
-        is_gap = column in (14, 18)
-        is_space_bar = row == 4 and 3 <= column <= 8
+    for row, column in product(range(KEY_ROWS), range(KEY_COLUMNS)):
+        is_gap = column in GAP_COLUMNS
+        is_space_bar = row == KEY_ROWS - 1 and 3 <= column <= 8
         if not is_gap and not is_space_bar:
-            x = 0.038 - 0.019 * row
-            y = 0.019 * column - 0.209
+            x = 0.038 - KEY_PITCH_M * row
+            y = KEY_PITCH_M * column - 0.209
             keys.append(key.moved(at(x, y, 0.014)))
     keys.append(space_bar.moved(at(-0.038, -0.1045, 0.014)))
     return [stood((0.125, 0.45, 0.011), BLACK), Part(joined_arrays(keys), DARK)]
@@ -446,15 +483,14 @@ def desk_lamp(rng: Rng, colour: str = TEAL) -> list[Part]:
 
 def cables(rng: Rng, length_m: float = 1.2, height_m: float = 0.7) -> list[Part]:
     """Cables that hang from a desk of height_m and run to a socket on the wall length_m behind it."""
-    radius_m = 0.0045
-    lowest = [-9, -9, 0.006]  # so that cables lie on the floor
+    lowest_m = [-9, -9, 0.006]  # so that cables lie on the floor
     x = length_m * np.array([0, -0.02, -0.3, -0.8, -1])
     z = [height_m, 0.45 * height_m, 0.01, 0.01, 0.22]
     leads = []
-    for k in range(3):
-        y = np.array([*rng.normal(0, 0.12, 4), 0.04 * k])
+    for number in range(CABLES):
+        y = np.array([*rng.normal(0, 0.12, 4), 0.04 * number])
         path = spline(np.stack([x, y, z], axis=1), 28)
-        leads.append(tube_arrays(np.maximum(path, lowest), radius_m, sections=6))
+        leads.append(tube_arrays(np.maximum(path, lowest_m), CABLE_RADIUS_M, sections=6))
     return [Part(joined_arrays(leads), BLACK)]
 
 
@@ -467,29 +503,14 @@ def plant(
     pot_m = 0.28 * height_m
     stems = []
     blades = []
-    t = np.linspace(0, 1, 8)[:, None]
     for _ in range(leaves):
         T_plant_leaf = at(yaw=rng.uniform(0, 360))
-        rise = rng.uniform(0.4, 0.95) * height_m
+        rise_m = rng.uniform(0.4, 0.95) * height_m
         shares = rng.uniform([0.05, 0.14, 0.1], [0.3, 0.26, 0.9])
-        reach, length, drop = shares * [height_m, height_m, 1]
-
-        stem_start = [0, 0, 0.85 * pot_m]
-        stem_middle = [0.3 * reach, 0, 0.6 * rise]
-        stem_end = [reach, 0, rise]
-        stem_path = spline([stem_start, stem_middle, stem_end], 6)
-        stem = tube_arrays(stem_path, 0.0035 * height_m, sections=5)
+        reach_m, length_m, drop = shares * [height_m, height_m, 1]
+        stem = _stem(pot_m, reach_m, rise_m, 0.0035 * height_m)
+        blade = _blade(reach_m, rise_m, length_m, drop)
         stems.append(stem.moved(T_plant_leaf))
-
-        # t runs along the blade, from the stem to the tip.
-        half_width = 0.26 * length * np.sin(np.pi * t**0.75) + 0.0005
-        y = half_width * np.array([1, 0.5, 0, -0.5, -1])
-        arch = length * (0.35 * t - drop * t**2)
-        fold = 0.25 * np.abs(y)
-        ripple = 0.006 * np.sin(9 * t)
-        z = rise + arch + fold + ripple
-        x = reach + length * (t + 0 * y)
-        blade = sheet_arrays(np.stack([x, y, z], axis=-1))
         blades.append(blade.moved(T_plant_leaf).two_sided())
 
     pot_profile = mm("0 0, 360 0, 480 920, 520 930, 520 1000, 460 1000, 440 850, 0 860")
@@ -503,6 +524,28 @@ def plant(
         Part(joined_arrays(stems), matt("#4b5a2e")),
         Part(joined_arrays(blades), leaf),
     ]
+
+
+def _stem(pot_m: float, reach_m: float, rise_m: float, radius_m: float) -> MeshArrays:
+    """A stem from the middle of a pot to the foot of a blade, at `reach_m` along x and `rise_m` above the floor."""
+    start = [0, 0, 0.85 * pot_m]
+    middle = [0.3 * reach_m, 0, 0.6 * rise_m]
+    end = [reach_m, 0, rise_m]
+    path_m = spline([start, middle, end], 6)
+    return tube_arrays(path_m, radius_m, sections=5)
+
+
+def _blade(reach_m: float, rise_m: float, length_m: float, drop: float) -> MeshArrays:
+    """A blade from its foot along x. The larger `drop`, the lower its tip."""
+    along = np.linspace(0, 1, 8)[:, None]  # from the stem to the tip
+    half_width_m = 0.26 * length_m * np.sin(np.pi * along**0.75) + 0.0005
+    y = half_width_m * np.array([1, 0.5, 0, -0.5, -1])
+    arch_m = length_m * (0.35 * along - drop * along**2)
+    fold_m = 0.25 * np.abs(y)
+    ripple_m = 0.006 * np.sin(9 * along)
+    z = rise_m + arch_m + fold_m + ripple_m
+    x = np.broadcast_to(reach_m + length_m * along, y.shape)
+    return sheet_arrays(np.stack([x, y, z], axis=-1))
 
 
 def carton(_: Rng, size_m: tuple[float, float, float] = (0.36, 0.46, 0.3), seed: int = 0) -> list[Part]:
@@ -520,10 +563,11 @@ def crate(rng: Rng, size_m: tuple[float, float, float] = (0.8, 0.8, 1.2)) -> lis
     core_m = (x - 0.06, y - 0.06, z - 0.01)
     parts = [stood(core_m, matt("#2b221a"), bevel=0)]
 
-    rows = max(2, round(z / 0.14))
-    for side in (-1, 1):
+    rows = max(2, round(z / CRATE_PLANK_M))
+    for side in SIDES:
         for row in range(rows):
-            plank_m = z / rows - rng.uniform(0.003, 0.01)
+            gap_m = rng.uniform(0.003, 0.01)
+            plank_m = z / rows - gap_m
             u = rng.uniform(0, 3)
             bottom = row * z / rows
             across_m = (x - 0.04, 0.02, plank_m)
@@ -532,25 +576,27 @@ def crate(rng: Rng, size_m: tuple[float, float, float] = (0.8, 0.8, 1.2)) -> lis
             flank_x = side * (x / 2 - 0.03)
             parts.append(stood(across_m, rough, 0, front_y, bottom, u=u))
             parts.append(stood(along_m, rough, flank_x, 0, bottom, u=u + 0.4))
-        for other in (-1, 1):
+        for other_side in SIDES:
+            # A corner post consists of a board on the front or the back and one on the flank.
             u = rng.uniform(0, 3)
-            post_m = (0.09, 0.02, z)
-            edge_m = (0.02, 0.07, z)
-            post_x = side * (x / 2 - 0.055)
-            post_y = other * (y / 2 - 0.01)
-            edge_x = side * (x / 2 - 0.01)
-            edge_y = other * (y / 2 - 0.055)
-            parts.append(stood(post_m, rough, post_x, post_y, u=u))
-            parts.append(stood(edge_m, rough, edge_x, edge_y, u=u + 0.2))
+            front_board_m = (0.09, 0.02, z)
+            flank_board_m = (0.02, 0.07, z)
+            front_x = side * (x / 2 - 0.055)
+            front_y = other_side * (y / 2 - 0.01)
+            flank_x = side * (x / 2 - 0.01)
+            flank_y = other_side * (y / 2 - 0.055)
+            parts.append(stood(front_board_m, rough, front_x, front_y, u=u))
+            parts.append(stood(flank_board_m, rough, flank_x, flank_y, u=u + 0.2))
 
-    lid_m = (x / 5 - 0.006, y, 0.02)
-    for k in range(5):
-        board_x = (k - 2) * x / 5
-        parts.append(stood(lid_m, rough, board_x, 0, z - 0.01, u=0.3 * k))
+    middle_board = (CRATE_LID_BOARDS - 1) // 2
+    lid_board_m = (x / CRATE_LID_BOARDS - 0.006, y, 0.02)
+    for number in range(CRATE_LID_BOARDS):
+        board_x = (number - middle_board) * x / CRATE_LID_BOARDS
+        parts.append(stood(lid_board_m, rough, board_x, z=z - 0.01, u=0.3 * number))
 
     plate = matt(texture=picture.sign("M-12", SAND))
     face_x = x / 2 - 0.0185
-    parts.append(put(card((0.36, 0.18)), plate, face_x, 0, 0.6 * z))
+    parts.append(put(card((0.36, 0.18)), plate, face_x, z=0.6 * z))
     return parts
 
 
@@ -563,32 +609,33 @@ def sofa(
 ) -> list[Part]:
     """A three-seat sofa on short legs, with two loose cushions."""
     cover = cloth(colour)
-    seat_m = (width_m - 0.36) / 3
-    d = depth_m / 2
-    base = cushion((2 * d - 0.04, width_m - 0.1, 0.2), power=12)
+    seat_m = (width_m - 2 * ARMREST_M) / SOFA_SEATS
+    front_x = depth_m / 2
+    back_x = -depth_m / 2
+    base = cushion((depth_m - 0.04, width_m - 0.1, 0.2), power=12)
     back = cushion((0.22, width_m - 0.06, height_m - 0.14), power=7, cells=8)
     parts = [
-        put(base, cover, 0, 0, 0.2),
-        put(back, cover, 0.11 - d, 0, 0.07 + height_m / 2),
+        put(base, cover, z=0.2),
+        put(back, cover, back_x + 0.11, z=0.07 + height_m / 2),
     ]
 
-    armrest = cushion((2 * d - 0.02, 0.18, 0.44), power=7)
+    armrest = cushion((depth_m - 0.02, ARMREST_M, 0.44), power=7)
     loose = cushion((0.13, 0.42, 0.4), power=2.8)
     leg_m = (0.05, 0.05, 0.12)
-    for side in (-1, 1):
-        armrest_y = side * (width_m / 2 - 0.09)
+    for side in SIDES:
+        armrest_y = side * (width_m / 2 - ARMREST_M / 2)
         parts.append(put(armrest, cover, 0.01, armrest_y, 0.34))
-        for x in (0.08 - d, d - 0.08):
+        for leg_x in (back_x + 0.08, front_x - 0.08):
             leg_y = side * (width_m / 2 - 0.1)
-            parts.append(stood(leg_m, wood("walnut"), x, leg_y))
+            parts.append(stood(leg_m, wood("walnut"), leg_x, leg_y))
         accent = cloth(OCHRE if side > 0 else BRICK)
         parts.append(put(loose, accent, -0.12, side * 0.58, 0.6, pitch=-18, yaw=side * 6))
 
-    seat = cushion((2 * d - 0.22, seat_m - 0.005, 0.15), power=6)
-    rest = cushion((0.17, seat_m - 0.01, 0.36), power=4.5)
+    seat = cushion((depth_m - 0.22, seat_m - 0.005, 0.15), power=6)
+    backrest = cushion((0.17, seat_m - 0.01, 0.36), power=4.5)
     for y in (-seat_m, 0, seat_m):
         parts.append(put(seat, cover, 0.1, y, 0.36))
-        parts.append(put(rest, cover, 0.27 - d, y, 0.56, pitch=-10))
+        parts.append(put(backrest, cover, back_x + 0.27, y, 0.56, pitch=-10))
     return parts
 
 
@@ -600,13 +647,14 @@ def waste_bin(
     """A waste bin with crumpled paper."""
     profile = mm("0 0, 400 0, 500 1000, 480 1000, 385 20, 0 20") * [width_m, height_m]
     size_m = [width_m, width_m, height_m]
+    middle_m = [0, 0, 0.6 * height_m]  # of the paper
     ball = cushion((0.1, 0.09, 0.08), power=2, cells=4)
     balls = []
-    for _ in range(7):
-        x, y, z = rng.uniform(-0.25, 0.25, 3) * size_m + [0, 0, 0.6 * height_m]
-        yaw = rng.uniform(0, 360)
-        roll = rng.uniform(0, 90)
-        balls.append(moved(ball, at(x, y, z, yaw=yaw, roll=roll)))
+    for _ in range(CRUMPLED_PAGES):
+        x, y, z = rng.uniform(-0.25, 0.25, 3) * size_m + middle_m
+        yaw_deg = rng.uniform(0, 360)
+        roll_deg = rng.uniform(0, 90)
+        balls.append(moved(ball, at(x, y, z, yaw=yaw_deg, roll=roll_deg)))
     return [put(lathe(profile, sections=32), DARK), Part(joined(balls), PAGE)]
 
 
@@ -619,26 +667,24 @@ def cabinet(
 ) -> list[Part]:
     """A steel cabinet with two doors, on a plinth."""
     paint = coated(colour, roughness=0.35)
-    w = width_m
-    d = depth_m
-    h = height_m
-    body_m = (d - 0.02, w, h - 0.06)
-    plinth_m = (d - 0.06, w - 0.03, 0.06)
+    body_m = (depth_m - 0.02, width_m, height_m - PLINTH_M)
+    plinth_m = (depth_m - 0.06, width_m - 0.03, PLINTH_M)
     parts = [
-        stood(body_m, paint, -0.01, 0, 0.06, bevel=0.005),
+        stood(body_m, paint, -0.01, z=PLINTH_M, bevel=0.005),
         stood(plinth_m, BLACK, -0.01),
     ]
 
     grip_path = spline(mm("0 0 -80, 30 0 -60, 30 0 60, 0 0 80"), 12)
     grip = tube(grip_path, 0.006)
-    door_m = (0.018, w / 2 - 0.006, h - 0.08)
+    door_m = (0.018, width_m / 2 - 0.006, height_m - 0.08)
     plate = card((0.12, 0.06))
     label = matt(texture=picture.sign("FILES"))
-    for side in (-1, 1):
-        door_y = side * w / 4
-        parts.append(stood(door_m, paint, d / 2 - 0.01, door_y, 0.07, bevel=0.004))
-        parts.append(put(grip, CHROME, d / 2, side * 0.04, 0.6 * h))
-        parts.append(put(plate, label, d / 2 - 0.0005, door_y, 0.85 * h))
+    front_x = depth_m / 2
+    for side in SIDES:
+        door_y = side * width_m / 4
+        parts.append(stood(door_m, paint, front_x - 0.01, door_y, 0.07, bevel=0.004))
+        parts.append(put(grip, CHROME, front_x, side * 0.04, 0.6 * height_m))
+        parts.append(put(plate, label, front_x - 0.0005, door_y, 0.85 * height_m))
     return parts
 
 
@@ -650,24 +696,21 @@ def bench(
 ) -> list[Part]:
     """A work bench of beech with a shelf below."""
     beech = wood("beech")
-    d = depth_m
-    w = width_m
-    h = height_m
-
-    leg_m = (0.09, 0.09, h - 0.05)
+    leg_m = (0.09, 0.09, height_m - BENCH_TOP_M)
     parts = []
-    for side in (-1, 1):
-        for end in (-1, 1):
-            x = side * (d / 2 - 0.07)
-            y = end * (w / 2 - 0.09)
+    for side in SIDES:
+        for end in SIDES:
+            x = side * (depth_m / 2 - 0.07)
+            y = end * (width_m / 2 - 0.09)
             parts.append(stood(leg_m, beech, x, y, u=rng.uniform(0, 2), bevel=0.005))
 
-    plank_m = (d / 4 - 0.003, w, 0.05)
-    for k in range(4):
-        x = (k - 1.5) * d / 4
-        parts.append(stood(plank_m, beech, x, 0, h - 0.05, u=rng.uniform(0, 2)))
-    shelf_m = (d - 0.1, w - 0.12, 0.025)
-    parts.append(stood(shelf_m, beech, 0, 0, 0.18, u=rng.uniform(0, 2)))
+    middle_plank = (BENCH_PLANKS - 1) / 2
+    plank_m = (depth_m / BENCH_PLANKS - 0.003, width_m, BENCH_TOP_M)
+    for number in range(BENCH_PLANKS):
+        x = (number - middle_plank) * depth_m / BENCH_PLANKS
+        parts.append(stood(plank_m, beech, x, z=height_m - BENCH_TOP_M, u=rng.uniform(0, 2)))
+    shelf_m = (depth_m - 0.1, width_m - 0.12, 0.025)
+    parts.append(stood(shelf_m, beech, z=0.18, u=rng.uniform(0, 2)))
     return parts
 
 
@@ -679,10 +722,10 @@ def pillar(
     """A column of raw concrete with chamfered edges, a kick plate and a sign."""
     concrete = matt(texture=picture.ground("concrete"))
     sign = matt(texture=picture.sign("P2", OCHRE))
-    w = width_m
-    kick_m = w + 0.006
+    shaft_m = (width_m, width_m, height_m)
+    kick_plate_m = (width_m + 0.006, width_m + 0.006, 0.1)
     return [
-        stood((w, w, height_m), concrete, bevel=0.015, u=rng.uniform(0, 2)),
-        stood((kick_m, kick_m, 0.1), STEEL, bevel=0.002),
-        put(card((0.24, 0.12)), sign, w / 2 + 0.001, 0, 1.7),
+        stood(shaft_m, concrete, bevel=0.015, u=rng.uniform(0, 2)),
+        stood(kick_plate_m, STEEL, bevel=0.002),
+        put(card((0.24, 0.12)), sign, width_m / 2 + 0.001, z=1.7),
     ]

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vobench.asset import branching_tree, furniture, household, meadow, outdoors, picture
+from vobench.asset import branching_tree, conifer, furniture, household, meadow, outdoors, picture
 from vobench.asset.daylight import Daylight, lamp_colour, level_daylight
 from vobench.asset.furniture import Part, coated, matt, put, stood, wood
 from vobench.asset.park_plan import STEP_M, ParkGround, ParkPlan, Path, park_plan
@@ -414,7 +414,7 @@ def _tree(rng: Rng) -> list[Part]:
     """A tree of some kind: broad, slender or a conifer."""
     kind = one_of(rng, "broad", "broad", "slender", "conifer")
     if kind == "conifer":
-        return meadow.conifer(rng, float(rng.uniform(6.5, 10.5)), float(rng.uniform(0.17, 0.28)))
+        return conifer.conifer(rng, float(rng.uniform(6.5, 10.5)), float(rng.uniform(0.17, 0.28)))
     if kind == "slender":
         return branching_tree.branching_tree(rng, float(rng.uniform(7.0, 9.5)), float(rng.uniform(0.2, 0.26)), 0.6)
     return branching_tree.branching_tree(rng, float(rng.uniform(5.4, 8.2)), float(rng.uniform(0.34, 0.46)))
