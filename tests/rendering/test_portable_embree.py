@@ -5,7 +5,8 @@ import pytest
 from embreex.mesh_construction import TriangleMesh
 
 from vobench.portable import PORTABLE
-from vobench.rendering.embree import new_scene, with_portable_places
+from vobench.rendering.embree import TriangleCaster, new_scene
+from vobench.rendering.portable_embree import with_portable_places
 
 
 @pytest.fixture
@@ -51,10 +52,16 @@ def test_recomputed_places_are_those_of_embree_and_on_the_ray(soup, monkeypatch)
     np.testing.assert_allclose((1 - u - v) * a + u * b + v * c, origins[met] + t * directions[met], atol=1e-4)
 
 
-def test_places_stay_embrees_where_nothing_need_be_portable(soup, monkeypatch):
+def test_a_caster_recomputes_places_only_where_they_must_be_portable(soup, monkeypatch):
     triangles, origins, directions = soup
-    monkeypatch.delenv(PORTABLE, raising=False)
+    distances = {}
+    for value in ("", "1"):
+        monkeypatch.setenv(PORTABLE, value)
+        caster = TriangleCaster(triangles, np.arange(len(triangles)), robust=False)
+        distances[value] = caster.hits(origins, directions, 1e8).distance
     hit = first_hits(soup)
-    before = {name: values.copy() for name, values in hit.items()}
-    after = with_portable_places(hit, triangles, origins, directions)
-    assert all(np.array_equal(after[name], before[name], equal_nan=True) for name in before)
+    recomputed = with_portable_places(hit, triangles, origins, directions)
+    met = hit["primID"] >= 0
+    np.testing.assert_array_equal(distances["1"][met], recomputed["tfar"][met])
+    monkeypatch.setenv(PORTABLE, "")
+    np.testing.assert_array_equal(distances[""][met], first_hits(soup)["tfar"][met])
