@@ -17,7 +17,7 @@ import numpy as np
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.mitsuba import wanted_variant
-from vobench.rendering.mitsuba_description import load
+from vobench.rendering.mitsuba_description import load_scene
 from vobench.rendering.path import PathRenderer
 from vobench.rendering.renderer import single_instant
 from vobench.scene.scene import Scene
@@ -47,7 +47,7 @@ def mitsuba_itself(scene: Scene, T_world_camera: Array, samples: int) -> Callabl
     """Draws one picture the way Mitsuba's own documentation does."""
     import mitsuba as mi
 
-    world = load(mi, scene)
+    world = load_scene(mi, scene)
     w = LENS.width_px
     h = LENS.height_px
     film = {"type": "hdrfilm", "width": w, "height": h, "rfilter": {"type": "box"}, "pixel_format": "luminance"}

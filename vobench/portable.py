@@ -2,7 +2,8 @@
 
 Libraries select their code by the features of the processor, and sums then round differently. With VOBENCH_PORTABLE=1
 they are restricted to SSE4, which every x86-64 processor has. Embree, which reads no variable, is restricted in
-`vobench.rendering.embree`. The variables must be set before the libraries load, so `vobench` sets them on import.
+`vobench.rendering.portable_embree`. The variables must be set before the libraries load, so `vobench` sets them on
+import.
 """
 
 import os

@@ -11,9 +11,10 @@ from vobench.geometry.rig import PIONEER_WHEELS
 from vobench.geometry.se3 import Array
 from vobench.motion.controller import CONTROLLERS, ControllerSettings, Vehicle, loop_growth, references, settling_gain
 from vobench.motion.course import Circle, PureRotation, Reverse, rolled
+from vobench.motion.disturbance import DELTAS, Disturbance
 from vobench.motion.drive import Drive, drive, follow, led_by
 from vobench.motion.pioneer import THETAS, AccelerationLimits, Theta, feed_forward, velocities
-from vobench.motion.slip import DELTAS, SLIPS, Disturbance
+from vobench.motion.slip import SLIPS
 from vobench.trajectory.kinematics import CurveMotion, level
 
 SQUARE = ((1, 1), (0, 1), (1, 0), (2, 2))

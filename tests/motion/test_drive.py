@@ -11,17 +11,11 @@ from vobench.errors import MotionError, SettingError
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.controller import CONTROLLERS, references
+from vobench.motion.disturbance import DELTAS, DISTURBANCE_STREAMS, random_disturbances
 from vobench.motion.drive import Drive, drive
+from vobench.motion.floor_patch import FloorPatch
 from vobench.motion.pioneer import THETAS, AccelerationLimits, Theta, accelerations, over_period, velocities
-from vobench.motion.slip import (
-    DELTAS,
-    DISTURBANCE_STREAMS,
-    SLIP_STREAMS,
-    SLIPS,
-    FloorPatch,
-    SlipSettings,
-    random_disturbances,
-)
+from vobench.motion.slip import SLIP_STREAMS, SLIPS, SlipSettings
 from vobench.trajectory.kinematics import level
 
 PATHS = {"figure_10": ((1, 1), (0, 1), (1, 0), (2, 2)), "figure_12": ((0, 1), (1, 1), (2, 2))}

@@ -8,11 +8,12 @@ import pytest
 from vobench.errors import MotionError
 from vobench.geometry.rig import PIONEER_WHEELS
 from vobench.geometry.se3 import Array
+from vobench.motion.disturbance import DISTURBANCE_STREAMS
 from vobench.motion.drive import Drive, drive
 from vobench.motion.identification import WINDOW_S, Fit, identify, identify_odometry
 from vobench.motion.motor import MotorConstants, theta_of
 from vobench.motion.pioneer import THETAS, Theta, accelerations
-from vobench.motion.slip import DISTURBANCE_STREAMS, SLIPS
+from vobench.motion.slip import SLIPS
 
 ROBOTS = {**THETAS, "representative": theta_of(MotorConstants())}
 EVERY_ROBOT = pytest.mark.parametrize("theta", ROBOTS.values(), ids=ROBOTS.keys())

@@ -1,60 +1,39 @@
-"""Embree held to one instruction set meets the same triangles, in the same places but for their last bits."""
+"""A caster names triangles by their rows in the table, and interpolates between their corners."""
 
 import numpy as np
-import pytest
-from embreex.mesh_construction import TriangleMesh
 
-from vobench.portable import PORTABLE
-from vobench.rendering.embree import new_scene, with_portable_places
+from vobench.rendering.embree import TriangleCaster
 
-
-@pytest.fixture
-def soup():
-    """Triangles (K, 3, 3), and rays from amid them."""
-    rng = np.random.default_rng(0)
-    triangles = 0.3 * rng.normal(size=(500, 3, 3)) + 3 * rng.normal(size=(500, 1, 3))
-    origins, directions = rng.normal(size=(2, 4000, 3))
-    return tuple(np.ascontiguousarray(each, np.float32) for each in (triangles, origins, directions))
+# Three triangles that face up, at heights of 0, 1 and 2 m.
+CORNERS_M = np.array([[[0, 0, z], [4, 0, z], [0, 4, z]] for z in range(3)], float)
+ORIGINS_M = np.array([[1.0, 1.0, 5.0], [9.0, 9.0, 5.0]])  # the first is above the triangles
+DOWN = np.tile([0.0, 0.0, -2.0], (2, 1))
 
 
-def first_hits(soup, **options):
-    triangles, origins, directions = soup
-    scene = new_scene(**options)
-    mesh = TriangleMesh(scene, triangles)
-    hit = scene.run(origins, directions, np.full(len(origins), 1e8, np.float32), query="INTERSECT", output=1)
-    del mesh
-    return hit
+def caster(*rows: int) -> TriangleCaster:
+    return TriangleCaster(CORNERS_M, np.array(rows, int), robust=True)
 
 
-@pytest.mark.parametrize("robust", [False, True])
-def test_a_portable_scene_meets_the_triangles_that_any_other_meets(soup, robust, monkeypatch):
-    monkeypatch.delenv(PORTABLE, raising=False)
-    usual = first_hits(soup, robust=robust)
-    monkeypatch.setenv(PORTABLE, "1")
-    portable = first_hits(soup, robust=robust)
-    assert (usual["primID"] >= 0).sum() > 100
-    assert np.array_equal(usual["primID"], portable["primID"])
+def test_hits_name_the_nearest_triangle_by_its_row_and_measure_in_lengths_of_the_direction():
+    hits = caster(0, 1).hits(ORIGINS_M, DOWN, 100.0)
+    np.testing.assert_array_equal(hits.face, [1, -1])
+    np.testing.assert_allclose(hits.distance, [2, np.nan])
+    np.testing.assert_array_equal(caster(2, 0).nearest(ORIGINS_M, DOWN, 100.0), [2, -1])
 
 
-def test_recomputed_places_are_those_of_embree_and_on_the_ray(soup, monkeypatch):
-    triangles, origins, directions = soup
-    monkeypatch.setenv(PORTABLE, "1")
-    hit = first_hits(soup)
-    before = {name: values.copy() for name, values in hit.items()}
-    after = with_portable_places(hit, triangles, origins, directions)
-    met = after["primID"] >= 0
-    for name in ("u", "v", "tfar"):
-        np.testing.assert_allclose(after[name][met], before[name][met], rtol=1e-3, atol=1e-4)
-        assert np.array_equal(after[name][~met], before[name][~met])
-    a, b, c = np.moveaxis(triangles[after["primID"][met]], 1, 0)
-    u, v, t = (after[name][met, None] for name in ("u", "v", "tfar"))
-    np.testing.assert_allclose((1 - u - v) * a + u * b + v * c, origins[met] + t * directions[met], atol=1e-4)
+def test_values_are_interpolated_between_corners():
+    hits = caster(1).hits(ORIGINS_M, DOWN, 100.0).take([0])
+    np.testing.assert_allclose(hits.at(CORNERS_M), [[1, 1, 1]], rtol=1e-6)
+    np.testing.assert_allclose(hits.at(CORNERS_M[..., 0]), [1], rtol=1e-6)
 
 
-def test_places_stay_embrees_where_nothing_need_be_portable(soup, monkeypatch):
-    triangles, origins, directions = soup
-    monkeypatch.delenv(PORTABLE, raising=False)
-    hit = first_hits(soup)
-    before = {name: values.copy() for name, values in hit.items()}
-    after = with_portable_places(hit, triangles, origins, directions)
-    assert all(np.array_equal(after[name], before[name], equal_nan=True) for name in before)
+def test_a_ray_is_blocked_within_its_reach_only():
+    for reach, is_blocked in ((1.9, False), (2.1, True), (-1.0, False)):
+        assert caster(1).stops(ORIGINS_M, DOWN, reach).tolist() == [is_blocked, False]
+    assert caster(1).stops(ORIGINS_M[[0, 0]], DOWN, np.array([1.9, 2.1])).tolist() == [False, True]
+
+
+def test_without_triangles_nothing_is_hit():
+    nothing = caster()
+    assert nothing.hits(ORIGINS_M, DOWN, 100.0).face.tolist() == [-1, -1]
+    assert not nothing.stops(ORIGINS_M, DOWN, 100.0).any()

@@ -1,11 +1,11 @@
-"""Faces are grouped into meshes, and lights have names and strengths, as Mitsuba needs them."""
+"""Faces are grouped into meshes by material and mover, as Mitsuba needs them."""
 
 import numpy as np
 import pytest
 
 from tests.rendering.rectangles import box, rectangle
-from vobench.rendering.mitsuba_description import STRENGTH, groups, lamp_look, light_key, nominal
-from vobench.scene.light import PointLight, Sky, Sun
+from vobench.rendering.mitsuba_description import mesh_groups, textured_material
+from vobench.scene.light import PointLight
 from vobench.scene.material import Material, Picture
 from vobench.scene.mesh import two_sided
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light, triangles
@@ -24,7 +24,7 @@ def test_faces_of_one_material_and_mover_share_a_mesh_and_lamps_are_left_out() -
     other = rectangle(4 * X, X, Y, "grey", "other")
     scene = Scene("scene", (FLOOR, red, other), MATERIALS, (LAMP,), (CART,))
     faces = triangles(scene)
-    made = groups(scene, faces)
+    made = mesh_groups(scene, faces)
     assert {(group.material, group.mover) for group in made} == {("grey", -1), ("red", -1), ("grey", 0)}
     assert len({group.key for group in made}) == 3
     members = np.concatenate([group.faces for group in made])
@@ -35,26 +35,17 @@ def test_faces_of_one_material_and_mover_share_a_mesh_and_lamps_are_left_out() -
 def test_a_sheet_is_one_mesh_with_two_sides_unless_it_glows(material: str, is_two_sided: bool, count: int) -> None:
     sheet = Thing("sheet", two_sided(FLOOR.mesh), material)
     scene = Scene("scene", (sheet,), MATERIALS, ())
-    (group,) = groups(scene, triangles(scene))
+    (group,) = mesh_groups(scene, triangles(scene))
     assert group.two_sided == is_two_sided
     assert len(group.faces) == count
 
 
-def test_lights_have_the_strength_of_their_unit_and_colour() -> None:
-    np.testing.assert_allclose(nominal(PointLight("bulb", Z, 4 * np.pi, colour=(1, 2, 3))), [1, 2, 3])
-    np.testing.assert_allclose(nominal(LAMP), LAMP.luminance_cd_m2 * np.ones(3))
-    np.testing.assert_allclose(nominal(Sun("sun", 1e4, (0.0,), (0.0,), (30.0,))), 1e4 * np.ones(3))
-    np.testing.assert_allclose(nominal(Sky("sky", 1e4)), np.ones(3))
-    assert {type(LAMP), PointLight, Sun, Sky} <= STRENGTH.keys()
-    assert light_key(0) != light_key(1)
-
-
-def test_only_a_lamp_whose_material_has_an_emission_texture_has_a_look() -> None:
+def test_only_a_lamp_whose_material_has_an_emission_texture_has_one() -> None:
     picture = Picture(np.full((2, 2), 0.5, np.float32), 1.0)
     screen = Material(emission_cd_m2=(1, 1, 1), emission_texture=picture)
     shown = ceiling_light("lamp", 2 * Z, (0.4, 0.3), power_lm=500)
     with_look = type(shown)(shown.name, shown.mesh, shown.power_lm, material="screen")
     scene = Scene("scene", (FLOOR,), {**MATERIALS, "screen": screen}, (shown, with_look))
-    assert lamp_look(scene, shown) is None
-    assert lamp_look(scene, with_look) is screen
-    assert lamp_look(scene, PointLight("bulb", Z, 100.0)) is None
+    assert textured_material(scene, shown) is None
+    assert textured_material(scene, with_look) is screen
+    assert textured_material(scene, PointLight("bulb", Z, 100.0)) is None

@@ -1,12 +1,10 @@
-"""Rays are spread by their cosine, a mirrored ray leaves at the angle it came in at, entries are sorted by point."""
+"""Rays are spread by their cosine, few faint rays stand for all of them, and entries are sorted by point."""
 
 import numpy as np
 import pytest
 
 from vobench.geometry.se3 import Array
-from vobench.rendering import ray_kernels
 from vobench.rendering.ray_kernels import (
-    FACE,
     FAINT,
     ROULETTE,
     chosen_rays,
@@ -47,16 +45,6 @@ def test_weights_under_a_coat_average_to_the_share_that_enters() -> None:
     _, weight = rays(np.array([0.0, 0.0, 1.0]), eta)
     # Diffuse light from outside: 1 - F, averaged with the cosine, is 0.908 for 1.5 (Duntley, 1942).
     assert weight.mean() == pytest.approx(0.908, abs=2e-3)
-
-
-def test_of_a_sheet_a_ray_meets_the_side_that_it_comes_from() -> None:
-    faces = np.zeros(2, FACE)
-    faces["normal"] = [[0, 0, 1], [0, 0, -1]]
-    faces["twin"] = [1, 0]
-    assert ray_kernels.face_towards(faces, 0, 0.0, 0.0, -1.0) == (0, False)
-    assert ray_kernels.face_towards(faces, 0, 0.0, 0.0, 1.0) == (1, True)
-    faces["twin"] = -1
-    assert ray_kernels.face_towards(faces, 0, 0.0, 0.0, 1.0) == (0, False)
 
 
 def test_facets_of_a_smooth_face_are_its_normal_and_those_of_a_rough_one_spread_with_roughness() -> None:

@@ -5,7 +5,8 @@ import numpy as np
 from tests.rendering.gathered_room import MATERIALS, GatheredRoom, gathered_room
 from tests.rendering.rectangles import rectangle
 from vobench.geometry.se3 import Array
-from vobench.rendering.specular_path import RayBatch, SpecularTracer, hemisphere_rays, joined_ends
+from vobench.rendering.ray_batch import RayBatch, joined_ends
+from vobench.rendering.specular_path import SpecularTracer, hemisphere_rays
 from vobench.scene.material import pane_reflectance
 from vobench.scene.triangles import Thing
 

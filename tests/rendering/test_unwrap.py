@@ -147,5 +147,5 @@ def test_an_atlas_of_xatlas_is_never_destroyed():
     xatlas = pytest.importorskip("xatlas")
     atlas = xatlas.Atlas()
     before = sys.getrefcount(atlas)
-    unwrapping._keep_for_ever(atlas)
+    unwrapping._never_destroy(atlas)
     assert sys.getrefcount(atlas) == before + 1

@@ -8,8 +8,9 @@ import pytest
 from vobench.errors import SuiteError
 from vobench.geometry import se3
 from vobench.motion.controller import CONTROLLERS
+from vobench.motion.disturbance import DISTURBANCE_STREAMS
 from vobench.motion.drive import drive
-from vobench.motion.slip import DISTURBANCE_STREAMS, SLIPS
+from vobench.motion.slip import SLIPS
 from vobench.runner.motion import body_motion, body_motions, generator
 from vobench.suite.scene_spec import MoverSpec, PathKey
 from vobench.suite.suite import read_plan

@@ -11,6 +11,7 @@ from annotated_types import Ge, Gt, Le
 from vobench.errors import MotionError
 from vobench.geometry.rig import WheelGeometry
 from vobench.geometry.se3 import Array
+from vobench.motion.disturbance import Disturbance
 from vobench.motion.pioneer import (
     INTEGRATORS,
     UNLIMITED,
@@ -23,7 +24,6 @@ from vobench.motion.pioneer import (
     velocities,
     wheel_speeds,
 )
-from vobench.motion.slip import Disturbance
 from vobench.setting import OneOf, Positive, require
 
 

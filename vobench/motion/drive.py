@@ -14,19 +14,18 @@ from vobench.errors import MotionError
 from vobench.geometry.rig import PIONEER_WHEELS, WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.controller import CONTROLLERS, MOST_FRAMES, ControllerSettings, Legs, LegTime, Vehicle
-from vobench.motion.pioneer import THETAS, UNLIMITED, AccelerationLimits, Theta
-from vobench.motion.slip import (
+from vobench.motion.disturbance import (
     DELTAS,
-    SLIPS,
     DeltaSettings,
     Disturbance,
     Disturbances,
-    FloorPatch,
     Generators,
-    SlipSettings,
     generator_of,
     random_disturbances,
 )
+from vobench.motion.floor_patch import FloorPatch
+from vobench.motion.pioneer import THETAS, UNLIMITED, AccelerationLimits, Theta
+from vobench.motion.slip import SLIPS, SlipSettings
 from vobench.motion.wheeled import PIONEER_KEYS, Mover, Wheeled
 from vobench.setting import MOST_POINTS, Positive
 from vobench.trajectory.kinematics import Kinematics, level

@@ -13,9 +13,11 @@ from vobench.geometry.rig import PIONEER_WHEELS, Mount, WheelGeometry
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS
 from vobench.motion.controller import CONTROLLERS
+from vobench.motion.disturbance import DELTAS
+from vobench.motion.floor_patch import FloorPatch
 from vobench.motion.motor import MotorConstants, theta_of
 from vobench.motion.pioneer import INTEGRATORS, THETAS, AccelerationLimits, Theta
-from vobench.motion.slip import DELTAS, SLIPS, FloorPatch
+from vobench.motion.slip import SLIPS
 from vobench.setting import OneOf, settings
 from vobench.trajectory.kinematics import level
 

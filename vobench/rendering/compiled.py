@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
+import numpy as np
 
 Function = TypeVar("Function", bound=Callable[..., object])
 FOLDER = "kernels"  # below vobench's cache folder
@@ -39,6 +40,11 @@ def _is_cached() -> bool:
 
 
 IS_CACHED = _is_cached()
+
+
+def float32(value: float) -> float:
+    """A constant with which kernels compute in float32. For type checkers it is a float, as all scalars of kernels."""
+    return cast("float", np.float32(value))
 
 
 def compiled(function: Function) -> Function:

@@ -28,11 +28,18 @@ Z_AXIS = (0.0, 0.0, 1.0)
 
 
 def take(table: T, rows: Rows | Mask | slice) -> T:
-    """The same rows of all arrays of a dataclass."""
-    columns = [getattr(table, field.name) for field in fields(table)]  # type: ignore[arg-type]
+    """The same rows of all arrays of a dataclass or of a named tuple."""
+    columns = _columns(table)
     if isinstance(rows, np.ndarray) and rows.dtype != bool:
         return type(table)(*(column.take(rows, axis=0) for column in columns))  # three times as fast as an index
     return type(table)(*(column[rows] for column in columns))
+
+
+def _columns(table: object) -> list[Any]:
+    """The arrays of a dataclass or of a named tuple."""
+    if isinstance(table, tuple):
+        return list(table)
+    return [getattr(table, field.name) for field in fields(table)]  # type: ignore[arg-type]
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,8 +11,9 @@ from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.face_response import Response
 from vobench.rendering.geometry import FAR_M
+from vobench.rendering.ray_batch import RayBatch, RayEnds, joined_ends
 from vobench.rendering.ray_kernels import sorted_by_point
-from vobench.rendering.specular_path import RayBatch, RayEnds, SpecularTracer, hemisphere_rays, joined_ends
+from vobench.rendering.specular_path import SpecularTracer, hemisphere_rays
 from vobench.rendering.texel import Texels
 from vobench.rendering.thread_pool import in_chunks
 from vobench.rendering.visibility import Visibility

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.mitsuba_description import STRENGTH, groups, lamp_look, light_key, load, nominal, one_sided
+from vobench.rendering.mitsuba_description import load_scene, mesh_groups, one_sided_shapes, textured_material
+from vobench.rendering.mitsuba_light import STRENGTH_PARAMETERS, light_key, nominal_strength
 from vobench.scene.light import Light, Sky, Sun
 from vobench.scene.scene import Scene, triangles
 
@@ -44,10 +45,10 @@ class MitsubaScene:
         self._state = SceneState((1.0,) * len(scene.lights), 0.0)
         self._faces = triangles(scene)
         self._pictures = dict[int, Any]()
-        self._world = load(mi, scene)
+        self._world = load_scene(mi, scene)
         self._parameters = mi.traverse(self._world)
         # `path` is faster, but sees through panes and holes only by chance; `volpath` samples lights through them.
-        self._one_sided = one_sided(mi, scene, self._world)
+        self._one_sided = one_sided_shapes(mi, scene, self._world)
         materials = scene.materials.values()
         is_seen_through = any(material.kind == "pane" or material.cutout is not None for material in materials)
         integrator = {
@@ -72,16 +73,16 @@ class MitsubaScene:
         import drjit as dr
         import mitsuba as mi
 
-        if lamp_look(self._scene, light):
+        if textured_material(self._scene, light):
             key = f"{light_key(index)}.emitter.radiance.data"
             nominal_picture = self._pictures.setdefault(index, self._parameters[key].array)
             picture = nominal_picture * wanted.levels[index]
             self._parameters[key] = mi.TensorXf(picture, shape=self._parameters[key].shape)
             return
         # Opaque, for a constant would be compiled into the kernel.
-        channels = [wanted.levels[index] * channel for channel in nominal(light).tolist()]
+        channels = [wanted.levels[index] * channel for channel in nominal_strength(light).tolist()]
         strength = [dr.opaque(mi.Float, channel) for channel in channels]
-        key = f"{light_key(index)}.{STRENGTH[type(light)]}"
+        key = f"{light_key(index)}.{STRENGTH_PARAMETERS[type(light)]}"
         self._parameters[key] = strength[0] if isinstance(light, Sky) else mi.Color3f(*strength)
         if isinstance(light, Sun) and light.moves:
             direction = light.direction(wanted.t_ns).tolist()
@@ -91,7 +92,7 @@ class MitsubaScene:
         """Set the vertices of the movers to where they are at an instant."""
         poses = [mover.path.pose(t_ns) for mover in self._scene.movers]
         faces = self._faces.with_movers_at(poses)
-        for group in groups(self._scene, self._faces):
+        for group in mesh_groups(self._scene, self._faces):
             if group.mover < 0:
                 continue
             corners_m = faces.corners_m[group.faces]

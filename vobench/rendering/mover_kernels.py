@@ -1,31 +1,25 @@
 """Compiled kernels of the shadows of moving bodies: their shadow maps, the light they block, and the light on them."""
 
 import math
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
-from vobench.rendering.compiled import compiled
+from vobench.rendering.compiled import compiled, float32
 from vobench.rendering.ray_kernels import fresnel_of
 
-
-def _float32(value: float) -> float:
-    """A constant in float32, so that kernels compute in float32."""
-    return cast("float", np.float32(value))
-
-
-ZERO = _float32(0)
-ONE = _float32(1)
-HALF = _float32(0.5)
-NEAR_M = _float32(0.05)  # the distance from a sample at which the nearness in its shadow map is 1
-LEAST_NEARNESS = _float32(1e-6)  # a point counts as at least this near, so that an empty map hides nothing
-CLEAR_M = _float32(0.004)  # the distance towards the light at which a stationary point looks for bodies
-OWN_M = _float32(0.025)  # the same for a point on a body, whose shadow map shows the body coarsely
-STEEPEST = _float32(0.999)  # the largest sine of the half-angle of a cone, for points near the emitter
-NEGLIGIBLE_LOSS = _float32(1 / 400)  # the largest share of the light at a point whose loss is invisible
-SMALLEST_M2 = _float32(1e-6)  # the smallest squared distance of a sample
-PART_MARGIN = _float32(1.1)  # the radius around a part of a body in which its shadow map may show the part
+ZERO = float32(0)
+ONE = float32(1)
+HALF = float32(0.5)
+NEAR_M = float32(0.05)  # the distance from a sample at which the nearness in its shadow map is 1
+LEAST_NEARNESS = float32(1e-6)  # a point counts as at least this near, so that an empty map hides nothing
+CLEAR_M = float32(0.004)  # the distance towards the light at which a stationary point looks for bodies
+OWN_M = float32(0.025)  # the same for a point on a body, whose shadow map shows the body coarsely
+STEEPEST = float32(0.999)  # the largest sine of the half-angle of a cone, for points near the emitter
+NEGLIGIBLE_LOSS = float32(1 / 400)  # the largest share of the light at a point whose loss is invisible
+SMALLEST_M2 = float32(1e-6)  # the smallest squared distance of a sample
+PART_MARGIN = float32(1.1)  # the radius around a part of a body in which its shadow map may show the part
 TILE = 32  # the side in texels of the tiles of the light map that are marked as changed
 
 

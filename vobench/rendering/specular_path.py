@@ -1,66 +1,20 @@
 """Rays that are followed by mirrors, coats and panes until they end at a face that scatters light."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 
-from vobench.rendering.array_types import Floats, Indices, Mask
+from vobench.rendering.array_types import Floats, Indices
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.embree import Hits
 from vobench.rendering.face_response import Response
-from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M, take
-from vobench.rendering.ray_kernels import FACE, Faces, chosen_rays, cosine_rays, end_rays
+from vobench.rendering.geometry import FAR_M, RAY_OFFSET_M
+from vobench.rendering.ray_batch import RayBatch, RayEnds, empty_batch, empty_ends
+from vobench.rendering.ray_end_kernels import FACE, Faces, RayHits, RayTargets, end_rays
+from vobench.rendering.ray_kernels import chosen_rays, cosine_rays
 from vobench.rendering.texel import Texels
 from vobench.rendering.visibility import Visibility
 from vobench.scene.triangles import Triangles
-
-
-@dataclass(slots=True)
-class RayBatch:
-    """Rays (R,) on their way: the row `point` of the result that each counts for, its origin, direction and weight.
-
-    is_direct: whether the light of a lamp that it meets next is direct light, which is counted elsewhere.
-    """
-
-    point: Indices
-    origins_m: Floats
-    directions: Floats
-    weight: Floats
-    is_direct: Mask
-
-    take = take
-
-    def joined(self, other: "RayBatch") -> "RayBatch":
-        """The rays of both batches."""
-        columns = [(getattr(self, field.name), getattr(other, field.name)) for field in fields(self)]
-        return RayBatch(*(np.concatenate(column) for column in columns))
-
-
-@dataclass(frozen=True, slots=True)
-class RayEnds:
-    """Where rays (R,) ended.
-
-    point: that each ray counts for. column: of the table, for the surfel or lamp that it met, and share: what it counts
-    there. texel: where it ended on the map. is_near: whether the last segment of the ray is shorter than NEAR_M.
-    """
-
-    point: Indices
-    column: Indices
-    texel: Indices
-    share: Floats
-    is_near: Mask
-
-    take = take
-
-
-def joined_ends(parts: Sequence[RayEnds]) -> RayEnds:
-    """The ends of the rays of all parts, one part after the other."""
-    columns = {}
-    for column in fields(RayEnds):
-        values = [getattr(part, column.name) for part in parts]
-        columns[column.name] = np.concatenate(values)
-    return RayEnds(**columns)
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,10 +47,13 @@ class SpecularTracer:
         lamp_column: int,
     ) -> None:
         self._visibility = visibility
-        self._surfel_of = surfel_of
-        self._map_size = (atlas.height, atlas.width)
-        self._lamp_column = lamp_column
-        self._faces = face_table(visibility.faces, atlas, visibility, response)
+        self._targets = RayTargets(
+            faces=face_table(visibility.faces, atlas, visibility, response),
+            surfel_of=surfel_of,
+            height=atlas.height,
+            width=atlas.width,
+            lamp_column=lamp_column,
+        )
 
     def follow(
         self,
@@ -112,48 +69,12 @@ class SpecularTracer:
         hits = self._visibility.opaque.one_sided_hits(batch.origins_m, batch.directions)
         from_panes = self._reflected_by_panes(batch, hits, dither)
         count = len(batch.weight)
-        ends = RayEnds(
-            point=np.empty(count, np.int32),
-            column=np.empty(count, np.int32),
-            texel=np.empty(count, np.int32),
-            share=np.empty(count, np.float32),
-            is_near=np.empty(count, bool),
-        )
-        onward = RayBatch(
-            point=np.empty(count, np.int32),
-            origins_m=np.empty((count, 3), np.float32),
-            directions=np.empty((count, 3), np.float32),
-            weight=np.empty(count, np.float32),
-            is_direct=np.empty(count, bool),
-        )
+        ends = empty_ends(count)
+        onward = empty_batch(count)
         escaped = np.empty(count, np.int64)
+        ray_hits = RayHits(hits.face, hits.u, hits.v, hits.distance)
         end_count, onward_count, escaped_count = end_rays(
-            batch.origins_m,
-            batch.directions,
-            batch.weight,
-            batch.is_direct,
-            batch.point,
-            hits.face,
-            hits.u,
-            hits.v,
-            hits.distance,
-            self._faces,
-            self._surfel_of,
-            self._map_size,
-            self._lamp_column,
-            dither,
-            is_first,
-            ends.point,
-            ends.column,
-            ends.texel,
-            ends.share,
-            ends.is_near,
-            onward.point,
-            onward.origins_m,
-            onward.directions,
-            onward.weight,
-            onward.is_direct,
-            escaped,
+            batch, ray_hits, self._targets, dither, is_first, ends, onward, escaped
         )
         onward = onward.take(slice(onward_count))
         if len(from_panes.point):

@@ -1,8 +1,9 @@
-"""Unwrapping: charts of faces packed into the atlas of the light map."""
+"""Unwrapping: the faces of a scene are flattened to charts, which are packed side by side on the light map."""
 
 import ctypes
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import scipy
@@ -17,228 +18,310 @@ from vobench.rendering.atlas import Atlas, doubled_areas_px2
 from vobench.scene.triangles import Triangles
 from vobench.scene.weld import WELD_M, distinct_rows
 
-TEXELS = 16_000_000  # at most in one map: some 100 bytes each, and 4 more for each light
-FINENESS = 4096  # steps a texel: places that are meant to be at the middle of texels are so to the last bit
-PADDING = 1  # texels around a chart, besides those that interpolation within it reads
-BLOCK = 3  # texels along the side of a block that faces of one lamp share
-LEAST_PX2 = 1e-6  # area of a face that axis charts have a place for
+MAX_TEXELS = 16_000_000  # of one map; a texel needs about 100 bytes while light is computed, and 4 more for each light
+STEPS_PER_TEXEL = 4096  # places are rounded to these steps, so that the middle of a texel is exact in float32
+PADDING_PX = 1  # empty texels around a chart, besides those that interpolation within the chart reads
+BLOCK_PX = 3  # the side of the block of texels that all faces of one lamp share
+MIN_AREA_PX2 = 1e-6  # of a face that gets a place in an axis chart
+MIN_XATLAS_AREA_PX2 = 1e-9  # of a place from xatlas, twice its area; smaller ones are not used
+
+# The coordinates that remain if one looks along the first, the second or the third axis.
+PLANE_AXES = np.array([[1, 2], [0, 2], [0, 1]])
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Charts:
-    """Places (F, 3, 2) in texels and charts (F,), -1 for none; and the size of the map that they cover."""
+    """Faces (F,) on a map of some width and height in texels.
 
-    places: Array
+    `places_px` (F, 3, 2) are the places of the faces' corners on the map.
+    `chart` (F,) is the chart of each face, -1 for a face that has no place yet.
+    """
+
+    places_px: Array
     chart: Indices
     width: int
     height: int
 
 
 def unwrap(faces: Triangles, spacing_m: Array, lit: Mask) -> Atlas:
-    """Charts of the lit faces (F,) with samples every spacing_m (F,), and below them the shared blocks.
+    """Place the corners of all faces on the light map.
 
-    Raises RenderError where the map would be too large.
+    The lit faces (F,) get charts, in which one texel corresponds to `spacing_m` (F,). All other faces share blocks of
+    texels below the charts: one block for each lamp, and one for the rest.
+    Raises RenderError if the map would be too large.
     """
     _require_room(faces, spacing_m, lit)
     lowest_m = faces.corners_m.reshape(-1, 3).min(0)
     corners_px = (faces.corners_m - lowest_m) / spacing_m[:, None, None]
-    charts = _xatlas_charts(corners_px, spacing_m, _parts(faces.thing, spacing_m, np.flatnonzero(lit)))
 
-    has_area = areas_m2(corners_px) > LEAST_PX2
-    unplaced = np.flatnonzero(lit & (charts.chart < 0) & has_area)
-    if len(unplaced):
-        unplaced_px = corners_px[unplaced]
-        places, chart, width, height = axis_charts(
-            unplaced_px, unplaced_px * spacing_m[unplaced, None, None], faces.thing[unplaced]
-        )
-        charts.places[unplaced] = places + np.array([0, charts.height])
-        charts.chart[unplaced] = chart + charts.chart.max() + 1
-        charts.width = max(charts.width, width)
-        charts.height = charts.height + height
-    thin = np.flatnonzero(lit & (charts.chart < 0))
-    _place_thin_faces(faces, charts.places, charts.chart, thin)
-    return _with_shared_blocks(charts, faces.lamp + 1)
+    charts = _xatlas_charts(corners_px, spacing_m, _parts(faces.thing, spacing_m, np.flatnonzero(lit)))
+    charts = _with_axis_charts(charts, faces, corners_px, spacing_m, lit)
+    charts = _with_thin_faces(charts, faces, lit)
+    return _with_shared_blocks(charts, block=faces.lamp + 1)
 
 
 def _require_room(faces: Triangles, spacing_m: Array, lit: Mask) -> None:
-    """Raise RenderError where the map of the lit faces (F,) would be too large."""
-    needed = float((areas_m2(faces.corners_m) / spacing_m**2)[lit].sum())
-    if needed > TEXELS:
+    """Raise RenderError if the lit faces (F,) need too many texels."""
+    texels = areas_m2(faces.corners_m) / spacing_m**2
+    needed = float(texels[lit].sum())
+    if needed > MAX_TEXELS:
         raise RenderError(
-            f"the light map would need {needed / 1e6:.0f} million samples; {TEXELS / 1e6:.0f} million are the most: "
-            f"give its largest things {np.sqrt(needed / TEXELS):.1f} times the spacing_m"
+            f"the light map would need {needed / 1e6:.0f} million samples; {MAX_TEXELS / 1e6:.0f} million are the "
+            f"most: give its largest things {np.sqrt(needed / MAX_TEXELS):.1f} times the spacing_m"
         )
 
 
-def _with_shared_blocks(charts: _Charts, block: Indices) -> Atlas:
-    """The atlas of charts, where faces without one have the block (F,) of their lamp, 0 for those of none."""
-    height = charts.height + PADDING
-    width = max(charts.width, BLOCK)
-    blocks_a_row = width // BLOCK
-    column = block % blocks_a_row * BLOCK + BLOCK / 2
-    row = block // blocks_a_row * BLOCK + BLOCK / 2 + height
-    middle = np.stack([column, row], -1)
-    has_no_chart = charts.chart < 0
-    charts.places[has_no_chart] = middle[has_no_chart, None]
-    height += BLOCK * (int(block.max(initial=0)) // blocks_a_row + 1)
-    rounded_px = np.rint(charts.places * FINENESS) / FINENESS
-    light_px = rounded_px.astype(np.float32)
-    return Atlas(light_px, charts.chart, height, width)
-
-
-def _parts(thing: Indices, spacing_m: Array, faces: Rows) -> list[Rows]:
-    """Faces thing by thing, each part with one spacing."""
-    if not len(faces):
+def _parts(thing: Indices, spacing_m: Array, rows: Rows) -> list[Rows]:
+    """Divide faces into parts. The faces of a part belong to one thing and have one spacing."""
+    if not len(rows):
         return []
-    order = faces[np.lexsort((spacing_m[faces], thing[faces]))]
-    is_new_thing = np.diff(thing[order]) != 0
-    is_new_spacing = np.diff(spacing_m[order]) != 0
-    begins_part = is_new_thing | is_new_spacing
-    return np.split(order, np.flatnonzero(begins_part) + 1)
+    order = np.lexsort((spacing_m[rows], thing[rows]))
+    sorted_rows = rows[order]
+    is_new_thing = np.diff(thing[sorted_rows]) != 0
+    is_new_spacing = np.diff(spacing_m[sorted_rows]) != 0
+    starts = np.flatnonzero(is_new_thing | is_new_spacing) + 1
+    return np.split(sorted_rows, starts)
+
+
+# Charts of xatlas, which flattens curved surfaces.
 
 
 def _xatlas_charts(corners_px: Array, spacing_m: Array, parts: Sequence[Rows]) -> _Charts:
-    """Charts of the parts of faces with corners (F, 3, 3) in texels; none without xatlas."""
-    places = np.zeros((len(corners_px), 3, 2))
-    no_chart = np.full(len(corners_px), -1, np.int32)
-    charts = _Charts(places, no_chart, 0, 0)
+    """The charts that xatlas creates for parts of the faces, whose corners are (F, 3, 3).
+
+    Faces that are too thin, and those that xatlas leaves out, have no place. Without xatlas no face has one.
+    """
+    face_count = len(corners_px)
+    places_px = np.zeros((face_count, 3, 2))
+    chart = np.full(face_count, -1, np.int32)
     try:
         import xatlas
-    except ImportError:  # Python 3.14 has none yet
-        return charts
+    except ImportError:  # there is no xatlas for Python 3.14 yet
+        return _Charts(places_px, chart, width=0, height=0)
+
     atlas = xatlas.Atlas()
-    _keep_for_ever(atlas)
-    added = []
+    _never_destroy(atlas)
+    added_parts = list[Rows]()
     for part in parts:
-        first, vertex = _welded(corners_px[part] * spacing_m[part, None, None])
-        is_whole = (vertex != np.roll(vertex, 1, axis=1)).all(1)
-        if is_whole.any():
-            vertices_px = corners_px[part].reshape(-1, 3)[first]
-            from_lowest_px = (vertices_px - vertices_px.min(0)).astype(np.float32)
-            atlas.add_mesh(from_lowest_px, vertex[is_whole].astype(np.uint32))
-            added.append(part[is_whole])
+        vertices_px, vertex = _indexed_mesh(corners_px[part], spacing_m[part])
+        has_three_vertices = (vertex != np.roll(vertex, 1, axis=1)).all(1)
+        if has_three_vertices.any():
+            atlas.add_mesh(vertices_px, vertex[has_three_vertices].astype(np.uint32))
+            added_parts.append(part[has_three_vertices])
     stop.check()
+    atlas.generate(xatlas.ChartOptions(), _packing(xatlas))
 
-    packing = xatlas.PackOptions()
-    packing.texels_per_unit = 1.0
-    packing.padding = PADDING
-    packing.bilinear = True
-    atlas.generate(xatlas.ChartOptions(), packing)
-    charts.width = atlas.width
-    charts.height = atlas.height
     chart_count = 0
-    for nth, part in enumerate(added):
-        _, vertex, uv = atlas[nth]
-        charts.places[part] = (uv * (atlas.width, atlas.height))[vertex]
-        has_place = np.abs(doubled_areas_px2(charts.places[part])) > 1e-9
-        chart = _connected(vertex.astype(np.int64))
-        charts.chart[part] = np.where(has_place, chart + chart_count, -1)
-        chart_count += chart.max() + 1
-    return charts
+    for index, part in enumerate(added_parts):
+        _, vertex, vertex_uv = atlas[index]
+        vertex_px = vertex_uv * (atlas.width, atlas.height)
+        places_px[part] = vertex_px[vertex]
+        has_area = np.abs(doubled_areas_px2(places_px[part])) > MIN_XATLAS_AREA_PX2
+        part_chart = _connected_components(vertex.astype(np.int64))
+        chart[part] = np.where(has_area, chart_count + part_chart, -1)
+        chart_count += part_chart.max() + 1
+    return _Charts(places_px, chart, atlas.width, atlas.height)
 
 
-def _keep_for_ever(atlas: object) -> None:
-    """Never destroy an atlas of xatlas, which may wait for ever when it is destroyed.
+def _indexed_mesh(corners_px: Array, spacing_m: Array) -> tuple[NDArray[np.float32], Rows]:
+    """The vertices (V, 3) of faces with corners (F, 3, 3), and the vertices (F, 3) of each face.
 
-    Its scheduler sets a flag and notifies its threads without holding their lock. A thread that has just looked at the
-    flag misses both, and the scheduler joins it in vain. Seen once, in a run of all tests. What is kept is the
-    memory of one unwrapped scene and its idle threads; a bake has a process of its own.
+    The coordinates of the vertices begin at 0, because float32 resolves small numbers better.
+    """
+    corners_m = corners_px * spacing_m[:, None, None]
+    first_corner, vertex = _welded(corners_m)
+    vertices_px = corners_px.reshape(-1, 3)[first_corner]
+    from_lowest_px = vertices_px - vertices_px.min(0)
+    return from_lowest_px.astype(np.float32), vertex
+
+
+def _packing(xatlas: Any) -> Any:
+    """The options of xatlas for charts whose unit of length is already one texel."""
+    options = xatlas.PackOptions()
+    options.texels_per_unit = 1.0
+    options.padding = PADDING_PX
+    options.bilinear = True
+    return options
+
+
+def _never_destroy(atlas: object) -> None:
+    """Keep an atlas of xatlas in memory until the process ends, because its destructor can wait forever.
+
+    The scheduler of xatlas sets a flag and notifies its threads without holding their lock. A thread that has just read
+    the flag misses both, and the scheduler then waits for that thread forever. This happened once, in a run of all
+    tests. The cost is the memory of one unwrapped scene and some idle threads. A bake has a process of its own.
     """
     ctypes.pythonapi.Py_IncRef(ctypes.py_object(atlas))
 
 
-def _welded(
-    corners_m: Array,
-    *also: NDArray[np.int64],
-) -> tuple[Rows, Rows]:
-    """Of corners (F, 3, 3) the first (V,) of those at one place, and which each is (F, 3); `also` (F,) keeps apart."""
-    keys = np.rint(corners_m / WELD_M).astype(np.int64).reshape(-1, 3)
-    keys = np.column_stack([keys, *(np.repeat(other, 3) for other in also)])
-    first, of = distinct_rows(keys)
-    return first, of.reshape(-1, 3)
+# Axis charts: projections of flat or nearly flat surfaces.
 
 
-def _connected(index: Rows) -> Indices:
-    """Which of the groups that share vertices each face is in (F,), by its vertices (F, 3)."""
-    count = len(index) + int(index.max()) + 1
-    links = (np.repeat(np.arange(len(index)), 3), index.ravel() + len(index))
-    graph = scipy.sparse.coo_matrix((np.ones(index.size, np.int8), links), (count, count))
-    labels = scipy.sparse.csgraph.connected_components(graph, directed=False)[1][: len(index)]
-    return np.unique(labels, return_inverse=True)[1].astype(np.int32)
+def _with_axis_charts(charts: _Charts, faces: Triangles, corners_px: Array, spacing_m: Array, lit: Mask) -> _Charts:
+    """Add axis charts, below the other charts, for the lit faces (F,) that have an area but no place yet."""
+    has_area = areas_m2(corners_px) > MIN_AREA_PX2
+    rows = np.flatnonzero(lit & (charts.chart < 0) & has_area)
+    if not len(rows):
+        return charts
+
+    row_corners_px = corners_px[rows]
+    row_corners_m = row_corners_px * spacing_m[rows, None, None]
+    added = _axis_charts(row_corners_px, row_corners_m, faces.thing[rows])
+
+    places_px = charts.places_px.copy()
+    places_px[rows] = added.places_px + np.array([0, charts.height])
+    chart = charts.chart.copy()
+    chart[rows] = added.chart + charts.chart.max() + 1
+    return _Charts(
+        places_px,
+        chart,
+        width=max(charts.width, added.width),
+        height=charts.height + added.height,
+    )
 
 
-def axis_charts(
-    corners_px: Array,
-    corners_m: Array,
-    thing: Indices,
-) -> tuple[Array, Indices, int, int]:
-    """Charts of connected faces whose normals are nearest to one axis, seen along it: for what xatlas leaves.
+def _axis_charts(corners_px: Array, corners_m: Array, thing: Indices) -> _Charts:
+    """The charts of faces with corners (F, 3, 3), by projection along the coordinate axes.
 
-    corners_px (F, 3, 3): in texels. Returns places (F, 3, 2), charts (F,), width and height.
+    A chart contains connected faces of one thing (F,) whose normals are nearest to the same axis direction.
     """
     first_edge = corners_px[:, 1] - corners_px[:, 0]
     second_edge = corners_px[:, 2] - corners_px[:, 0]
     side = nearest_axis(np.cross(first_edge, second_edge))
-    chart = _connected(_welded(corners_m, thing.astype(np.int64), side)[1])
-    plane_axes = np.array([[1, 2], [0, 2], [0, 1]])[side // 2]  # (F, 2)
-    places = np.take_along_axis(corners_px, plane_axes[:, None].repeat(3, 1), 2)
+    _, vertex = _welded(corners_m, thing.astype(np.int64), side)
+    chart = _connected_components(vertex)
 
-    count = int(chart.max()) + 1
-    low = np.full((count, 2), np.inf)
-    high = np.full((count, 2), -np.inf)
+    # (F, 3, 2): the two coordinates across the axis of the face, for each of its corners
+    plane_axes = PLANE_AXES[side // 2]
+    projected_px = np.take_along_axis(corners_px, plane_axes[:, None].repeat(3, 1), 2)
+
+    chart_count = int(chart.max()) + 1
+    low_px = np.full((chart_count, 2), np.inf)
+    high_px = np.full((chart_count, 2), -np.inf)
     for corner in range(3):
-        np.minimum.at(low, chart, places[:, corner])
-        np.maximum.at(high, chart, places[:, corner])
-    size = np.maximum(np.ceil(high - low - 1e-6), 1)
-    stretch = size / np.maximum(high - low, 1e-9)
-    places = (places - low[chart, None]) * stretch[chart, None]
-    padded_size = size.astype(np.int64) + 1 + 2 * PADDING
-    box_corner, width, height = _shelves(padded_size)
-    return places + box_corner[chart, None] + PADDING + 0.5, chart, width, height
+        np.minimum.at(low_px, chart, projected_px[:, corner])
+        np.maximum.at(high_px, chart, projected_px[:, corner])
+
+    # A chart is stretched to whole texels, so that its outermost samples are on its outline.
+    extent_px = high_px - low_px
+    size_px = np.maximum(np.ceil(extent_px - 1e-6), 1)
+    stretch = size_px / np.maximum(extent_px, 1e-9)
+    in_chart_px = (projected_px - low_px[chart, None]) * stretch[chart, None]
+
+    samples = size_px.astype(np.int64) + 1  # along each side, one at both ends
+    box_corners_px, width, height = _packed_in_shelves(samples + 2 * PADDING_PX)
+    places_px = in_chart_px + box_corners_px[chart, None] + PADDING_PX + 0.5
+    return _Charts(places_px, chart, width, height)
 
 
 def nearest_axis(vectors: Array) -> Rows:
-    """The direction that vectors (N, 3) point along most: 0 and 1 along the first axis and against it, and so on."""
+    """The axis direction (N,) that is nearest to each vector (N, 3).
+
+    0 is along the first axis, 1 is against it, 2 and 3 are along and against the second axis, 4 and 5 the third.
+    """
     axis = np.abs(vectors).argmax(1)
     component = np.take_along_axis(vectors, axis[:, None], 1)[:, 0]
     return np.asarray(2 * axis + (component < 0))
 
 
-def _shelves(sizes: Rows) -> tuple[Rows, int, int]:
-    """Corners (N, 2) of boxes (N, 2) in shelves, tallest first, and the width and height of them all."""
+def _packed_in_shelves(sizes: Rows) -> tuple[Rows, int, int]:
+    """Pack boxes with sizes (N, 2) in shelves, the tallest first: one row of boxes after another.
+
+    Returns the lowest corners (N, 2) of the boxes, and the width and the height of all shelves together.
+    """
     square_side = np.sqrt(sizes.prod(1).sum())
     width = int(max(square_side, sizes[:, 0].max()))
     corners = np.zeros_like(sizes)
     column = 0
     row = 0
     shelf_height = 0
+    # Boxes of one height are sorted by their width, and equal boxes by their index.
     tallest_first = np.lexsort((np.arange(len(sizes)), -sizes[:, 0], -sizes[:, 1]))
     for index in tallest_first:
         box_width, box_height = sizes[index].tolist()
         if column + box_width > width:
             column = 0
-            row = row + shelf_height
+            row += shelf_height
             shelf_height = 0
         corners[index] = column, row
-        column = column + box_width
+        column += box_width
         shelf_height = max(shelf_height, box_height)
     return corners, width, row + shelf_height
 
 
-def _place_thin_faces(
-    faces: Triangles,
-    places: Array,
-    chart: Indices,
-    thin: Rows,
-) -> None:
-    """Give faces that are too thin for a place that of a neighbour's corner."""
+# Faces without a chart of their own.
+
+
+def _with_thin_faces(charts: _Charts, faces: Triangles, lit: Mask) -> _Charts:
+    """Place the lit faces (F,) that are too thin for a chart on one point: a corner that they share with a placed face.
+
+    A thin face without such a neighbour is not placed.
+    """
+    thin = np.flatnonzero(lit & (charts.chart < 0))
     if not len(thin):
-        return
+        return charts
+
+    # A corner is identified by its index in the flat list of the corners of all faces: 3 * face + corner.
     _, vertex = _welded(faces.corners_m, faces.thing.astype(np.int64))
-    corner_at = np.full(vertex.max() + 1, -1)
-    placed = np.flatnonzero(chart >= 0)
-    corner_at[vertex[placed]] = 3 * placed[:, None] + np.arange(3)
-    source = corner_at[vertex[thin]].max(1)
-    has_source = source >= 0
-    places[thin[has_source]] = places.reshape(-1, 2)[source[has_source], None]
-    chart[thin[has_source]] = chart[source[has_source] // 3]
+    placed = np.flatnonzero(charts.chart >= 0)
+    placed_corner = np.full(vertex.max() + 1, -1)  # (V,): a corner of a placed face at each vertex
+    placed_corner[vertex[placed]] = 3 * placed[:, None] + np.arange(3)
+
+    corner = placed_corner[vertex[thin]].max(1)  # (N,), -1 for none
+    has_neighbour = corner >= 0
+    rows = thin[has_neighbour]
+    corner = corner[has_neighbour]
+    places_px = charts.places_px.copy()
+    places_px[rows] = charts.places_px.reshape(-1, 2)[corner, None]
+    chart = charts.chart.copy()
+    chart[rows] = charts.chart[corner // 3]
+    return replace(charts, places_px=places_px, chart=chart)
+
+
+def _with_shared_blocks(charts: _Charts, block: Indices) -> Atlas:
+    """The atlas of all faces. Faces without a chart are placed at the middle of their block (F,), below the charts."""
+    blocks_top = charts.height + PADDING_PX
+    width = max(charts.width, BLOCK_PX)
+    blocks_per_row = width // BLOCK_PX
+    column = block % blocks_per_row * BLOCK_PX + BLOCK_PX / 2
+    row = block // blocks_per_row * BLOCK_PX + BLOCK_PX / 2 + blocks_top
+    middle_px = np.stack([column, row], -1)
+    block_rows = int(block.max(initial=0)) // blocks_per_row + 1
+    height = blocks_top + BLOCK_PX * block_rows
+
+    has_no_chart = (charts.chart < 0)[:, None, None]
+    places_px = np.where(has_no_chart, middle_px[:, None], charts.places_px)
+    rounded_px = np.rint(places_px * STEPS_PER_TEXEL) / STEPS_PER_TEXEL
+    return Atlas(rounded_px.astype(np.float32), charts.chart, height, width)
+
+
+# Connected faces.
+
+
+def _welded(corners_m: Array, *labels: NDArray[np.int64]) -> tuple[Rows, Rows]:
+    """Merge corners (F, 3, 3) at the same position to vertices.
+
+    Corners of faces with different labels (F,) are not merged.
+    Returns the first corner (V,) of each vertex in the flat list of corners, and the vertices (F, 3) of each face.
+    """
+    cells = np.rint(corners_m / WELD_M).astype(np.int64).reshape(-1, 3)
+    corner_labels = [np.repeat(label, 3) for label in labels]
+    keys = np.column_stack([cells, *corner_labels])
+    first_corner, vertex = distinct_rows(keys)
+    return first_corner, vertex.reshape(-1, 3)
+
+
+def _connected_components(vertex: Rows) -> Indices:
+    """The component (F,) of each face, from 0, by its vertices (F, 3). Faces that share a vertex are connected."""
+    # The nodes of the graph are the faces, followed by the vertices. Its edges lead from faces to their vertices.
+    face_count = len(vertex)
+    node_count = face_count + int(vertex.max()) + 1
+    face_nodes = np.repeat(np.arange(face_count), 3)
+    vertex_nodes = face_count + vertex.ravel()
+    edges = np.ones(vertex.size, np.int8)
+    graph = scipy.sparse.coo_matrix((edges, (face_nodes, vertex_nodes)), (node_count, node_count))
+
+    _, node_component = scipy.sparse.csgraph.connected_components(graph, directed=False)
+    # Components of unused vertices are removed from the numbering.
+    _, component = np.unique(node_component[:face_count], return_inverse=True)
+    return component.astype(np.int32)

@@ -18,11 +18,11 @@ from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS, ackermann
 from vobench.motion.controller import MOST_FRAMES, ControllerSettings
 from vobench.motion.course import Planar, Unled, rolled
+from vobench.motion.disturbance import DISTURBANCE_STREAMS, Generators
 from vobench.motion.drive import Drive, Waypoints, follow, led_by, options
 from vobench.motion.handheld import Handheld
 from vobench.motion.pioneer import Theta, feed_forward
 from vobench.motion.replay import Replay
-from vobench.motion.slip import DISTURBANCE_STREAMS, Generators
 from vobench.motion.wander import Wander
 from vobench.motion.wheeled import Wheeled
 from vobench.rendering.geometry import RayCaster

@@ -1,0 +1,110 @@
+"""Lights as plugins of Mitsuba: their strength at level 1, and the emitters of lights without a surface."""
+
+from typing import Any
+
+import numpy as np
+
+from vobench.geometry.se3 import Array
+from vobench.rendering.mitsuba_material import Plugin, rgb
+from vobench.rendering.mitsuba_sun import PLUGIN as SUN_PLUGIN
+from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
+from vobench.scene.material import Map
+
+# Rows and columns of the picture of a sky. A row is a third of a degree. With an even number none is on the horizon.
+SKY_PX = (512, 1024)
+PANORAMA_PX = (1024, 2048)
+
+# The parameter of each kind of emitter that is proportional to the level of the light.
+STRENGTH_PARAMETERS = {
+    AreaLight: "emitter.radiance.value",
+    PointLight: "intensity.value",
+    SpotLight: "intensity.value",
+    Sun: "irradiance",
+    Sky: "scale",
+}
+
+
+def light_key(index: int) -> str:
+    """The name of a light in the scene of Mitsuba."""
+    return f"light_{index}"
+
+
+def nominal_strength(light: Light) -> Array:
+    """The strength (3,) of a light at level 1 in red, green and blue.
+
+    Its unit depends on the kind of light: cd/m² for area lights, cd for point and spot lights, lx for the sun. For the
+    sky it is 1, because the picture of the sky contains the luminance.
+    """
+    match light:
+        case AreaLight():
+            strength = light.luminance_cd_m2
+        case PointLight():
+            strength = light.power_lm / (4 * np.pi)
+        case SpotLight():
+            strength = light.peak_cd
+        case Sun():
+            strength = light.illuminance_lx
+        case Sky():
+            return np.ones(3)
+    return strength * np.array(light.colour)
+
+
+def emitter_plugin(mi: Any, light: Light) -> Plugin:
+    """The emitter of a light without a surface, at level 1 and at time 0.
+
+    Raises ValueError for an area light, whose emitter is a part of its mesh.
+    """
+    match light:
+        case PointLight():
+            return {
+                "type": "point",
+                "position": list(light.position_m),
+                "intensity": rgb(nominal_strength(light)),
+            }
+        case SpotLight():
+            return _spot(mi, light)
+        case Sun():
+            return {
+                "type": SUN_PLUGIN,
+                "irradiance": mi.ScalarColor3f(nominal_strength(light).tolist()),
+                "direction": list(light.direction(0)),
+            }
+        case Sky():
+            return _environment_map(mi, light)
+        case AreaLight():
+            raise ValueError(f"the lamp '{light.name}' has no faces")
+
+
+def _spot(mi: Any, light: SpotLight) -> Plugin:
+    target_m = light.position_m + light.direction
+    up = np.eye(3)[np.argmin(np.abs(light.direction))]  # the axis that is the least parallel to the direction
+    to_world = mi.ScalarTransform4f().look_at(origin=list(light.position_m), target=list(target_m), up=list(up))
+    return {
+        "type": "spot",
+        "to_world": to_world,
+        "cutoff_angle": light.outer_deg,
+        "beam_width": min(light.inner_deg, light.outer_deg - 1e-3),  # Mitsuba requires it to be smaller
+        "intensity": rgb(nominal_strength(light)),
+    }
+
+
+def _environment_map(mi: Any, sky: Sky) -> Plugin:
+    """The emitter of a sky. Mitsuba's environment maps have y up, so it is rotated until z is up."""
+    return {
+        "type": "envmap",
+        "bitmap": mi.Bitmap(_sky_picture(sky)),
+        "to_world": mi.ScalarTransform4f().rotate([1, 0, 0], 90),
+    }
+
+
+def _sky_picture(sky: Sky) -> Map:
+    """The luminance (rows, columns, 3) float32 of a sky from the zenith to the nadir, in cd/m²."""
+    rows, columns = SKY_PX if sky.panorama is None else PANORAMA_PX
+    theta = np.pi * np.arange(rows)[:, None] / (rows - 1)  # from the zenith
+    phi = 2 * np.pi * (np.arange(columns) + 0.5) / columns
+    # The rotation of the emitter maps (x, y, z) of the environment map to (x, -z, y) in the world.
+    x = np.sin(theta) * np.sin(phi)
+    y = np.sin(theta) * np.cos(phi)
+    z = np.cos(theta)
+    directions = np.stack(np.broadcast_arrays(x, y, z), -1)
+    return np.asarray(sky.seen_cd_m2(directions), np.float32)
