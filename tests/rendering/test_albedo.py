@@ -8,6 +8,7 @@ import pytest
 from tests.rendering.rectangles import rectangle
 from vobench.geometry.se3 import Array
 from vobench.rendering.albedo import LARGEST_ALBEDO, albedo
+from vobench.rendering.geometry import lengths
 from vobench.rendering.texel import Texels, texels
 from vobench.rendering.texel_owner import owners
 from vobench.rendering.unwrap import unwrap
@@ -52,17 +53,33 @@ def test_mirrors_and_panes_scatter_nothing(kind) -> None:
     assert (albedo_of(Material(kind, colour=COLOUR)) == 0).all()
 
 
-def test_each_point_has_the_colour_of_the_texture_there() -> None:
-    halves = np.zeros((2, 2, 3), np.uint8)
-    halves[:, 0] = [255, 0, 0]
-    halves[:, 1] = [0, 0, 100]
+def test_each_point_has_the_mean_of_the_texture_around_it() -> None:
+    halves = np.zeros((64, 64, 3), np.uint8)
+    halves[:, :32] = [255, 0, 0]
+    halves[:, 32:] = [0, 0, 100]
     material = Material(texture=Picture(halves, 1.0))
     faces, points = floor_points(material)
     values = albedo(faces, {"a": material}, points)
     weights = np.column_stack([1 - points.uv.sum(1), points.uv])
     u = np.einsum("ni,ni->n", weights, faces.uv[points.face][..., 0]) % 1
-    np.testing.assert_allclose(values[u < 0.49], np.tile([LARGEST_ALBEDO, 0, 0], (np.sum(u < 0.49), 1)), atol=1e-6)
+    from_edge = np.minimum(np.abs(u - 0.5), np.minimum(u, 1 - u))
+    is_left = (u < 0.5) & (from_edge > 0.06)
+    is_right = (u > 0.5) & (from_edge > 0.06)
+    np.testing.assert_allclose(values[is_left], np.tile([LARGEST_ALBEDO, 0, 0], (is_left.sum(), 1)), atol=1e-6)
     blue = linear(np.uint8(100))
-    np.testing.assert_allclose(values[u > 0.51], np.tile([0, 0, blue], (np.sum(u > 0.51), 1)), atol=1e-6)
+    np.testing.assert_allclose(values[is_right], np.tile([0, 0, blue], (is_right.sum(), 1)), atol=1e-6)
     half_as_large = albedo(faces, {"a": replace(material, texture=Picture(halves, 0.5))}, points)
     assert not np.array_equal(half_as_large, values)
+
+
+@pytest.mark.parametrize("size_px", [5, 10, 64])
+def test_stripes_as_far_apart_as_the_points_have_their_mean(size_px: int) -> None:
+    """Sampled at their middles, all points could be on a stripe, or none."""
+    stripes = np.zeros((size_px, 10, 3), np.uint8)
+    stripes[:, 0] = 200
+    material = Material(texture=Picture(stripes, 0.1))
+    faces, points = floor_points(material)
+    values = albedo(faces, {"a": material}, points)
+    has_neighbours = np.maximum(lengths(points.step_u_m), lengths(points.step_v_m)) > 0
+    assert has_neighbours.sum() > 100
+    np.testing.assert_allclose(values[has_neighbours], linear(np.uint8(200)) / 10, rtol=1e-3)

@@ -40,6 +40,20 @@ def test_points_on_both_sides_of_a_wall_are_in_different_surfels() -> None:
     assert len(open_floor.groups) < len(divided.groups)
 
 
+def test_points_close_behind_a_cover_are_in_other_surfels_than_those_beside_it() -> None:
+    """So that a cabinet's points behind its drawers, which are dark, do not stand for those that can be seen."""
+    floor = rectangle(0.5 * X + 0.5 * Y, X, Y, "grey", "floor")
+    cover = rectangle(0.26 * X + 0.5 * Y + 0.02 * Z, 0.52 * X, Y, "grey", "cover")
+    lit = gathered_room([floor, cover], spacing_m=0.05, step_m=1.0)
+    is_floor = lit.points.points_m[:, 2] < 0.01
+    is_covered = lit.points.points_m[:, 0] < 0.52
+    covered = set(lit.groups.of[is_floor & is_covered])
+    open_to_light = set(lit.groups.of[is_floor & ~is_covered])
+    assert covered
+    assert open_to_light
+    assert not covered & open_to_light
+
+
 def test_the_sample_offsets_of_neighbouring_surfels_are_stratified() -> None:
     lit = gathered_room([rectangle(2 * X + 2 * Y, 4 * X, 4 * Y, "grey")], spacing_m=0.1, step_m=0.5)
     middles = stratified_middles(lit.middles, lit.groups.step_m)

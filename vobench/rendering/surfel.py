@@ -50,11 +50,16 @@ def surfels(
     key = thing.astype(np.int64) * 6 + nearest_axis(points.planes)
     for coordinate in cell.T:
         key = key * (coordinate.max(initial=0) + 1) + coordinate
-    group, middle = _grouped(key, points.points_m)
-
-    # Points on both sides of a thin wall are not one surfel.
     raised_m = points.points_m + RAISED * step_m[:, None] * points.planes
 
+    # Points close behind something, as those of a cabinet behind its drawers, are no surfel with the points before it.
+    def covered(part: slice) -> Mask:
+        return visibility.opaque.occluded(points.points_m[part], raised_m[part])
+
+    is_covered = chunked(covered, len(points))
+    group, middle = _grouped(2 * key + is_covered, points.points_m)
+
+    # Points on both sides of a thin wall are not one surfel.
     def hidden(part: slice) -> Mask:
         return visibility.opaque.occluded(raised_m[part], raised_m[middle[group[part]]])
 
