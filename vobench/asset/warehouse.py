@@ -5,14 +5,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vobench.asset import fitting, furniture, outdoors, picture, storage
+from vobench.asset import fitting, furniture, outdoors, pallet, picture, warehouse_equipment
 from vobench.asset.daylight import lamp_colour, level_daylight
 from vobench.asset.furniture import STEEL, WHITE, Part, coated, matt, put, stood
+from vobench.asset.pallet_rack import Rack
 from vobench.asset.picture import Rng, one_of
 from vobench.asset.room import OUTWARD, Opening, Wall, shell
 from vobench.asset.shape import at, block_arrays, card_arrays, extrusion
 from vobench.asset.site import Area, Footprint, LevelAreas, Site, SitePiece, Structure, footprint
-from vobench.asset.storage import Rack
 from vobench.asset.texture import Procedural
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Light
@@ -237,7 +237,7 @@ def _steelwork(rng: Rng, plan: HallPlan, trays: list[Part]) -> Iterator[Structur
     for number in range(docks):
         across = (number - (docks - 1) / 2) * 5.2 + float(rng.uniform(-0.3, 0.3))
         if abs(across) + 2.6 < y:
-            door = storage.roller_door(rng, int(rng.integers(1, 20)))
+            door = warehouse_equipment.roller_door(rng, int(rng.integers(1, 20)))
             parts = tuple(part.moved(at(x, across, 0, yaw=180)) for part in door)
             yield Structure(f"dock_{number}", parts, RACK_SPACING_M)
 
@@ -360,7 +360,7 @@ def _loads(plan: HallPlan, seed: int) -> Iterator[SitePiece]:
                 for place in range(per_bay):
                     x = middle_m + (place - (per_bay - 1) / 2) * rack.bay_m / per_bay
                     high_m = min(ceiling_m - z, 1.7) * float(rng.uniform(0.6, 1.0))
-                    parts = storage.load(rng, high_m)
+                    parts = pallet.load(rng, high_m)
                     # Pallets stand crosswise: their longer side reaches into the rack.
                     T = at(
                         x + float(np.clip(rng.normal(0, 0.012), -0.02, 0.02)),
@@ -379,23 +379,28 @@ def _furniture(plan: HallPlan, rng: Rng) -> Iterator[SitePiece]:
     free_x = (plan.docks_x_m + 1.9, x - STAGING_X_M - 0.3)
     for number in range(int(rng.integers(3, 8))):
         turn_deg = float(rng.choice([0.0, 90.0]) + np.clip(rng.normal(0, 4), -8, 8))
-        parts = storage.load(rng, float(rng.uniform(0.8, 1.7)))
+        parts = pallet.load(rng, float(rng.uniform(0.8, 1.7)))
         yield _placed(f"waiting_{number}", parts, rng, free_x=free_x, reach_y=y - 1.2, turn_deg=turn_deg)
     stack = int(rng.integers(4, 10))
     pallets = []
     for level in range(stack):
-        T = at(0, 0, level * storage.PALLET_M[2], yaw=float(np.clip(rng.normal(0, 1.5), -3, 3)))
-        pallets += [part.moved(T) for part in storage.pallet()]
+        T = at(0, 0, level * pallet.PALLET_M[2], yaw=float(np.clip(rng.normal(0, 1.5), -3, 3)))
+        pallets += [part.moved(T) for part in pallet.pallet()]
     yield _placed(
         "empty_pallets", pallets, rng, free_x=free_x, reach_y=y - 1.2, turn_deg=float(rng.choice([0.0, 90.0]))
     )
     if rng.random() < 0.75:
         yield _placed(
-            "forklift", storage.forklift(rng), rng, free_x=free_x, reach_y=y - 2.0, turn_deg=float(rng.uniform(0, 360))
+            "forklift",
+            warehouse_equipment.forklift(rng),
+            rng,
+            free_x=free_x,
+            reach_y=y - 2.0,
+            turn_deg=float(rng.uniform(0, 360)),
         )
     yield _placed(
         "pallet_truck",
-        storage.pallet_truck(rng),
+        warehouse_equipment.pallet_truck(rng),
         rng,
         free_x=free_x,
         reach_y=y - 1.4,
