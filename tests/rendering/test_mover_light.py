@@ -1,4 +1,4 @@
-"""What casts a mover's shade, and that pictures do not depend on what was drawn before."""
+"""Pictures of a scene with movers do not depend on what was drawn before."""
 
 from dataclasses import replace
 from typing import Any
@@ -12,38 +12,17 @@ from vobench.asset.texture import Procedural
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
-from vobench.geometry.triangle import areas_m2
 from vobench.rendering.bake import bake
 from vobench.rendering.baked_scene import BakedScene, BakeSettings
-from vobench.rendering.geometry import RayCaster
-from vobench.rendering.mover_light import occluder
 from vobench.rendering.renderer import single_instant
 from vobench.scene.light import PointLight, Sky
 from vobench.scene.material import Material
-from vobench.scene.mesh import moved, quad
+from vobench.scene.mesh import moved
 from vobench.scene.scene import Mover, Scene, WaypointMotion, ceiling_light
-from vobench.scene.triangles import Thing, triangle_table
+from vobench.scene.triangles import Thing
 
 PILLAR = moved(block((0.5, 0.3, 1.8), bevel_m=0), at(0.4, -0.2, 0.9, yaw=25))
-FLOOR = quad((-2, -2, 0), (4, 0, 0), (0, 4, 0))
 LAMP = ceiling_light("panel", np.array([1.0, 0.3, 2.4]), (0.8, 0.4), power_lm=1000)
-CASTER = RayCaster(triangle_table([Thing("pillar", PILLAR, "grey")], [-1], [-1]))
-
-
-def test_a_convex_thing_casts_the_shade_of_its_hull_and_a_sheet_its_own() -> None:
-    hull = occluder(PILLAR.triangles)
-    assert len(hull) == 12
-    assert np.ptp(hull.reshape(-1, 3), axis=0) == pytest.approx(np.ptp(PILLAR.triangles.reshape(-1, 3), axis=0))
-    np.testing.assert_allclose(np.sort(areas_m2(occluder(FLOOR.triangles))), areas_m2(FLOOR.triangles))
-
-
-def test_a_shape_that_its_hull_would_fill_keeps_its_gap() -> None:
-    """Two pillars of one thing: a hull would close what is between them."""
-    pair = np.concatenate([PILLAR.triangles, PILLAR.triangles + np.array([2.0, 0, 0])])
-    caster = RayCaster(triangle_table([Thing("pair", PILLAR, "grey")], [-1], [-1]))
-    assert caster.occluded(np.array([[0.4, -5, 1.0]]), np.array([[0.4, 5, 1.0]])).all()
-    middles = occluder(pair).mean(1)
-    assert not ((middles[:, 0] > 0.9) & (middles[:, 0] < 1.9)).any()
 
 
 CAMERA = Pinhole(90, 60, 60.0, 60.0, 44.5, 29.5)

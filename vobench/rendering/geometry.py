@@ -60,6 +60,15 @@ def bounding_sphere(points_m: Array) -> BoundingSphere:
     return BoundingSphere(centre, float(distances.max()))
 
 
+def sphere_directions(count: int) -> Array:
+    """Unit vectors (count, 3) that are distributed evenly. Source: González (2010), the Fibonacci lattice."""
+    steps = np.arange(count) + 0.5
+    height = 1 - 2 * steps / count
+    angle = np.pi * (1 + np.sqrt(5)) * steps
+    radius = np.sqrt(1 - height**2)
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), height], -1)
+
+
 def reversed_faces(corners_m: Array) -> Indices:
     """For each triangle (F, 3, 3) one with the same corners in reverse order, the back of a sheet; -1 for none."""
     weights = np.sqrt(np.arange(2.0, 11.0)).reshape(3, 3)

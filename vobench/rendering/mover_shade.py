@@ -23,7 +23,8 @@ from vobench.rendering.mover_kernels import (
     mark_in_views,
     take_shaded,
 )
-from vobench.rendering.mover_light import MoverLight, MoverLightAt, SampledEmitter
+from vobench.rendering.mover_light import MoverLight, MoverLightAt
+from vobench.rendering.sampled_emitter import SampledEmitter
 from vobench.rendering.texel_owner import Owners, owners
 from vobench.rendering.view import Box, PinholeView
 from vobench.scene.light import Steady
