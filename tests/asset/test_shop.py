@@ -9,7 +9,7 @@ WIDTH_M = 4.5
 DEPTH_M = 4.0
 
 
-@pytest.mark.parametrize("kind", sorted(shop.KINDS))
+@pytest.mark.parametrize("kind", sorted(shop.GOODS))
 def test_goods_stay_in_the_room(kind: str) -> None:
     for seed in range(3):
         made = shop.interior(np.random.default_rng(seed), kind, width_m=WIDTH_M, sill_m=0.42, depth_m=DEPTH_M)
@@ -22,5 +22,5 @@ def test_goods_stay_in_the_room(kind: str) -> None:
 
 
 def test_every_kind_has_names() -> None:
-    assert shop.NAMES.keys() == shop.KINDS.keys()
-    assert {shop.drawn_kind(np.random.default_rng(seed)) for seed in range(60)} == set(shop.KINDS)
+    assert shop.NAMES.keys() == shop.GOODS.keys()
+    assert {shop.drawn_kind(np.random.default_rng(seed)) for seed in range(60)} == set(shop.GOODS)
