@@ -23,13 +23,21 @@ def uniforms_of(material: Material, *, is_lamp: bool = False) -> np.ndarray:
     return uniforms
 
 
-def test_at_normal_incidence_a_surface_reflects_what_fresnel_says() -> None:
-    for eta in (1.0, 1.5, 2.4):
-        assert uniforms_of(Material(eta=eta))["normal_reflectance"] == pytest.approx(fresnel(np.array(1.0), eta))
+def test_a_smooth_coat_reflects_what_fresnel_says() -> None:
+    for roughness in (0.0, 0.02):
+        assert uniforms_of(Material(eta=1.5, roughness=roughness))["grazing_exponent"] == 0
 
 
 def test_the_rougher_a_coat_the_less_its_reflectance_rises_towards_grazing_incidence() -> None:
-    rises = [float(uniforms_of(Material(eta=1.5, roughness=alpha))["grazing_rise"]) for alpha in (0, 0.1, 0.4, 1)]
+    coats = [uniforms_of(Material(eta=1.5, roughness=alpha)) for alpha in (0.06, 0.1, 0.4, 1)]
+    rises = [float(coat["grazing_rise"]) for coat in coats]
+    assert rises == sorted(rises, reverse=True)
+    assert all(coat["grazing_exponent"] > 0 for coat in coats)
+    assert coats[0]["normal_reflectance"] == pytest.approx(fresnel(np.array(1.0), 1.5), rel=0.05)
+
+
+def test_the_rougher_metal_is_the_less_it_reflects_at_grazing_incidence() -> None:
+    rises = [float(uniforms_of(Material(metal=1.0, roughness=alpha))["metal_rise"]) for alpha in (0, 0.1, 0.4, 1)]
     assert rises[0] == 1
     assert rises == sorted(rises, reverse=True)
     assert rises[-1] == 0

@@ -14,7 +14,7 @@ from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.batch import geometry
 from vobench.rendering.draw import BatchDraw
 from vobench.rendering.gl_texture import LightTexture, PanoramaTexture
-from vobench.rendering.glint import glints
+from vobench.rendering.glint import glints, lamp_parts
 from vobench.rendering.illumination import AmbientLight, Illumination
 from vobench.rendering.mover_shade import ShadedLight
 from vobench.rendering.probe import Probe, room_probe
@@ -41,6 +41,7 @@ class FrameRenderer:
         self._ambient = AmbientLight(baked)
         self._movers = baked.scene.movers
         self._lights = baked.scene.lights
+        self._lamp_parts = lamp_parts(self._lights)
         self._fog = baked.scene.fog
         light_map = self._illumination.at(0, 0)
         self._light = ShadedLight(baked, light_map) if self._movers else LightTexture(light_map)
@@ -107,7 +108,10 @@ class FrameRenderer:
             self._draw.add(target, target.total, whole, 1.0)
             return target.total.read(whole), target.framebuffer.reversed_depth()
 
-        return room_probe(draw, faces.corners_m[faces.mover < 0], ambient_cd_m2)
+        is_stationary = faces.mover < 0
+        with_glints = sorted({part.light for part in self._lamp_parts})
+        lamp_faces = np.flatnonzero(np.isin(faces.lamp[is_stationary], with_glints))
+        return room_probe(draw, faces.corners_m[is_stationary], lamp_faces, ambient_cd_m2)
 
     def _strip(
         self,
@@ -166,7 +170,7 @@ class FrameRenderer:
         light = self._illumination.at(start_ns, end_ns)
         shown_glints = NO_GLINTS
         if self._draw.needs_probe:
-            shown_glints = glints(self._lights, T_world_camera[:3, 3], start_ns, end_ns)
+            shown_glints = glints(self._lights, self._lamp_parts, T_world_camera[:3, 3], start_ns, end_ns)
         pinhole = pinhole_view(
             camera,
             T_world_camera,

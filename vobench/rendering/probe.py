@@ -3,12 +3,16 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 
 from vobench.geometry import se3
-from vobench.geometry.camera import Pinhole
+from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Indices, Mask
 from vobench.rendering.cube_map import PrefilteredCubeMap
+from vobench.rendering.embree import TriangleCaster
+from vobench.rendering.geometry import FAR_M
 from vobench.rendering.renderer import Radiance
 from vobench.rendering.view import NEAR_M
 from vobench.scene.material import LUMINANCE, Material
@@ -18,6 +22,7 @@ FADE = 0.1  # the width of the range of roughness below PROBE_MOST in which the 
 SIZE_PX = 256
 CAMERA = Pinhole(SIZE_PX, SIZE_PX, SIZE_PX / 2, SIZE_PX / 2, (SIZE_PX - 1) / 2, (SIZE_PX - 1) / 2)
 LEVELS = 6
+ROUGH_LEVEL = 4  # the first level without the area lights, which have glints in surfaces as rough as that
 # Rows: the right, down and ahead axes of OpenGL's six faces, which show the world as a mirror does.
 FACES = np.array(
     [
@@ -30,6 +35,7 @@ FACES = np.array(
     ],
     float,
 )
+SAME_DEPTH = 0.01  # the share of a distance by which the depth of a lamp and of what hides it differ at least
 WALL = 0.9  # the share of a face's pixels that are nearer than the wall there
 
 
@@ -51,28 +57,49 @@ class Probe:
 
 
 def room_probe(
-    draw: Callable[[Pinhole, Array], tuple[Radiance, Radiance]], corners_m: Array, ambient_cd_m2: Array
+    draw: Callable[[Pinhole, Array], tuple[Radiance, Radiance]],
+    corners_m: Array,
+    lamp_faces: Indices,
+    ambient_cd_m2: Array,
 ) -> Probe:
-    """The probe of a scene of faces (F, 3, 3). `draw` returns the picture (H, W, 3) and depth (H, W) of a camera."""
+    """The probe of a scene of faces (F, 3, 3). `draw` returns the picture (H, W, 3) and depth (H, W) of a camera.
+
+    lamp_faces (L,): those of area lights that have glints.
+    """
     centre_m = _free_place(corners_m)
+    lamps = TriangleCaster(corners_m, lamp_faces, robust=True)
     pictures = []
+    pictures_without_lamps = []
     wall_distances_m = []
     for right, down, ahead in FACES:
         R_world_camera = np.stack([-right, down, ahead], 1)
         picture, reversed_depth = draw(CAMERA, se3.transform(R_world_camera, centre_m))
-        pictures.append(picture[:, ::-1])
         farthest_m = float(((corners_m - centre_m) @ ahead).max())
         distance_m = np.where(reversed_depth > 0, NEAR_M / np.maximum(reversed_depth, 1e-9), farthest_m)
+        is_lamp = _shows_lamp(lamps, centre_m, R_world_camera, distance_m)
+        pictures.append(picture[:, ::-1])
+        pictures_without_lamps.append(np.where(is_lamp[..., None], 0, picture)[:, ::-1])
         wall_distances_m.append(np.quantile(distance_m, WALL))
     roughness = [roughness_of(level) for level in range(LEVELS)]
+    by_level = [pictures] * ROUGH_LEVEL + [pictures_without_lamps] * (LEVELS - ROUGH_LEVEL)
     return Probe(
-        texture=PrefilteredCubeMap(pictures, FACES, roughness),
+        texture=PrefilteredCubeMap(by_level, FACES, roughness),
         centre_m=centre_m,
         low_m=centre_m - wall_distances_m[1::2],
         high_m=centre_m + wall_distances_m[::2],
         light=_irradiance(np.array(pictures)),
         ambient_cd_m2=ambient_cd_m2,
     )
+
+
+def _shows_lamp(lamps: TriangleCaster, centre_m: Array, R_world_camera: Array, distance_m: Array) -> Mask:
+    """Which pixels (H, W) show a lamp or are beside one that does, given the distance (H, W) along the axis."""
+    rays = CAMERA.rays(pixel_grid(CAMERA)).reshape(-1, 3)
+    along_axis = rays / rays[:, 2:]
+    origins_m = np.broadcast_to(centre_m, rays.shape)
+    lamp_m = lamps.hits(origins_m, along_axis @ R_world_camera.T, FAR_M).distance.reshape(distance_m.shape)
+    is_lamp = lamp_m < distance_m * (1 + SAME_DEPTH)
+    return cv2.dilate(is_lamp.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
 
 
 def level_of(roughness: float) -> float:
@@ -92,6 +119,11 @@ def probe_share(material: Material) -> float:
         return 1.0
     margin = PROBE_MOST - material.roughness
     return float(np.clip(margin / FADE, 0, 1))
+
+
+def area_glint_share(material: Material) -> float:
+    """The share of the glints of area lights that a surface shows; their other share is in the probe that it shows."""
+    return float(np.clip(level_of(material.roughness) - (ROUGH_LEVEL - 1), 0, 1))
 
 
 CLEAR_M = 0.5  # the distance of the probe from the nearest face above which more is no better

@@ -88,7 +88,8 @@ def _bytes(field: Field) -> int:
 
 
 MIRROR_PLANES = 3
-MOST_GLINTS = 4
+MOST_GLINTS = 12
+GLINT_ROWS = 4  # vectors of each
 
 PASS = UniformBlock(
     "Pass",
@@ -112,7 +113,7 @@ PASS = UniformBlock(
         Field("float", "probe_mean", "irradiance / pi at the probe, the mean over all directions"),
         Field("vec3", "probe_scale", "the light now over that in which the probe was drawn"),
         Field("float", "glint_count", "how many of the glints are set"),
-        Field("vec4", "glints", "position, intensity and axis of each", count=3 * MOST_GLINTS),
+        Field("vec4", "glints", "position, intensity, axis and size of each", count=GLINT_ROWS * MOST_GLINTS),
     ),
 )
 BATCH = UniformBlock(
@@ -131,12 +132,15 @@ BATCH = UniformBlock(
         Field("float", "inverse_eta_squared", "1 / eta^2"),
         Field("float", "arriving_over_entering", "illuminance over what enters the coat"),
         Field("float", "metal", "share that is metal"),
-        Field("float", "grazing_rise", "share of Fresnel's rise that roughness leaves"),
+        Field("float", "grazing_rise", "of the reflectance of a rough coat"),
+        Field("float", "grazing_exponent", "of that rise; 0 for a smooth coat"),
+        Field("float", "metal_rise", "of the reflectance of metal"),
         Field("float", "cutout", "least opacity that is drawn"),
         Field("float", "roughness", "GGX alpha"),
         Field("float", "probe_level", "level of the probe that is as blurred"),
         Field("float", "probe_share", "how much of the probe is shown"),
-        Field("float", "normal_reflectance", "Fresnel's share at normal incidence"),
+        Field("float", "area_glint_share", "how much of the glints of area lights is shown"),
+        Field("float", "normal_reflectance", "of a rough coat at normal incidence"),
     ),
 )
 BLOCKS = {block.name: block for block in (PASS, BATCH)}

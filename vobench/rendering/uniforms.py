@@ -6,7 +6,9 @@ from numpy.typing import NDArray
 from vobench.rendering.batch import Batch
 from vobench.rendering.framebuffer import LayeredFramebuffer
 from vobench.rendering.gl_texture import SurfaceTexture
-from vobench.rendering.probe import Probe, level_of, probe_share
+from vobench.rendering.probe import Probe, area_glint_share, level_of, probe_share
+from vobench.rendering.rough_fresnel import SMOOTH, rough_reflectance
+from vobench.rendering.uniform_block import GLINT_ROWS
 from vobench.rendering.view import PinholeView
 from vobench.scene.material import Rgb, emitted_cd_m2, inner_reflectance
 
@@ -48,7 +50,7 @@ def set_probe(uniforms: Block, view: PinholeView, probe: Probe) -> None:
     uniforms["probe_mean"] = probe.light[3]
     uniforms["probe_scale"] = view.ambient_cd_m2 / np.maximum(probe.ambient_cd_m2, 1e-12)
     uniforms["glint_count"] = len(view.glints)
-    uniforms["glints"][: 3 * len(view.glints)] = view.glints.reshape(-1, 4)
+    uniforms["glints"][: GLINT_ROWS * len(view.glints)] = view.glints.reshape(-1, 4)
 
 
 def set_batch(
@@ -101,14 +103,17 @@ def _set_coat(uniforms: np.void, batch: Batch) -> None:
 def _set_gloss(uniforms: np.void, batch: Batch) -> None:
     """Set the reflectance of a surface, its roughness and the share of the probe."""
     material = batch.material
-    # Rougher surfaces reflect less at grazing incidence: Lagarde (2011).
-    normal_reflectance = ((1 - material.eta) / (1 + material.eta)) ** 2
-    grazing_loss = 0.0 if batch.mirror else np.sqrt(material.roughness)
-    grazing_reflectance = max(1 - grazing_loss, normal_reflectance)
-    uniforms["normal_reflectance"] = normal_reflectance
-    uniforms["grazing_rise"] = (grazing_reflectance - normal_reflectance) / (1 - normal_reflectance)
+    is_smooth = bool(batch.mirror) or material.roughness < SMOOTH
+    if not is_smooth:
+        coat = rough_reflectance(material.eta, material.roughness)
+        uniforms["normal_reflectance"] = coat.normal
+        uniforms["grazing_rise"] = coat.rise
+        uniforms["grazing_exponent"] = coat.exponent
     uniforms["metal"] = material.metal
+    # Rougher metal reflects less at grazing incidence: Lagarde (2011).
+    uniforms["metal_rise"] = 1.0 if batch.mirror else max(1 - np.sqrt(material.roughness), 0.0)
 
     uniforms["roughness"] = material.roughness
     uniforms["probe_level"] = level_of(material.roughness)
     uniforms["probe_share"] = probe_share(material)
+    uniforms["area_glint_share"] = area_glint_share(material)

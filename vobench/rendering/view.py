@@ -9,6 +9,7 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole
 from vobench.geometry.se3 import Array
 from vobench.rendering.background import PanoramaSky, StandardSky
+from vobench.rendering.uniform_block import GLINT_ROWS
 
 Box = tuple[int, int, int, int]
 
@@ -95,7 +96,7 @@ def within(box: Sequence[float], other: Sequence[float]) -> Box | None:
 
 STATIC = -1
 IDENTITY = np.eye(4)
-NO_GLINTS = np.zeros((0, 3, 4))
+NO_GLINTS = np.zeros((0, GLINT_ROWS, 4))
 # OpenCV's camera faces +z with y down, OpenGL's -z with y up.
 T_CV_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 
@@ -108,7 +109,7 @@ class PinholeView:
     view_projection (4, 4): from the world to OpenGL's screen, nearness from 1 at NEAR_M to 0; `direct` (4, 4) as if
     there were no mirrors.
     eye_m (3,) is behind the last mirror, if any.
-    images (4, 4) takes what the last mirror shows to where the camera sees it. glints (G, 3, 4) as in `glint`.
+    images (4, 4) takes what the last mirror shows to where the camera sees it. glints (G, 4, 4) as in `glint`.
     extinction_per_m and airlight_cd_m2 (3,) are those of fog; 0 where the air is clear.
     """
 

@@ -68,23 +68,37 @@ vec3 probed(vec3 from, vec3 ray)
     return view.probe_scale * textureLod(probe, met - view.probe_centre, batch.probe_level).rgb;
 }
 
-// The lamps that no picture shows, as rough facets mirror them (GGX; Heitz 2014), where what arrives is not less
-// than one of them gives.
-vec3 glint(vec3 from, vec3 N, vec3 V, float arrives)
+// The lamps that the probe does not show, as rough facets mirror them (GGX; Heitz 2014). Where less light arrives than
+// all of them would give, something hides some of them. F is taken out again: facets are not seen as N is.
+vec3 glint(vec3 from, vec3 N, vec3 V, float arrives, float F)
 {
+    float root = (batch.eta - 1.0) / (batch.eta + 1.0), normal = root * root, inverse_f = 1.0 / max(F, 1e-4);
     vec3 light = vec3(0.0);
-    float alpha = batch.roughness + 0.0025, squared = alpha * alpha, cv = max(abs(dot(N, V)), 0.01);
+    float cv = max(dot(N, V), 0.01), unhidden = 1e-9, alpha = batch.roughness + 0.0025;
     for (int i = 0; i < int(view.glint_count); i++) {
-        vec4 place = view.glints[3 * i], power = view.glints[3 * i + 1], axis = view.glints[3 * i + 2];
-        vec3 way = place.xyz - place.w * from, L = normalize(way);
-        float cl = dot(N, L), edge = clamp((power.w - acos(clamp(-dot(L, axis.xyz), -1.0, 1.0))) * axis.w, 0.0, 1.0);
-        if (cl <= 0.0 || edge == 0.0) continue;
-        float h = dot(N, normalize(L + V)), peak = h * h * (squared - 1.0) + 1.0;
-        vec3 square_on = edge * power.rgb / (place.w > 0.0 ? dot(way, way) : 1.0);
-        float shows = smoothstep(0.5, 0.9, PI * arrives / max(cl * dot(LUMINANCE, square_on), 1e-9));
-        light += shows * square_on * cl * squared / (PI * peak * peak) * 0.5 / mix(2.0 * cl * cv, cl + cv, alpha);
+        vec4 place = view.glints[4 * i], power = view.glints[4 * i + 1], axis = view.glints[4 * i + 2];
+        vec4 size = view.glints[4 * i + 3];
+        vec3 way = place.xyz - place.w * from;
+        float inverse_square = 1.0 / dot(way, way);
+        vec3 L = sqrt(inverse_square) * way;
+        float cl = dot(N, L);
+        if (cl <= 0.0) continue;
+        float edge = 1.0;
+        if (axis.w < 0.0) edge = max(-dot(L, axis.xyz), 0.0);
+        else if (power.w < PI) edge = clamp((power.w - acos(clamp(-dot(L, axis.xyz), -1.0, 1.0))) * axis.w, 0.0, 1.0);
+        vec3 square_on = mix(1.0, inverse_square, place.w) * edge * power.rgb;
+        unhidden += cl * dot(LUMINANCE, square_on);
+        // A lamp widens the lobe by its size; facets turn by half as much (Karis 2013).
+        float squared = alpha * alpha + 0.25 * size.x * size.x * inverse_square;
+        float doubled = max(1.0 + dot(V, L), 1e-6), squared_h = 0.5 * (cl + cv) * (cl + cv) / doubled;
+        float peak = squared_h * (squared - 1.0) + 1.0;
+        // What a facet mirrors (Schlick 1994), in units of F, which is that of N.
+        float away = 1.0 - sqrt(0.5 * doubled), away2 = away * away;
+        float facet = mix((normal + (1.0 - normal) * away2 * away2 * away) * inverse_f, 1.0, batch.metal);
+        facet *= mix(1.0, batch.area_glint_share, size.y);
+        light += facet * cl * squared / (peak * peak * mix(2.0 * cl * cv, cl + cv, alpha)) * square_on;
     }
-    return light;
+    return 0.5 / PI * smoothstep(0.2, 1.0, PI * arrives / unhidden) * light;
 }
 #endif
 
@@ -130,7 +144,8 @@ void main()
     float above = dot(facing, to_eye), c = clamp(abs(above) / (length(facing) * length(to_eye)), 0.0, 1.0);
     vec3 N = sign(above) * normalize(facing);
 #endif
-    float F = batch.normal_reflectance + batch.grazing_rise * (fresnel(c, batch.eta, batch.inverse_eta_squared) - batch.normal_reflectance);
+    float F = batch.grazing_exponent > 0.0 ? batch.normal_reflectance + batch.grazing_rise * pow(1.0 - c, batch.grazing_exponent)
+                                           : fresnel(c, batch.eta, batch.inverse_eta_squared);
 #ifdef HAS_REFLECTION
     vec3 seen = texelFetch(reflection, ivec3(ivec2(gl_FragCoord.xy), layer), 0).rgb;
 #ifdef IS_MONO
@@ -154,7 +169,7 @@ void main()
     // Where less light arrives than at the probe, something hides what the probe sees.
     float most = max(view.probe_mean + dot(view.probe_gradient, N), 0.05 * view.probe_mean);
     float open = min(1.0, arrives / (most * dot(LUMINANCE, view.probe_scale)));
-    seen = mix(seen, open * probed(from, reflect(-V, N)) + glint(from, N, V, arrives), batch.probe_share);
+    seen = mix(seen, open * probed(from, reflect(-V, N)) + glint(from, N, V, arrives, F), batch.probe_share);
 #endif
 #endif
     Light mirrored = LIGHT(seen);
@@ -171,7 +186,7 @@ void main()
 #ifdef HAS_GLOSS
     Shade body = colour, mirrors = Shade(batch.tint * F);
 #ifdef HAS_METAL
-    float metal = batch.metal, away = 1.0 - c, grazing = batch.grazing_rise * away * away * away * away * away;
+    float metal = batch.metal, away = 1.0 - c, grazing = batch.metal_rise * away * away * away * away * away;
     body *= 1.0 - metal;
     mirrors = (1.0 - metal) * mirrors + metal * (colour + (1.0 - colour) * grazing);
 #endif
