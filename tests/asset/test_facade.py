@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from vobench.asset.facade import FOUNDATION_M, House, house
+from vobench.asset.facade import House, house
 from vobench.asset.fitting import PANE
+from vobench.asset.house_body import FOUNDATION_M
 from vobench.asset.plan_frame import PlanFrame
 from vobench.asset.street_plan import KERB_M, Lot
 from vobench.geometry.se3 import Array

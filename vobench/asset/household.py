@@ -10,6 +10,7 @@ from vobench.asset import picture
 from vobench.asset.furniture import (
     BLACK,
     DARK,
+    SIDES,
     STEEL,
     WHITE,
     Part,
@@ -28,6 +29,7 @@ from vobench.asset.picture import (
     OCHRE,
     SAGE,
     SAND,
+    Draw,
     Rng,
     one_of,
 )
@@ -37,6 +39,25 @@ from vobench.scene.mesh import flipped, joined, moved
 
 if TYPE_CHECKING:
     from trimesh import Trimesh
+
+Slat = tuple[tuple[float, float, float], float, float]  # the size of a bar, and the y and z of its middle
+
+SLAT_BACK_X_M = -0.2  # of the back of a chair with slats, at its middle
+SLAT_BACK_Z_M = 0.45
+SLAT_BACK_TILT_DEG = -5
+SLAT_BACK_SLOPE = 0.0875  # the tangent of that angle
+THREE_SEATS_FROM_M = 1.95  # width of a couch
+SLIM_ARM_M = 0.12  # width of an arm up to which it is low
+LOZENGES = 16  # in a row of a woven rug, and rows
+BORDER_PX = 14  # width of each of the stripes around the rug
+SCREEN_ASPECT = 0.57  # height of a television over its width
+TELEVISION_CD_M2 = (120.0, 120.0, 120.0)  # luminance of white
+SHADE_M = 0.28  # height of the shade of a floor lamp
+SHADE_TAPER = 0.35  # by which the top of a shade is narrower, relative to the bottom
+INNER_SCALE = 0.985  # of the inside of a shade
+CEILING_LAMP_M = 0.07  # height of a ceiling lamp
+FRUITS = 7  # the last one lies on top of the others
+FRUIT_COLOURS = ("#a62a22", "#8fa03a", "#d8812a", "#c9492c")
 
 
 def table(
@@ -50,20 +71,20 @@ def table(
     look = wood(tones)
     leg_x = depth_m / 2 - 0.06
     leg_y = width_m / 2 - 0.06
-    h = height_m
-
-    leg_profile = np.array([[0, 0], [0.018, 0], [0.03, h - 0.03], [0, h - 0.03]])
+    leg_m = height_m - 0.03  # height of a leg
+    leg_profile = np.array([[0, 0], [0.018, 0], [0.03, leg_m], [0, leg_m]])
     leg = lathe(leg_profile, sections=12)
-    parts = [put(leg, look, s * leg_x, t * leg_y) for s, t in product((-1, 1), (-1, 1))]
+    parts = [put(leg, look, end * leg_x, side * leg_y) for end, side in product(SIDES, SIDES)]
 
-    side_m = (0.02, 2 * leg_y, 0.07)
-    end_m = (2 * leg_x, 0.02, 0.07)
-    parts += [stood(side_m, look, s * leg_x, 0, h - 0.1) for s in (-1, 1)]
-    parts += [stood(end_m, look, 0, t * leg_y, h - 0.1) for t in (-1, 1)]
+    side_apron_m = (0.02, 2 * leg_y, 0.07)
+    end_apron_m = (2 * leg_x, 0.02, 0.07)
+    apron_z = height_m - 0.1
+    parts += [stood(side_apron_m, look, end * leg_x, z=apron_z) for end in SIDES]
+    parts += [stood(end_apron_m, look, 0, side * leg_y, apron_z) for side in SIDES]
 
     top_m = (depth_m, width_m, 0.03)
     u = rng.uniform(0, 2)
-    parts.append(stood(top_m, look, 0, 0, h - 0.03, bevel=0.006, u=u))
+    parts.append(stood(top_m, look, z=height_m - 0.03, bevel=0.006, u=u))
     return parts
 
 
@@ -71,10 +92,10 @@ def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
     """A wooden chair with a cushion; a person on it looks along x."""
     look = wood(tones)
     legs = []
-    for side in (-1, 1):
+    for side in SIDES:
         front = [[0.2, side * 0.19, 0], [0.19, side * 0.18, 0.44]]
         legs.append(tube(front, 0.016, sections=10))
-    for side in (-1, 1):
+    for side in SIDES:
         back = mm(f"-240 {side * 190} 0, -190 {side * 180} 440, -250 {side * 175} 860")
         legs.append(tube(spline(back, 10), 0.016, sections=10))
 
@@ -96,23 +117,36 @@ def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
 def slat_chair(rng: Rng, colour: str = SAND, tones: str = "oak", *, has_pad: bool = True) -> list[Part]:
     """A chair of square bars with slats in its back; a person on it looks along x."""
     look = wood(tones)
-    parts = [stood((0.42, 0.42, 0.028), look, 0, 0, 0.43, bevel=0.008, u=rng.uniform(0, 2))]
-    for side in (-1, 1):
-        parts.append(stood((0.036, 0.036, 0.43), look, 0.18, side * 0.18, bevel=0.003))
-        post = block((0.032, 0.036, 0.9), bevel_m=0.004)
-        parts.append(put(post, look, -0.2, side * 0.18, 0.45, pitch=-5))
-    level = rng.random() < 0.5
-    slats = [((0.016, 0.34, 0.06), 0.0, z) for z in (0.58, 0.7, 0.82)]
-    if not level:
-        slats = [((0.014, 0.03, 0.36), y, 0.68) for y in (-0.1, 0.0, 0.1)]
-        slats.append(((0.02, 0.34, 0.06), 0.0, 0.86))
-    for size_m, y, z in slats:
-        x = -0.2 - 0.0875 * (z - 0.45)
-        parts.append(put(block(size_m, bevel_m=0.003), look, x, y, z, pitch=-5))
+    seat_m = (0.42, 0.42, 0.028)
+    leg_m = (0.036, 0.036, 0.43)
+    post = block((0.032, 0.036, 0.9), bevel_m=0.004)  # a hind leg, which continues upwards
+    parts = [stood(seat_m, look, z=0.43, bevel=0.008, u=rng.uniform(0, 2))]
+    for side in SIDES:
+        y = side * 0.18
+        parts.append(stood(leg_m, look, 0.18, y, bevel=0.003))
+        parts.append(put(post, look, SLAT_BACK_X_M, y, SLAT_BACK_Z_M, pitch=SLAT_BACK_TILT_DEG))
+
+    has_level_slats = rng.random() < 0.5
+    for size_m, y, z in _level_slats() if has_level_slats else _upright_slats():
+        x = SLAT_BACK_X_M - SLAT_BACK_SLOPE * (z - SLAT_BACK_Z_M)
+        parts.append(put(block(size_m, bevel_m=0.003), look, x, y, z, pitch=SLAT_BACK_TILT_DEG))
     if has_pad:
         pad = cushion((0.4, 0.4, 0.045), power=6, cells=4)
-        parts.append(put(pad, cloth(colour), 0.01, 0, 0.477))
+        parts.append(put(pad, cloth(colour), 0.01, z=0.477))
     return parts
+
+
+def _level_slats() -> list[Slat]:
+    """Three level bars."""
+    size_m = (0.016, 0.34, 0.06)
+    return [(size_m, 0.0, z) for z in (0.58, 0.7, 0.82)]
+
+
+def _upright_slats() -> list[Slat]:
+    """Three upright bars below a level one."""
+    size_m = (0.014, 0.03, 0.36)
+    top_m = (0.02, 0.34, 0.06)
+    return [*((size_m, y, 0.68) for y in (-0.1, 0.0, 0.1)), (top_m, 0.0, 0.86)]
 
 
 def couch(
@@ -124,27 +158,33 @@ def couch(
 ) -> list[Part]:
     """A sofa 0.9 m deep for two or three on wooden legs, with cushions; its middle is at the origin."""
     cover = cloth(colour)
-    seats = 3 if width_m > 1.95 else 2
+    seats = 3 if width_m > THREE_SEATS_FROM_M else 2
     arm_m = float(rng.choice([0.1, 0.16, 0.2]))
+    arm_height_m = 0.42 if arm_m > SLIM_ARM_M else 0.34
     seat_m = (width_m - 2 * arm_m) / seats
-    rises = float(rng.choice([0.12, 0.16]))
+    base_z = float(rng.choice([0.12, 0.16]))  # height of the legs that is seen
+
     base = cushion((0.86, width_m - 0.02, 0.2), power=14, cells=4)
     back = cushion((0.2, width_m - 0.04, 0.5), power=9, cells=4)
-    arm = cushion((0.86, arm_m, 0.42 if arm_m > 0.12 else 0.34), power=8, cells=4)
-    parts = [put(base, cover, 0, 0, rises + 0.1), put(back, cover, -0.34, 0, 0.53, pitch=-5)]
-    for side in (-1, 1):
+    arm = cushion((0.86, arm_m, arm_height_m), power=8, cells=4)
+    leg_m = (0.05, 0.05, base_z + 0.03)
+    parts = [put(base, cover, z=base_z + 0.1), put(back, cover, -0.34, z=0.53, pitch=-5)]
+    for side in SIDES:
         parts.append(put(arm, cover, 0, side * (width_m - arm_m) / 2, 0.36))
         leg_y = side * (width_m / 2 - 0.09)
-        parts += [stood((0.05, 0.05, rises + 0.03), wood(tones), x, leg_y, bevel=0.004) for x in (-0.36, 0.36)]
+        parts += [stood(leg_m, wood(tones), x, leg_y, bevel=0.004) for x in (-0.36, 0.36)]
+
     seat = cushion((0.68, seat_m - 0.006, 0.16), power=7, cells=4)
     rest = cushion((0.17, seat_m - 0.012, 0.4), power=5, cells=4)
-    for k in range(seats):
-        y = (k - (seats - 1) / 2) * seat_m
+    for number in range(seats):
+        y = (number - (seats - 1) / 2) * seat_m
         parts.append(put(seat, cover, 0.09, y, 0.37))
         parts.append(put(rest, cover, -0.18, y, 0.6, pitch=-11))
+
     loose = cushion((0.12, 0.42, 0.4), power=2.8, cells=4)
-    for side, accent in zip((-1, 1), accents, strict=True):
-        if rng.random() < 0.75:
+    for side, accent in zip(SIDES, accents, strict=True):
+        has_cushion = rng.random() < 0.75
+        if has_cushion:
             y = side * (width_m / 2 - arm_m - 0.24)
             parts.append(put(loose, cloth(accent), -0.03, y, 0.61, pitch=-18, yaw=side * 8))
     return parts
@@ -155,37 +195,44 @@ def _weave(seed: int, px: int = 1024) -> Picture:
     """A woven pattern: rows of lozenges in a few colours, inside a border."""
     rng = np.random.default_rng(seed)
     inks = rng.permutation([NAVY, BRICK, OCHRE, SAGE, INK, "#7d6a58"]).tolist()
+    *row_inks, border_ink = inks
     image = Image.new("RGB", (px, px), SAND)
     draw = ImageDraw.Draw(image)
-    side = px / 16
+    cell_px = px / LOZENGES
+    for row in range(LOZENGES):
+        mirrored_row = min(row, LOZENGES - 1 - row)
+        ink = row_inks[mirrored_row % len(row_inks)]
+        is_narrow = row % 3 == 0
+        half_width_px = cell_px * (0.3 if is_narrow else 0.62)
+        y = (row + 0.5) * cell_px
+        for column in range(LOZENGES):
+            x = (column + 0.5) * cell_px
+            _draw_lozenge(draw, x, y, half_width_px, cell_px=cell_px, ink=ink)
 
-    for row in range(16):
-        band = row if row < 8 else 15 - row
-        ink = inks[band % 5]
-        half_width = side * (0.62 if row % 3 else 0.3)
-        y = (row + 0.5) * side
-        for column in range(16):
-            x = (column + 0.5) * side
-            lozenge = [
-                (x - half_width, y),
-                (x, y - 0.45 * side),
-                (x + half_width, y),
-                (x, y + 0.45 * side),
-            ]
-            dot = 0.1 * side
-            draw.polygon(lozenge, fill=ink)
-            draw.ellipse([x - dot, y - dot, x + dot, y + dot], fill=SAND)
-
-    for k, ink in enumerate((inks[5], SAND, inks[0])):
-        start = k * 14
-        end = px - 1 - k * 14
-        draw.rectangle([start, start, end, end], outline=ink, width=14)
+    for number, ink in enumerate((border_ink, SAND, row_inks[0])):
+        start_px = number * BORDER_PX
+        end_px = px - 1 - number * BORDER_PX
+        draw.rectangle([start_px, start_px, end_px, end_px], outline=ink, width=BORDER_PX)
 
     coarse = picture.noise(rng, px, 120, 500, slope=0.0)
     fine = picture.noise(rng, px, 2, 12)
     pile = 1 + 0.1 * coarse + 0.05 * fine
     woven = np.asarray(image) * pile[..., None]
     return Picture(np.clip(woven, 0, 255).astype(np.uint8))
+
+
+def _draw_lozenge(draw: Draw, x: float, y: float, half_width_px: float, *, cell_px: float, ink: str) -> None:
+    """Draw a lozenge with a dot in its middle."""
+    half_height_px = 0.45 * cell_px
+    dot_px = 0.1 * cell_px
+    corners_px = [
+        (x - half_width_px, y),
+        (x, y - half_height_px),
+        (x + half_width_px, y),
+        (x, y + half_height_px),
+    ]
+    draw.polygon(corners_px, fill=ink)
+    draw.ellipse([x - dot_px, y - dot_px, x + dot_px, y + dot_px], fill=SAND)
 
 
 def rug(
@@ -209,31 +256,28 @@ def television(
     seed: int = 0,
 ) -> list[Part]:
     """A flat screen on two feet that shows hills."""
-    h = 0.57 * width_m
+    height_m = SCREEN_ASPECT * width_m
     glow = Material(
         colour=(0.02, 0.02, 0.02),
-        emission_cd_m2=(120.0, 120.0, 120.0),
+        emission_cd_m2=TELEVISION_CD_M2,
         emission_texture=picture.poster("hills", seed, 960, 540),
     )
     foot_m = (0.22, 0.03, 0.05)
-    body_m = (0.04, width_m, h)
-    screen = card((width_m - 0.02, h - 0.02))
+    body_m = (0.04, width_m, height_m)
+    screen = card((width_m - 0.02, height_m - 0.02))
     return [
         stood(foot_m, BLACK, 0, -0.3 * width_m),
         stood(foot_m, BLACK, 0, 0.3 * width_m),
-        stood(body_m, BLACK, 0, 0, 0.04, bevel=0.004),
-        put(screen, glow, 0.0205, 0, 0.04 + h / 2),
+        stood(body_m, BLACK, z=0.04, bevel=0.004),
+        put(screen, glow, 0.0205, z=0.04 + height_m / 2),
     ]
-
-
-SHADE_M = 0.28  # height of the shade of a floor lamp
 
 
 def _shade(colour: str, width_m: float, height_m: float) -> list[Part]:
     """A conical lampshade of cloth on z = 0, open at both ends and white inside."""
     angle = np.linspace(0, 2 * np.pi, 33)
     share = np.array([0.0, 1.0])[:, None]
-    radius = width_m / 2 * (1 - 0.35 * share)
+    radius = width_m / 2 * (1 - SHADE_TAPER * share)
     x = radius * np.cos(angle)
     y = radius * np.sin(angle)
     z = height_m * share + 0 * angle
@@ -241,7 +285,7 @@ def _shade(colour: str, width_m: float, height_m: float) -> list[Part]:
     cone = sheet(np.stack([x, y, z], axis=-1))
     looks_outward = cone.vertex_normals[0] @ [1, 0, 0] > 0
     outer = cone if looks_outward else flipped(cone)
-    inner = moved(flipped(outer), np.diag([0.985, 0.985, 1, 1]))
+    inner = moved(flipped(outer), np.diag([INNER_SCALE, INNER_SCALE, 1, 1]))
     return [Part(outer, cloth(colour)), Part(inner, WHITE)]
 
 
@@ -277,7 +321,7 @@ def pendant(
     scale = wide_m / 0.4
     profile = mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232") * [scale, scale]
     shade = lathe(profile, sections=sections)
-    inner = moved(flipped(shade), np.diag([0.985, 0.985, 0.985, 1]))
+    inner = moved(flipped(shade), np.diag([INNER_SCALE, INNER_SCALE, INNER_SCALE, 1]))
     paint = coated(colour or one_of(rng, NAVY, INK, "#5c6b5a"), roughness=0.3)
     cord = tube(np.array([[0, 0, 0.2 - drop_m], [0, 0, 0]]), 0.004, sections=6)
     rose = lathe(mm("0 -30, 50 -25, 50 0, 0 0"))
@@ -305,9 +349,6 @@ def glowing_shade(x_m: float, y_m: float, top_m: float, width_m: float) -> "Trim
     return moved(outer.mesh, at(x_m, y_m, top_m - SHADE_M))
 
 
-CEILING_LAMP_M = 0.07  # height of a ceiling lamp
-
-
 def ceiling_lamp(_: Rng, width_m: float = 0.4, *, is_round: bool = True) -> list[Part]:
     """The body of a flat lamp below z = 0, round or square. What shines is to be at its lower face."""
     paint = matt("#dcdbd6")
@@ -323,14 +364,15 @@ def fruit_bowl(rng: Rng) -> list[Part]:
     parts = [put(bowl, coated("#d8d2c4", roughness=0.15))]
 
     fruit = cushion((0.074, 0.074, 0.066), power=2.1, cells=5)
-    for k in range(7):
-        is_on_top = k == 6
-        angle = 2 * np.pi * k / 6
+    in_ring = FRUITS - 1
+    for number in range(FRUITS):
+        is_on_top = number == in_ring
+        angle = 2 * np.pi * number / in_ring
         radius = 0.0 if is_on_top else 0.068
         x = radius * np.cos(angle)
         y = radius * np.sin(angle)
         z = 0.12 if is_on_top else 0.075
-        colour = one_of(rng, "#a62a22", "#8fa03a", "#d8812a", "#c9492c")
+        colour = one_of(rng, *FRUIT_COLOURS)
         parts.append(put(fruit, coated(colour, roughness=0.25), x, y, z))
     return parts
 
@@ -344,32 +386,29 @@ def low_board(
 ) -> list[Part]:
     """A low cupboard on a recessed foot, with doors and an open bay of boxes in its middle."""
     look = wood(tones)
-    w = width_m
-    d = depth_m
-    h = height_m
-    third = w / 3
-    inner = h - 0.1
-
-    board_m = (d, w, 0.022)
-    back_m = (0.01, w - 0.04, inner)
+    third_m = width_m / 3
+    inner_m = height_m - 0.1  # height between foot and top
+    foot_m = (depth_m - 0.1, width_m - 0.12, 0.06)
+    board_m = (depth_m, width_m, 0.022)
+    back_m = (0.01, width_m - 0.04, inner_m)
     parts = [
-        stood((d - 0.1, w - 0.12, 0.06), DARK),
-        stood(board_m, look, 0, 0, h - 0.022, u=rng.uniform(0, 2)),
-        stood(board_m, look, 0, 0, 0.06),
-        stood(back_m, look, 0.01 - d / 2, 0, 0.07),
+        stood(foot_m, DARK),
+        stood(board_m, look, z=height_m - 0.022, u=rng.uniform(0, 2)),
+        stood(board_m, look, z=0.06),
+        stood(back_m, look, 0.01 - depth_m / 2, z=0.07),
     ]
 
-    body_m = (d - 0.01, third, inner - 0.02)
-    door_m = (0.018, third - 0.006, inner - 0.026)
+    body_m = (depth_m - 0.01, third_m, inner_m - 0.02)
+    door_m = (0.018, third_m - 0.006, inner_m - 0.026)
     knob = cushion((0.03, 0.03, 0.03), power=2, cells=4)
-    for side in (-1, 1):
-        y = side * third
-        knob_y = side * 0.62 * third
+    for side in SIDES:
+        y = side * third_m
+        knob_y = side * 0.62 * third_m
         parts.append(stood(body_m, look, -0.01, y, 0.08, u=side))
-        parts.append(stood(door_m, look, d / 2 - 0.008, y, 0.083, u=3 * side))
-        parts.append(put(knob, DARK, d / 2 + 0.01, knob_y, 0.55 * h))
+        parts.append(stood(door_m, look, depth_m / 2 - 0.008, y, 0.083, u=3 * side))
+        parts.append(put(knob, DARK, depth_m / 2 + 0.01, knob_y, 0.55 * height_m))
 
-    box = cloth(one_of(rng, SAGE, SAND, NAVY))
-    box_m = (0.28, 0.42 * third, 0.6 * inner)
-    parts += [stood(box_m, box, 0, side * 0.24 * third, 0.083) for side in (-1, 1)]
+    cardboard = cloth(one_of(rng, SAGE, SAND, NAVY))
+    box_m = (0.28, 0.42 * third_m, 0.6 * inner_m)
+    parts += [stood(box_m, cardboard, 0, side * 0.24 * third_m, 0.083) for side in SIDES]
     return parts

@@ -332,28 +332,26 @@ def _lamps(
 ) -> list[Light]:
     """Shops, lit unless it is a sunny day; street lamps and some of the windows, lit when it is dark."""
     lamps: list[Light] = []
-    shop_faces = [face for house in houses for face in house.shop_lamps]
     has_lit_shops = outside.lamp_share > SHOPS_LIT_ABOVE
-    if shop_faces and has_lit_shops:
-        lamps.append(_area_light("shops", shop_faces, SHOP_LAMP_LM, SHOP_LAMP_K))
-
+    if has_lit_shops:
+        shop_faces = [face for house in houses for face in house.shop_lamps]
+        lamps += _area_light("shops", shop_faces, SHOP_LAMP_LM, SHOP_LAMP_K)
     is_dark = outside.lamp_share > DARK_ABOVE
-    if not is_dark:
-        return lamps
-    lamp_faces = [_lamp_face(T_world_lamp) for T_world_lamp in lamp_poses]
-    if lamp_faces:
-        lamps.append(_area_light("street_lamps", lamp_faces, LAMP_LM, LAMP_K))
-    windows = [window for house in houses for window in house.windows]
-    lit_windows = [window for window in windows if rng.random() < LIT_WINDOW_SHARE]
-    if lit_windows:
-        lamps.append(_area_light("windows", lit_windows, WINDOW_LM, WINDOW_K))
+    if is_dark:
+        lamp_faces = [_lamp_face(T_world_lamp) for T_world_lamp in lamp_poses]
+        windows = [window for house in houses for window in house.windows]
+        lit_windows = [window for window in windows if rng.random() < LIT_WINDOW_SHARE]
+        lamps += _area_light("street_lamps", lamp_faces, LAMP_LM, LAMP_K)
+        lamps += _area_light("windows", lit_windows, WINDOW_LM, WINDOW_K)
     return lamps
 
 
-def _area_light(name: str, faces: Sequence[MeshArrays], flux_lm: float, temperature_k: float) -> AreaLight:
-    """One light of several faces; `flux_lm` is the luminous flux of each."""
+def _area_light(name: str, faces: Sequence[MeshArrays], flux_lm: float, temperature_k: float) -> list[Light]:
+    """One light of several faces, `flux_lm` each; none if there are no faces."""
+    if not faces:
+        return []
     mesh = as_mesh(joined_arrays(faces))
-    return AreaLight(name, mesh, flux_lm * len(faces), colour=lamp_colour(temperature_k))
+    return [AreaLight(name, mesh, flux_lm * len(faces), colour=lamp_colour(temperature_k))]
 
 
 def _lamp_face(T_world_lamp: Array) -> MeshArrays:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,6 +14,9 @@ from vobench.scene.material import LUMINANCE, Material, emitted_cd_m2, reflectan
 from vobench.scene.mesh import face_corners
 from vobench.scene.scene import Scene
 from vobench.suite.scene_spec import ModelSpec, SceneFile
+
+if TYPE_CHECKING:
+    from vobench.asset.model import Model
 
 # A larger model is probably in centimetres.
 LARGEST_M = 300.0
@@ -33,30 +37,41 @@ def bare_model_scene(path: Path) -> SceneFile:
     from vobench.suite.default_light import DAYLIGHT_SKY, DAYLIGHT_SUN, DUSK_SKY, default_light
 
     model = read_model(path)
-    corners_m = np.concatenate([thing.mesh.vertices for thing in model.all_things])
-    extent_m = float(np.ptp(corners_m, axis=0).max())
-    scale = CENTIMETRE if extent_m > LARGEST_M else 1.0
+    scale = _scale(model)
     if scale != 1:
         model = read_model(path, scale=scale)
-
-    name = re.sub(r"[^a-z0-9_]+", "_", path.stem.lower()).strip("_") or "model"
+    things = tuple(model.all_things)
+    name = _scene_name(path)
     whole_model = ModelSpec(file=str(path.resolve()), scale=scale)
     spec = SceneFile(name=name, meshes=(whole_model,))
 
     properties = {name: _optical_properties(material) for name, material in model.materials.items()}
-    properties_by_thing = np.array([properties[thing.material] for thing in model.all_things])  # (T, 2)
+    properties_by_thing = np.array([properties[thing.material] for thing in things])  # (T, 2)
     emission_cd_m2 = properties_by_thing[:, 0]
     absorption = 1 - properties_by_thing[:, 1]
-    light = default_light(Scene(name, tuple(model.all_things), {}, ()), absorption)
+    light = default_light(Scene(name, things, {}, ()), absorption)
 
-    area_m2 = np.array([areas_m2(face_corners(thing.mesh)).sum() for thing in model.all_things])  # (T,)
-    emitted_lm = _lamp_power_lm(model.lights) + float(np.pi * area_m2 @ emission_cd_m2)
-    own_lx = _daylight_lx(model.lights) + emitted_lm / light.absorption_m2
-    if own_lx >= LEAST_LX:
+    area_m2 = np.array([areas_m2(face_corners(thing.mesh)).sum() for thing in things])  # (T,)
+    luminous_faces_lm = float(np.pi * area_m2 @ emission_cd_m2)
+    lamps_lx = (_lamp_power_lm(model.lights) + luminous_faces_lm) / light.absorption_m2
+    has_enough_light = _daylight_lx(model.lights) + lamps_lx >= LEAST_LX
+    if has_enough_light:
         return spec
     if light.lamps:
         return replace(spec, lamps=light.lamps, sky=DUSK_SKY if light.has_windows else None)
     return replace(spec, sun=DAYLIGHT_SUN, sky=DAYLIGHT_SKY)
+
+
+def _scale(model: "Model") -> float:
+    """The factor from the units of a model to metres."""
+    corners_m = np.concatenate([thing.mesh.vertices for thing in model.all_things])
+    extent_m = float(np.ptp(corners_m, axis=0).max())
+    return CENTIMETRE if extent_m > LARGEST_M else 1.0
+
+
+def _scene_name(path: Path) -> str:
+    """The name of a file as the name of a scene."""
+    return re.sub(r"[^a-z0-9_]+", "_", path.stem.lower()).strip("_") or "model"
 
 
 def _optical_properties(material: Material) -> tuple[float, float]:

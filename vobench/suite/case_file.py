@@ -93,19 +93,24 @@ def special_settings(settings: Any) -> Any:
 def _special(settings: Any, tree: Any) -> Any:
     """The part of a tree of plain values that differs from the defaults of the settings that it stands for."""
     if is_dataclass(settings) and isinstance(tree, dict):
-        known = {field.name: field for field in fields(settings)}
-        special = {}
-        for key, value in tree.items():
-            current = getattr(settings, key, None)
-            if key in known and key != KIND_KEY and current == _default(known[key]):
-                continue
-            special[key] = _special(current, value)
-        return special
+        return _special_fields(settings, tree)
     if isinstance(settings, dict) and isinstance(tree, dict):
         return {key: _special(settings.get(key), value) for key, value in tree.items()}
     if isinstance(settings, tuple) and isinstance(tree, list):
         return [_special(item, value) for item, value in zip(settings, tree, strict=True)]
     return tree
+
+
+def _special_fields(settings: Any, tree: dict[str, Any]) -> dict[str, Any]:
+    """The keys of a tree that differ from the defaults of the fields of a dataclass."""
+    defaults = {field.name: _default(field) for field in fields(settings) if field.name != KIND_KEY}
+    special = {}
+    for key, value in tree.items():
+        current = getattr(settings, key, None)
+        is_default = key in defaults and current == defaults[key]
+        if not is_default:
+            special[key] = _special(current, value)
+    return special
 
 
 def _default(field: "Field[Any]") -> Any:

@@ -33,22 +33,33 @@ def with_lighting(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, .
 
 def _override_light(light: Light, override: LightOverride) -> Light:
     """The light with another level. Another power is converted to a level, so that its light is computed only once."""
-    is_daylight = isinstance(light, Sun | Sky)
-    unsuitable_key = "power_lm" if is_daylight else "illuminance_lx"
-    if getattr(override, unsuitable_key) is not None:
-        raise SuiteError(f"lighting: {unsuitable_key} does not belong to '{light.name}'")
-
+    if isinstance(light, Sun | Sky):
+        _require_unset("power_lm", override, light)
+        nominal = light.illuminance_lx
+        target = override.illuminance_lx
+    else:
+        _require_unset("illuminance_lx", override, light)
+        nominal = light.power_lm
+        target = override.power_lm
     level = override.level.build() if override.level else light.level
-    target = override.illuminance_lx if is_daylight else override.power_lm
     if target is None:
         return replace(light, level=level)
-    nominal = light.illuminance_lx if isinstance(light, Sun | Sky) else light.power_lm
+    return replace(light, level=scaled(level, _factor(light, nominal, target)))
+
+
+def _require_unset(key: str, override: LightOverride, light: Light) -> None:
+    """Raise SuiteError if an override has a key that belongs to other kinds of lights."""
+    if getattr(override, key) is not None:
+        raise SuiteError(f"lighting: {key} does not belong to '{light.name}'")
+
+
+def _factor(light: Light, nominal: float, target: float) -> float:
+    """The factor from the strength of a light in the scene to another one. Raises SuiteError if there is none."""
     if nominal == 0 and target > 0:
         raise SuiteError(
             f"lighting: '{light.name}' is 0 in the scene, so it cannot be set to {target:g}; increase it in the scene"
         )
-    factor = target / nominal if nominal else 0.0
-    return replace(light, level=scaled(level, factor))
+    return target / nominal if nominal else 0.0
 
 
 def require_possible(name: str, scene: YamlFile) -> None:

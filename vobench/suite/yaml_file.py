@@ -136,16 +136,19 @@ def _set_value(tree: Any, dotted_keys: str, value: str) -> None:
     The sections on the way are copied before they change, because other readers of the file share them.
     """
     change = f"{SET_OPTION} {dotted_keys}={value}"
-    *section_keys, last_key = [int(key) if key.isdigit() else key for key in dotted_keys.split(".")]
+    keys = [int(key) if key.isdigit() else key for key in dotted_keys.split(".")]
+    last_key = keys.pop()
     section = tree
-    for key in section_keys:
+    for key in keys:
         subsection = _subsection(section, key)
         if not isinstance(subsection, dict | list):
             raise SuiteError(f"{change}: there are no keys below {key!r}")
         section[key] = _shallow_copy(subsection)
         section = section[key]
-    if isinstance(section, list) and (not isinstance(last_key, int) or last_key >= len(section)):
-        raise SuiteError(f"{change}: a list of {len(section)} has no entry {last_key!r}")
+    if isinstance(section, list):
+        has_entry = isinstance(last_key, int) and last_key < len(section)
+        if not has_entry:
+            raise SuiteError(f"{change}: a list of {len(section)} has no entry {last_key!r}")
     try:
         section[last_key] = plain_tree(parse_text(Path(SET_OPTION), value).tree)
     except SuiteError:
@@ -210,7 +213,7 @@ def _intact_sections(
     known = hints(model)
     for key in data.keys() & known.keys():
         value = data[key]
-        wrong_entries = [place[1] for place in wrong_places if place[0:1] == (key,) and len(place) > 1]
+        wrong_entries = _wrong_entries(key, wrong_places)
         if isinstance(value, dict):
             value = {name: entry for name, entry in value.items() if name not in wrong_entries}
         elif isinstance(value, list):
@@ -219,6 +222,11 @@ def _intact_sections(
         with suppress(ValidationError):  # its mistakes have been recorded already
             sections[key] = TypeAdapter(known[key]).validate_json(json.dumps(value), strict=True)
     return sections, remaining
+
+
+def _wrong_entries(section: str, wrong_places: list[Keys]) -> list[int | str]:
+    """The keys or indices of the entries of a section that are wrong, or in which something is wrong."""
+    return [place[1] for place in wrong_places if len(place) > 1 and place[0] == section]
 
 
 def _partial_model(model: type[Model], sections: Mapping[str, Any]) -> Model:
