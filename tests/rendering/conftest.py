@@ -19,9 +19,9 @@ from vobench.geometry.triangle import areas_m2
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.baked_scene import BakedScene, Patches
 from vobench.rendering.context import create_context
+from vobench.rendering.face_parts import FaceParts
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
-from vobench.rendering.sun_tiles import FaceParts
 from vobench.scene.light import STEADY, Level, PointLight
 from vobench.scene.material import Material, reflectance
 from vobench.scene.scene import Scene, triangles

@@ -7,7 +7,8 @@ import pytest
 
 from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
-from vobench.rendering.sun_tiles import TILE_SAMPLES, FaceParts, sunlit_parts
+from vobench.rendering.face_parts import FaceParts
+from vobench.rendering.sun_tiles import TILE_SAMPLES, sunlit_parts
 from vobench.scene.mesh import quad
 from vobench.scene.triangles import Thing, Triangles, triangle_table
 

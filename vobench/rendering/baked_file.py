@@ -13,8 +13,8 @@ import scipy
 from vobench.errors import RenderError, SettingError
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.baked_scene import BakedScene, BakeSettings, Patches, SunTrack
+from vobench.rendering.face_parts import FaceParts
 from vobench.rendering.key_time import moving_suns
-from vobench.rendering.sun_tiles import FaceParts
 from vobench.scene.light import Light, Sky
 from vobench.scene.material import Material, Picture, Texture
 from vobench.scene.panorama import PanoramaMap

@@ -7,7 +7,7 @@ from annotated_types import Ge
 
 from vobench.rendering.array_types import Floats, Indices
 from vobench.rendering.atlas import Atlas
-from vobench.rendering.sun_tiles import FaceParts
+from vobench.rendering.face_parts import FaceParts
 from vobench.scene.scene import Scene
 from vobench.scene.triangles import Triangles
 from vobench.setting import Positive, settings
@@ -22,10 +22,12 @@ INDIRECT_RAYS = 72  # from a surfel at first, by default
 class BakeSettings:
     """How finely light is sampled. Numbers of rays are rounded to squares, so that rays can be stratified.
 
-    spacing_m: between samples of direct light. light_rays: from a sample to a lamp of medium width that is partly
-    hidden. indirect_spacing_m: between surfels. indirect_rays: from each surfel at first; more follow from surfels
-    whose light has a relative standard error above light_noise, up to 8 times as many. bounces: at most; they end where
-    they add no more.
+    `spacing_m` is the distance between samples of direct light.
+    `light_rays` is the number of rays from a sample to a lamp of medium width that is partly hidden.
+    `indirect_spacing_m` is the distance between surfels.
+    `indirect_rays` is the number of rays from each surfel in the first round. If the relative standard error of its
+    light is above `light_noise`, further rays follow, up to 8 times as many.
+    `bounces` is the largest number of bounces. Fewer are computed if further ones add nothing.
     """
 
     spacing_m: Positive = 0.025
@@ -39,7 +41,10 @@ class BakeSettings:
 
 @dataclass(frozen=True, slots=True)
 class SunTrack:
-    """The indirect light (K, S, 3) of a moving sun at increasing times_ns (K,). light: its index among the lights."""
+    """The indirect light of a moving sun.
+
+    `light` is its index among the lights. `bounced` (K, S, 3) is its light at increasing `times_ns` (K,).
+    """
 
     light: int
     times_ns: tuple[float, ...]
@@ -48,10 +53,11 @@ class SunTrack:
 
 @dataclass(frozen=True, slots=True)
 class Patches:
-    """The surfels of a map, and the light that they send out.
+    """The S surfels of a light map, and the light that leaves them.
 
-    surfel_of (H·W,): the surfel of each texel, -1 for none. reflectance (S, 3). area_m2 (S,). radiosity (L, S, 3): in
-    lm/m² under each light alone, if it is white.
+    `surfel_of` (H·W,) is the surfel of each texel, -1 for none.
+    `reflectance` (S, 3) and `area_m2` (S,) are their properties.
+    `radiosity` (L, S, 3) in lm/m² is due to each light alone, if the light is white.
     """
 
     surfel_of: Indices
@@ -62,16 +68,17 @@ class Patches:
 
 @dataclass(frozen=True, slots=True)
 class BakedScene:
-    """A scene with its light: all that rendering a picture needs.
+    """A scene with its light: everything that is needed to render a picture.
 
-    parts and faces (T,): the parts of the scene's faces, and their table; parts differ in the distance of samples.
-    atlas: the places of these faces on the light map.
-    direct (L, H, W): what each light alone gives directly at level 1 if it is white: the illuminance in lx, under a
-    coat the share that enters it; on a lamp π times its luminance.
-    bounced (L, S, 3): what it gives surfels by bounces in lx. spread (H·W, S) interpolates that on the map.
-    patches: the surfels.
-    tracks: the indirect light of moving suns; their layers in `direct` and `bounced` are those of the first instant.
-    light_noise: the relative standard error of the light due to random rays, root mean square over surfaces.
+    `parts` and `faces` (T,) are the parts of the scene's faces, and their table. The parts of a face differ in the
+    distance between samples of light.
+    `atlas` has the places of these faces on the light map.
+    `direct` (L, H, W) is the direct light of each light alone, if it is white and at level 1: the illuminance in lx,
+    under a coat only the light that enters it. On a lamp it is π times the luminance.
+    `bounced` (L, S, 3) is the indirect illuminance of surfels in lx. `spread` (H·W, S) interpolates it on the map.
+    `patches` are the surfels.
+    `tracks` are the indirect light of moving suns. In `direct` and `bounced`, they are at their first instant.
+    `light_noise` is the relative standard error of the light due to random rays: the root mean square over surfaces.
     """
 
     scene: Scene

@@ -16,16 +16,21 @@ from vobench.rendering.texel_layout import STRIDES, TexelLayout
 from vobench.rendering.thread_pool import chunked
 from vobench.rendering.visibility import Visibility
 
-EDGE_STEPS = 2  # texels around the edge of a hard shadow that are supersampled
+EDGE_STEPS = 2  # the number of texels around the edge of a hard shadow that are supersampled
 LEAST_LX = 1e-30  # avoids a division by zero
 FINER_STRIDES = (*STRIDES[1:], 1)
-# Differences of the visible share between neighbours from which it is computed at every second and at every texel. What
-# is interpolated beside the rim of a half shadow errs by less than half of them.
+
+# The visible share is interpolated on the grids of FINER_STRIDES if it differs by less than this between neighbours.
+# The error of an interpolated value beside the edge of a penumbra is less than half of this.
 STEEP = (0.08, 0.15)
-GENTLE = 0.2  # difference of the visible share between neighbours on a coarse grid up to which it is smoothed
-UNEVEN = 0.1  # relative difference of unshadowed light between neighbours from which it is computed on a finer grid
-BEND = 0.004  # the same of the mean of its neighbours, four times the error of what is interpolated
-BENT = 1e-4  # difference of a normal from that of its flat face from which light is computed at each texel
+GENTLE = 0.2  # the visible share on a coarse grid is smoothed if it differs by less than this between neighbours
+
+# Unshadowed light is interpolated if its relative difference between neighbours is less than UNEVEN, and if it differs
+# by less than BEND from the mean of its neighbours, which is four times the error of the interpolation. It is always
+# computed where the normal differs by more than BENT from that of the flat face.
+UNEVEN = 0.1
+BEND = 0.004
+BENT = 1e-4
 
 
 def direct_light(
@@ -38,10 +43,11 @@ def direct_light(
     side: int,
     among: Mask,
 ) -> Floats:
-    """The illuminance (P,) in lx that an emitter at level 1 gives to the points in a mask; under a coat what enters.
+    """The illuminance (P,) in lx of points by an emitter at level 1. Under a coat it is the light that enters the coat.
 
-    cells (P,): the surfel that each point is in. side: about side x side shadow rays are cast where an emitter is
-    partly hidden.
+    `cells` (P,) is the surfel of each point.
+    `side` determines the number of shadow rays: about side x side where an emitter is partly hidden.
+    `among` (P,) selects the points. The others get 0.
     """
     lit = reachable(emitter, points, np.flatnonzero(among))
     if not len(lit):
@@ -56,9 +62,12 @@ def direct_light(
 
 @dataclass(frozen=True, slots=True)
 class Receivers:
-    """Points (P,), those at rows `lit` (N,) that an emitter may light, and what may hide it from them.
+    """Points that receive light.
 
-    cells (P,): the surfel that each point is in.
+    `points` (P,) are all points, with their places in the `layout` of texels.
+    `cells` (P,) is the surfel of each point.
+    `visibility` finds what hides an emitter from a point.
+    `lit` (N,) are the rows of the points that the emitter can light.
     """
 
     points: Texels
@@ -68,7 +77,7 @@ class Receivers:
     lit: Rows
 
     def pane_light(self, emitter: Emitter, side: int) -> Floats:
-        """The light (P,) of the sky through a pane, sampled at every other texel along rows and columns."""
+        """The light (P,) of the sky through a pane, sampled at every second texel along rows and columns."""
         light = TexelField.unknown(self.layout, len(self.points))
         rows = self.layout.on_grid(self.lit, STRIDES[-1])
         light.set(rows, self._sampled(emitter, rows, side))
@@ -77,9 +86,9 @@ class Receivers:
         return self.layout.blurred(light.values)
 
     def hard_light(self, emitter: Emitter, side: int) -> Floats:
-        """The light (P,) of an emitter so narrow that one ray tells whether it is visible, but near edges of shadows.
+        """The light (P,) of a narrow emitter, for which one shadow ray suffices except near the edges of shadows.
 
-        There, more rays start all over the area of each texel: few near an edge, many at the edge itself.
+        There, several rays start from the area of each texel: few near an edge, many at the edge itself.
         """
         points = self.points
         light = np.zeros(len(points), np.float32)
@@ -89,14 +98,16 @@ class Receivers:
         clear_share[self.lit] = arrived.clear_share
         near_edge = self._at_shadow_edge(clear_share, self.cells, self.lit, steps=EDGE_STEPS)
 
+        # Near an edge.
         pattern = self._pattern(stride=1)
         few_rays = RayGrid(max(side // 2, 1), is_spread=True)
         arrived = cast_shadow_rays(emitter, points, near_edge, self.visibility, few_rays, pattern)
         light[near_edge] = arrived.light
         clear_share[near_edge] = arrived.clear_share
-        each_alone = np.arange(len(points), dtype=np.int32)
-        at_edge = self._at_shadow_edge(clear_share, each_alone, near_edge, steps=1)
 
+        # At the edge itself. Here, every point has a cell of its own, so that only the neighbouring texels count.
+        own_cells = np.arange(len(points), dtype=np.int32)
+        at_edge = self._at_shadow_edge(clear_share, own_cells, near_edge, steps=1)
         many_rays = RayGrid(3 * side // 2, is_spread=True)
         light[at_edge] = cast_shadow_rays(emitter, points, at_edge, self.visibility, many_rays, pattern).light
         return light
@@ -118,7 +129,7 @@ class Receivers:
         return light
 
     def _visible_share(self, emitter: Emitter, side: int) -> Floats:
-        """The share (P,) of an emitter's light that nothing hides."""
+        """The share (P,) of an emitter's light that reaches each point."""
         share = TexelField.unknown(self.layout, len(self.points))
         coarsest = STRIDES[0]
         rows = self.layout.on_grid(self.lit, coarsest)
@@ -149,7 +160,7 @@ class Receivers:
         share.smooth(rows[is_partial & is_gentle], steps=stride)
 
     def _shares_by_sides(self, emitter: Emitter, rows: Rows, side: int, stride: int) -> tuple[Floats, Floats]:
-        """As `_shares`, with as many rays from each point as it first needs."""
+        """As `_shares`, with a number of rays that depends on the apparent size of the emitter."""
         share = np.zeros(len(rows), np.float32)
         clear_share = np.zeros(len(rows), np.float32)
         for ray_side, part in self._parts_by_side(emitter, rows, side):
@@ -157,13 +168,13 @@ class Receivers:
         return share, clear_share
 
     def _shares(self, emitter: Emitter, rows: Rows, grid: RayGrid, stride: int) -> tuple[Floats, Floats]:
-        """The visible share (N,) of an emitter's light at points, and the share (N,) of clear rays."""
+        """The visible share (N,) of an emitter's light at points, and the share (N,) of unobstructed rays."""
         arrived = cast_shadow_rays(emitter, self.points, rows, self.visibility, grid, self._pattern(stride=stride))
         share = arrived.light / np.maximum(arrived.unshadowed, LEAST_LX)
         return share, np.nan_to_num(arrived.clear_share)
 
     def _sampled(self, emitter: Emitter, rows: Rows, side: int) -> Floats:
-        """The light (N,) that arrives at points along as many rays as each first needs."""
+        """The light (N,) at points, with a number of rays that depends on the apparent size of the emitter."""
         light = np.zeros(len(rows), np.float32)
         for ray_side, part in self._parts_by_side(emitter, rows, side):
             grid = RayGrid(ray_side)
@@ -171,51 +182,58 @@ class Receivers:
         return light
 
     def _parts_by_side(self, emitter: Emitter, rows: Rows, side: int) -> list[tuple[int, NDArray[np.intp]]]:
-        """The sides of grids of rays, each with the indices of the rows whose points first need such a grid."""
+        """The sides of the grids of rays, each with the indices of the rows for which it is used at first."""
         sides = first_sides(emitter, self.points.points_m[rows], side)
         return [(int(ray_side), np.flatnonzero(sides == ray_side)) for ray_side in np.unique(sides)]
 
     def _unshadowed_light(self, emitter: Emitter, rows: Rows, side: int) -> tuple[Floats, Mask]:
-        """The illuminance (N,) at points if nothing hid the emitter, and which of these values are sampled (N,)."""
+        """The unshadowed illuminance (N,) at points, and whether each value is sampled and therefore noisy (N,)."""
         points = self.points
         light = TexelField.unknown(self.layout, len(points))
         is_sampled = np.zeros(len(points), bool)
         is_bent = np.zeros(len(points), bool)
         is_bent[rows] = chunked(lambda part: _are_bent(points, rows[part]), len(rows))
+
         grid = self.layout.on_grid(rows, STRIDES[0])
-        exact_lx, is_sampled[grid] = unshadowed_light(emitter, points, grid, side)
-        light.set(grid, exact_lx)
+        unshadowed_lx, is_sampled[grid] = unshadowed_light(emitter, points, grid, side)
+        light.set(grid, unshadowed_lx)
         for stride in FINER_STRIDES:
             exact = grid[~is_sampled[grid]]
             is_bend = light.bends(exact, steps=2 * stride, tolerance=BEND)
             grid = self.layout.on_grid(rows, stride)
             light.state[grid[is_bent[grid]]] = UNKNOWN
             not_interpolated = light.refine(grid, stride=stride, tolerance=UNEVEN, is_relative=True, marked=is_bend)
-            exact_lx, is_sampled[not_interpolated] = unshadowed_light(emitter, points, not_interpolated, side)
-            light.set(not_interpolated, exact_lx)
+            unshadowed_lx, is_sampled[not_interpolated] = unshadowed_light(emitter, points, not_interpolated, side)
+            light.set(not_interpolated, unshadowed_lx)
         return light.values[rows], is_sampled[rows]
 
     def _pattern(self, *, stride: int) -> SobolPattern:
-        """The pattern by which the rays of every stride-th texel are stratified together."""
+        """The pattern that stratifies the rays of neighbouring texels together, on a grid of every stride-th texel."""
         return SobolPattern(self.layout.width, stride, self.points.dither[:1])
 
     def _at_shadow_edge(self, clear_share: Floats, cells: Indices, rows: Rows, *, steps: int) -> Rows:
-        """Those of the points at rows (N,) that are at the edge of a shadow.
+        """The points among the rows (N,) that are at the edge of a shadow.
 
-        An emitter is both seen and hidden within a number of steps from texel to texel, or in the same of the cells
-        (P,). clear_share (P,): the share of rays that meet nothing opaque, NaN where no ray was cast.
+        The emitter is visible and hidden within `steps` texels of such a point, or within its cell (P,).
+        `clear_share` (P,) is the share of unobstructed rays, NaN for points without rays.
         """
-        is_seen = clear_share > 0
+        is_visible = clear_share > 0
         is_hidden = clear_share < 1
-        seen_in_cell = np.zeros(int(cells.max(initial=0)) + 1, bool)
-        hidden_in_cell = np.zeros_like(seen_in_cell)
-        seen_in_cell[cells[is_seen]] = True
+        visible_nearby = self.layout.dilated(is_visible, steps=steps)
+        hidden_nearby = self.layout.dilated(is_hidden, steps=steps)
+
+        cell_count = int(cells.max(initial=0)) + 1
+        visible_in_cell = np.zeros(cell_count, bool)
+        hidden_in_cell = np.zeros(cell_count, bool)
+        visible_in_cell[cells[is_visible]] = True
         hidden_in_cell[cells[is_hidden]] = True
-        is_mixed = seen_in_cell & hidden_in_cell
-        is_near = self.layout.dilated(is_seen, steps=steps) & self.layout.dilated(is_hidden, steps=steps)
-        return rows[(is_near | is_mixed[cells])[rows]]
+        is_mixed_cell = visible_in_cell & hidden_in_cell
+
+        is_at_edge = (visible_nearby & hidden_nearby) | is_mixed_cell[cells]
+        return rows[is_at_edge[rows]]
 
 
 def _are_bent(points: Texels, rows: Rows) -> Mask:
-    """Which of the points at rows (N,) have a normal that is not that of their flat face."""
-    return np.asarray(np.abs(points.normals[rows] - points.planes[rows]).max(1) > BENT)
+    """Whether the normals of the points at rows (N,) differ from those of their flat faces."""
+    difference = np.abs(points.normals[rows] - points.planes[rows])
+    return np.asarray(difference.max(1) > BENT)

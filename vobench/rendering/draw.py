@@ -1,4 +1,4 @@
-"""Draws pictures: batches of triangles, mirrors with their reflections, the background, and panes."""
+"""Draws the views of a picture: batches of triangles, mirrors with their reflections, the background, and panes."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,12 +17,13 @@ from vobench.rendering.render_target import MIRRORS, RenderTarget
 from vobench.rendering.shader_define import ShaderDefine
 from vobench.rendering.view import Box, PinholeView, Plane, visible_boxes, within
 
-FOLLOWED = (6, 3, 2)  # planes at each depth, those that show most; the others mirror by the probe
-LEAST_SHARE = 5e-4  # of the picture, times what it mirrors, that a mirror is followed for
+# The largest number of mirrors whose reflections are drawn, at each depth of reflection. Other mirrors show the probe.
+FOLLOWED = (6, 3, 2)
+LEAST_SHARE = 5e-4  # the smallest share of the picture, times its reflectance, for which a reflection is drawn
 
 
 class BatchDraw:
-    """Draws batches onto targets, as long as its context is current."""
+    """Draws batches of triangles onto targets. The OpenGL context must be current."""
 
     def __init__(
         self,
@@ -34,7 +35,7 @@ class BatchDraw:
         self._culling = CullingSet(geometry.clusters)
         self._mirrors = geometry.mirrors
         unmirrored = [batch for batch in geometry.batches if batch.mirror is None]
-        # Small things first: they hide much of what is large, which is then not shaded there.
+        # Small things are drawn first, so that the parts of large things behind them are not shaded.
         opaque = [batch for batch in unmirrored if not batch.is_pane]
         smallest_first = sorted(opaque, key=lambda batch: batch.area_m2)
         self._opaque = [batch for batch in smallest_first if not batch.has_holes]
@@ -59,11 +60,11 @@ class BatchDraw:
         return False
 
     def use_probe(self, probe: Probe) -> None:
-        """Show a probe from now on where no mirror is followed."""
+        """Use a probe, from now on, where the reflections of a mirror are not drawn."""
         self._probe = probe
 
     def views(self, view: PinholeView, box: Box) -> list[tuple[PinholeView, Box]]:
-        """All views that a picture is drawn from, those into mirrors among them, each with its box."""
+        """All views from which a picture is drawn, including those into mirrors, each with its box in the picture."""
         visible = self._culling.visible(view, box)
         views = [(view, box)]
         followed = self._followed(view, self._boxes(view, visible), box)
@@ -75,7 +76,7 @@ class BatchDraw:
         return views
 
     def draw(self, view: PinholeView, target: RenderTarget, box: Box) -> None:
-        """Fill a box of the target's framebuffer at the depth of the view, which must be clear there."""
+        """Draw a view in a box of the target's framebuffer for the depth of the view. The box must be clear."""
         visible = self._culling.visible(view, box)
         framebuffer = self._begin(view, target, box)
         self._draw_unmirrored(self._with_holes, visible, view, framebuffer, ShaderDefine.IS_SOLID)
@@ -90,7 +91,7 @@ class BatchDraw:
                 self._draw_mirror(mirror, view, target, box=box, visible=visible, part=part)
 
         self._calls.draw_background(view, framebuffer, target.weights)
-        # How much of what is behind passes between leaves does not depend on the order in which rims are blended.
+        # The rims of holes are blended over the background. The result does not depend on their order.
         self._draw_unmirrored(self._with_holes, visible, view, framebuffer, ShaderDefine.IS_RIM)
         self._draw_unmirrored(self._panes, visible, view, framebuffer)
         panes = [mirror for mirror in mirrors if mirror.is_pane]
@@ -122,7 +123,7 @@ class BatchDraw:
         framebuffer: LayeredFramebuffer,
         *defines: ShaderDefine,
     ) -> None:
-        """Draw batches that lie in no mirror's plane, with what the probe shows.
+        """Draw the visible ones of batches that are not in the plane of a mirror. Glossy ones reflect the probe.
 
         `defines` are further preprocessor names for the shader.
         """
@@ -133,9 +134,10 @@ class BatchDraw:
                 self._calls.draw_surface(batch, visible, view, framebuffer, frozenset([*probe_defines, *defines]))
 
     def _boxes(self, view: PinholeView, visible: TriangleRuns) -> dict[int, Box]:
-        """Mirrors whose mirroring side is seen, all or those of which something is visible: boxes in the picture.
+        """The boxes in the picture of the mirrors whose reflecting side faces the camera.
 
-        If there are more mirrors than are drawn, the selection must be the same for every part of a picture.
+        Invisible mirrors are omitted, unless there are more mirrors than are followed. Then the selection must be the
+        same for every part of a picture.
         """
         is_choice = len(self._mirrors) > FOLLOWED[min(view.depth, MIRRORS - 1)]
         candidates = [mirror for mirror in self._mirrors if is_choice or self._is_visible(mirror, visible)]
@@ -195,7 +197,10 @@ class BatchDraw:
         visible: TriangleRuns,
         part: Box | None,
     ) -> None:
-        """Draw what lies in one plane, with what it mirrors in a part of the picture, or with what the probe shows."""
+        """Draw the batches in the plane of a mirror.
+
+        They reflect the scene in a part of the picture. If the part is None, they reflect the probe.
+        """
         framebuffer = target.framebuffers[view.depth]
         plane = _plane_towards(mirror, view)
         is_last = view.depth == MIRRORS or not self._probe
@@ -213,9 +218,9 @@ class BatchDraw:
 
 
 def _plane_towards(mirror: PlanarMirror, view: PinholeView) -> Plane | None:
-    """The plane of a mirror with its normal towards the eye.
+    """The plane of a mirror, with its normal towards the camera.
 
-    None where its mirroring side is not seen, or where it is the mirror that is looked into.
+    None if its reflecting side faces away, or if the view is the one into this mirror.
     """
     plane = view.plane(mirror.plane, mirror.mover)
     if plane.distance_m(view.eye_m) <= 0:
@@ -228,7 +233,7 @@ def _plane_towards(mirror: PlanarMirror, view: PinholeView) -> Plane | None:
 
 
 def _distance_m(mirror: PlanarMirror, view: PinholeView) -> float:
-    """How far the nearest corner of a mirror is from the camera."""
+    """The distance of the nearest corner of a mirror from the camera."""
     T_camera_world = se3.inverse(view.T_world_camera) @ view.images
     T_camera_mover = T_camera_world @ view.pose(mirror.mover)
     corners_m = se3.apply(T_camera_mover, mirror.outline_m)

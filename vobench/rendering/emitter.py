@@ -12,28 +12,28 @@ from vobench.rendering.texel import Texels
 
 
 class Occluder(Protocol):
-    """What may hide an emitter from points. Rays run from origins to origins + segments (R, 3)."""
+    """What can hide an emitter from points. Rays lead from origins to origins + segments (R, 3)."""
 
     def clear(self, origins_m: Floats, segments_m: Floats) -> Mask:
-        """Whether nothing opaque is there."""
+        """Whether nothing opaque is on each ray."""
 
     def passing(self, origins_m: Floats, segments_m: Floats) -> Floats:
-        """Share (R,) of light that passes what is there."""
+        """The share (R,) of light that opaque faces and panes transmit."""
 
     def through_panes(self, origins_m: Floats, segments_m: Floats) -> Floats:
-        """Share (R,) that all panes there let through."""
+        """The share (R,) of light that panes transmit."""
 
 
-# Maps two random numbers (P,) to vectors (P, 3) in m to places on an emitter, and to the illuminance (P,) in lx that a
-# surface perpendicular to the vector receives if all of the emitter shone from that place.
+# A function of two random numbers (P,) in [0, 1). It returns the vectors (P, 3) in m from points to random places on an
+# emitter, and the illuminance (P,) in lx at normal incidence if all light of the emitter came from that place.
 Aim = Callable[[Floats, Floats], tuple[Floats, Floats]]
 
 
 class Emitter(ABC):
     """A source of direct light.
 
-    ball: a bounding sphere, of infinite radius if the emitter surrounds the scene. sky: "pane" for the sky behind a
-    pane, "open" for the sky that no pane covers, otherwise empty.
+    `ball` is a bounding sphere. Its radius is infinite if the emitter surrounds the scene.
+    `sky` is "pane" for the sky behind a pane, "open" for the sky without a pane, and empty for other emitters.
     """
 
     __slots__ = ()
@@ -42,32 +42,32 @@ class Emitter(ABC):
 
     @property
     def least_side(self) -> int:
-        """The least side of the grid of places by which its unshadowed light is sampled."""
+        """The smallest side of the grid of places with which its unshadowed light is sampled."""
         return 1
 
     @property
     def is_hard(self) -> bool:
-        """Whether it is so narrow that one ray tells whether it is visible from a point."""
+        """Whether it is so narrow that one ray to a point decides whether it is visible from there."""
         return False
 
     @abstractmethod
     def towards(self, texels: Texels) -> Aim:
-        """The function that aims at random places on the emitter from texels (P,)."""
+        """The function that chooses random places on the emitter for texels (P,)."""
 
     @abstractmethod
     def width_rad(self, points_m: Floats) -> Floats:
         """Its approximate angular width (P,) seen from points (P, 3); 0 if its shadows are hard."""
 
     def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
-        """The share (R,) of light from origins + segments (R, 3) that reaches the origins, past what may hide it."""
+        """The share (R,) of light that reaches origins from origins + segments (R, 3)."""
         return occluder.passing(origins_m, segments_m)
 
     def may_reach(self, points_m: Floats) -> Mask:
-        """Which points (P, 3) its light can reach, as far as that is known without rays."""
+        """Whether its light can reach points (P, 3), as far as this is known without casting rays."""
         return np.ones(len(points_m), bool)
 
     def unshadowed_light(self, texels: Texels) -> Floats:
-        """The illuminance (P,) in lx if nothing hides it, under a coat what enters; NaN where there is no formula."""
+        """The illuminance (P,) in lx without shadows; NaN if there is no formula. Under a coat, it is what enters."""
         return np.full(len(texels), np.nan, np.float32)
 
 

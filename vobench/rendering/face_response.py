@@ -1,4 +1,4 @@
-"""What the faces of a table do with light that meets them: scatter it, mirror it, or absorb it."""
+"""The optical properties of faces: how much light they scatter and mirror."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,11 +14,14 @@ from vobench.scene.triangles import Triangles
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """The optical properties of faces (F,); the last entry, which rays without a hit use, is for no face.
+    """The optical properties of faces. All arrays are (F + 1,); rays without a hit read the last entry.
 
-    scatters: whether it has a body. eta: the refractive index of its coat, 0 without one. tint and roughness: of what
-    it mirrors. metal: the share that it mirrors without a coat. lamp: the index of the lamp that it belongs to, or -1.
-    shows_lamps: whether it shows lamps as images, which are emitters of direct light.
+    `scatters` is whether a face has a body.
+    `eta` is the refractive index of its coat, 0 without a coat.
+    `tint` scales the light that the coat mirrors. `roughness` is that of the coat or of the metal.
+    `metal` is the share of light that it mirrors without a coat.
+    `lamp` is the index of its lamp, -1 for none.
+    `shows_lamps` is whether it shows images of lamps, which are emitters of direct light.
     """
 
     scatters: Mask
@@ -36,7 +39,7 @@ class Response:
         return np.asarray(self.tint[face] * by_coat + by_metal)
 
     def scattered(self, face: Indices, cosine: Floats) -> Floats:
-        """π times the luminance (R,) towards a cosine (R,), per light that entered the coat and was scattered."""
+        """The share (R,) of the light scattered below the coat that leaves it at a cosine (R,); 0 without a body."""
         leaving = np.where(self.eta[face] > 0, 1 - self._fresnel(face, cosine), 1)
         return self.scatters[face] * leaving
 

@@ -1,7 +1,7 @@
-"""The first face that each ray meets from its front, exact to float64.
+"""The first face that each ray hits from the front, with the accuracy of float64.
 
-Embree, which finds the faces, computes in float32. Where a ray passes so close to an edge that rounding may select the
-wrong face, or none, the candidates around that point are compared in float64.
+Embree, which finds the faces, computes in float32. If a ray passes so close to an edge that rounding can select the
+wrong face, or none, the candidates around this point are compared in float64.
 """
 
 from dataclasses import dataclass, replace
@@ -18,13 +18,12 @@ from vobench.rendering.embree import Hits, TriangleCaster
 from vobench.scene.triangles import Triangles
 
 REACH_M = 1e8  # beyond every scene
-MOST_PASSED = 64  # backs and holes that a ray passes before it counts as lost between faces that touch
-LEAST_STEEPNESS = 1e-3  # the least cosine to a normal by which a step along a ray is lengthened
-# Embree works in float32, which resolves coordinates to this share of the scene's largest coordinate.
-RESOLUTION = 1e-6
-WATERTIGHT = 1e-3  # a ray that passes an edge at less than this share of the resolution meets the face
-STEP_EDGES = 3  # steps past a back face, and shifts to candidates aside, in units of the resolution
-SHIFTS = 5  # directions in which candidates are looked for: straight on and to four sides
+MOST_PASSED = 64  # the largest number of backs and holes that a ray passes; then it is caught between faces that touch
+LEAST_STEEPNESS = 1e-3  # the smallest cosine to a normal by which a step along a ray is divided
+RESOLUTION = 1e-6  # the resolution of coordinates in Embree's float32, relative to the largest coordinate of the scene
+WATERTIGHT = 1e-3  # a ray hits a face if it passes its edge at less than this distance, relative to the resolution
+STEP_EDGES = 3  # the step past a back face, and the shift of the rays that find candidates, relative to the resolution
+SHIFTS = 5  # the number of rays that find candidates: the ray itself, and rays shifted to four sides
 AXES = np.eye(3)
 
 
@@ -32,10 +31,11 @@ AXES = np.eye(3)
 class FacePlanes:
     """The faces of a table and their planes, each in the frame of its body.
 
-    corners_m (F, 3, 3). The other arrays have a last entry for the face -1, which is no face: normals (F + 1, 3) and
-    offsets_m (F + 1,) satisfy normal · x = offset on the plane; height_m (F + 1,) is the least height of the triangle,
-    and back (F + 1,) the face on the other side of a sheet, or -1.
-    resolution_m: what float32 resolves at the largest coordinate.
+    `corners_m` (F, 3, 3) are their corners. The other arrays have a last entry for the face -1, which is no face.
+    `normals` (F + 1, 3) and `offsets_m` (F + 1,) define the planes: normal · x = offset.
+    `height_m` (F + 1,) is the smallest height of each triangle.
+    `back` (F + 1,) is the face on the other side of a sheet, -1 for none.
+    `resolution_m` is the resolution of float32 at the largest coordinate.
     """
 
     corners_m: Array
@@ -64,7 +64,7 @@ def face_planes(faces: Triangles) -> FacePlanes:
 
 
 def least_height_m(corners_m: Array) -> Array:
-    """The least of the three heights (F,) of triangles (F, 3, 3)."""
+    """The smallest of the three heights of each triangle (F, 3, 3)."""
     edges_m = corners_m - np.roll(corners_m, 1, axis=1)
     lengths_m = np.linalg.norm(edges_m, axis=2)
     longest_m = np.maximum(lengths_m.max(1), 1e-30)
@@ -74,7 +74,7 @@ def least_height_m(corners_m: Array) -> Array:
 
 
 class FrontCaster:
-    """Casts rays in the frame of one body against its faces, of which only fronts count and holes do not."""
+    """Casts rays at the faces of one body, in the frame of the body. Backs of faces and holes are invisible."""
 
     def __init__(self, triangles: TriangleCaster, planes: FacePlanes, cut_outs: CutOuts) -> None:
         self._triangles = triangles
@@ -89,9 +89,9 @@ class FrontCaster:
         distance_m = (planes.offsets_m[hits.face] - origin_offsets_m) / cosine
 
         first_weight = 1 - hits.u - hits.v
-        least_weight = np.minimum(np.minimum(hits.u, hits.v), first_weight)
-        edge_distance_m = least_weight * planes.height_m[hits.face]
-        ray_distance_m = -cosine * edge_distance_m  # from the ray to the nearest edge of its face
+        smallest_weight = np.minimum(np.minimum(hits.u, hits.v), first_weight)
+        edge_distance_m = smallest_weight * planes.height_m[hits.face]  # from the hit, at least
+        ray_distance_m = -cosine * edge_distance_m  # from the ray, because a ray can pass obliquely
         doubtful = np.flatnonzero(ray_distance_m < planes.resolution_m)
         distance_m[doubtful] = hits.distance[doubtful]
         exact_hits = replace(hits, distance=distance_m)
@@ -99,9 +99,9 @@ class FrontCaster:
         return exact_hits
 
     def close_gaps(self, origins_m: Array, directions: Array, hits: Hits) -> None:
-        """Add hits in place for rays that slipped through a gap that float32 leaves between two faces.
+        """Add hits, in place, for rays that have passed through a gap between two faces due to float32.
 
-        A ray without a hit slipped through a gap if a ray slightly aside has one.
+        A ray without a hit may have passed through a gap if a slightly shifted ray has a hit.
         """
         missed = np.flatnonzero(hits.face < 0)
         shift = self._planes.resolution_m * AXES.sum(0)
@@ -116,7 +116,7 @@ class FrontCaster:
         directions: Array,
         most_passed: int = MOST_PASSED,
     ) -> tuple[Hits, Array]:
-        """The first hits of rays that are neither backs nor holes, and the cosines (R,) to the normals of the faces."""
+        """The first hits of rays with fronts of faces, and the cosines (R,) to the normals of these faces."""
         hits = self._triangles.hits(origins_m, directions, REACH_M)
         is_hole = self._cut_outs.are_in_holes(hits)
         cosine = self._turn_to_fronts(hits.face, directions)
@@ -124,7 +124,7 @@ class FrontCaster:
         if not len(passed) or not most_passed:
             return hits, cosine
 
-        # These rays continue slightly behind what they pass.
+        # These rays continue slightly behind the back or the hole.
         steepness = np.maximum(np.abs(cosine[passed]), LEAST_STEEPNESS)
         step_m = hits.distance[passed] + STEP_EDGES * self._planes.resolution_m / steepness
         next_origins_m = origins_m[passed] + step_m[:, None] * directions[passed]
@@ -138,7 +138,7 @@ class FrontCaster:
     def _turn_to_fronts(self, face: Indices, directions: Array) -> Array:
         """The cosines (R,) between directions and the normals of faces; negative for fronts.
 
-        A back face that is one side of a sheet is replaced, in `face`, by the other side.
+        If a ray hits the back of one side of a sheet, the face is replaced, in place, by the other side.
         """
         planes = self._planes
         cosine = dot(planes.normals[face], directions)
@@ -155,10 +155,10 @@ class FrontCaster:
         hits: Hits,
         doubtful: Pixels,
     ) -> None:
-        """Decide doubtful hits (D,) in float64, in place, among the faces that Embree finds there and slightly aside.
+        """Replace doubtful hits (D,), in place, by the nearest hit in float64 with the candidates around them.
 
-        A ray that meets none of these faces passed an outline, and has no hit. It keeps its hit if all its candidates
-        are faces: then it runs into the joint between them.
+        A ray can miss all its candidates. If some of the shifted rays hit nothing, the ray has passed an outline, and
+        has no hit. Otherwise it has hit the edge between two faces, and keeps its hit.
         """
         if not len(doubtful):
             return
@@ -170,16 +170,16 @@ class FrontCaster:
 
         nearest = candidate_distance_m.argmin(0), np.arange(len(doubtful))
         nearest_m = candidate_distance_m[nearest]
-        is_met = np.isfinite(nearest_m)
-        hits.face[doubtful[is_met]] = candidates[nearest][is_met]
-        hits.distance[doubtful[is_met]] = nearest_m[is_met]
-        passes_outline = ~is_met & (candidates < 0).any(0)
+        is_hit = np.isfinite(nearest_m)
+        hits.face[doubtful[is_hit]] = candidates[nearest][is_hit]
+        hits.distance[doubtful[is_hit]] = nearest_m[is_hit]
+        passes_outline = ~is_hit & (candidates < 0).any(0)
         missed = doubtful[passes_outline]
         hits.face[missed] = -1
         hits.distance[missed] = np.nan
 
     def _candidates(self, origins_m: Array, directions: Array, hits: Hits) -> Indices:
-        """The faces (SHIFTS, D) that Embree finds along rays (D, 3): those of their hits, and those aside."""
+        """The faces (SHIFTS, D) of the hits of rays (D, 3), in the first row, and of shifted rays; -1 for none."""
         least_along = AXES[np.argmin(np.abs(directions), axis=1)]
         right = unit(np.cross(directions, least_along))
         down = np.cross(directions, right)
@@ -193,7 +193,7 @@ class FrontCaster:
         return candidates
 
     def _exact_m(self, face: Indices, origins_m: Array, directions: Array) -> Array:
-        """The distances (R,) at which rays (R, 3) meet the fronts of faces (R,), infinite if they do not."""
+        """The distances (R,), in float64, at which rays (R, 3) hit the fronts of faces (R,); infinite without a hit."""
         planes = self._planes
         normals = planes.normals[face]
         corners_m = planes.corners_m[face]
@@ -205,5 +205,5 @@ class FrontCaster:
             inward = np.cross(normals[:, None], unit(edges_m))
             inside_m = np.einsum("rei,rei->re", inward, points_m[:, None] - corners_m).min(1)
             is_inside = inside_m >= -WATERTIGHT * planes.resolution_m
-            is_met = (cosine < 0) & (distance_m > 0) & is_inside
-        return np.where(is_met, distance_m, np.inf)
+            is_hit = (cosine < 0) & (distance_m > 0) & is_inside
+        return np.where(is_hit, distance_m, np.inf)

@@ -1,6 +1,6 @@
 """Adaptive gathering, with more rays where indirect light is noisy, and smoothing of light from far surfels."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -8,20 +8,22 @@ import numpy as np
 import scipy
 
 from vobench import stop
-from vobench.rendering.array_types import Floats
-from vobench.rendering.indirect_light import Gatherer
+from vobench.rendering.array_types import Floats, Rows
+from vobench.rendering.indirect_light import Gatherer, Sample
 from vobench.rendering.texel import Texels
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
     from scipy.sparse.linalg import LinearOperator
 
-SMOOTHINGS = 4  # how often light from far surfels is averaged over neighbouring surfels
-VARIANCE_SMOOTHINGS = 2  # how often variances are smoothed
-DARK = 0.1  # the noise of a place darker than this share of the mean light is relative to this share
-FAINTEST = 1e-9  # the smallest light in lux that noise is relative to, for a scene without light
+SMOOTHINGS = 4  # the number of times that light from far surfels is averaged over neighbouring surfels
+VARIANCE_SMOOTHINGS = 2  # the number of times that variances are averaged
 MOST_ROUNDS = 8  # the largest number of rounds of rays from a surfel
 FEWEST = 0.002  # the share of noisy surfels up to which another round is not worth its overhead
+
+# Noise is relative to the light, but at least to this share of the mean light, and at least to this illuminance in lx.
+DARK = 0.1
+FAINTEST = 1e-9
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,52 +142,86 @@ class Rounds:
         `direct` (S,) and `by_mirrors` (2, S), from two sets of photons, are luminances of all lights together.
         `sky_weights` (K,) is the luminance of the colour of each sky.
         """
-        count = len(self._middles)
-        rounds = np.ones(count, np.int64)
         other_light = smoothing.blended(direct + by_mirrors.mean(0))
-        near = np.stack([half.near @ radiosity for half in self._halves])
-        far = np.stack([half.far @ radiosity for half in self._halves])
-        sky = np.stack([half.sky for half in self._halves])
+        totals = _totals_of(self._halves, radiosity)
         self._halves = []
-
-        def halves() -> tuple[Floats, Floats]:
-            """Near and far light (2, S) by each half of the rays, in luminance."""
-            far_sky = np.einsum("k,hks->hs", sky_weights, sky)
-            return near @ luminance / rounds, (far @ luminance + far_sky) / rounds
-
         while True:
             stop.check()
-            standard_error = _noise(smoothing, *halves(), other_light)
-            rows = np.flatnonzero((standard_error > noise) & (rounds < MOST_ROUNDS))
-            if len(rows) <= FEWEST * count:
+            near_halves, far_halves = totals.luminance_halves(luminance, sky_weights)
+            standard_error = _noise(smoothing, near_halves, far_halves, other_light)
+            is_noisy = (standard_error > noise) & (totals.rounds < MOST_ROUNDS)
+            noisy = np.flatnonzero(is_noisy)
+            if len(noisy) <= FEWEST * len(self._middles):
                 break
-            round_count = int(rounds[rows].max())
-            middles = self._middles.take(rows)
-            for repeat in range(round_count):
-                for half in (0, 1):
-                    turn = 2 * (round_count + repeat) + half
-                    found_near, found_far, found_sky = self._gatherer.light(
-                        middles, radiosity, side=self._side, turn=turn
-                    )
-                    near[half, rows] += found_near
-                    far[half, rows] += found_far
-                    sky[half][:, rows] += found_sky
-            rounds[rows] += round_count
+            round_count = self._double_rounds(totals, noisy, radiosity)
             if done:
-                done(np.log2(2 * round_count) / np.log2(2 * MOST_ROUNDS))
-        by_photons = smoothing.blended((by_mirrors[0] - by_mirrors[1]) / 2)
-        photon_variance = smoothing.averaged(by_photons**2)
-        near_halves, far_halves = halves()
+                done(np.log2(round_count) / np.log2(2 * MOST_ROUNDS))
+
+        # The noise of photons is added to that of rays.
+        photon_noise = smoothing.blended((by_mirrors[0] - by_mirrors[1]) / 2)
+        photon_variance = smoothing.averaged(photon_noise**2)
         light = _relative_to(smoothing.blended((near_halves + far_halves).mean(0)) + other_light)
         standard_error = np.sqrt(standard_error**2 + photon_variance / light**2)
-        near_lx = near.mean(0) / rounds[:, None]
-        far_lx = far.mean(0) / rounds[:, None]
-        sky_lx = sky.mean(0) / rounds
+        near_lx, far_lx, sky_lx = totals.means()
         return Gathered(
             (near_lx + smoothing.averaged(far_lx)).astype(np.float32),
             smoothing.averaged(sky_lx.T).T,
             standard_error,
         )
+
+    def _double_rounds(self, totals: "_Totals", rows: Rows, radiosity: Floats) -> int:
+        """Double the number of rounds of the surfels at rows (N,). Returns the largest number of rounds after that."""
+        round_count = int(totals.rounds[rows].max())
+        middles = self._middles.take(rows)
+        for repeat in range(round_count):
+            for half in (0, 1):
+                turn = 2 * (round_count + repeat) + half
+                near, far, sky = self._gatherer.light(middles, radiosity, side=self._side, turn=turn)
+                totals.near[half, rows] += near
+                totals.far[half, rows] += far
+                totals.sky[half][:, rows] += sky
+        totals.rounds[rows] += round_count
+        return 2 * round_count
+
+
+@dataclass(frozen=True, slots=True)
+class _Totals:
+    """The sums, over the rounds of rays, of the light that surfels receive. The two halves of all rays are separate.
+
+    `near` and `far` (2, S, C) are the light from near and far surfels in C channels.
+    `sky` (2, K, S) is the light of K skies.
+    `rounds` (S,) is the number of rounds of each surfel.
+    """
+
+    near: Floats
+    far: Floats
+    sky: Floats
+    rounds: Rows
+
+    def luminance_halves(self, luminance: Floats, sky_weights: Floats) -> tuple[Floats, Floats]:
+        """The mean near and far light (2, S) by each half of the rays.
+
+        Channels are weighted by `luminance` (C,), and skies by `sky_weights` (K,).
+        """
+        far_sky = np.einsum("k,hks->hs", sky_weights, self.sky)
+        near_halves = self.near @ luminance / self.rounds
+        far_halves = (self.far @ luminance + far_sky) / self.rounds
+        return near_halves, far_halves
+
+    def means(self) -> tuple[Floats, Floats, Floats]:
+        """The mean light from near and far surfels (S, C), and of the skies (K, S)."""
+        near_lx = self.near.mean(0) / self.rounds[:, None]
+        far_lx = self.far.mean(0) / self.rounds[:, None]
+        sky_lx = self.sky.mean(0) / self.rounds
+        return near_lx, far_lx, sky_lx
+
+
+def _totals_of(halves: Sequence[Sample], radiosity: Floats) -> _Totals:
+    """The light by the first round of rays, given its two halves and the radiosity (S, C) of surfels."""
+    near = np.stack([half.near @ radiosity for half in halves])
+    far = np.stack([half.far @ radiosity for half in halves])
+    sky = np.stack([half.sky for half in halves])
+    return _Totals(near, far, sky, rounds=np.ones(near.shape[1], np.int64))
 
 
 def _relative_to(light: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""Rays against the faces of a scene; bounding spheres, and random points on surfaces."""
+"""Ray casting in a scene, bounding spheres, directions and points that are distributed evenly."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
@@ -16,13 +16,13 @@ from vobench.scene.triangles import Triangles
 
 T = TypeVar("T")
 
-# The distance at which rays start off their face, and what is added for each metre from the origin: float32 resolves
-# 1e-7 of that.
+# The distance from their face at which rays start, and what is added to it per metre from the origin of the world. The
+# resolution of float32 is 1e-7 of that distance.
 RAY_OFFSET_M = 1e-4
 RAY_OFFSET = 1e-6
 FAR_M = 1e3  # beyond every scene
-ENDLESS = 1e8  # lengths of a direction, beyond every scene
-SHORT_OF_END = 1 - 1e-3  # share of the segment between two points in which something blocks it
+ENDLESS = 1e8  # in lengths of a direction, beyond every scene
+SHORT_OF_END = 1 - 1e-3  # the share of a segment in which a face blocks it, so that the face at its end does not
 X_AXIS = (1.0, 0.0, 0.0)
 Z_AXIS = (0.0, 0.0, 1.0)
 
@@ -70,7 +70,8 @@ def sphere_directions(count: int) -> Array:
 
 
 def reversed_faces(corners_m: Array) -> Indices:
-    """For each triangle (F, 3, 3) one with the same corners in reverse order, the back of a sheet; -1 for none."""
+    """The back (F,) of each triangle (F, 3, 3): a triangle with the same corners in reverse order; -1 for none."""
+    # A weighted sum of the nine coordinates is almost unique, so that only one candidate has to be compared.
     weights = np.sqrt(np.arange(2.0, 11.0)).reshape(3, 3)
     reverse = np.ascontiguousarray(corners_m[:, ::-1])
     keys = np.einsum("fij,ij->f", np.ascontiguousarray(corners_m), weights)
@@ -84,10 +85,12 @@ def reversed_faces(corners_m: Array) -> Indices:
 
 
 class RayCaster:
-    """Casts rays against the faces `among` (K,) of a table, by Embree. Hits have their indices in the table.
+    """Casts rays at faces of a table. Hits name faces by their row in the table.
 
-    A ray hits the side of a sheet that it comes from. twin (F + 1,): the other side of the sheet that a face belongs
-    to, -1 for none. solid: the faces that belong to no sheet.
+    A sheet consists of two faces back to back. A ray hits the side of a sheet that it comes from.
+    `among` (K,) are the rows of the faces that rays can hit, by default all.
+    `twin` (F + 1,) is the other side of the sheet of each face, -1 for none. The last entry is that of the face -1.
+    `solid` are the faces that do not belong to a sheet.
     """
 
     def __init__(
@@ -102,7 +105,7 @@ class RayCaster:
         twin = reversed_faces(faces.corners_m[rows])
         has_twin = twin >= 0
         self._has_sheets = bool(has_twin.any())
-        self.twin = np.full(len(faces) + 1, -1, np.int32)  # the last one for the face -1
+        self.twin = np.full(len(faces) + 1, -1, np.int32)
         self.twin[rows[has_twin]] = rows[twin[has_twin]]
         self.solid = rows[~has_twin]
 
@@ -115,7 +118,7 @@ class RayCaster:
         return self._triangles.stops(origins_m, segments_m, SHORT_OF_END)
 
     def nearest(self, origins_m: ArrayLike, directions: ArrayLike) -> Indices:
-        """The face that each ray (R, 3) hits first, -1 for none: as `hits`, but faster."""
+        """Only the `face` (R,) of `hits`, which is faster."""
         face = self._triangles.nearest(origins_m, directions, ENDLESS)
         behind = self._behind(face, directions)
         face[behind] = self.twin[face[behind]]
@@ -146,19 +149,19 @@ class RayCaster:
     def facing(self, hits: Hits, directions: ArrayLike) -> Hits:
         """The same hits, moved in place to the side of each sheet that the ray (R, 3) comes from."""
         behind = self._behind(hits.face, directions)
-        # The corners in reverse: the second keeps its place, the first is the third.
+        # On the other side, the first and the third corner are exchanged.
         hits.v[behind] = 1 - hits.u[behind] - hits.v[behind]
         hits.face[behind] = self.twin[hits.face[behind]]
         return hits
 
 
 def lengths(vectors: Floats) -> Floats:
-    """Lengths (...) of vectors (..., 3)."""
+    """The lengths (...) of vectors (..., 3)."""
     return np.asarray(np.sqrt(np.einsum("...j,...j->...", vectors, vectors)))
 
 
 def tangents(normals: Floats) -> tuple[Floats, Floats]:
-    """Two unit vectors (P, 3) each, at right angles to the normals and to each other."""
+    """Two unit vectors (P, 3) for each normal (P, 3), perpendicular to it and to each other."""
     is_upright = np.abs(normals[:, 2:]) >= 0.9
     helper = np.where(is_upright, X_AXIS, Z_AXIS).astype(normals.dtype)
     u = np.cross(helper, normals)
@@ -167,14 +170,14 @@ def tangents(normals: Floats) -> tuple[Floats, Floats]:
 
 
 def offset_from_surface(points_m: Floats, normals: Floats) -> Floats:
-    """Points (P, 3) lifted off their faces along normals (P, 3), so that rays from there do not hit these faces."""
+    """Move points (P, 3) off their faces along normals (P, 3), so that rays from there do not hit these faces."""
     largest_m = np.abs(points_m).max(1, keepdims=True)
     lift = RAY_OFFSET_M + RAY_OFFSET * largest_m
     return np.asarray(points_m + lift * normals)
 
 
 def sample_points(corners_m: Array, a: Floats, b: Floats) -> Array:
-    """Points (P, 3) uniform over triangles (K, 3, 3), by two uniform random numbers (P,) in [0, 1)."""
+    """Points (P, 3) that are distributed uniformly over triangles (K, 3, 3), by two random numbers (P,) in [0, 1)."""
     ends_m2 = np.cumsum(areas_m2(corners_m))
     starts_m2 = np.concatenate([[0.0], ends_m2])
     sample_m2 = a * ends_m2[-1]
@@ -193,11 +196,15 @@ def face_materials(
     materials: Mapping[str, Material],
 ) -> list[Material | None]:
     """The material of each thing of a table, None for lamps and for things without a material."""
-    lamps = set(faces.thing[faces.lamp >= 0].tolist())
-    return [None if i in lamps else materials.get(thing.material) for i, thing in enumerate(faces.things)]
+    is_lamp = np.zeros(len(faces.things), bool)
+    is_lamp[faces.thing[faces.lamp >= 0]] = True
+    thing_materials: list[Material | None] = []
+    for thing, emits in zip(faces.things, is_lamp, strict=True):
+        thing_materials.append(None if emits else materials.get(thing.material))
+    return thing_materials
 
 
 def are_panes(faces: Triangles, materials: Mapping[str, Material]) -> Mask:
-    """Which faces (F,) of a table are panes."""
+    """Whether each face (F,) of a table is a pane."""
     by_thing = [material is not None and material.kind == "pane" for material in face_materials(faces, materials)]
     return np.array(by_thing, bool)[faces.thing]

@@ -1,4 +1,4 @@
-"""Indirect light: rays from points that find surfels, lamps and the sky, and photons that find surfels."""
+"""Indirect light: rays gather light from surfels, lamps and the sky, and photons bring light to surfels."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
@@ -22,19 +22,21 @@ from vobench.scene.light import Sky
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-TURN = np.array([0.4142135624, 0.7320508076], np.float32)  # the step of sample offsets from one turn to the next
-MIRRORS = 4  # that a ray is followed by at most
-POINTS = 1 << 9  # whose rays are traced at a time
-MOST_RAYS = 25_000_000  # in one table
-PHOTONS = 1 << 16  # that are traced at a time
+TURN = np.array([0.4142135624, 0.7320508076], np.float32)  # the step of the random numbers from one turn to the next
+MIRRORS = 4  # the largest number of reflections of a ray
+POINTS = 1 << 9  # the number of points whose rays are traced at a time
+MOST_RAYS = 25_000_000  # the largest number of rays in a table
+PHOTONS = 1 << 16  # the number of photons that are traced at a time
 
 
 @dataclass(frozen=True, slots=True)
 class FinalGather:
-    """The illuminance of points: table (P, S + L) times the radiosity of surfels and lamps, plus sky (K, P) by mirrors.
+    """The result of rays from P points.
 
-    hits (H·W,): how many rays ended on each texel. escaped (P,): the share of rays that left the scene, but not through
-    a pane that shows the sky.
+    The illuminance of the points is the product of `table` (P, S + L) with the radiosity of the S surfels and L lamps,
+    plus `sky` (K, P), the light of each of K skies by mirrors.
+    `hits` (H·W,) is the number of rays that ended on each texel.
+    `escaped` (P,) is the share of rays that left the scene, except through panes that show the sky.
     """
 
     table: "csr_matrix"
@@ -45,10 +47,11 @@ class FinalGather:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What rays from some points found.
+    """The result of some of the rays from P points.
 
-    near and far (P, S + L): tables as in FinalGather, by the length of the last segment of a ray. sky (K, P) and
-    escaped (P,) as there. texels (R,): where rays ended.
+    `near` and `far` (P, S + L) are tables as in `FinalGather`: of the rays whose last segment is shorter than NEAR_M,
+    and of the other rays. `sky` (K, P) and `escaped` (P,) are as there.
+    `texels` (R,) are the texels on which rays ended.
     """
 
     near: "csr_matrix"
@@ -60,10 +63,11 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class Photons:
-    """Light that leaves reflecting faces: origins and directions (R, 3), and the flux (R,) of each photon in lumens.
+    """R photons that leave reflecting faces.
 
-    is_shown: whether the face that it meets first shows that light already, as the image of a lamp in a mirror.
-    dither (R, 2): random numbers.
+    `origins_m` and `directions` (R, 3) are in the world, `flux_lm` (R,) is the flux of each photon in lumens.
+    `is_shown` (R,) is whether the first face that it meets already shows its light, as the image of a lamp in a mirror.
+    `dither` (R, 2) are random numbers.
     """
 
     origins_m: Floats
@@ -75,9 +79,10 @@ class Photons:
 
 @dataclass(frozen=True, slots=True)
 class Gatherer:
-    """Sends rays from points and records where they end.
+    """Casts rays from points, and records where they end.
 
-    surfel_of (H·W,): the surfel of each texel, -1 for none. surfels and lamps: their numbers, S and L.
+    `surfel_of` (H·W,) is the surfel of each texel, -1 for none.
+    `surfels` and `lamps` are their numbers, S and L.
     """
 
     atlas: Atlas
@@ -106,13 +111,13 @@ class Gatherer:
         rays: int,
         done: Callable[[float], object] | None = None,
     ) -> FinalGather:
-        """Send about `rays` rays from every point. `done` is called with the share of the work that is done."""
+        """Cast about `rays` rays from every point. `done` is called with the share of the work that is done."""
         rays_each = min(rays, MOST_RAYS / max(len(points), 1))
         sample = self.sample(points, side=int(np.sqrt(rays_each)), done=done)
         return FinalGather(sample.near + sample.far, sample.sky, self.hits(sample), sample.escaped)
 
     def hits(self, sample: Sample) -> Rows:
-        """How many rays of a sample ended on each texel of the map (H·W,)."""
+        """The number of rays of a sample that ended on each texel of the map (H·W,)."""
         return np.bincount(sample.texels, minlength=self.atlas.height * self.atlas.width)
 
     def sample(
@@ -123,21 +128,35 @@ class Gatherer:
         turn: int = 0,
         done: Callable[[float], object] | None = None,
     ) -> Sample:
-        """Send side x side rays from every point, others in each turn. `done` is called with the share that is done."""
-        parts = list[Sample]()
-        if side and len(points):
-            points = turned(points, turn)
-            parts = in_chunks(lambda part: self._sample(points.take(part), side), len(points), chunk=POINTS, done=done)
-        rayless = 0 if parts else len(points)  # points from which no ray is sent
-        no_entries = scipy.sparse.csr_matrix((rayless, self.surfels + self.lamps), dtype=np.float32)
-        no_sky = np.zeros((len(self.skies), rayless), np.float32)
-        all_escaped = np.ones(rayless, np.float32)
+        """Cast side x side rays from every point, in other directions in each turn.
+
+        `done` is called with the share of the work that is done.
+        """
+        if not side or not len(points):
+            return self._empty_sample(len(points))
+        points = turned(points, turn)
+
+        def sample_of(part: slice) -> Sample:
+            return self._sample(points.take(part), side)
+
+        parts = in_chunks(sample_of, len(points), chunk=POINTS, done=done)
         return Sample(
-            near=scipy.sparse.vstack([no_entries, *(part.near for part in parts)], "csr"),
-            far=scipy.sparse.vstack([no_entries, *(part.far for part in parts)], "csr"),
-            sky=np.concatenate([no_sky, *(part.sky for part in parts)], 1),
-            escaped=np.concatenate([all_escaped, *(part.escaped for part in parts)]),
-            texels=np.concatenate([np.zeros(0, np.int32), *(part.texels for part in parts)]),
+            near=scipy.sparse.vstack([part.near for part in parts], "csr"),
+            far=scipy.sparse.vstack([part.far for part in parts], "csr"),
+            sky=np.concatenate([part.sky for part in parts], 1),
+            escaped=np.concatenate([part.escaped for part in parts]),
+            texels=np.concatenate([part.texels for part in parts]),
+        )
+
+    def _empty_sample(self, point_count: int) -> Sample:
+        """The result for points without rays, from which all light counts as escaped."""
+        no_entries = scipy.sparse.csr_matrix((point_count, self.surfels + self.lamps), dtype=np.float32)
+        return Sample(
+            near=no_entries,
+            far=no_entries,
+            sky=np.zeros((len(self.skies), point_count), np.float32),
+            escaped=np.ones(point_count, np.float32),
+            texels=np.zeros(0, np.int32),
         )
 
     def light(
@@ -148,9 +167,9 @@ class Gatherer:
         side: int,
         turn: int,
     ) -> tuple[Floats, Floats, Floats]:
-        """The light that side x side rays from every point find: near and far (P, C), and sky by mirrors (K, P).
+        """The light that side x side rays from every point find: near and far (P, C), and the skies by mirrors (K, P).
 
-        radiosity (S, C): that of surfels in C channels.
+        `radiosity` (S, C) is that of surfels in C channels.
         """
         points = turned(points, turn)
 
@@ -163,7 +182,7 @@ class Gatherer:
         return np.concatenate(near), np.concatenate(far), np.concatenate(sky, 1)
 
     def deposited(self, photons: Photons) -> Floats:
-        """The flux (S,) in lumens that photons bring to surfels; under a coat what enters."""
+        """The flux (S,) in lumens that photons bring to surfels. Under a coat it is the flux that enters the coat."""
         flux_lm = np.zeros(self.surfels)
 
         def trace(part: slice) -> Floats:
@@ -174,7 +193,7 @@ class Gatherer:
         return flux_lm
 
     def _sample(self, points: Texels, side: int) -> Sample:
-        """What side x side rays from every point found."""
+        """The result of side x side rays from every point."""
         ray_count = np.float32(side * side)
         sky = np.zeros((len(self.skies), len(points)), np.float32)
         escaped = np.zeros(len(points), np.float32)
@@ -210,7 +229,7 @@ class Gatherer:
             weight=np.ones(len(rows), np.float32),
             is_direct=photons.is_shown[rows],
         )
-        # The first face of these photons shows their light as an image, so that only what it mirrors onwards counts.
+        # The first face of the shown photons shows their light already. Only the light that it reflects counts.
         shown = batch.take(batch.is_direct)
         batch = batch.take(~batch.is_direct)
         from_shown = self._tracer.follow(shown, photons.dither, is_first=False).onward
@@ -226,7 +245,7 @@ class Gatherer:
         return flux_lm
 
     def _table(self, ends: RayEnds, selected: Mask, point_count: int) -> "csr_matrix":
-        """The ends of the selected rays (R,) as a table (P, S + L) with an entry for each ray."""
+        """The table (P, S + L) of the ends of the selected rays (R,), with an entry for each ray."""
         count = np.count_nonzero(selected)
         starts = np.empty(point_count + 1, np.int32)
         columns = np.empty(count, np.int32)
@@ -235,12 +254,12 @@ class Gatherer:
         return scipy.sparse.csr_matrix((shares, columns, starts), (point_count, self.surfels + self.lamps))
 
     def _escaped_counts(self, escaped: RayBatch, point_count: int) -> Floats:
-        """How many (P,) of the rays of each point that met nothing crossed no pane that shows the sky."""
+        """The number (P,) of escaped rays of each point that crossed no pane that shows the sky."""
         crosses_no_pane = ~self.visibility.crosses_sky_pane(escaped.origins_m, FAR_M * escaped.directions)
         return np.bincount(escaped.point, crosses_no_pane, minlength=point_count).astype(np.float32)
 
     def _add_sky(self, sky: Floats, escaped: RayBatch) -> None:
-        """Add the illuminance of points (K, P) by rays that met nothing, from each of the skies."""
+        """Add the illuminance of points (K, P) by each sky along escaped rays."""
         for index, light in enumerate(self.skies):
             luminance_cd_m2 = light.luminance_cd_m2(escaped.directions)
             ray_lx = np.pi * luminance_cd_m2 * escaped.weight
@@ -248,7 +267,7 @@ class Gatherer:
 
 
 def turned(points: Texels, turn: int) -> Texels:
-    """Points whose sample offsets differ from those of any other turn."""
+    """The points with random numbers that differ from those of any other turn."""
     dither = points.dither + np.float32(turn) * TURN
     dither -= np.floor(dither)
     return replace(points, dither=dither)

@@ -1,4 +1,4 @@
-"""Rays against stationary and moving bodies: what a camera sees, and what blocks the light between two points."""
+"""Ray casting with stationary and moving bodies: the faces that a camera sees, and whether a segment is blocked."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,15 +15,17 @@ from vobench.rendering.geometry import RAY_OFFSET_M
 from vobench.rendering.shot import moved, rays_in, turn
 from vobench.scene.scene import Scene, triangles
 
-MOST_HOLES = 64  # that a ray passes before it counts as not blocked
+MOST_HOLES = 64  # the largest number of holes that a ray passes; then it counts as not blocked
 
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """The faces of one rigid body in its frame, by what they do to rays, and a sphere around them.
+    """The faces of one rigid body, in its frame.
 
-    fronts: all that a camera can see. opaque: what blocks light all over; holed: what has holes; panes: glass. The last
+    `fronts` finds the faces that a camera sees.
+    `opaque` are the faces without holes that block light, `holed` those with holes, and `panes` are of glass. The last
     two are None if the body has no such faces.
+    `centre_m` (3,) and `radius_m` are a bounding sphere.
     """
 
     fronts: FrontCaster
@@ -39,7 +41,7 @@ class Body:
         directions: Array,
         reach_m: Array | float = np.inf,
     ) -> Mask:
-        """Which rays (R, 3) of unit length pass the sphere within `reach_m` of their origins (R, 3)."""
+        """Whether rays (R, 3) with unit directions meet the bounding sphere within `reach_m` of their origins."""
         to_centre_m = self.centre_m - origins_m
         along_m = dot(to_centre_m, directions)
         nearest_m = np.clip(along_m, 0, reach_m)
@@ -49,17 +51,17 @@ class Body:
 
 @dataclass(frozen=True, slots=True)
 class Occluders:
-    """Triangles (T, 3, 3) that block light, and which of them (T,) have no holes."""
+    """Triangles (T, 3, 3) that block light, and whether each has no holes (T,)."""
 
     corners_m: Array
     is_whole: Mask
 
 
 class Bodies:
-    """The faces of a scene, each in the frame of its body. Body 0 has all that is stationary, the others are movers.
+    """The faces of a scene, each in the frame of its body. Body 0 has all stationary faces, the others are movers.
 
-    normals (F + 1, 3) and offsets_m (F + 1,) are the planes of the faces: normal · x = offset. body (F + 1,) is the
-    index of each face's body. The last entries are for the face -1, which is no face.
+    `normals` (F + 1, 3) and `offsets_m` (F + 1,) define the planes of the faces: normal · x = offset.
+    `body` (F + 1,) is the body of each face. The last entries are for the face -1, which is no face.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -75,7 +77,7 @@ class Bodies:
         pane_materials = {name for name, material in scene.materials.items() if material.kind == "pane"}
         is_pane_by_thing = np.array([thing.material in pane_materials for thing in self.faces.things], bool)
         self._is_pane = is_pane_by_thing[self.faces.thing]
-        # Rays could meet either of two faces back to back, so only the first of them takes part.
+        # Of two faces back to back, only the first is included, because a ray could hit either of them.
         back = self._planes.back[:-1]
         is_first_of_pair = (back < 0) | (back > np.arange(len(back)))
         self._is_solid = is_first_of_pair & ~self._is_pane
@@ -84,7 +86,10 @@ class Bodies:
         self._bodies = [self._create_body(index) for index in range(1 + len(scene.movers))]
 
     def visible(self, directions: Array, T_bodies_camera: Sequence[Array]) -> Hits:
-        """The hits of a camera's rays along unit directions (R, 3) in its frame; without a hit, the distance is NaN."""
+        """The first hits of rays from a camera along unit directions (R, 3) in its frame.
+
+        `T_bodies_camera` are the poses of the camera in the frames of all bodies.
+        """
         stationary, *movers = self._bodies
         origins_m, stationary_directions = rays_in(T_bodies_camera[0], directions)
         hits = stationary.fronts.hits(origins_m, stationary_directions)
@@ -105,7 +110,7 @@ class Bodies:
         T_bodies_camera: Sequence[Array],
         distance_m: Array,
     ) -> Mask:
-        """Whether a pane is in front of the hit at a distance (R,); NaN stands for a ray without a hit."""
+        """Whether a pane is in front of the hit at a distance (R,), which is NaN for a ray without a hit."""
         is_behind = np.zeros(len(directions), bool)
         limit_m = np.nan_to_num(distance_m, nan=REACH_M)
         for body, T_body_camera in zip(self._bodies, T_bodies_camera, strict=True):
@@ -121,7 +126,7 @@ class Bodies:
         T_bodies_world: Sequence[Array],
         reach: Floats,
     ) -> Mask:
-        """Whether anything but glass is between starts and starts + reach * vectors (R, 3), both in the world."""
+        """Whether anything except glass is between starts and starts + reach * vectors (R, 3), in the world frame."""
         is_blocked = self._blocked_by_body(self._bodies[0], starts_m, vectors_m, reach)
         return is_blocked | self.blocked_by_movers(starts_m, vectors_m, T_bodies_world, reach, where=~is_blocked)
 
@@ -134,7 +139,10 @@ class Bodies:
         *,
         where: Mask,
     ) -> Mask:
-        """Whether a mover is between starts and starts + reach * vectors (R, 3), of the rays in the mask `where`."""
+        """Whether a mover is between starts and starts + reach * vectors (R, 3), in the world frame.
+
+        Only the rays in the mask `where` (R,) are tested.
+        """
         movers = self._bodies[1:]
         is_blocked = np.zeros(len(starts_m), bool)
         for body, T_body_world in zip(movers, T_bodies_world[1:], strict=True):
@@ -185,7 +193,7 @@ class Bodies:
         vectors_m: Array | Floats,
         reach: Floats,
     ) -> Mask:
-        """Whether a body is between starts and starts + reach * vectors (R, 3), both in its frame.
+        """Whether a body is between starts and starts + reach * vectors (R, 3), in the frame of the body.
 
         Both sides of its faces block light, but their holes do not.
         """
@@ -203,7 +211,7 @@ class Bodies:
         starts_m: Array | Floats,
         segments_m: Array | Floats,
     ) -> Rows:
-        """Those of the rays (R,) whose segments from starts (R, 3) meet faces with holes at an opaque point."""
+        """The rays (R,) whose segments (R, 3) from starts (R, 3) hit faces with holes at an opaque point."""
         blocked = [rays[:0]]
         for _ in range(MOST_HOLES):
             if not len(rays):

@@ -72,31 +72,35 @@ class Reflectors:
 
     def _places_on_faces(self, seed: int) -> _Places:
         """Random points on the panes and mirrors, which have no texels: PLACES, or none if there are no such faces."""
-        corners_of_faces_m = self.visibility.faces.corners_m
+        faces = self.visibility.faces
         face, sign = self._mirror_faces()
-        place_count = PLACES if len(face) else 0
-        number = np.random.default_rng([seed, 2]).random((2, place_count))
-        if not place_count:
+        if not len(face):
             no_places_m = np.zeros((0, 3))
             return _Places(no_places_m, no_places_m, face, np.zeros(0))
-        along = (np.arange(place_count) + number[0]) / place_count
-        corners_m = corners_of_faces_m[face]
+
+        # Random points that are stratified over the total area.
+        random_a, random_b = np.random.default_rng([seed, 2]).random((2, PLACES))
+        stratified = (np.arange(PLACES) + random_a) / PLACES
+        corners_m = faces.corners_m[face]
+        on_surface_m = sample_points(corners_m, stratified, random_b)
+
+        # The face of each point is the one that `sample_points` has chosen.
         ends_m2 = np.cumsum(areas_m2(corners_m))
-        row = np.searchsorted(ends_m2, along * ends_m2[-1], side="right")
+        total_m2 = ends_m2[-1]
+        row = np.searchsorted(ends_m2, stratified * total_m2, side="right")
         row = np.minimum(row, len(face) - 1)
-        normals = self.visibility.faces.plane[face[row]] * sign[row, None]
-        on_surface_m = sample_points(corners_m, along, number[1])
+        normals = faces.plane[face[row]] * sign[row, None]
         return _Places(
             points_m=offset_from_surface(on_surface_m, normals),
             normals=normals,
             face=face[row],
-            area_m2=np.full(place_count, ends_m2[-1] / place_count),
+            area_m2=np.full(PLACES, total_m2 / PLACES),
         )
 
     def _mirror_faces(self) -> tuple[Rows, Floats]:
-        """The reflecting faces (K,) without texels, and the side (K,) on which each reflects: 1 before, -1 behind.
+        """The reflecting faces (K,) without texels, and the side (K,) that reflects: 1 for the front, -1 for the back.
 
-        A pane of a single face reflects on both sides, so it is there twice.
+        A pane that consists of a single face reflects on both sides, so it is included twice.
         """
         faces = self.visibility.faces
         all_faces = np.arange(len(faces), dtype=np.int32)
@@ -154,7 +158,7 @@ class Reflectors:
         lit = light_lx[light_lx > 0]
         if not len(lit) or not len(self):
             return 1.0
-        # Panes and mirrors have no texels. They are taken to be lit as lit texels are on average.
+        # The illuminance of panes and mirrors, which have no texels, is assumed to be the mean of lit texels.
         place_lx = np.full(len(self), lit.mean(dtype=float))
         place_lx[: len(self.texels)] = light_lx[self.texels]
         mirrored_lm = float((self._weight * place_lx).sum())
@@ -164,16 +168,14 @@ class Reflectors:
     def _chances(self, light_lx: Floats) -> Floats:
         """The probability that a photon starts at each place, given the direct light (P,) on all texels."""
         texel_count = len(self.texels)
-        texel_weight = self._weight[:texel_count]
-        parts = [
-            (BY_LIGHT, np.arange(texel_count), texel_weight * np.sqrt(np.maximum(light_lx[self.texels], 0))),
-            (EVENLY, np.arange(texel_count), texel_weight),
-            (1 - BY_LIGHT - EVENLY, np.arange(texel_count, len(self)), self._weight[texel_count:]),
-        ]
+        on_texels = slice(0, texel_count)
+        on_faces = slice(texel_count, len(self))
+        brightness = np.sqrt(np.maximum(light_lx[self.texels], 0))
+
         chance = np.zeros(len(self))
-        for share, rows, weight in parts:
-            if weight.sum() > 0:
-                chance[rows] += share * weight / weight.sum()
+        chance[on_texels] += _with_sum(BY_LIGHT, self._weight[on_texels] * brightness)
+        chance[on_texels] += _with_sum(EVENLY, self._weight[on_texels])
+        chance[on_faces] += _with_sum(1 - BY_LIGHT - EVENLY, self._weight[on_faces])
         return np.asarray(chance / max(chance.sum(), 1e-30))
 
     def _emitted(
@@ -268,3 +270,10 @@ class Reflectors:
             eta=np.zeros(count, np.float32),
             dither=np.ascontiguousarray(number[:2].T),
         )
+
+
+def _with_sum(total: float, weights: Floats) -> Floats:
+    """The weights (N,) scaled to a sum; 0 if all weights are 0."""
+    if weights.sum() <= 0:
+        return np.zeros(len(weights))
+    return np.asarray(total * weights / weights.sum())

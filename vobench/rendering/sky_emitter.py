@@ -1,4 +1,4 @@
-"""The sky as emitters: behind each pane that shows it, and where no pane covers it."""
+"""The sky as emitters: one for each pane through which it is visible, and one for the sky without panes."""
 
 from dataclasses import dataclass, field
 from typing import ClassVar
@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 
 from vobench.geometry.triangle import areas_m2
-from vobench.rendering.array_types import Floats
+from vobench.rendering.array_types import Floats, Mask
 from vobench.rendering.cosine_sampling import cosine_weighted
 from vobench.rendering.emitter import Aim, Emitter, Occluder, sphere_width_rad
 from vobench.rendering.geometry import (
@@ -28,7 +28,10 @@ from vobench.scene.material import fresnel
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkyPane(Emitter):
-    """The sky through one pane. Rays that cross another such pane behind it do not count, so that none counts twice."""
+    """The sky through one pane. Light that also crosses another such pane belongs to the pane that is farther away.
+
+    `face` is the rectangle of the pane, None if it has another shape.
+    """
 
     sky: ClassVar[str] = "pane"
     light: Sky
@@ -38,44 +41,50 @@ class SkyPane(Emitter):
     face: Rectangle | None
 
     def towards(self, texels: Texels) -> Aim:
-        """Places uniform over the solid angle of the pane, or over its area if it is not a rectangle."""
+        """Places that are uniform over the solid angle of the pane, or over its area if it is not a rectangle."""
         places = self._places(texels)
-        follows = self._followed()
+        has_pane_behind, has_pane_in_front = self._other_panes()
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             vectors_m, steradian = places(a, b)
             direction = vectors_m / lengths(vectors_m)[:, None]
-            strength = steradian * self._luminance(texels.points_m + vectors_m, direction, follows)
+            is_to_front = direction @ self.pane.normal > 0
+            may_cross_other = np.where(is_to_front, has_pane_in_front, has_pane_behind)
+            luminance_cd_m2 = self._luminance_cd_m2(texels.points_m + vectors_m, direction, may_cross_other)
+            strength = steradian * luminance_cd_m2
             return (FAR_M * direction).astype(np.float32), strength.astype(np.float32)
 
         return aim
 
-    def _luminance(self, places_m: Floats, directions: Floats, follows: tuple[bool, bool]) -> Floats:
-        """The luminance (P,) seen through places (P, 3) of the pane, 0 where another pane of the sky follows."""
-        luminance = self.light.luminance_cd_m2(directions) * self.visibility.pane_passes(self.pane, directions)
-        is_outward = directions @ self.pane.normal > 0
-        doubtful = np.flatnonzero(np.where(is_outward, follows[1], follows[0]))
-        beyond_m = places_m[doubtful] + 2 * RAY_OFFSET_M * directions[doubtful]
-        luminance[doubtful] *= ~self.visibility.crosses_sky_pane(beyond_m, FAR_M * directions[doubtful])
-        return luminance
+    def _luminance_cd_m2(self, places_m: Floats, directions: Floats, may_cross_other: Mask) -> Floats:
+        """The luminance (P,) of the sky through places (P, 3) of the pane; 0 if another such pane is beyond it.
+
+        Only rays that may cross another pane (P,) are tested for it.
+        """
+        transmitted = self.visibility.pane_passes(self.pane, directions)
+        luminance_cd_m2 = self.light.luminance_cd_m2(directions) * transmitted
+        rows = np.flatnonzero(may_cross_other)
+        beyond_m = places_m[rows] + 2 * RAY_OFFSET_M * directions[rows]
+        luminance_cd_m2[rows] *= ~self.visibility.crosses_sky_pane(beyond_m, FAR_M * directions[rows])
+        return luminance_cd_m2
 
     def width_rad(self, points_m: Floats) -> Floats:
         """The width of its bounding sphere."""
         return sphere_width_rad(self.ball, points_m)
 
     def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
-        """What passes opaque faces, and the panes in front of this one."""
+        """The share (R,) of light that is not blocked, and that panes between the points and this pane transmit."""
         share = occluder.clear(origins_m, segments_m).astype(np.float32)
         rays = np.flatnonzero(share)
         start_m = origins_m[rays]
-        ahead_m = segments_m[rays]
-        reach = -self.pane.height_m(start_m) / (ahead_m @ self.pane.normal)
-        short_of_pane = ((1 - 1e-4) * reach[:, None]).astype(np.float32)
-        share[rays] *= occluder.through_panes(start_m, ahead_m * short_of_pane)
+        ray_m = segments_m[rays]
+        pane_at = -self.pane.height_m(start_m) / (ray_m @ self.pane.normal)  # in lengths of the segment
+        before_pane = ((1 - 1e-4) * pane_at[:, None]).astype(np.float32)
+        share[rays] *= occluder.through_panes(start_m, ray_m * before_pane)
         return share
 
     def _places(self, texels: Texels) -> Aim:
-        """A function that gives vectors to places on the pane, and the solid angle in sr that each stands for."""
+        """A function that returns vectors to places on the pane, and the solid angle in sr that each represents."""
         if self.face is not None:
             angle = SolidAngle(SeenRectangle(self.face, texels.points_m))
             return lambda a, b: (angle.vectors_m(a, b), angle.steradian)
@@ -89,16 +98,21 @@ class SkyPane(Emitter):
 
         return by_area
 
-    def _followed(self) -> tuple[bool, bool]:
+    def _other_panes(self) -> tuple[bool, bool]:
         """Whether another pane that shows the sky extends behind this one, and whether one extends in front of it."""
         heights_m = [self.pane.height_m(other.corners_m).ravel() for other in self.visibility.sky_panes]
         height_m = np.concatenate(heights_m)
-        return bool((height_m < -RAY_OFFSET_M).any()), bool((height_m > RAY_OFFSET_M).any())
+        has_pane_behind = bool((height_m < -RAY_OFFSET_M).any())
+        has_pane_in_front = bool((height_m > RAY_OFFSET_M).any())
+        return has_pane_behind, has_pane_in_front
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OpenSky(Emitter):
-    """The sky that no pane covers: rays in the hemisphere above each point. tables: what coats of each index let in."""
+    """The sky without panes, sampled in the hemisphere above each point.
+
+    `tables` are the tables of `_sky_table` by the refractive index of the coat; they are computed when they are needed.
+    """
 
     sky: ClassVar[str] = "open"
     light: Sky
@@ -107,13 +121,13 @@ class OpenSky(Emitter):
     tables: dict[float, Floats] = field(default_factory=dict, repr=False)
 
     def towards(self, texels: Texels) -> Aim:
-        """Cosine-weighted directions."""
+        """Cosine-distributed directions."""
         around = cosine_weighted(texels.normals)
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
             direction = around(a, b)
             luminance_cd_m2 = self.light.luminance_cd_m2(direction)
-            # Divided by the cosine, in proportion to which the directions are sampled.
+            # The strength is divided by the cosine, because the directions are sampled in proportion to it.
             cosine = np.einsum("ij,ij->i", direction, texels.normals)
             strength = np.pi * luminance_cd_m2 / np.maximum(cosine, 1e-6)
             return FAR_M * direction, strength.astype(np.float32)
@@ -125,14 +139,14 @@ class OpenSky(Emitter):
         return np.full(len(points_m), np.sqrt(2 * np.pi), np.float32)
 
     def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
-        """What passes opaque faces and panes, without panes that are emitters themselves."""
+        """The share (R,) of light that faces and panes transmit; 0 through panes that are emitters themselves."""
         share = occluder.passing(origins_m, segments_m)
         rays = np.flatnonzero(share)
         share[rays] *= ~self.visibility.crosses_sky_pane(origins_m[rays], segments_m[rays])
         return share
 
     def unshadowed_light(self, texels: Texels) -> Floats:
-        """By a table of normals; NaN where the normal of the shape is not that of its flat face."""
+        """The illuminance (P,), read from a table by the normal; NaN where the normal is not that of the flat face."""
         light = np.full(len(texels), np.nan, np.float32)
         is_flat = np.einsum("ij,ij->i", texels.normals, texels.planes) > FLAT
         for eta in np.unique(texels.eta):
@@ -141,23 +155,26 @@ class OpenSky(Emitter):
         return light
 
     def _table(self, eta: float) -> Floats:
-        """The light by normal that enters a coat of a refractive index, 0 without a coat; computed once."""
+        """The table of `_sky_table` for a refractive index, which is computed once."""
         if eta not in self.tables:
             self.tables[eta] = _sky_table(self.light, eta)
         return self.tables[eta]
 
 
-FLAT = 1 - 1e-5  # cosine of a normal of the shape to that of its face, from which the face alone limits the sky
-TABLE_STEPS = 32  # of normals, from pole to pole; twice as many around
-SKY_DIRECTIONS = 4096
+FLAT = 1 - 1e-5  # the smallest cosine of a normal to that of its flat face, for which the table is valid
+TABLE_STEPS = 32  # the number of steps of the tilt in the table; the angle around the vertical has twice as many
+SKY_DIRECTIONS = 4096  # the number of directions over which the light of the sky is summed
 GOLDEN_RAD = np.pi * (3 - np.sqrt(5))
 
 
 def _sky_table(sky: Sky, eta: float) -> Floats:
-    """Illuminance (TABLE_STEPS + 1, 2 TABLE_STEPS + 1) that enters a face under the whole sky, by its normal."""
-    nth = np.arange(SKY_DIRECTIONS)
-    height = 1 - (2 * nth + 1) / SKY_DIRECTIONS
-    directions = _by_height(height, nth * GOLDEN_RAD)  # Fibonacci's lattice
+    """The illuminance (TABLE_STEPS + 1, 2 TABLE_STEPS + 1) of faces by the whole sky, by their normals.
+
+    Under a coat, it is the light that enters the coat. `eta` is the refractive index of the coat, 0 without a coat.
+    """
+    number = np.arange(SKY_DIRECTIONS)
+    height = 1 - (2 * number + 1) / SKY_DIRECTIONS
+    directions = _by_height(height, number * GOLDEN_RAD)  # a Fibonacci lattice
     sent = sky.luminance_cd_m2(directions) * 4 * np.pi / SKY_DIRECTIONS
     table_normals = _table_directions()
     table = np.empty(table_normals.shape[:2])
@@ -169,13 +186,13 @@ def _sky_table(sky: Sky, eta: float) -> Floats:
 
 
 def _by_height(height: Floats, turn_rad: Floats) -> Floats:
-    """Unit vectors (..., 3) by their height and the angle around the vertical (...)."""
+    """The unit vectors (..., 3) with a height (...) and an angle (...) around the vertical."""
     level = np.sqrt(np.maximum(1 - height**2, 0))
     return np.stack([level * np.cos(turn_rad), level * np.sin(turn_rad), height], -1)
 
 
 def _table_directions() -> Floats:
-    """The directions (TABLE_STEPS + 1, 2 TABLE_STEPS + 1, 3) that the entries of a table stand for."""
+    """The normals (TABLE_STEPS + 1, 2 TABLE_STEPS + 1, 3) of the entries of a table."""
     tilt_rad = np.linspace(0, np.pi, TABLE_STEPS + 1)
     turn_rad = np.linspace(-np.pi, np.pi, 2 * TABLE_STEPS + 1)
     tilt, turn = np.meshgrid(tilt_rad, turn_rad, indexing="ij")
@@ -183,7 +200,7 @@ def _table_directions() -> Floats:
 
 
 def _read_by_normal(table: Floats, normals: Floats) -> Floats:
-    """Values (P,) of a table of tilts and turns at normals (P, 3), interpolated linearly."""
+    """The values (P,) of a table at normals (P, 3), interpolated linearly."""
     tilt = np.arccos(np.clip(normals[:, 2], -1, 1)) / np.pi * TABLE_STEPS
     turn = (np.arctan2(normals[:, 1], normals[:, 0]) / np.pi + 1) * TABLE_STEPS
     return np.asarray(scipy.ndimage.map_coordinates(table, [tilt, turn], order=1))
@@ -195,5 +212,5 @@ def sky_pane(light: Sky, pane: PlanarPatch, visibility: Visibility) -> SkyPane:
 
 
 def open_sky(light: Sky, visibility: Visibility) -> OpenSky:
-    """The emitter of the sky that no pane covers."""
+    """The emitter of the sky without panes."""
     return OpenSky(light, visibility, BoundingSphere(np.zeros(3), np.inf))

@@ -1,4 +1,4 @@
-"""Rectangles as seen from points: places spread evenly over their solid angle, and the light that they give."""
+"""Rectangles as seen from points: their projected solid angle, and places that sample their solid angle uniformly."""
 
 import math
 from dataclasses import dataclass
@@ -10,14 +10,14 @@ from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats
 from vobench.rendering.compiled import compiled
 
-FILLED = 1e-4  # share by which triangles may miss the rectangle that they fill
-FLAT = 1e-6  # difference of a normal from that of its plane
-LEVEL_M = 1e-6  # a point nearer than this to a rectangle's plane sees none of it
+FILLED = 1e-4  # the relative tolerance with which triangles fill a rectangle
+FLAT = 1e-6  # the largest difference of a normal from that of its flat face
+LEVEL_M = 1e-6  # a point that is nearer than this to the plane of a rectangle sees none of it
 
 
 @dataclass(frozen=True, slots=True)
 class Rectangle:
-    """A corner, two edges at right angles and the normal edge_u × edge_v (3,) of a rectangle."""
+    """A rectangle: a corner, two perpendicular edges, and the unit normal (3,), in the direction of edge_u × edge_v."""
 
     corner_m: Array
     edge_u_m: Array
@@ -26,14 +26,16 @@ class Rectangle:
 
 
 def rectangle(corners_m: Array) -> Rectangle | None:
-    """The rectangle that triangles (K, 3, 3) fill between them, if they do."""
+    """The rectangle that triangles (K, 3, 3) fill together; None if they do not fill one."""
     first, second, third = corners_m[0]
     normal = unit(np.cross(second - first, third - first))
     edges = np.roll(corners_m[0], -1, axis=0) - corners_m[0]
-    square = np.abs([edges[i] @ edges[i - 1] for i in range(3)]).argmin()  # the corner with the right angle
-    u_axis = unit(edges[square])
+    corner_cosines = np.abs([edges[corner] @ edges[corner - 1] for corner in range(3)])
+    right_angled = corner_cosines.argmin()
+    u_axis = unit(edges[right_angled])
     v_axis = np.cross(normal, u_axis)
 
+    # The triangles fill their bounding box in this frame if they are flat and have its area.
     local_m = (corners_m - first) @ np.stack([u_axis, v_axis, normal]).T
     low_m = local_m.min((0, 1))
     size_m = np.ptp(local_m, axis=(0, 1))
@@ -42,23 +44,23 @@ def rectangle(corners_m: Array) -> Rectangle | None:
     doubled_areas = np.cross(first_edge_m, second_edge_m)[:, 2]
     area_m2 = doubled_areas.sum() / 2
     box_area_m2 = size_m[0] * size_m[1]
-    is_thick = size_m[2] > FILLED * size_m.max()
     tolerance_m2 = FILLED * size_m[0] * size_m[1]
+    is_thick = size_m[2] > FILLED * size_m.max()
     if is_thick or abs(area_m2 - box_area_m2) > tolerance_m2:
         return None
     corner_m = first + low_m[0] * u_axis + low_m[1] * v_axis
     return Rectangle(corner_m, size_m[0] * u_axis, size_m[1] * v_axis, normal)
 
 
-# Columns of the table of a rectangle as it is seen from points: its edges in its own frame, how far ahead its plane is,
-# and the direction of its normal, 1 away from the point and -1 towards it.
+# The columns of `SeenRectangle.table`, in a frame with its origin at the point and axes along the edges: the limits of
+# the rectangle along x and y, the distance of its plane, and 1 or -1 if its normal points away from or to the point.
 X0 = 0
 Y0 = 1
 X1 = 2
 Y1 = 3
 DEPTH = 4
 AHEAD = 5
-# Columns of the table of its solid angle, named as in the source of `SolidAngle`.
+# The columns of the table of `SolidAngle`. K, B0 and B1 are named as in its source.
 STERADIAN = 0
 K = 1
 B0 = 2
@@ -66,7 +68,13 @@ B1 = 3
 
 
 class SeenRectangle:
-    """A rectangle in the frame of its edges, as seen from points (P, 3). `is_before` (P,): it faces the point."""
+    """A rectangle as seen from points (P, 3).
+
+    `is_before` (P,) is whether the rectangle faces the point.
+    `is_seen` (P,) is whether the point is not in the plane of the rectangle.
+    `axes` (3, 3) are the unit vectors along its edges and its normal.
+    `table` (P, 6) has the columns X0, Y0, X1, Y1, DEPTH and AHEAD.
+    """
 
     def __init__(self, face: Rectangle, points_m: Floats) -> None:
         width_m = float(np.linalg.norm(face.edge_u_m))
@@ -79,9 +87,11 @@ class SeenRectangle:
         self.is_seen = np.abs(height_m) > LEVEL_M
 
     def projected_sr(self, normals: Floats, planes: Floats) -> Floats:
-        """Its solid angle (P,) weighted by the cosine to normals (P, 3), of the part before the planes (P, 3).
+        """The solid angle (P,) of the rectangle, weighted by the cosine to the normals (P, 3) of points.
 
-        NaN where it is only in part before both and these differ.
+        Only the part above the planes counts that are perpendicular to the normals (P, 3) of the flat faces, `planes`.
+        NaN if the rectangle is partly below one of the planes that are perpendicular to `normals` and `planes`, and
+        these differ.
         """
         result = np.empty(len(self.table))
         _project(self.table, self.axes, normals, planes, result)
@@ -113,7 +123,7 @@ def _see(
 
 @compiled
 def _local(axes: Floats, ahead: float, vector: Floats) -> tuple[float, float, float]:
-    """The parts of a vector along the edges and ahead."""
+    """The components of a vector along the two edges, and in the direction from the point to the rectangle."""
     x = np.float64(vector[0])
     y = np.float64(vector[1])
     z = np.float64(vector[2])
@@ -125,7 +135,7 @@ def _local(axes: Floats, ahead: float, vector: Floats) -> tuple[float, float, fl
 
 @compiled
 def _lowest(seen: Floats, normal: tuple[float, float, float]) -> float:
-    """The height of the lowest corner over the plane through the point that has a normal."""
+    """The height of the lowest corner above the plane through the point with a normal."""
     along_x = min(normal[0] * seen[X0], normal[0] * seen[X1])
     along_y = min(normal[1] * seen[Y0], normal[1] * seen[Y1])
     lowest: float = along_x + along_y + normal[2] * seen[DEPTH]
@@ -147,10 +157,10 @@ def _project(table: Floats, axes: Floats, normals: Floats, planes: Floats, resul
 
 @compiled
 def _whole_sr(seen: Floats, normal: tuple[float, float, float]) -> float:
-    """The weighted solid angle of a rectangle that is above the horizon.
+    """The cosine-weighted solid angle of a rectangle that is completely above the horizon.
 
-    Half the sum over the edges of the angle that each is seen under, times the normal of the plane through it and the
-    point. Source: Lambert, Photometria, 1760.
+    It is half the dot product of the normal and a sum over the edges. The term of an edge is the angle that the edge
+    subtends, times the unit normal of the plane through the edge and the point. Source: Lambert, Photometria, 1760.
     """
     depth = seen[DEPTH]
     near_y_m = math.hypot(depth, seen[Y0])
@@ -170,7 +180,11 @@ def _whole_sr(seen: Floats, normal: tuple[float, float, float]) -> float:
 
 @compiled
 def _cut_sr(seen: Floats, normal: tuple[float, float, float]) -> float:
-    """The weighted solid angle of the part above the plane through the point with a normal."""
+    """The cosine-weighted solid angle of the part of a rectangle above the plane through the point with a normal.
+
+    Each edge is clipped at the plane. The part is closed by the edge from the place where the outline leaves the upper
+    half-space to the place where it enters it again.
+    """
     depth = seen[DEPTH]
     corners = (
         (seen[X0], seen[Y0], depth),
@@ -226,7 +240,7 @@ def _edge_term(
     end: tuple[float, float, float],
     normal: tuple[float, float, float],
 ) -> float:
-    """The angle between two vectors, times the cosine of a normal to that of the plane through both."""
+    """The angle between two vectors, times the cosine between a normal and the normal of the plane through both."""
     across = (
         start[1] * end[2] - start[2] * end[1],
         start[2] * end[0] - start[0] * end[2],
@@ -238,10 +252,9 @@ def _edge_term(
 
 
 class SolidAngle:
-    """A rectangle as seen from points, and places on it spread evenly over its solid angle `steradian` (P,).
+    """Uniform sampling of the solid angle `steradian` (P,) of a rectangle as seen from points.
 
-    Names are those of the source: Ureña, Fajardo, King (2013), An area-preserving parametrization for spherical
-    rectangles.
+    Source, also of the names: Ureña, Fajardo, King (2013), An area-preserving parametrization for spherical rectangles.
     """
 
     def __init__(self, seen: SeenRectangle) -> None:
@@ -251,7 +264,7 @@ class SolidAngle:
         self.steradian = np.where(seen.is_seen, self._table[:, STERADIAN], 0)
 
     def vectors_m(self, a: Floats, b: Floats) -> Floats:
-        """Vectors (P, 3) float32 to places on the rectangle, by two numbers (P,) in [0, 1) each."""
+        """The vectors (P, 3) float32 to places on the rectangle, given two random numbers (P,) in [0, 1)."""
         result = np.empty((len(self._table), 3), np.float32)
         _aim(self._seen.table, self._seen.axes, self._table, a, b, result)
         return result
@@ -275,7 +288,7 @@ def _span(table: Floats, angles: Floats) -> None:
 
 @compiled
 def _angle(a: float, b: float) -> float:
-    """The inner angle of a spherical rectangle between sides whose normals have these z."""
+    """The inner angle of a spherical rectangle between two sides, given the z of their normals."""
     return math.acos(min(max(-a * b, -1.0), 1.0))
 
 

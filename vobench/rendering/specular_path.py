@@ -1,4 +1,4 @@
-"""Rays that are followed by mirrors, coats and panes until they end at a face that scatters light."""
+"""Rays that are reflected by mirrors, coats and panes until they end at a face that scatters light."""
 
 from dataclasses import dataclass
 
@@ -19,10 +19,10 @@ from vobench.scene.triangles import Triangles
 
 @dataclass(frozen=True, slots=True)
 class FollowedRays:
-    """What became of the rays of a batch after one more segment.
+    """The rays of a batch after one more segment.
 
-    ends: those that ended at surfels or lamps. onward: those that continue from a mirror, a coat or a pane. escaped:
-    those that met nothing.
+    `ends` are those that ended at surfels or lamps, `onward` those that a mirror, a coat or a pane reflected, and
+    `escaped` those that met nothing. A ray can end at a surfel and be reflected, too.
     """
 
     ends: RayEnds
@@ -33,8 +33,8 @@ class FollowedRays:
 class SpecularTracer:
     """Follows rays through the stationary part of a scene.
 
-    surfel_of (H·W,): the surfel of each texel, -1 for none. lamp_column: the column of the table for the first lamp,
-    negative if lamps do not count.
+    `surfel_of` (H·W,) is the surfel of each texel, -1 for none.
+    `lamp_column` is the column of the result for the first lamp, negative if the light of lamps is not counted.
     """
 
     def __init__(
@@ -62,9 +62,10 @@ class SpecularTracer:
         *,
         is_first: bool,
     ) -> FollowedRays:
-        """Follow rays to the next face that is not a pane. The weights in the batch lose what panes absorb and reflect.
+        """Follow rays to the next face that is not a pane. In the batch, weights are reduced by panes on the way.
 
-        dither (P, 2): the random numbers of points. is_first: whether the rays come from the points themselves.
+        `dither` (P, 2) are the random numbers of points.
+        `is_first` is whether the rays come from the points themselves.
         """
         hits = self._visibility.opaque.one_sided_hits(batch.origins_m, batch.directions)
         from_panes = self._reflected_by_panes(batch, hits, dither)
@@ -82,9 +83,9 @@ class SpecularTracer:
         return FollowedRays(ends.take(slice(end_count)), onward, batch.take(escaped[:escaped_count]))
 
     def _reflected_by_panes(self, batch: RayBatch, hits: Hits, dither: Floats) -> RayBatch:
-        """The rays that the first pane before a hit reflects. The weights in the batch lose what panes do not transmit.
+        """The rays that the first pane before each hit reflects. In the batch, weights are reduced by all panes.
 
-        A lamp that a reflected ray meets is not direct light.
+        The light of a lamp that a reflected ray meets is not direct light.
         """
         reach_m = np.where(hits.face < 0, FAR_M, hits.distance)
         rays, panes = self._visibility.first_panes(batch.origins_m, batch.directions, reach_m)
@@ -110,7 +111,7 @@ class SpecularTracer:
 
 
 def face_table(faces: Triangles, atlas: Atlas, visibility: Visibility, response: Response) -> Faces:
-    """The properties (F + 1,) of faces that the kernels of rays read, the last entry for no face."""
+    """The properties (F + 1,) of faces that compiled kernels read. The last entry is for no face."""
     table = np.zeros(len(faces) + 1, FACE)
     table["normal"] = visibility.normals
     table["light_px"][:-1] = atlas.light_px
@@ -121,7 +122,7 @@ def face_table(faces: Triangles, atlas: Atlas, visibility: Visibility, response:
 
 
 def hemisphere_rays(points: Texels, side: int) -> RayBatch:
-    """Side x side cosine-weighted rays from each point; their weights are the shares that enter its coat."""
+    """Side x side cosine-distributed rays from each point. The weight of a ray is the share that enters the coat."""
     count = len(points) * side**2
     origins_m = np.empty((count, 3), np.float32)
     directions = np.empty((count, 3), np.float32)

@@ -1,4 +1,4 @@
-"""The stationary part of a scene: which of its faces show light, how densely it is sampled, and at which points."""
+"""The stationary part of a scene: the points at which its light is computed."""
 
 from dataclasses import dataclass
 
@@ -9,9 +9,10 @@ from vobench.geometry.triangle import areas_m2
 from vobench.rendering.array_types import Floats, Indices, Mask
 from vobench.rendering.atlas import Atlas
 from vobench.rendering.baked_scene import BakedScene, BakeSettings
+from vobench.rendering.face_parts import FaceParts
 from vobench.rendering.geometry import are_panes, face_materials
 from vobench.rendering.key_time import key_times_ns
-from vobench.rendering.sun_tiles import FaceParts, sunlit_parts
+from vobench.rendering.sun_tiles import sunlit_parts
 from vobench.rendering.texel import Texels, texel_areas_m2, texels
 from vobench.rendering.texel_layout import TexelLayout
 from vobench.rendering.texel_owner import owners
@@ -20,16 +21,17 @@ from vobench.scene.light import Sun
 from vobench.scene.scene import Scene, triangles
 from vobench.scene.triangles import Triangles
 
-MOVER_COARSER = 2  # times the distance between samples on movers
-SUNLIT_FINER = 2  # the penumbra of the sun is 1 cm wide for each metre to what casts it
-SAMPLES = 4_000_000  # of light, by default: what a bake of minutes takes
+MOVER_COARSER = 2  # the factor of the distance between samples on movers
+SUNLIT_FINER = 2  # the divisor of this distance near shadows of the sun, whose penumbra is 1 cm per metre of distance
+SAMPLES = 4_000_000  # the largest number of samples if no distance is requested, for a bake of some minutes
 
 
 @dataclass(frozen=True, slots=True)
 class StaticScene:
-    """The stationary part of a scene: faces for rays, and points whose light is computed.
+    """The stationary part of a scene: the faces that rays can hit, and the points whose light is computed.
 
-    cells (P,): the surfel of each point. open_sky (P,): whether it may see the sky other than through a pane.
+    `cells` (P,) is the surfel of each point.
+    `open_sky` (P,) is whether the sky may be visible from a point without a pane in front of it.
     """
 
     faces: Triangles
@@ -42,7 +44,7 @@ class StaticScene:
 
 
 def bodies(scene: Scene, faces: Triangles) -> Mask:
-    """Which faces (F,) have a body, so that they show light."""
+    """Whether each face (F,) has a body, and therefore shows light."""
     materials = face_materials(faces, scene.materials)
     is_body = [material is not None and material.kind == "body" for material in materials]
     return np.array(is_body, bool)[faces.thing]
@@ -51,7 +53,7 @@ def bodies(scene: Scene, faces: Triangles) -> Mask:
 def sampled_faces(scene: Scene, settings: BakeSettings) -> tuple[FaceParts, Triangles, Array]:
     """The parts of a scene's faces, the table (T,) of these parts, and the distance (T,) in m between samples on each.
 
-    Faces are divided so that samples are dense only near the edges of the sun's shadows.
+    Faces are divided so that samples are dense only near the edges of shadows of the sun.
     """
     faces = triangles(scene)
     directions = []
@@ -71,16 +73,16 @@ def sampled_faces(scene: Scene, settings: BakeSettings) -> tuple[FaceParts, Tria
 
 
 def _requested_spacing_m(faces: Triangles, settings: BakeSettings) -> Array:
-    """The distance (F,) between samples that the thing of each face requests, or else that of the settings."""
+    """The distance (F,) between samples on each face: the one that its thing requests, or that of the settings."""
     by_thing_m = [thing.spacing_m or settings.spacing_m for thing in faces.things]
     return np.array(by_thing_m)[faces.thing]
 
 
 def spacings_m(scene: Scene, faces: Triangles, settings: BakeSettings, is_fine: Mask) -> Array:
-    """The distance (F,) in m between samples on each face: what its thing requests, less on fine faces, more on movers.
+    """The distance (F,) in m between samples on each face. It is smaller on fine faces (F,) and larger on movers.
 
-    is_fine (F,): the fine faces. Where nothing is requested, the distance grows with the scene, so that the number of
-    samples is at most SAMPLES.
+    On the faces of things that request no distance, it grows with the size of the scene, so that the number of samples
+    is at most SAMPLES.
     """
     static_factor = np.where(is_fine, 1 / SUNLIT_FINER, 1.0)
     factor = np.where(faces.mover < 0, static_factor, MOVER_COARSER)
@@ -99,7 +101,7 @@ def static_points(
     atlas: Atlas,
     seed: int,
 ) -> tuple[Visibility, Texels, TexelLayout, Floats]:
-    """The stationary part of a scene: faces for rays, points, their layout, and the area (P,) of each in m²."""
+    """The stationary faces, the points on them, their layout, and the area (P,) in m² that each point represents."""
     is_static = faces.mover < 0
     visibility = Visibility(faces, scene.materials, np.flatnonzero(is_static))
     owner = owners(atlas)

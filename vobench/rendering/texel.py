@@ -1,4 +1,4 @@
-"""Texels: the points of a scene that its light is computed at, and those of them that lie inside things."""
+"""Texels: the points of a scene at which its light is computed."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -18,20 +18,29 @@ from vobench.rendering.visibility import Visibility
 from vobench.scene.material import Material, fresnel
 from vobench.scene.triangles import Triangles
 
-TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))  # of rays that search a way out
-PULLED_M = 1e-3  # points at a chart's rim lie so far inwards, where they see past the neighbour
-FACING = 0.1  # cosine to its flat face from which a normal of the shape counts
-# of faces that touch: cosine to an axis, how deep in the thing they are looked for
+PULLED_M = 1e-3  # points at the edge of a chart are moved inwards by this, so that adjacent faces do not hide all
+FACING = 0.1  # the smallest cosine between an interpolated normal and that of the flat face; a smaller one is not used
+
+# The rays that test whether a point is inside a thing: the components of their directions along both tangents, if the
+# component along the normal is 1.
+TILTS = ((0.0, 0.0), (1.0, 0.4), (-1.0, -0.3), (0.3, -1.0), (-0.4, 1.0))
+
+# Two faces touch if their normals are along an axis, by this cosine, and one is within this distance behind the other.
 ALIGNED = 0.999
 CONTACT_M = 4e-4
 
 
 @dataclass(frozen=True, slots=True)
 class Texels:
-    """P points: position, normal of the shape and of the flat face, steps to the next along u and v, all (P, 3).
+    """P points, one for each texel of the light map that shows light.
 
-    A step is 0 where the texel lies at a rim. index (P,) is flat in the map, face (P,) in the table, uv (P, 2) its
-    place there; eta (P,) of the coat, 0 for none; dither (P, 2) in [0, 1) turns each point's pattern of rays.
+    `points_m` (P, 3) are their positions.
+    `normals` (P, 3) are interpolated between the corners of faces, `planes` (P, 3) are those of the flat faces.
+    `step_u_m`, `step_v_m` (P, 3) lead to the next texels along u and v. They are 0 at the edge of a chart.
+    `index` (P,) is the index of the texel in the flat map.
+    `face` (P,) is the face that the point is on, `uv` (P, 2) are the weights of its second and third corner there.
+    `eta` (P,) is the refractive index of the coat, 0 without a coat.
+    `dither` (P, 2) are random numbers in [0, 1), by which the patterns of rays of points differ.
     """
 
     points_m: Floats
@@ -51,14 +60,14 @@ class Texels:
     take = take
 
     def entering(self, cosine: Floats) -> Floats:
-        """Share (..., P) of light that arrives at a cosine (..., P) and passes the coat, 1 where there is none."""
+        """The share (..., P) of light at a cosine of incidence (..., P) that enters the coat; 1 without a coat."""
         share = np.ones(cosine.shape, np.float32)
         coated = np.flatnonzero(self.eta)
         share[..., coated] -= fresnel(cosine[..., coated], self.eta[coated]).astype(np.float32)
         return share
 
     def cosine(self, directions: Floats) -> Floats:
-        """Cosine (..., P) of the angle between each normal and a vector (..., P, 3), 0 from behind the face."""
+        """The cosine (..., P) between each normal and a vector (..., P, 3); 0 for vectors from behind the face."""
         is_before = np.einsum("...ij,ij->...i", directions, self.planes) > 0
         along_normal = np.einsum("...ij,ij->...i", directions, self.normals)
         return np.asarray(is_before * along_normal / lengths(directions))
@@ -74,7 +83,10 @@ def texels(
     seed: int,
     visibility: Visibility | None = None,
 ) -> tuple[Texels, TexelLayout]:
-    """The points of those among the faces (F,) that light can show on; with a visibility those that lie in no thing."""
+    """The points on the faces in the mask `among` (F,), and their layout on the light map.
+
+    With a visibility, points inside things and points that are covered by another face are omitted.
+    """
     index = claimed(owner, among)
     beside = neighbours(index, atlas, owner)
     points = _placed(faces, materials, atlas, owner, index=index, beside=beside, seed=seed)
@@ -106,9 +118,10 @@ def texel_areas_m2(
     owner: Owners,
     among: Mask,
 ) -> Floats:
-    """The area (H·W,) that each texel of those among the faces (F,) stands for: together that of all faces.
+    """The area (H·W,) that each texel of the faces in the mask `among` (F,) represents; 0 for all other texels.
 
-    A texel at a rim that reaches beyond its face stands for less than it covers, by the same factor in all of a chart.
+    Texels at the edge of a chart extend beyond their faces. The areas of all texels of a chart are therefore scaled by
+    a common factor, so that their sum is the area of its faces.
     """
     face_areas_m2 = areas_m2(faces.corners_m)
     face_areas_px2 = np.abs(doubled_areas_px2(atlas.light_px.astype(float))) / 2
@@ -135,7 +148,7 @@ def _placed(
     beside: Indices,
     seed: int,
 ) -> Texels:
-    """The points at flat indices (P,) of the map, whose neighbours (4, P) are known, slightly off their faces."""
+    """The points of the texels at flat indices (P,), slightly off their faces. `beside` (4, P) are their neighbours."""
     face = owner.face[index]
     points_m = np.empty((len(index), 3), np.float32)
     normals = np.empty_like(points_m)
@@ -164,8 +177,8 @@ def _placed(
         steps_v_m[part] = step_v_m
 
     in_chunks(place, len(index))
-    kinds = face_materials(faces, materials)
-    etas = np.array([kind.eta if kind and kind.is_coated else 0.0 for kind in kinds], np.float32)
+    thing_materials = face_materials(faces, materials)
+    thing_eta = np.array([kind.eta if kind and kind.is_coated else 0.0 for kind in thing_materials], np.float32)
     dither = np.random.default_rng([seed, 1]).random((atlas.height * atlas.width, 2), dtype=np.float32)
     return Texels(
         points_m,
@@ -176,20 +189,23 @@ def _placed(
         index,
         face,
         owner.uv[index],
-        etas[faces.thing[face]],
+        thing_eta[faces.thing[face]],
         dither[index],
     )
 
 
 def _inwards_m(step_u_m: Array, step_v_m: Array, is_missing: Mask) -> Array:
-    """How far points (P, 3) move from a chart's rim, where neighbours (4, P) on four sides are missing."""
+    """The vectors (P, 3) that move points inwards from the edge of a chart, where neighbours (4, P) are missing."""
     along_u = (is_missing[0] * 1.0 - is_missing[1])[:, None] * unit(step_u_m)
     along_v = (is_missing[2] * 1.0 - is_missing[3])[:, None] * unit(step_v_m)
     return np.asarray(PULLED_M * (along_u + along_v))
 
 
 def _steps_m(corners_m: Array, places: Array) -> tuple[Array, Array]:
-    """What one texel along u and v is (F, 3) on faces with corners (F, 3, 3) and places (F, 3, 2)."""
+    """The vectors (F, 3) on each face that correspond to one texel along u and along v.
+
+    `corners_m` (F, 3, 3) are the corners of the faces, `places` (F, 3, 2) their places on the map in texels.
+    """
     first_u, first_v = places[:, 1].T - places[:, 0].T
     second_u, second_v = places[:, 2].T - places[:, 0].T
     area = doubled_areas_px2(places)
@@ -202,7 +218,7 @@ def _steps_m(corners_m: Array, places: Array) -> tuple[Array, Array]:
 
 
 def _sees_only_backs(points: Texels, visibility: Visibility) -> Mask:
-    """Which points (P,) see only backs of faces, as does the floor under a crate."""
+    """Whether a point (P,) is inside a thing, like the floor under a crate: all rays from it hit backs of faces."""
     is_inside = np.ones(len(points), bool)
     for tilt_u, tilt_v in TILTS:
         rows = np.flatnonzero(is_inside)
@@ -217,15 +233,15 @@ def _sees_only_backs(points: Texels, visibility: Visibility) -> Mask:
 
 
 def _touches_other_face(points: Texels, visibility: Visibility) -> Mask:
-    """Which points (P,) lie on a face that looks the other way, as does the bottom of a crate on the floor.
+    """Whether another face touches the face of a point (P,), as the floor touches the bottom of a crate.
 
-    Only where both look along an axis. Raised off their face they are beyond the other, outside in the sky for all
-    that rays tell.
+    Rays from these points do not find this, because the points are raised above their face and are already beyond the
+    other one. Only faces whose normals are along an axis are tested.
     """
     is_touching = np.zeros(len(points), bool)
     solid = visibility.opaque.solid
     for axis, is_positive in np.ndindex(3, 2):
-        sign = 2 * is_positive - 1
+        sign = 1 if is_positive else -1
         rows = np.flatnonzero(sign * points.planes[:, axis] > ALIGNED)
         opposite = solid[sign * visibility.faces.plane[solid, axis] < -ALIGNED]
         if len(rows) and len(opposite):

@@ -1,4 +1,4 @@
-"""The layout of texels on the light map: their neighbours, what fills the rest of the map, interpolation, smoothing."""
+"""The layout of points on the light map: their neighbours, the texels that show their light, grids and smoothing."""
 
 from dataclasses import dataclass
 
@@ -12,24 +12,24 @@ from vobench.rendering.texel_owner import Owners
 from vobench.rendering.thread_pool import chunked
 from vobench.rendering.visibility import Visibility
 
-STRAIGHT = np.cos(np.deg2rad(1.5))  # between texels that lie in one plane
-CREASE = np.cos(
-    np.deg2rad(30)
-)  # between the normals of texels, across which light is neither smoothed nor interpolated
-BLURS = 2
-WIDEST_M = 0.22  # between points of a grid; light changes over such distances
-STRIDES = (4, 2)  # of the grids of texels at which light is computed first
+STRAIGHT = np.cos(np.deg2rad(1.5))  # the smallest cosine between the normals of neighbours that are in one plane
+# Light is neither smoothed nor interpolated between neighbours with a smaller cosine between their normals.
+CREASE = np.cos(np.deg2rad(30))
+BLURS = 2  # the number of passes of the blur
+WIDEST_M = 0.22  # the largest distance between the points of a grid, because light changes over such distances
+STRIDES = (4, 2)  # the grids at which light is computed first have every fourth and every second texel
 
 
 @dataclass(frozen=True, slots=True)
 class TexelLayout:
-    """How P points lie on a map of a height and width.
+    """The layout of P points on a light map (height, width).
 
-    source (H·W,) is the point that each texel takes its value from, P for none: texels beside a face are read by
-    interpolation, and those inside things have the light of the nearest of their chart, so that no darkness reaches
-    out. neighbours (4, P) are the points left, right, above and below in the same chart, the point itself for none.
-    Texels on both sides of a crease, as on top and side of a board, count as being in two charts.
-    grids (N, P): which points are on the grid of each of STRIDES; the last points of rows and columns of a chart are.
+    `source` (H·W,) is the point whose value each texel shows, P for none. Texels beside a face have a source, because
+    interpolation reads them. Texels inside things show the nearest point of their chart, so that no darkness leaks out.
+    `neighbours` (4, P) are the points to the left, to the right, above and below in the same chart. A point that has no
+    neighbour on a side is its own neighbour. There are no neighbours across a crease, such as the edge of a board.
+    `grids` (N, P) is whether a point is on the grid of each of STRIDES. The points at the ends of the rows and columns
+    of a chart are on all grids.
     """
 
     height: int
@@ -39,17 +39,20 @@ class TexelLayout:
     grids: Mask
 
     def on_grid(self, rows: Rows, stride: int) -> Rows:
-        """Those of the points at rows (N,) that are on the grid of a stride, which is 1 or one of STRIDES."""
-        return rows if stride == 1 else rows[self.grids[STRIDES.index(stride), rows]]
+        """The points among the rows (N,) that are on the grid of a stride, which is 1 or one of STRIDES."""
+        if stride == 1:
+            return rows
+        is_on_grid: Mask = self.grids[STRIDES.index(stride)]
+        return np.asarray(rows[is_on_grid[rows]])
 
     def filled(self, values: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Values (P, ...) as a map (H, W, ...)."""
-        no_value = np.zeros((1, *values.shape[1:]), values.dtype)  # of the point P
+        """The map (H, W, ...) that shows the values (P, ...) of points; 0 in texels without a source."""
+        no_value = np.zeros((1, *values.shape[1:]), values.dtype)  # of the source P
         padded = np.concatenate([values, no_value])
         return padded[self.source].reshape(self.height, self.width, *values.shape[1:])
 
     def dilated(self, marked: Mask, *, steps: int) -> Mask:
-        """Points (P,) that so many steps from texel to texel lead to from a marked one."""
+        """Whether a point (P,) is within this number of steps between neighbours from a marked point (P,)."""
         for _ in range(steps):
             result = np.empty_like(marked)
             dilate(marked, self.neighbours, result)
@@ -57,11 +60,14 @@ class TexelLayout:
         return marked
 
     def blurred(self, values: Floats) -> Floats:
-        """Values (P,) smoothed by about one texel, each chart by itself."""
+        """The values (P,) smoothed by about one texel, within each chart."""
         return _blurred(values.astype(np.float32), self.neighbours)
 
     def blurred_among(self, values: Floats, rows: Rows, counts: Mask) -> Floats:
-        """Values (N,) of the points at rows smoothed as by `blurred`, of those of them alone that count (N,)."""
+        """The values (N,) of the points at rows (N,), smoothed as by `blurred`.
+
+        Only the points for which `counts` (N,) is true contribute.
+        """
         place = np.full(len(values), -1, np.int32)
         place[rows] = np.arange(len(rows))
         beside = place[self.neighbours[:, rows]]
@@ -72,7 +78,7 @@ class TexelLayout:
 
 
 def _blurred(values: Floats, beside: Indices) -> Floats:
-    """Values (P,) float32 smoothed by about one texel, among neighbours (4, P)."""
+    """The values (P,) float32 smoothed by about one texel, given the neighbours (4, P) of points."""
     left, right, above, below = beside
     for _ in range(BLURS):
         along_row = np.empty_like(values)
@@ -83,7 +89,10 @@ def _blurred(values: Floats, beside: Indices) -> Floats:
 
 
 def neighbours(index: Rows, atlas: Atlas, owner: Owners) -> Indices:
-    """The points (4, P) left, right, above and below of those at flat indices (P,) in the same chart, else itself."""
+    """The neighbours (4, P) of the points at flat indices (P,): left, right, above and below in the same chart.
+
+    A point without a neighbour on a side is its own neighbour.
+    """
     point_at = np.full(atlas.height * atlas.width, -1, np.int32)
     point_at[index] = np.arange(len(index))
     chart = atlas.chart[owner.face[index]]
@@ -111,10 +120,10 @@ def texel_layout(
     owner: Owners,
     visibility: Visibility | None,
 ) -> tuple[TexelLayout, Mask]:
-    """The layout of the valid ones (P,) among points (A,), and which of their neighbours (4, P) lie in one plane.
+    """The layout of the P valid points among A points, and whether each neighbour (4, P) is in the plane of its point.
 
-    index (A,), beside (4, A) and is_valid (A,) are of all points; points_m, normals of the shape and planes (P, 3) of
-    the valid ones.
+    `index` (A,), `beside` (4, A) and `is_valid` (A,) are the flat indices, the neighbours and the validity of all
+    points. `points_m`, `normals` and `planes` (P, 3) are those of the valid points.
     """
     count = len(points_m)
     new_index = np.where(is_valid, np.cumsum(is_valid) - 1, -1)
@@ -134,10 +143,10 @@ def texel_layout(
 
 
 def _read_points(index: Rows, atlas: Atlas, owner: Owners) -> Rows:
-    """The point (H·W,) that each texel takes its value from, of those at flat indices (P,); P for none."""
+    """The point (H·W,) whose value each texel shows, given the flat indices (P,) of points; P for none."""
     point = np.full(atlas.height * atlas.width, len(index))
     point[index] = np.arange(len(index))
-    # A texel beside a face reads the one that the nearest place of the face lies in.
+    # A texel beside a face shows the point of the texel that contains the nearest place of the face.
     read = np.flatnonzero((owner.face >= 0) & (point == len(index)))
     uv = owner.uv[read]
     corner_weights = np.column_stack([1 - uv.sum(1), uv])
@@ -152,13 +161,13 @@ def _in_plane(
     beside: Indices,
     visibility: Visibility | None,
 ) -> Mask:
-    """Whether points (P, 3) lie in one plane with their neighbours (4, P), which no wall hides from them."""
+    """Whether points (P, 3) are in one plane with their neighbours (4, P), and nothing is between them."""
     is_other = beside != np.arange(len(points_m))
     cosine = np.einsum("nij,ij->ni", planes[beside], planes)
     in_plane: Mask = is_other & (cosine > STRAIGHT)
     if visibility is None:
         return in_plane
-    # A texel that reaches behind a thin wall has its light from its middle alone.
+    # If a neighbour is behind a thin wall, the light of a texel is that of its middle only.
     opaque = visibility.opaque
     for first, second in ((0, 1), (2, 3)):
         neighbour = beside[second]
@@ -173,10 +182,10 @@ def _in_plane(
 
 
 def _grids(index: Rows, points_m: Floats, beside: Indices, width: int) -> Mask:
-    """Which points (P, 3) are on the grid of each of STRIDES (N, P): every so many along rows and columns.
+    """Whether points (P, 3) are on the grid of each of STRIDES (N, P): every stride-th along rows and columns.
 
-    At rims, where a row or a column ends, its last point is, too. Where points of a grid would be more than WIDEST_M
-    apart, the next finer one stands for it.
+    The last point of a row or a column is on the grid, too. Where the points of a grid would be more than WIDEST_M
+    apart, the next finer grid is used instead.
     """
     at_rim = beside == np.arange(len(index), dtype=np.int32)
     row, column = np.divmod(index, width)
@@ -195,7 +204,10 @@ def _grids(index: Rows, points_m: Floats, beside: Indices, width: int) -> Mask:
 
 
 def _nearest_valid(beside: Indices, is_valid: Mask) -> Rows:
-    """For each point (P,) itself if valid, else the nearest valid one by steps within its chart, or itself."""
+    """The valid point (P,) that is nearest to each point, by steps between neighbours (4, P).
+
+    A valid point is nearest to itself. A point without a valid one in its chart is returned itself.
+    """
     nearest = np.arange(len(is_valid))
     candidate = np.full(len(is_valid), -1)
     is_known = is_valid.copy()

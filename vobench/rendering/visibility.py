@@ -1,4 +1,4 @@
-"""How much light passes between two points of a scene, through panes and past opaque faces."""
+"""How much light passes between two points of a scene: opaque faces block it, and panes reduce it."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -23,15 +23,22 @@ from vobench.rendering.shadow_kernels import meet_boxes
 from vobench.scene.material import Material, pane_reflectance
 from vobench.scene.triangles import Triangles
 
-MOST_PANES = 16  # crossed by one ray
-WIDE_M2 = 0.05  # of mirrors that show lamps and of panes that show the sky
-BOX_MARGIN_M = 0.01  # around panes
-MOST_BOXES = 48  # around panes; where there are more, one box around all is tested
-SKY_PROBES = 512  # rays to each side of a pane that tell whether the sky is seen through it
+MOST_PANES = 16  # the largest number of panes that a ray crosses
+WIDE_M2 = 0.05  # the smallest area of mirrors that show lamps, and of panes that show the sky
+BOX_MARGIN_M = 0.01  # the margin of the boxes around panes
+MOST_BOXES = 48  # if there are more boxes around panes, one box around all of them is used instead
+SKY_PROBES = 512  # the number of rays to each side of a pane that test whether the sky is visible through it
 
 
 class Visibility:
-    """Opaque faces and panes of a table, of those `among` (K,) names. Cut-outs count as solid."""
+    """The opaque faces and the panes among the given rows (K,) of a table. Cut-outs count as solid.
+
+    `faces` is the table. `normals` (F + 1, 3) are those of its faces, the last entry for no face.
+    `opaque` casts rays at the opaque faces.
+    `is_pane` (F,) and `is_static` (F,) are whether a face is a pane, and whether it is among the rows.
+    `mirrors` are the smooth, flat mirrors, each with its tint and a caster of rays at it.
+    `sky_panes` are the panes through which the sky is visible.
+    """
 
     def __init__(
         self,
@@ -48,7 +55,7 @@ class Visibility:
         is_smooth_mirror = (kind == "mirror") & (roughness == 0)
 
         self.faces = faces
-        normals = np.append(faces.plane, np.zeros((1, 3)), 0)  # the last one for the face -1
+        normals = np.append(faces.plane, np.zeros((1, 3)), 0)
         self.normals = normals.astype(np.float32)
         self._eta = _by_face(faces, materials_of, lambda material: material.eta, 1.0)
         self._tint = tint.astype(np.float32)
@@ -67,7 +74,7 @@ class Visibility:
         self._sky_panes = RayCaster(faces, sky_pane_faces)
 
     def _mirrors(self, rows: Indices) -> list[tuple[PlanarPatch, float, RayCaster]]:
-        """Mirrors that show lamps as sharp as they are, with their tints. Coats mirror too, but faintly."""
+        """The mirrors that show sharp images of lamps, with their tints. Coats, which reflect little, are omitted."""
         mirrors = []
         for patch in planar_patches(self.faces, rows, at_least_m2=WIDE_M2):
             tint = float(self._tint[patch.faces[0]])
@@ -75,7 +82,7 @@ class Visibility:
         return mirrors
 
     def _panes_before_sky(self, rows: Indices) -> list[PlanarPatch]:
-        """Panes that the sky is seen through, which are lamps of their own; of a pane's two sides one."""
+        """One side of each pane through which the sky is visible. These panes are treated as lamps."""
         panes = list[PlanarPatch]()
         for pane in planar_patches(self.faces, rows, at_least_m2=WIDE_M2):
             is_back = any(pane.coincides(other) for other in panes)
@@ -84,7 +91,7 @@ class Visibility:
         return panes
 
     def passing(self, origins_m: Floats, segments_m: Floats) -> Floats:
-        """Share (R,) of light that comes from origins + segments (R, 3) to the origins (R, 3)."""
+        """The share (R,) of light that reaches origins (R, 3) from origins + segments (R, 3)."""
         share = (~self.opaque.stops(origins_m, segments_m)).astype(np.float32)
         if self._has_panes:
             rays = self._near_panes(origins_m, segments_m)
@@ -93,7 +100,7 @@ class Visibility:
         return share
 
     def _near_panes(self, origins_m: Floats, segments_m: Floats) -> Rows:
-        """The rays from origins along segments (R, 3) that meet the box of a pane; all others cross none."""
+        """The rays from origins along segments (R, 3) that meet the box of a pane. Other rays cross no pane."""
         is_near = np.empty(len(origins_m), bool)
         origins = np.ascontiguousarray(origins_m, np.float32)
         segments = np.ascontiguousarray(segments_m, np.float32)
@@ -105,7 +112,7 @@ class Visibility:
         return ~self.opaque.stops(origins_m, segments_m)
 
     def pane_passes(self, pane: PlanarPatch, directions: Floats) -> Floats:
-        """Share (R,) that one pane lets through along unit directions (R, 3)."""
+        """The share (R,) of light that a pane transmits along unit directions (R, 3)."""
         face = pane.faces[0]
         reflected = pane_reflectance(directions @ pane.normal, float(self._eta[face]))
         return np.asarray(self._tint[face] * (1 - reflected))
@@ -117,9 +124,9 @@ class Visibility:
         return self._sky_panes.stops(origins_m, segments_m)
 
     def first_panes(self, origins_m: Floats, directions: Floats, reach_m: Floats) -> tuple[Rows, Hits]:
-        """Which rays (R, 3) cross a pane (K,) within their reach, and where they meet their first.
+        """The rays (K,) that cross a pane within their reach (R,), and their hits with the first one.
 
-        reach_m (R,) is in lengths of the direction, as are the hits.
+        Reach and distances of hits are in lengths of the directions (R, 3).
         """
         if not self._has_panes:
             none = np.zeros(0, np.int64)
@@ -132,39 +139,42 @@ class Visibility:
         return rays, self._glass.facing(hits.take(met), directions[rays])
 
     def pane_mirrors(self, panes: Indices, cosine: Floats) -> Floats:
-        """Share (R,) that panes, given by their faces (R,), reflect at cosines (R,)."""
+        """The reflectance (R,) of the panes with faces (R,) at cosines of incidence (R,)."""
         return pane_reflectance(cosine, self._eta[panes]).astype(np.float32)
 
     def through_panes(self, origins_m: Floats, segments_m: Floats) -> Floats:
-        """Share (R,) that all panes between origins and origins + segments (R, 3) let through."""
+        """The share (R,) of light that all panes between origins and origins + segments (R, 3) transmit."""
         share = np.ones(len(origins_m), np.float32)
         if not self._has_panes:
             return share
         rays = self._near_panes(origins_m, segments_m)
         rays = rays[self._glass.stops(origins_m[rays], segments_m[rays])]
-        travelled = np.zeros(len(rays), np.float32)  # share of the segment
+        travelled = np.zeros(len(rays), np.float32)  # the share of the segment behind each ray
         for _ in range(MOST_PANES):
             if not len(rays):
                 break
-            ahead = segments_m[rays] * (1 - travelled)[:, None]
+            # The next pane of each ray. Rays without one are complete.
+            rest_m = segments_m[rays] * (1 - travelled)[:, None]
             start_m = origins_m[rays] + segments_m[rays] * travelled[:, None]
-            hits = self._glass.hits(start_m, ahead)
+            hits = self._glass.hits(start_m, rest_m)
             crossing = np.flatnonzero((hits.face >= 0) & (hits.distance < 1))
             rays = rays[crossing]
             pane = hits.face[crossing]
-            ahead = ahead[crossing]
-            length_m = lengths(ahead)
-            cosine = np.einsum("ij,ij->i", ahead, self.normals[pane]) / length_m
+            rest_m = rest_m[crossing]
+            travelled = travelled[crossing]
+
+            length_m = lengths(rest_m)
+            cosine = np.einsum("ij,ij->i", rest_m, self.normals[pane]) / length_m
             reflected = pane_reflectance(cosine, self._eta[pane])
-            passed = (1 - reflected).astype(np.float32)
-            share[rays] *= self._tint[pane] * passed
+            share[rays] *= self._tint[pane] * (1 - reflected).astype(np.float32)
+
+            # The ray continues slightly behind the pane.
             step = hits.distance[crossing] + RAY_OFFSET_M / length_m
-            before = travelled[crossing]
-            travelled = (before + (1 - before) * step).astype(np.float32)
+            travelled = (travelled + (1 - travelled) * step).astype(np.float32)
         return share
 
     def _sees_sky(self, pane: PlanarPatch) -> bool:
-        """Whether any of fixed rays, half to each side, leaves the scene without another pane."""
+        """Whether any of SKY_PROBES rays to each side of a pane leaves the scene without meeting another pane."""
         a, b, tilt, turn = np.random.default_rng(0).random((4, SKY_PROBES))
         u_axis = unit(pane.corners_m[0, 1] - pane.corners_m[0, 0])
         v_axis = np.cross(pane.normal, u_axis)
@@ -176,13 +186,14 @@ class Visibility:
         points_m = np.tile(sample_points(pane.corners_m, a, b), (2, 1))
         origins_m = points_m + RAY_OFFSET_M * directions
         segments_m = FAR_M * directions
-        is_walled = self.opaque.stops(origins_m, segments_m)
-        is_blocked = is_walled | self._glass.stops(origins_m, segments_m)
+        meets_opaque = self.opaque.stops(origins_m, segments_m)
+        meets_pane = self._glass.stops(origins_m, segments_m)
+        is_blocked = meets_opaque | meets_pane
         return not is_blocked.all()
 
 
 def _boxes(faces: Triangles, rows: Indices) -> Floats:
-    """Boxes (K, 2, 3) float32 around the faces at rows, one for each plane of each thing, slightly enlarged."""
+    """Slightly enlarged boxes (K, 2, 3) float32 around the faces at rows, one for each plane of each thing."""
     patches = planar_patches(faces, rows)
     corners_m = [[patch.corners_m.min((0, 1)), patch.corners_m.max((0, 1))] for patch in patches]
     boxes_m = np.array(corners_m).reshape(-1, 2, 3)
@@ -196,7 +207,7 @@ def _boxes(faces: Triangles, rows: Indices) -> Floats:
 
 
 def _around(boxes_m: Floats) -> Floats:
-    """The box (2, 3) around boxes (K, 2, 3); one that no segment meets if there are none."""
+    """The box (2, 3) around boxes (K, 2, 3). Without boxes it is a point that no segment meets."""
     if not len(boxes_m):
         return np.full((2, 3), FAR_M, np.float32)
     return np.stack([boxes_m[:, 0].min(0), boxes_m[:, 1].max(0)])
@@ -208,6 +219,6 @@ def _by_face(
     read: Callable[[Material], Any],
     default: Any,
 ) -> NDArray[Any]:
-    """A property (F,) of each face's material, by the materials of a table's things; the default where one is None."""
+    """A property (F,) of the material of each face, given the materials of things; the default if there is none."""
     values = [read(material) if material else default for material in materials_of]
     return np.array(values)[faces.thing]
