@@ -74,7 +74,9 @@ def bake(
     smoothing = Smoothing(spread[points.index[groups.middle]])
 
     # Direct light, and the light that mirroring faces pass on.
-    open_sky = (spread @ rounds.escaped)[points.index] > 0
+    # Where the sky is seen through a small opening only, the rays of some surfels miss it.
+    escaped_around = smoothing.averaged(rounds.escaped[:, None])[:, 0]
+    open_sky = (spread @ escaped_around)[points.index] > 0
     static = StaticScene(faces, visibility, atlas, points, layout, groups.of, open_sky)
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
     reflectors = Reflectors(gatherer, points, point_areas_m2, settings.seed)

@@ -28,6 +28,11 @@ GENTLE = 0.2  # the visible share on a coarse grid is smoothed if it differs by 
 # Unshadowed light is interpolated if its relative difference between neighbours is less than UNEVEN, and if it differs
 # by less than BEND from the mean of its neighbours, which is four times the error of the interpolation. It is always
 # computed where the normal differs by more than BENT from that of the flat face.
+FAINT_SHARE = 0.3  # share of the open sky up to which more rays are cast
+FAINT_SIDES = 4  # how many times as many rays along each side
+FAINT_STEPS = 8  # steps of the coarsest grid from a point that saw the sky to those that may have missed it
+# Shares below these are smoothed so many times more: the smaller a share is, the fewer of its rays see the sky.
+SMOOTHINGS_OF_FAINT = ((FAINT_SHARE, 2), (0.1, 4), (0.02, 16))
 UNEVEN = 0.1
 BEND = 0.004
 BENT = 1e-4
@@ -139,6 +144,8 @@ class Receivers:
         share.set(rows, first_share)
         partly_hidden = rows[(low < 1) & (high > 0)]
         self._compute_share(share, emitter, partly_hidden, RayGrid(side, is_spread=True), coarsest)
+        if emitter.sky == "open":
+            self._compute_faint_share(share, emitter, rows, FAINT_SIDES * side)
 
         finer_grid = RayGrid(max(3 * side // 4, 1), is_spread=True)
         for stride, tolerance in zip(FINER_STRIDES, STEEP, strict=True):
@@ -146,6 +153,23 @@ class Receivers:
             steep = share.refine(rows, stride=stride, tolerance=tolerance)
             self._compute_share(share, emitter, steep, finer_grid, stride)
         return share.values
+
+    def _compute_faint_share(self, share: TexelField, emitter: Emitter, rows: Rows, side: int) -> None:
+        """Compute again, with side x side rays, a small share of the sky, as that seen through an opening far away.
+
+        A few rays find such an opening or miss it. The sky is so bright that this would be seen as stains.
+        """
+        coarsest = STRIDES[0]
+        _, high = share.extremes(rows, steps=coarsest)
+        _, high_around = share.extremes(rows, steps=FAINT_STEPS * coarsest)
+        is_faint = (high_around > 0) & (high < FAINT_SHARE)
+        faint = rows[is_faint]
+        values, _ = self._shares(emitter, faint, RayGrid(side, is_spread=True), coarsest)
+        share.set(faint, values)
+        for greatest_share, smoothings in SMOOTHINGS_OF_FAINT:
+            fainter = faint[share.values[faint] < greatest_share]
+            for _ in range(smoothings):
+                share.smooth(fainter, steps=coarsest)
 
     def _compute_share(self, share: TexelField, emitter: Emitter, rows: Rows, grid: RayGrid, stride: int) -> None:
         """Set the visible share of an emitter's light at the rows (N,), smoothed where it is partly hidden.

@@ -110,7 +110,7 @@ class FrameRenderer:
 
         is_stationary = faces.mover < 0
         with_glints = sorted({part.light for part in self._lamp_parts})
-        lamp_faces = np.flatnonzero(np.isin(faces.lamp[is_stationary], with_glints))
+        lamp_faces = np.flatnonzero(np.isin(faces.lamp[is_stationary], with_glints)).astype(np.int32)
         return room_probe(draw, faces.corners_m[is_stationary], lamp_faces, ambient_cd_m2)
 
     def _strip(
