@@ -15,7 +15,7 @@ from vobench.suite.lookup import Lookup
 from vobench.suite.scenario import Scenario, Setup, read_scenario
 from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_spec import SceneFile
-from vobench.suite.spread import UNIT_AXES, Dealer, Unit, units
+from vobench.suite.spread import UNIT_AXES, Dealer, Unit, UnitAxis, units
 from vobench.suite.suite_case import Axes, check_buildable, scene_lights, shared_settings
 from vobench.suite.suite_spec import Suite
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
@@ -26,8 +26,8 @@ from vobench.suite.yaml_source import Mistakes
 class ScenarioCases:
     """Reads the cases of the scenarios of a suite, and collects mistakes.
 
-    `axes` are those of the suite, over whose scenes and trajectories scenarios can be spread, and `replayed` the poses
-    of the trajectories that are replayed.
+    `axes` are those of the suite. Scenarios can be spread over its scenes and trajectories.
+    `replayed` are the poses of the trajectories that are replayed, as TUM text by the name of the trajectory.
     `scenes` caches the scenes with a scenario's changes, because scenarios can share them.
     """
 
@@ -43,21 +43,27 @@ class ScenarioCases:
         cases = list[Case]()
         dealer = self._dealer()
         for name, severities in (self.suite.scenarios or {}).items():
+            distinct_severities = list(dict.fromkeys(severities))
             with self.mistakes.at("scenarios", name):
-                path = self.lookup.find("scenario", name).path
-                scenario = read_scenario(path)
-                if scenario.name in (self.suite.trajectories or {}):
-                    raise SuiteError("a trajectory of the suite has this name, too; rename it")
-                distinct = list(dict.fromkeys(severities))
-                if dealer and scenario.suits_any_place:
-                    cases += self._in_units(read_scenario(path, self._base()), distinct, dealer)
-                    continue
-                for severity in distinct:
-                    cases += self._at_severity(scenario, severity)
+                for case in self._of_scenario(name, distinct_severities, dealer):
+                    cases.append(case)  # also those before a mistake
         return cases
 
+    def _of_scenario(self, name: str, severities: Sequence[int], dealer: Dealer | None) -> Iterator[Case]:
+        """The cases of a scenario: in its units if it is spread, or else in its own place. Raises VobenchError."""
+        path = self.lookup.find("scenario", name).path
+        scenario = read_scenario(path)
+        if scenario.name in (self.suite.trajectories or {}):
+            raise SuiteError("a trajectory of the suite has this name, too; rename it")
+        if dealer and scenario.suits_any_place:
+            with_base_of_suite = read_scenario(path, self._base())
+            yield from self._in_units(with_base_of_suite, severities, dealer)
+            return
+        for severity in severities:
+            yield from self._at_severity(scenario, severity)
+
     def _dealer(self) -> Dealer | None:
-        """What deals units to scenarios; None if the suite does not spread them, or has mistakes."""
+        """The dealer that assigns units to scenarios; None if the suite does not spread them, or has mistakes."""
         spread = self.suite.spread
         if spread is None or not self.suite.scenarios or self.mistakes.recorded:
             return None
@@ -69,47 +75,51 @@ class ScenarioCases:
         return None
 
     def _base(self) -> dict[str, Any]:
-        """The rig and the camera of the suite as they are written, which replace those of a scenario's base."""
-        written = self.mistakes.source.plain
+        """The rig and the camera in the file of the suite, which replace those of a scenario's base."""
+        content = self.mistakes.source.plain
         base = dict[str, Any]()
-        for key, name in {"rigs": "rig", "cameras": "camera"}.items():
-            for variant in (written.get(key) or {}).values():
-                base[name] = variant
+        for section, key in (("rigs", "rig"), ("cameras", "camera")):
+            for variant in (content.get(section) or {}).values():
+                base[key] = variant
         return base
 
     def _in_units(self, scenario: Scenario, severities: Sequence[int], dealer: Dealer) -> Iterator[Case]:
-        """The cases of a scenario in its units; severities share units, so that they differ by severity alone."""
+        """The cases of a scenario in its units. All severities have the same units, so that they can be compared."""
         runs = sum(len(self._calibration_levels(severity)) for severity in severities)
         chosen = dealer.deal(runs)
         self._require_free_mounts(scenario, chosen)
         for severity in severities:
-            setup = scenario.setups[severity]
+            rig = scenario.setups[severity].rig
             for unit in chosen:
-                by_axis: dict[str, str] = {
-                    axis: unit.by_axis.get(axis) or next(iter(self.axes[axis])) for axis in UNIT_AXES
-                }
-                trajectory = self.axes["trajectory"][by_axis["trajectory"]]
+                scene_name = self._variant(unit, "scene")
+                trajectory_name = self._variant(unit, "trajectory")
+                trajectory = self.axes["trajectory"][trajectory_name]
+                variant = scenario.variant_names(severity, scene_name)
                 yield from self._cases(
                     scenario,
                     severity,
-                    scene=self.axes["scene"][by_axis["scene"]],
+                    scene=self.axes["scene"][scene_name],
                     trajectory=trajectory,
-                    replayed=self.replayed.get(by_axis["trajectory"]),
-                    variant={**scenario.variant_names(severity, by_axis["scene"]), **by_axis},
-                    rig=setup.rig.read(self._folder_of_rig(scenario)).mounted_on(trajectory),
+                    replayed=self.replayed.get(trajectory_name),
+                    variant={**variant, "scene": scene_name, "trajectory": trajectory_name},
+                    rig=rig.read(self._folder_of_rig(scenario)).mounted_on(trajectory),
                     unit=unit.name,
                 )
+
+    def _variant(self, unit: Unit, axis: UnitAxis) -> str:
+        """The variant of a unit on an axis. An axis over which nothing is spread has only one."""
+        return unit.by_axis.get(axis) or next(iter(self.axes[axis]))
 
     def _require_free_mounts(self, scenario: Scenario, chosen: Sequence[Unit]) -> None:
         """Raise SuiteError if a trajectory mounts the cameras where only the severities of a scenario should."""
         varied = scenario.varied_rig_keys
         for unit in chosen:
-            name = unit.by_axis.get("trajectory") or next(iter(self.axes["trajectory"]))
+            name = self._variant(unit, "trajectory")
             trajectory = self.axes["trajectory"][name]
-            mounted = trajectory.mount.replaced if trajectory.mount else {}
-            both = varied & set(mounted)
-            if both:
-                keys = ", ".join(sorted(both))
+            mounted_keys = trajectory.mount.replaced if trajectory.mount else {}
+            conflicting = varied & set(mounted_keys)
+            if conflicting:
+                keys = ", ".join(sorted(conflicting))
                 raise SuiteError(
                     f"its severities change {keys} of the rig, which the mount of trajectory '{name}' sets"
                 )
