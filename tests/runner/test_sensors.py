@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vobench.runner.motion import body_motion
-from vobench.runner.sensors import SensorFeed, _felt, wheel_error_m
+from vobench.runner.sensors import SensorFeed, _imu_readings, wheel_error_m
 from vobench.sensor.timing import Timing
 from vobench.suite.suite import read_plan
 
@@ -77,7 +77,7 @@ def test_every_reading_up_to_the_last_picture_comes_once_and_in_order_of_time(ca
 def test_a_late_imu_has_the_same_readings_that_much_later(case, delay_ms):
     it = case()
     late = replace(it, camera=replace(it.camera, timing=Timing(imu_delay_ms=delay_ms)))
-    (told, bias), (was, _) = (_felt(each, body_motion(each)) for each in (late, it))
+    (told, bias), (was, _) = (_imu_readings(each, body_motion(each)) for each in (late, it))
     np.testing.assert_array_equal(told.t_ns - was.t_ns, round(delay_ms * 1e6))
     np.testing.assert_array_equal(bias.t_ns, told.t_ns)
     np.testing.assert_array_equal(told.gyro_radps, was.gyro_radps)
@@ -92,7 +92,7 @@ def test_the_noise_of_an_imu_is_the_same_whatever_it_rides_on(case):
         way = f"kind: circle, radius_m: 0.5, laps: 0.2, slip: {slip}"
         for imu in ("{like: adis16448, gyro: {step: 0}, accel: {step: 0}}", "exact"):
             it = case(way, imu)
-            errors.append(_felt(it, body_motion(it)))
+            errors.append(_imu_readings(it, body_motion(it)))
     (real, bias), (true, _), (other, its_bias), (its_true, _) = errors
     assert np.abs(true.gyro_radps - its_true.gyro_radps).max() > 1e-3
     np.testing.assert_array_equal(bias.gyro_radps, its_bias.gyro_radps)
@@ -106,7 +106,7 @@ def test_the_noise_of_an_imu_is_the_same_whatever_it_rides_on(case):
 def test_every_error_of_an_imu_draws_by_itself(case):
     way = "kind: circle, radius_m: 0.5, laps: 0.5, slip: none"
     unrounded, exact = (case(way, imu) for imu in ("{like: adis16448, gyro: {step: 0}, accel: {step: 0}}", "exact"))
-    (real, bias), (true, _) = (_felt(it, body_motion(it)) for it in (unrounded, exact))
+    (real, bias), (true, _) = (_imu_readings(it, body_motion(it)) for it in (unrounded, exact))
     white = [getattr(real, key) - getattr(true, key) - getattr(bias, key) for key in ("gyro_radps", "accel_mps2")]
     walk = [np.diff(getattr(bias, key), axis=0) for key in ("gyro_radps", "accel_mps2")]
     drawn = np.stack([draws[: len(walk[0])].ravel() for draws in (*white, *walk)])

@@ -1,4 +1,4 @@
-"""Whether two trajectories are of one motion, by whether their short motions agree better now than at other times."""
+"""Whether two trajectories describe the same motion: their short motions agree better than those at other times."""
 
 import numpy as np
 
@@ -6,18 +6,18 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.trajectory.align import align
 
-WINDOWS = 50  # short motions that a recording is divided into
+WINDOWS = 50  # the number of short motions into which a recording is divided
 MIN_WINDOWS = 20
-SHIFTS = 15  # by which motions are shifted in time, evenly over the recording
-TINY = 1e-300
+SHIFTS = 15  # the number of shifts in time, which are distributed evenly over the recording
+TINY = 1e-300  # avoids a division by zero
 
 
 def motion_disagreement(T_gt: Array, T_est: Array) -> float | None:
-    """How much matched poses (K, 4, 4) disagree in their short motions, relative to motions shifted in time.
+    """The disagreement of the short motions of matched poses (K, 4, 4), relative to that of motions shifted in time.
 
-    0 for the same motion up to scale and world, about 1 for motions that have nothing to do with each other; None if
-    there are too few poses. It is the smaller one of the disagreements in rotation and in length: on a straight road,
-    or at a constant speed, only one of them tells anything.
+    It is 0 for the same motion, except for its scale and world frame, and about 1 for unrelated motions. None if there
+    are too few poses. It is the smaller one of the disagreements in rotation and in length, because on a straight road,
+    or at a constant speed, only one of them is informative.
     """
     step = max(1, len(T_gt) // WINDOWS)
     motions_gt = _motions(T_gt, step)
@@ -28,18 +28,19 @@ def motion_disagreement(T_gt: Array, T_est: Array) -> float | None:
     scale = max(align(T_est, T_gt, kind="sim3").scale, 0.0)
     lengths_gt = np.linalg.norm(motions_gt[:, :3, 3], axis=1)
     lengths_est = scale * np.linalg.norm(motions_est[:, :3, 3], axis=1)
-    now = _squared_differences(motions_gt, motions_est, lengths_gt, lengths_est)
-    shifts = np.linspace(0, len(motions_gt), SHIFTS + 2)[1:-1].astype(int)
+    unshifted = _squared_differences(motions_gt, motions_est, lengths_gt, lengths_est)
+
     shifted = []
+    shifts = np.linspace(0, len(motions_gt), SHIFTS + 2)[1:-1].astype(int)
     for shift in shifts:
-        rolled = np.roll(np.arange(len(motions_gt)), shift)
-        shifted.append(_squared_differences(motions_gt, motions_est[rolled], lengths_gt, lengths_est[rolled]))
-    at_other_times = np.median(shifted, axis=0)
-    return float(np.min(now / np.maximum(at_other_times, TINY)))
+        rows = np.roll(np.arange(len(motions_gt)), shift)
+        shifted.append(_squared_differences(motions_gt, motions_est[rows], lengths_gt, lengths_est[rows]))
+    typical = np.median(shifted, axis=0)
+    return float(np.min(unshifted / np.maximum(typical, TINY)))
 
 
 def _motions(T: Array, step: int) -> Array:
-    """The consecutive motions (W, 4, 4), each over a number of poses."""
+    """The consecutive motions (W, 4, 4), each over `step` of the poses (K, 4, 4)."""
     poses = T[::step]
     motions: Array = se3.inverse(poses[:-1]) @ poses[1:]
     return motions

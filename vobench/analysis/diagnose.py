@@ -105,22 +105,27 @@ def diagnose(gt: TrajectoryReading, est: TrajectoryReading) -> tuple[Finding, ..
             return tuple(findings)
         raise AlignmentError(f"a diagnosis needs {MIN_POSES} matched poses or more, but {len(T_gt)} match")
 
-    if min(_extent_m(T_gt), _extent_m(T_est)) > 0:
-        misfit_before = misfit(T_gt, T_est).trans
-        mismatch = find_mismatch(T_gt, T_est, gt_order=gt.order, est_order=est.order)
-        if mismatch is not None:
-            findings.append(_mismatch_finding(mismatch, gt, est))
-            T_gt = mismatch.correction.T_gt
-            T_est = mismatch.correction.T_est
-        if has_clocks and mismatch is not None and mismatch.kind == "inverse_poses":
-            findings = [finding for finding in findings if finding.fault != "time_offset"]
-            T_gt, T_est = _on_one_clock_when_inverted(mismatch, gt, unshifted, findings)
-        unrelated = _find_unrelated(T_gt, T_est, misfit_before, has_unsure_offset=_has_unsure_offset(findings))
-        if unrelated is not None:
-            units = (finding for finding in findings if finding.fault == "stamp_unit")
-            return (*units, unrelated)
-        findings += _wrong_scale(T_gt, T_est)
-        findings += _swapped_inputs(gt, est)
+    is_stationary = min(_extent_m(T_gt), _extent_m(T_est)) == 0
+    if is_stationary:
+        return tuple(findings)
+
+    misfit_before = misfit(T_gt, T_est).trans
+    mismatch = find_mismatch(T_gt, T_est, gt_order=gt.order, est_order=est.order)
+    if mismatch is not None:
+        findings.append(_mismatch_finding(mismatch, gt, est))
+        T_gt = mismatch.correction.T_gt
+        T_est = mismatch.correction.T_est
+    if has_clocks and mismatch is not None and mismatch.kind == "inverse_poses":
+        # The time offset was estimated from inverted poses, so it is estimated again.
+        findings = [finding for finding in findings if finding.fault != "time_offset"]
+        T_gt, T_est = _on_one_clock_when_inverted(mismatch, gt, unshifted, findings)
+
+    unrelated = _find_unrelated(T_gt, T_est, misfit_before, has_unsure_offset=_has_unsure_offset(findings))
+    if unrelated is not None:
+        units = (finding for finding in findings if finding.fault == "stamp_unit")
+        return (*units, unrelated)
+    findings += _wrong_scale(T_gt, T_est)
+    findings += _swapped_inputs(gt, est)
     return tuple(findings)
 
 
@@ -194,19 +199,19 @@ def _in_right_unit(reading: TrajectoryReading, other: TrajectoryReading) -> Traj
     if min(duration_ratio, step_ratio) < MAX_DURATION_RATIO:
         return reading
 
-    factors = {}
-    for unit, digits in DECIMALS_OF_UNIT.items():
-        if digits < DECIMALS_OF_UNIT[reading.unit]:
-            factors[unit] = 10 ** (DECIMALS_OF_UNIT[reading.unit] - digits)
+    digits = DECIMALS_OF_UNIT[reading.unit]
+    finer_units = {unit: other for unit, other in DECIMALS_OF_UNIT.items() if other < digits}
+    factors = {unit: 10 ** (digits - other) for unit, other in finer_units.items()}
     ratios = {unit: duration_ns / factor / other_duration_ns for unit, factor in factors.items()}
-    unit_of_best = min(ratios, key=lambda unit: abs(np.log(ratios[unit])), default=None)
-    if unit_of_best is None or not 1 / MAX_DURATION_RATIO < ratios[unit_of_best] < MAX_DURATION_RATIO:
+    best_unit = min(ratios, key=lambda unit: abs(np.log(ratios[unit])), default=None)
+    if best_unit is None or not 1 / MAX_DURATION_RATIO < ratios[best_unit] < MAX_DURATION_RATIO:
         return reading
 
-    t_ns = reading.trajectory.t_ns // factors[unit_of_best]
-    if np.any(np.diff(t_ns) <= 0):
+    t_ns = reading.trajectory.t_ns // factors[best_unit]
+    has_equal_stamps = np.any(np.diff(t_ns) <= 0)
+    if has_equal_stamps:
         return reading
-    return replace(reading, trajectory=Trajectory(t_ns, reading.trajectory.T_world_frame), unit=unit_of_best)
+    return replace(reading, trajectory=Trajectory(t_ns, reading.trajectory.T_world_frame), unit=best_unit)
 
 
 def _unit_finding(

@@ -13,13 +13,14 @@ from vobench.scene.triangles import Triangles
 from vobench.suite.free_space import downward_directions
 
 Rgb8 = NDArray[np.uint8]
-CELL_WIDTH_PX = 480  # of a plan, and of each other part of a sheet
+# The size of a plan, and of each other cell of a sheet.
+CELL_WIDTH_PX = 480
 CELL_HEIGHT_PX = 320
-PLAN_MARGIN = 0.96  # of the cell that the plan fills
-PLAN_HEIGHT_M = 2.0  # above the floor, where the plan is cut: below lamps and ceilings
+PLAN_MARGIN = 0.96  # the share of the cell that the plan fills
+PLAN_HEIGHT_M = 2.0  # the height above the floor at which the plan is cut, below lamps and ceilings
 MIN_EXTENT_M = 1e-6
-TONE_OF_UNKNOWN = 0.9  # reflectance of objects without a material
-AMBIENT = 0.35  # brightness of a vertical face relative to a horizontal one
+TONE_OF_UNKNOWN = 0.9  # the reflectance of objects without a material
+AMBIENT = 0.35  # the brightness of a vertical face relative to a horizontal one
 CIRCLE_RGB = (20, 140, 60)
 CIRCLE_WIDTH_PX = 2
 
@@ -37,7 +38,7 @@ class _PlanScale:
         self._axes = np.array([1, -1])  # rows of pixels go down
 
     def positions_m(self, pixels: Array) -> Array:
-        """Positions (N, 2) of pixels (N, 2)."""
+        """The positions (N, 2) in metres of pixels (N, 2)."""
         from_centre_m = (pixels - self._centre_px) / self.px_per_m * self._axes
         positions_m: Array = from_centre_m + self._centre_m
         return positions_m
@@ -71,7 +72,7 @@ def plan(scene: Scene, survey: SceneSurvey) -> Rgb8:
 
 
 def _shaded(scene: Scene, faces: Triangles, origins_m: Array) -> Array:
-    """The brightness (N,) of the surfaces below points (N, 3); white if there is none."""
+    """The brightness (N,) of the surfaces below points (N, 3), from 0 to 1; white without a surface."""
     hits = RayCaster(faces).hits(origins_m, downward_directions(len(origins_m)))
     is_hit = hits.face >= 0
     tone_of_material = {name: reflectance(material).mean() for name, material in scene.materials.items()}

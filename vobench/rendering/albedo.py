@@ -1,4 +1,4 @@
-"""The albedo of surfaces: the share of light that their bodies scatter, by point and colour."""
+"""The albedo of surfaces: the share of light that their bodies scatter, for each colour."""
 
 from collections.abc import Mapping
 
@@ -12,8 +12,8 @@ from vobench.rendering.texture_mean import rectangle_means
 from vobench.scene.material import Material, linear_texture, under_coat
 from vobench.scene.triangles import Triangles
 
-MOST_PX = 256  # along the side of a texture, which is finer than the distance between points
-LARGEST_ALBEDO = 0.99  # so that the sum of all bounces is finite
+MOST_PX = 256  # the largest side of a texture; it is still finer than the distance between points
+LARGEST_ALBEDO = 0.99  # limits the albedo, so that the sum of all bounces is finite
 
 
 def albedo(

@@ -16,8 +16,8 @@ from vobench.rendering.texel import Texels
 from vobench.scene.light import AreaLight
 from vobench.scene.mesh import face_corners
 
-NEAR = 2.0  # radii of a rectangle within which places are sampled by solid angle: by area they would be too uneven
-COAT_SIDE = 2  # side of the grid of places on a panel that tells how much of its light enters a coat
+NEAR = 2.0  # the distance, in radii of a rectangle, up to which it is sampled by solid angle, to reduce the noise
+COAT_SIDE = 2  # the side of the grid of places on a panel with which the share of light that enters a coat is computed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +29,7 @@ class Panel(Emitter):
     ball: BoundingSphere
 
     def towards(self, texels: Texels) -> Aim:
-        """Places uniform over its area, from near points uniform over its solid angle."""
+        """Places that are uniform over its area. For points near it, they are uniform over its solid angle."""
         distances_m = lengths(texels.points_m - self.ball.centre_m.astype(np.float32))
         near = np.flatnonzero(distances_m < NEAR * self.ball.radius_m)
         from_afar = self._by_area(texels)
@@ -49,7 +49,7 @@ class Panel(Emitter):
         return sphere_width_rad(self.ball, points_m)
 
     def unshadowed_light(self, texels: Texels) -> Floats:
-        """By Lambert's formula; NaN where the horizon of a curved shape cuts the panel."""
+        """The illuminance (P,) by Lambert's formula; NaN if the horizon of a curved surface cuts the panel."""
         seen = SeenRectangle(self.face, texels.points_m)
         projected_sr = seen.projected_sr(texels.normals, texels.planes)
         arriving_lx = self.light.luminance_cd_m2 * projected_sr
@@ -73,7 +73,7 @@ class Panel(Emitter):
         return entering / np.maximum(arriving, np.float32(1e-30))
 
     def _by_solid_angle(self, texels: Texels) -> Aim:
-        """Places uniform over the solid angle of the panel."""
+        """Places that are uniform over the solid angle of the panel."""
         seen = SeenRectangle(self.face, texels.points_m)
         angle = SolidAngle(seen)
         arriving_lx = self.light.luminance_cd_m2 * angle.steradian
@@ -82,10 +82,10 @@ class Panel(Emitter):
         return lambda a, b: (angle.vectors_m(a, b) + lift_m, strength)
 
     def _by_area(self, texels: Texels) -> Aim:
-        """Places uniform over the area of the panel."""
+        """Places that are uniform over the area of the panel."""
         face = self.face
         area_m2 = np.linalg.norm(face.edge_u_m) * np.linalg.norm(face.edge_v_m)
-        intensity_cd = float(self.light.luminance_cd_m2 * area_m2)  # straight ahead
+        intensity_cd = float(self.light.luminance_cd_m2 * area_m2)  # along the normal
         lifted_m = face.corner_m + RAY_OFFSET_M * face.normal
         panel = (lifted_m, face.edge_u_m, face.edge_v_m, face.normal, intensity_cd)
         return _aim_by(aim_at_area, texels.points_m, panel)
@@ -95,7 +95,7 @@ class Panel(Emitter):
 class MeshPanel(Emitter):
     """A lamp of any shape, whose triangles (K, 3, 3) shine only to their front.
 
-    They are in the order of a Z-shaped curve, so that strata of random numbers are strata of the mesh.
+    The triangles are sorted along a Z-order curve, so that stratified random numbers give stratified places.
     """
 
     light: AreaLight
@@ -104,7 +104,7 @@ class MeshPanel(Emitter):
 
     @property
     def least_side(self) -> int:
-        """8, because triangles are seen under different angles."""
+        """8, because the light of a mesh is noisy: its triangles have different angles to a point."""
         return 8
 
     def towards(self, texels: Texels) -> Aim:
@@ -121,7 +121,10 @@ class MeshPanel(Emitter):
 
 
 def _aim_by(kernel: Callable[..., None], points_m: Floats, emitter: Sequence[object]) -> Aim:
-    """The aim of points (P, 3) at places that a kernel chooses on an emitter, given to it by its settings."""
+    """The function that aims at random places on an emitter from points (P, 3).
+
+    The kernel chooses the places. `emitter` are its arguments that describe the emitter.
+    """
 
     def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
         vectors_m = np.empty((len(points_m), 3), np.float32)
@@ -139,7 +142,7 @@ def panel_emitter(light: AreaLight) -> Panel | MeshPanel:
     face = rectangle(corners_m)
     if face is not None:
         return Panel(light, face, ball)
-    # In an order in which near triangles are near to one another (Morton).
+    # The triangles are sorted along a Z-order curve (Morton).
     shares = (corners_m.mean(1) - ball.centre_m) / ball.radius_m / 2 + 0.5
     along_curve = _interleaved(np.clip(shares, 0, 1 - 1e-6))
     order = np.argsort(along_curve, kind="stable")
@@ -147,7 +150,7 @@ def panel_emitter(light: AreaLight) -> Panel | MeshPanel:
 
 
 def _interleaved(shares: Floats) -> Floats:
-    """Numbers (N,) in [0, 1) whose bits are by turns those of shares (N, D) in [0, 1)."""
+    """Numbers (N,) in [0, 1) with the interleaved bits of the D shares (N, D) in [0, 1)."""
     rest = shares.astype(float)
     place = 1.0
     total = np.zeros(len(shares))

@@ -1,4 +1,4 @@
-"""The atlas: the place on the light map of each face's corners."""
+"""The atlas: the places of the corners of faces on the light map."""
 
 from dataclasses import dataclass
 
@@ -7,15 +7,17 @@ import numpy as np
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Floats, Indices, Rows
 
-CORNER_TEXELS = ((0, 0), (1, 0), (0, 1), (1, 1))  # columns and rows from the upper left of four texels
+CORNER_TEXELS = ((0, 0), (1, 0), (0, 1), (1, 1))  # the columns and rows of four texels, from the upper left one
 
 
 @dataclass(frozen=True, slots=True)
 class Atlas:
-    """Places of faces' corners on the map in texels, light_px (F, 3, 2), row 0 first; chart (F,) that each is in.
+    """The places of F faces on a light map (height, width).
 
-    Faces that have no light of their own have chart -1: those of one lamp share a block of 3 x 3 texels, and all
-    others one that stays dark. A chart's outermost texels have their middles on its outline's box.
+    `light_px` (F, 3, 2) are the columns and rows of their corners in texels.
+    `chart` (F,) is the chart of each face. It is -1 for faces that show no light: those of a lamp share a block of
+    3 x 3 texels, and all others share a block that stays dark. The outermost texels of a chart have their centres on
+    its bounding box.
     """
 
     light_px: Floats
@@ -25,12 +27,12 @@ class Atlas:
 
     @property
     def light_uv(self) -> Floats:
-        """The places (F, 3, 2) float32 in [0, 1]."""
+        """The places (F, 3, 2) float32 as fractions of the size of the map."""
         size_px = (self.width, self.height)
         return (self.light_px / size_px).astype(np.float32)
 
     def index(self, places_px: Floats) -> Rows:
-        """The flat index (R,) of the texel at places (R, 2)."""
+        """The flat index (R,) of the texel at each place (R, 2)."""
         column, row = np.floor(places_px).astype(np.int64).T
         row = np.clip(row, 0, self.height - 1)
         column = np.clip(column, 0, self.width - 1)
@@ -43,7 +45,7 @@ class Atlas:
         u: Floats,
         v: Floats,
     ) -> Floats:
-        """What a picture shows (R, ...) of a map (H, W, ...) at places of faces: between the four nearest texels."""
+        """The values (R, ...) of a map (H, W, ...) at places of faces, interpolated between the four nearest texels."""
         a, b, c = self.light_px[face].astype(float).swapaxes(0, 1)
         places_px = a + u[:, None] * (b - a) + v[:, None] * (c - a)
         upper_left, share = np.divmod(places_px - 0.5, 1)  # (R, 2) each
@@ -58,13 +60,13 @@ class Atlas:
         return total.reshape(len(share), *light.shape[2:])
 
     def block(self, face: int) -> tuple[slice, slice]:
-        """The texels that a lamp's faces share."""
+        """The block of texels that the faces of a lamp share, given one of these faces."""
         column, row = np.floor(self.light_px[face, 0]).astype(int)
         return slice(row - 1, row + 2), slice(column - 1, column + 2)
 
 
 def doubled_areas_px2(places: Array) -> Array:
-    """Twice the areas (F,) of triangles (F, 3, 2), negative where they run clockwise."""
+    """Twice the areas (F,) of triangles (F, 3, 2), negative for those that are clockwise."""
     first_x, first_y = places[:, 1].T - places[:, 0].T
     second_x, second_y = places[:, 2].T - places[:, 0].T
     return np.asarray(first_x * second_y - first_y * second_x)

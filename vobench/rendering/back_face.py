@@ -1,4 +1,4 @@
-"""Pairs of faces that lie back to back, as the two sides of a sheet."""
+"""Pairs of faces that are back to back: the two sides of a sheet."""
 
 from typing import Any
 
@@ -11,9 +11,9 @@ from vobench.scene.triangles import Triangles
 
 
 def back_faces(faces: Triangles) -> Indices:
-    """For each face (F + 1,) the one of the same thing with the same corners and the opposite normal, -1 for none.
+    """The back (F + 1,) of each face: a face of the same thing with the same corners and the opposite normal.
 
-    The last entry, -1, is that of the face -1.
+    It is -1 if there is none. The last entry, -1, is that of the face -1.
     """
     corners_m = faces.corners_m.reshape(-1, 3)
     corner_ids = _ids_of_rows(corners_m).reshape(-1, 3)
@@ -32,7 +32,7 @@ def back_faces(faces: Triangles) -> Indices:
 
 
 def _ids_of_rows(rows: NDArray[Any]) -> NDArray[np.int64]:
-    """A number (N,) for each row of (N, K); the numbers of two rows are equal if and only if the rows are."""
+    """A number (N,) for each row (N, K). The numbers of two rows are equal if and only if the rows are equal."""
     order = np.lexsort(rows.T)
     is_new = (np.diff(rows[order], axis=0) != 0).any(1)
     ids = np.zeros(len(rows), np.int64)

@@ -1,4 +1,4 @@
-"""The instants that lights are baked for: one, or several along the path of a moving sun."""
+"""The instants for which the light of lamps is baked: one, or several along the path of a moving sun."""
 
 from itertools import pairwise
 
@@ -9,7 +9,7 @@ from vobench.scene.light import Light, Sun
 from vobench.scene.scene import Scene
 from vobench.trajectory.nanoseconds import NS_PER_S
 
-SUN_STEP_RAD = np.deg2rad(3)  # between the positions of a moving sun for which indirect light is baked
+SUN_STEP_RAD = np.deg2rad(3)  # the largest angle between successive instants of a moving sun
 
 
 def moving_suns(scene: Scene) -> tuple[int, ...]:
@@ -18,7 +18,7 @@ def moving_suns(scene: Scene) -> tuple[int, ...]:
 
 
 def key_times_ns(light: Light) -> tuple[float, ...]:
-    """The instants in ns that a light is baked for: one, or for a moving sun several that are SUN_STEP_RAD apart."""
+    """The instants in ns for which a light is baked: one, or several along the path of a moving sun."""
     if not isinstance(light, Sun):
         return (0.0,)
     if not light.moves:

@@ -19,7 +19,7 @@ from vobench.rendering.sobol_pattern import SobolPattern
 from vobench.rendering.texel import Texels
 from vobench.rendering.thread_pool import chunked
 
-# Angular sizes of an emitter up to which fewer rays are needed.
+# The angular widths of an emitter up to which fewer rays are needed.
 NARROW_RAD = 0.15
 WIDE_RAD = 0.6
 WIDER_RAD = 1.5
@@ -29,7 +29,7 @@ WIDER_RAD = 1.5
 class RayGrid:
     """The shadow rays of a texel: one to each cell of an emitter that is divided into side x side cells.
 
-    is_spread: whether they start all over the area of the texel instead of its centre.
+    `is_spread` is whether the rays start at points in the area of the texel, instead of its centre.
     """
 
     side: int
@@ -38,10 +38,11 @@ class RayGrid:
 
 @dataclass(frozen=True, slots=True)
 class ArrivedLight:
-    """What shadow rays bring to points (N,).
+    """The light that arrives at N points along shadow rays.
 
-    light: the illuminance in lx, under a coat only what enters. clear_share: the share of the rays that meet nothing
-    opaque, NaN without any ray. unshadowed: the illuminance if nothing were between.
+    `light` (N,) is the illuminance in lx, under a coat only the light that enters it.
+    `clear_share` (N,) is the share of rays that hit nothing opaque, NaN without rays.
+    `unshadowed` (N,) is the illuminance without any obstacle.
     """
 
     light: Floats
@@ -50,7 +51,7 @@ class ArrivedLight:
 
 
 def reachable(emitter: Emitter, points: Texels, rows: Rows) -> Rows:
-    """Those of the points at rows (N,) that light of an emitter may reach, as far as that is known without rays."""
+    """The points among the rows (N,) that the light of an emitter can reach, as far as this is known without rays."""
 
     def reachable_part(part: slice) -> Rows:
         part_rows = rows[part]
@@ -68,14 +69,15 @@ def first_sides(
     points_m: Floats,
     side: int,
 ) -> NDArray[np.int64]:
-    """The side (P,) of the grid of rays that tells whether points (P, 3) see an emitter; 1 if its shadows are hard.
+    """The side (P,) of the first grid of rays from points (P, 3) to an emitter; 1 if its shadows are hard.
 
-    `side` is that for an emitter of medium width.
+    It depends on the angular width of the emitter. `side` is the one for a medium width.
     """
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
     half = max(side // 2, 1)
     three_quarters = max(3 * side // 4, 1)
-    # Few of the rays to an open sky find a small opening. Frames beside a pane send much of its light on into a room.
+    # An open sky needs many rays, because few of them pass through a small opening. A pane needs many rays because its
+    # frame reflects much of its light into the room.
     one_and_a_half = 3 * side // 2
     if emitter.sky == "pane":
         conditions = [width_rad < NARROW_RAD, width_rad < WIDE_RAD, width_rad < WIDER_RAD]
@@ -139,9 +141,9 @@ def unshadowed_light(
     rows: Rows,
     side: int,
 ) -> tuple[Floats, Mask]:
-    """The illuminance (N,) of the points at rows if nothing hid an emitter, and which of these values are sampled (N,).
+    """The unshadowed illuminance (N,) of the points at rows, and whether each value is sampled (N,).
 
-    It is computed by a formula if there is one, otherwise sampled at side x side places of the emitter, or more.
+    It is computed with a formula if there is one, otherwise it is sampled at side x side places of the emitter or more.
     """
     light = chunked(lambda part: emitter.unshadowed_light(points.take(rows[part])), len(rows))
     is_sampled = np.isnan(light)
@@ -171,7 +173,7 @@ def _light_of_cell(
     cell: int,
     side: int,
 ) -> tuple[Floats, Floats]:
-    """Vectors (P, 3) to places in one of side x side cells of an emitter, and their unshadowed illuminance (P,)."""
+    """The vectors (P, 3) to places in one of side x side cells of an emitter, and the unshadowed illuminance (P,)."""
     a, b, light = np.empty((3, len(texels)), np.float32)
     places_in_cell(texels.dither, cell, side, a, b)
     vectors_m, strength = aim(a, b)

@@ -1,4 +1,4 @@
-"""Sample offsets of a grid of texels that are stratified over neighbouring texels too."""
+"""Offsets of the samples of texels that are also stratified over neighbouring texels."""
 
 from dataclasses import dataclass
 
@@ -7,17 +7,17 @@ from numpy.typing import NDArray
 
 from vobench.rendering.array_types import Floats, Rows
 
-BITS = 12  # of an index along the curve: texels that are 64 apart have the same offsets
+BITS = 12  # the number of bits of an index along the curve; texels at a distance of 64 have the same offsets
 BITS_PER_AXIS = BITS // 2
 
 
 @dataclass(frozen=True, slots=True)
 class SobolPattern:
-    """Offsets for the samples of texels on a map of a width, so that the samples of neighbouring texels are stratified.
+    """The offsets of the samples of texels on a map with a width.
 
-    Texels have the points of Sobol's sequence in the order of a Z-shaped curve, so the texels of each square of
-    2^n x 2^n are a (0, 2n, 2)-net. Only every stride-th texel along rows and columns counts. `shift` (1, 2) is added to
-    all offsets.
+    The points of the Sobol sequence are assigned to texels along a Z-order curve. The points of each square of
+    2^n x 2^n texels are therefore a (0, 2n, 2)-net. Only every stride-th texel along rows and columns has a point.
+    `shift` (1, 2) is added to all offsets.
     Source: Ahmed and Wonka, Screen-Space Blue-Noise Diffusion of Monte Carlo Sampling Error, 2020.
     """
 
@@ -26,9 +26,9 @@ class SobolPattern:
     shift: Floats
 
     def offsets(self, index: Rows, others: Floats) -> Floats:
-        """Two offsets in [0, 1) for each texel (P, 2), by its flat index (P,) on the map.
+        """Two offsets (P, 2) in [0, 1) for each texel, given its flat index (P,) on the map.
 
-        Texels that the stride leaves out have those in `others` (P, 2).
+        Texels without a point have the offsets in `others` (P, 2).
         """
         row, column = np.divmod(index, self.width)
         is_left_out = (row % self.stride != 0) | (column % self.stride != 0)

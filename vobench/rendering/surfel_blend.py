@@ -16,7 +16,7 @@ from vobench.rendering.visibility import Visibility
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-NEIGHBOURS = 9  # surfels that the light of a texel is interpolated between at most, its own included
+NEIGHBOURS = 9  # the largest number of surfels between which the light of a texel is interpolated
 
 
 def blend(
@@ -28,8 +28,8 @@ def blend(
 ) -> "csr_matrix":
     """The weights (H·W, S) of surfels at each texel of the map.
 
-    They are those of surfels near the texel's own that face alike, and that are not hidden from it. Only `usable` ones
-    (S,) have weights.
+    Surfels have a weight if they are near the surfel of the texel, have a similar normal, are not hidden from it, and
+    are `usable` (S,).
     """
     usable_surfels = np.flatnonzero(usable)
     if not len(usable_surfels):
@@ -50,7 +50,7 @@ def blend(
 
 
 def _neighbours(middles: Texels, step_m: Floats, usable_surfels: Rows) -> Rows:
-    """The usable surfels (S, K) nearest to each surfel, in distance and in direction."""
+    """The usable surfels (S, K) that are nearest to each surfel, in position and direction."""
     places = np.hstack([middles.points_m, TURNED * step_m[:, None] * middles.normals])  # (S, 6)
     tree = scipy.spatial.cKDTree(places[usable_surfels])
     _, nearest = tree.query(places, k=min(NEIGHBOURS, len(usable_surfels)))
@@ -58,7 +58,7 @@ def _neighbours(middles: Texels, step_m: Floats, usable_surfels: Rows) -> Rows:
 
 
 def _are_hidden(middles: Texels, step_m: Floats, neighbours: Rows, visibility: Visibility) -> Mask:
-    """Which neighbours (S, K) something hides from their surfel; none of them if something hides all."""
+    """Whether each neighbour (S, K) is hidden from its surfel. If all are hidden, none counts as hidden."""
     raised_m = middles.points_m + RAISED * step_m[:, None] * middles.planes
     surfel = np.repeat(np.arange(len(middles)), neighbours.shape[1])
 
@@ -74,7 +74,7 @@ def _are_hidden(middles: Texels, step_m: Floats, neighbours: Rows, visibility: V
 def _weights(blending: Blending, layout: TexelLayout) -> "csr_matrix":
     """The weights (H·W, S) of surfels at the texels of a map."""
     texel_count = layout.source.size
-    starts = np.zeros(texel_count + 1, np.int32)  # of the entries of each texel
+    starts = np.zeros(texel_count + 1, np.int32)  # where the entries of each texel begin
     in_chunks(lambda part: count_weights(layout.source[part], blending, starts[1:][part]), texel_count)
     np.cumsum(starts, out=starts)
     columns = np.empty(starts[-1], np.int32)

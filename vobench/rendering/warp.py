@@ -1,7 +1,8 @@
-"""Lenses other than pinholes: pinhole faces around the camera, and the map from their pixels to the lens's.
+"""Pictures of lenses that are not pinholes: pinhole pictures in several directions, the faces, are drawn and warped.
 
-Each pixel is the mean of 2 x 2 points, each interpolated between the pixels of one face, which are as fine as the
-points. Faces overlap by a margin, so that no interpolation crosses a seam; only what the lens sees is drawn.
+A pixel of the lens is the mean of 2 x 2 points. Each point is interpolated between the pixels of one face, whose
+resolution is that of the points. Faces overlap by a margin, so that no interpolation crosses a seam. Only the parts of
+faces that the lens sees are drawn.
 """
 
 from dataclasses import dataclass
@@ -15,13 +16,15 @@ from vobench.geometry.se3 import Array
 from vobench.rendering.renderer import Radiance
 from vobench.rendering.view import Box
 
-POINTS = 2  # each way in a pixel
-MARGIN_PX = 3
-# Beyond this angle from the axis a single face would spend most of its pixels on its rim.
-ONE_FACE_RAD = np.deg2rad(65)
-NOWHERE = -100.0
-NO_SPAN = (1, 0, 1, 0)
-# Columns: the x, y and z axes of each face in the camera's: ahead, right, left, below, above, behind.
+POINTS = 2  # the number of points along each side of a pixel
+MARGIN_PX = 3  # by which faces overlap
+ONE_FACE_RAD = np.deg2rad(
+    65
+)  # a single face is used up to this angle; beyond it, most of its pixels would be at its rim
+NOWHERE = -100.0  # the place in the atlas of points without a ray
+NO_SPAN = (1, 0, 1, 0)  # an empty span of columns and rows
+
+# The x, y and z axes of each face in the camera frame, as columns: ahead, right, left, below, above, behind.
 FACES = np.array(
     [
         [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
@@ -37,9 +40,10 @@ FACES = np.array(
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """A pinhole turned by R_camera_face (3, 3), whose picture lies in the atlas from `row` on.
+    """A pinhole camera with the orientation R_camera_face (3, 3). Its picture begins at `row` in the atlas.
 
-    spans (R, 4): first and end column, first and end row that each row of points needs; empty where first >= end.
+    `spans` (R, 4) are the pixels that each row of points needs: first and end column, first and end row. A span is
+    empty if the first is not less than the end.
     """
 
     camera: Pinhole
@@ -48,7 +52,7 @@ class Face:
     spans: NDArray[np.int32]
 
     def needed_for(self, rows: slice) -> Box | None:
-        """The box of its picture that rows of the lens's picture need, None for nothing."""
+        """The box in the face's picture that rows of the lens's picture need; None if they need nothing."""
         spans = self.spans[rows.start * POINTS : rows.stop * POINTS]
         spans = spans[spans[:, 0] < spans[:, 1]]
         if len(spans) == 0:
@@ -60,14 +64,14 @@ class Face:
 
 @dataclass(frozen=True, slots=True)
 class Warp:
-    """Faces, and where in their atlas each point lies: at_column, at_row (2 H, 2 W)."""
+    """The faces of a lens, and the place of each point in the atlas of their pictures: at_column, at_row (2 H, 2 W)."""
 
     faces: tuple[Face, ...]
     at_column: Radiance
     at_row: Radiance
 
     def blank(self, channels: int) -> Radiance:
-        """An empty atlas (rows, columns), of three channels (rows, columns, 3)."""
+        """An empty atlas: (rows, columns) for one channel, otherwise (rows, columns, channels)."""
         cameras = [face.camera for face in self.faces]
         rows = sum(camera.height_px for camera in cameras)
         columns = max(camera.width_px for camera in cameras)
@@ -81,12 +85,12 @@ class Warp:
         box: Box,
         picture: Radiance,
     ) -> None:
-        """Lay a box of a face's picture into the atlas."""
+        """Copy a box of a face's picture to the atlas."""
         first, end, top, bottom = box
         atlas[face.row + top : face.row + bottom, first:end] = picture
 
     def picture(self, atlas: Radiance, rows: slice) -> Radiance:
-        """Rows of the lens's picture (rows, W) or (rows, W, 3); black where it has no rays."""
+        """Rows of the lens's picture (rows, W) or (rows, W, 3). Pixels without rays are black."""
         points = slice(rows.start * POINTS, rows.stop * POINTS)
         at_column = self.at_column[points]
         at_row = self.at_row[points]
@@ -96,7 +100,7 @@ class Warp:
 
 
 def warp(camera: Camera) -> Warp:
-    """The faces a lens needs, and the map from them."""
+    """The faces that a lens needs, and the map from them to its picture."""
     face_of, plane = _faces(_rays(camera))
     focal_px = _focal_px(plane, face_of, np.diag(camera.K)[:2])
     pixels = np.moveaxis((plane * focal_px).astype(np.float32), -1, 0)
@@ -118,7 +122,7 @@ def warp(camera: Camera) -> Warp:
 
 
 def _rays(camera: Camera) -> Array:
-    """Unit directions (2 H, 2 W, 3) of all points."""
+    """The unit directions (2 H, 2 W, 3) of all points."""
     size = (camera.height_px * POINTS, camera.width_px * POINTS)
     v, u = np.indices(size) + 0.5
     uv_px = np.stack([u, v], -1) / POINTS - 0.5
@@ -126,7 +130,7 @@ def _rays(camera: Camera) -> Array:
 
 
 def _faces(rays: Array) -> tuple[NDArray[np.int8], Array]:
-    """Which face each ray (R, C, 3) belongs to, -1 for none, and where it meets that face's plane z = 1 (R, C, 2)."""
+    """The face of each ray (R, C, 3), -1 for none, and its intersection (R, C, 2) with the plane z = 1 of the face."""
     has_no_ray = np.isnan(rays[..., 2])
     fits_one_face = rays[..., 2] > np.cos(ONE_FACE_RAD)
     if np.all(has_no_ray | fits_one_face):
@@ -134,13 +138,13 @@ def _faces(rays: Array) -> tuple[NDArray[np.int8], Array]:
         return face_of, np.nan_to_num(rays[..., :2] / rays[..., 2:])
     face_of = np.full(has_no_ray.shape, -1, np.int8)
     plane = np.zeros((*has_no_ray.shape, 2))
-    best = np.zeros(has_no_ray.shape)
+    largest_cosine = np.zeros(has_no_ray.shape)
     for index, axes in enumerate(FACES):
-        along = rays @ axes[:, 2]
-        is_nearer = along > best  # false where there is no ray
+        cosine = rays @ axes[:, 2]
+        is_nearer = cosine > largest_cosine  # false without a ray
         face_of[is_nearer] = index
-        best[is_nearer] = along[is_nearer]
-        plane[is_nearer] = (rays[is_nearer] @ axes[:, :2]) / along[is_nearer, None]
+        largest_cosine[is_nearer] = cosine[is_nearer]
+        plane[is_nearer] = (rays[is_nearer] @ axes[:, :2]) / cosine[is_nearer, None]
     return face_of, plane
 
 
@@ -149,8 +153,8 @@ def _focal_px(
     face_of: NDArray[np.int8],
     focal_lengths: Array,
 ) -> float:
-    """Focal length of faces as fine as the points are where they are finest, in the lens's finer direction."""
-    # Every third point along rows and columns, and those next to it.
+    """The focal length of faces whose resolution is the finest of the points, in the finer direction of the lens."""
+    # Every third point along rows and columns, and its neighbours to the right and below.
     here = (slice(0, -1, 3), slice(0, -1, 3))
     right = (slice(0, -1, 3), slice(1, None, 3))
     down = (slice(1, None, 3), slice(0, -1, 3))
@@ -160,7 +164,7 @@ def _focal_px(
     step_right = (plane[right] - plane[here])[is_within]
     step_down = (plane[down] - plane[here])[is_within]
     lengths = np.sort([np.hypot(*step_right.T), np.hypot(*step_down.T)], 0)
-    # Towards a fisheye's rim and a full sphere's poles, points lie close along one direction without showing more.
+    # Near the rim of a fisheye and the poles of a sphere, points are close in one direction without showing more.
     finest = lengths[1].min()
     return float(focal_lengths.max() / focal_lengths.min() / finest)
 
@@ -173,7 +177,7 @@ def _face(
     *,
     focal_px: float,
 ) -> Face:
-    """The face that holds its members of all pixels (2, R, C), which count from its axis."""
+    """The face that contains its members (R, C) of all points. Their pixels (2, R, C) are relative to its axis."""
     low = np.floor(np.where(is_member, pixels, np.inf).min(2))  # (2, R): of each row of points
     high = np.ceil(np.where(is_member, pixels, -np.inf).max(2))
     cx, cy = (MARGIN_PX - low.min(1)).tolist()

@@ -70,26 +70,23 @@ def read_finished_trial(path: Path, *, estimator: Path | None = None, progress: 
 
 
 def _find(path: Path) -> tuple[RunFolder, TrialScore]:
-    """The run and the score of the trial at a path."""
+    """The run and the score of the trial at a path: the folder of a trial, or RUN/CASE/ESTIMATOR[/REPEAT]."""
     if (path / SCORE).is_file() and len(path.parts) > LEVELS_TO_RUN:
         return RunFolder(path.parents[LEVELS_TO_RUN - 1]), read_score(path / SCORE)
 
-    parts = path.parts
-    repeat: int | None = None
-    if path.name.isdigit():
-        repeat = int(path.name)
-        parts = parts[:-1]
-    if len(parts) < 2:
+    repeat = int(path.name) if path.name.isdigit() else None
+    named = path if repeat is None else path.parent
+    if len(named.parts) < 2:
         raise InputError(f"a trial is named as RUN/CASE/ESTIMATOR, got {path}")
-    *run, case, estimator = parts
+    *run, case, estimator = named.parts
 
     folder = open_run(Path(*run))
     scores = folder.scores()
     _require_in_run("case", case, {score.case for score in scores}, folder)
     _require_in_run("estimator", estimator, {score.estimator for score in scores}, folder)
-    for score in sorted(scores, key=lambda score: score.repeat):
-        is_selected = repeat in (None, score.repeat)
-        if is_selected and (score.case, score.estimator) == (case, estimator):
+    trials = [score for score in scores if (score.case, score.estimator) == (case, estimator)]
+    for score in sorted(trials, key=lambda score: score.repeat):
+        if repeat in (None, score.repeat):
             return folder, score
     number = "trial" if repeat is None else f"repeat {repeat}"
     raise InputError(f"there is no {number} of {estimator} on {case} in the run {folder.path}")

@@ -21,8 +21,9 @@ LONGEST_GAP_NS = 200_000_000  # the truth is not interpolated over longer gaps
 
 
 def left_truth(folder: Path) -> Trajectory:
-    """The true poses of the left camera at the stamps of pictures. The truth is interpolated if its stamps differ.
+    """The true poses of the left camera at the stamps of pictures.
 
+    If the truth has other stamps, it is interpolated.
     Pictures before, after or in a gap of the truth are omitted, so they are not scored.
     Raises SequenceError if no picture remains.
     """
@@ -54,9 +55,9 @@ def noisy(exact: str, noise: TruthNoise, *, seed: int, frames: Window | None) ->
     skipped = frames[0] if frames else 0
     rng = np.random.default_rng([seed, NOISE_STREAM])
     draws = rng.standard_normal((skipped + len(truth), 2, 3))
-    of_position, of_rotation = draws[skipped:].swapaxes(0, 1)  # (N, 3) each
-    R = Rotation.from_rotvec(noise.rotation_deg * of_rotation, degrees=True).as_matrix()
-    T_true_noisy = se3.transform(R, noise.position_m * of_position)
+    position_draws, rotation_draws = draws[skipped:].swapaxes(0, 1)  # (N, 3) each
+    R = Rotation.from_rotvec(noise.rotation_deg * rotation_draws, degrees=True).as_matrix()
+    T_true_noisy = se3.transform(R, noise.position_m * position_draws)
     return format_tum(Trajectory(truth.t_ns, truth.T_world_frame @ T_true_noisy))
 
 

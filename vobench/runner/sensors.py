@@ -25,18 +25,18 @@ EMPTY = np.zeros(0, np.int64)
 
 
 class SensorFeed:
-    """The readings of a case's encoders and IMU, if it has them, and the IMU's true biases."""
+    """The readings of a case's encoders and IMU, if it has them, and the true biases of the IMU."""
 
     def __init__(self, case: Case, travel: BodyMotion) -> None:
-        self._encoder_t_ns, self._ticks = _counted(case, travel)
-        self._imu = _felt(case, travel)
-        self._last_ns = int(travel.t_ns[0]) - 1
+        self._encoder_t_ns, self._counts = _encoder_readings(case, travel)
+        self._imu = _imu_readings(case, travel)
+        self._last_ns = int(travel.t_ns[0]) - 1  # all readings up to this stamp have been written
 
     def write_until(self, t_ns: int, writer: SequenceWriter) -> None:
         """Write the readings after the last call, up to and including a stamp."""
         rows = _between(self._encoder_t_ns, self._last_ns, t_ns)
         stamps = self._encoder_t_ns[rows].tolist()
-        for stamp_ns, counts in zip(stamps, self._ticks[rows], strict=True):
+        for stamp_ns, counts in zip(stamps, self._counts[rows], strict=True):
             self._write_imu(stamp_ns, writer)
             writer.write_encoders([stamp_ns], counts)
         self._write_imu(t_ns, writer)
@@ -45,18 +45,19 @@ class SensorFeed:
         if self._imu:
             readings, bias = self._imu
             rows = _between(readings.t_ns, self._last_ns, t_ns)
-            new = ImuReadings(readings.t_ns[rows], readings.gyro_radps[rows], readings.accel_mps2[rows])
-            writer.write_imu(new)
-            stamps = bias.t_ns[rows].tolist()
-            for stamp_ns, gyro_radps, accel_mps2 in zip(
-                stamps, bias.gyro_radps[rows], bias.accel_mps2[rows], strict=True
-            ):
+            new_readings = ImuReadings(readings.t_ns[rows], readings.gyro_radps[rows], readings.accel_mps2[rows])
+            writer.write_imu(new_readings)
+            new_biases = zip(bias.t_ns[rows].tolist(), bias.gyro_radps[rows], bias.accel_mps2[rows], strict=True)
+            for stamp_ns, gyro_radps, accel_mps2 in new_biases:
                 writer.write_imu_bias(stamp_ns, gyro_radps, accel_mps2)
         self._last_ns = t_ns
 
 
-def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
-    """The stamps (M,) and counts (M, 2) of both encoders, 0 at the first picture; empty for a body without wheels."""
+def _encoder_readings(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
+    """The stamps (M,) and the counts (M, 2) of both encoders, which are 0 at the first picture.
+
+    They are empty for a body without wheels.
+    """
     spec = case.trajectory
     if travel.rims is None or not isinstance(spec, Wheeled | Wander) or spec.wheels is None:
         return EMPTY, EMPTY.reshape(0, 2)
@@ -68,7 +69,8 @@ def _counted(case: Case, travel: BodyMotion) -> tuple[Stamps, Stamps]:
     return t_ns, counts
 
 
-def _felt(case: Case, travel: BodyMotion) -> tuple[ImuReadings, ImuBias] | None:
+def _imu_readings(case: Case, travel: BodyMotion) -> tuple[ImuReadings, ImuBias] | None:
+    """The readings of the IMU and its true biases, with delayed stamps; None without an IMU."""
     if not case.rig.imu:
         return None
     rngs = {stream: generator(case.seed, f"imu.{stream}") for stream in STREAMS}
@@ -79,35 +81,38 @@ def _felt(case: Case, travel: BodyMotion) -> tuple[ImuReadings, ImuBias] | None:
 
 
 def _between(t_ns: Stamps, last_ns: int, now_ns: int) -> slice:
-    """The readings after one instant, up to and including another."""
+    """The rows with stamps after `last_ns`, up to and including `now_ns`."""
     first, end = np.searchsorted(t_ns, [last_ns, now_ns], side="right").tolist()
     return slice(first, end)
 
 
 def wheel_error_m(case: Case, travel: BodyMotion) -> float | None:
-    """The final position error of wheel odometry from the true start; None for a body without wheels."""
+    """The final position error of wheel odometry that starts at the true pose; None for a body without wheels."""
     wheels = case.build_rig().wheels
     if wheels is None:
         return None
-    t_ns, counts = _counted(case, travel)
+    t_ns, counts = _encoder_readings(case, travel)
     is_in_case = (t_ns >= travel.t_ns[0]) & (t_ns <= travel.t_ns[-1])
-    steps = np.diff(counts[is_in_case], axis=0)  # ticks (M, 2)
-    left_m, right_m = steps.T * 2 * np.pi * wheels.radius_m / wheels.ticks_per_revolution
-    turned = (right_m - left_m) / wheels.track_m
-    T_world_first, T_world_last = travel.motion.at(travel.t_ns[[0, -1]]).T_world_body
-    first_heading = np.arctan2(T_world_first[1, 0], T_world_first[0, 0])
-    heading = first_heading + np.cumsum(turned) - turned / 2  # in the middle of each arc
+    steps = np.diff(counts[is_in_case], axis=0)  # (M, 2), in ticks
 
-    # Each step is an arc, and its chord a little shorter.
-    chord_m = (left_m + right_m) / 2 * np.sinc(turned / 2 / np.pi)
-    x_m = (chord_m * np.cos(heading)).sum()
-    y_m = (chord_m * np.sin(heading)).sum()
+    # In each step, the middle of the axle moves along an arc.
+    left_m, right_m = steps.T * 2 * np.pi * wheels.radius_m / wheels.ticks_per_revolution
+    turn_rad = (right_m - left_m) / wheels.track_m
+    arc_m = (left_m + right_m) / 2
+    chord_m = arc_m * np.sinc(turn_rad / 2 / np.pi)
+
+    # The direction of a chord is the heading in the middle of its arc.
+    T_world_first, T_world_last = travel.motion.at(travel.t_ns[[0, -1]]).T_world_body
+    first_heading_rad = np.arctan2(T_world_first[1, 0], T_world_first[0, 0])
+    chord_heading_rad = first_heading_rad + np.cumsum(turn_rad) - turn_rad / 2
+    x_m = (chord_m * np.cos(chord_heading_rad)).sum()
+    y_m = (chord_m * np.sin(chord_heading_rad)).sum()
     end_m = T_world_first[:2, 3] + np.array([x_m, y_m])
     return float(np.linalg.norm(end_m - T_world_last[:2, 3]))
 
 
 class PixelTruth:
-    """Ground truth of a case's pictures, at the middle of each row's exposure, seen by the true rig."""
+    """The per-pixel ground truth of a case's pictures. It is for the true rig, at the middle of each row's exposure."""
 
     def __init__(self, case: Case, scene: Scene, motion: Motion) -> None:
         self._rig = case.build_true_rig()
@@ -118,11 +123,11 @@ class PixelTruth:
 
     @property
     def names(self) -> TruthNames:
-        """The names of the ids."""
+        """The names of the ids in the channels."""
         return self._caster.names
 
     def frame(self, side: Side, t_ns: int, next_t_ns: int | None) -> TruthFrame:
-        """The channels of the picture stamped t_ns; flow leads to the one stamped next_t_ns."""
+        """The channels of the picture with the stamp `t_ns`. The flow leads to the picture with `next_t_ns`, if any."""
         camera = self._rig.camera(side)
         shot = self._shot(side, t_ns)
         later = None if next_t_ns is None else self._shot(side, next_t_ns)
