@@ -52,6 +52,33 @@ def test_the_open_sky_lights_level_ground_by_its_illuminance() -> None:
     assert light_lx.mean() == pytest.approx(2000.0, rel=0.01)
 
 
+def test_the_sky_through_a_small_opening_leaves_no_stains() -> None:
+    """A lid with a hole of 0.4 x 0.4 m; a point sees the hole as an even source of its area."""
+    hole_m = np.array([1.5, 0.0, 1.0])
+    half_m = 0.2
+    far_m = 400.0
+    beside_m = (far_m + half_m) / 2  # from the hole to the middle of a part of the lid
+    along_x = 2 * far_m * X
+    across_x = (far_m - half_m) * X
+    lid = [
+        rectangle(hole_m + beside_m * Y, (far_m - half_m) * Y, along_x, "a", "north"),
+        rectangle(hole_m - beside_m * Y, (far_m - half_m) * Y, along_x, "a", "south"),
+        rectangle(hole_m + beside_m * X, 2 * half_m * Y, across_x, "a", "east"),
+        rectangle(hole_m - beside_m * X, 2 * half_m * Y, across_x, "a", "west"),
+    ]
+    points, layout, visibility = open_floor(*lid, spacing_m=0.025)
+    (emitter,) = emitters(Sky("sky", 1000.0), visibility)
+    cells = np.zeros(len(points), np.int32)
+    among = np.ones(len(points), bool)
+    light_lx = direct_light(emitter, points, layout, cells, visibility, side=4, among=among)
+    squared_m2 = ((hole_m - points.points_m) ** 2).sum(1)
+    area_m2 = (2 * half_m) ** 2
+    expected_lx = 1000.0 * area_m2 / (np.pi * squared_m2**2)
+    assert light_lx.sum() == pytest.approx(expected_lx.sum(), rel=0.1)
+    relative = (light_lx - expected_lx) / expected_lx
+    assert np.sqrt(np.mean(relative**2)) < 0.4
+
+
 def test_a_panel_far_away_is_a_point_with_the_cosine_of_its_face() -> None:
     far = ceiling_light("far", np.array([0.0, 0, 30.0]), (0.4, 0.3), power_lm=5000)
     points_m, light_lx = lit_by(far)

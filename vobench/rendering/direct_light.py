@@ -25,14 +25,16 @@ FINER_STRIDES = (*STRIDES[1:], 1)
 STEEP = (0.08, 0.15)
 GENTLE = 0.2  # the visible share on a coarse grid is smoothed if it differs by less than this between neighbours
 
+# The open sky is so bright that the light of a small share of it is computed with more rays, and smoothed.
+FAINT_SHARE = 0.3  # the greatest share for which this is done
+FAINT_SIDES = 4  # how many times as many rays along each side of the grid of rays
+FAINT_STEPS = 8  # the distance of points that may have missed the sky from one that saw it, in coarsest steps
+# The greatest shares, and how many times such shares are smoothed: the smaller a share is, the fewer rays see the sky.
+SMOOTHINGS_OF_FAINT = ((FAINT_SHARE, 2), (0.1, 4), (0.02, 16))
+
 # Unshadowed light is interpolated if its relative difference between neighbours is less than UNEVEN, and if it differs
 # by less than BEND from the mean of its neighbours, which is four times the error of the interpolation. It is always
 # computed where the normal differs by more than BENT from that of the flat face.
-FAINT_SHARE = 0.3  # share of the open sky up to which more rays are cast
-FAINT_SIDES = 4  # how many times as many rays along each side
-FAINT_STEPS = 8  # steps of the coarsest grid from a point that saw the sky to those that may have missed it
-# Shares below these are smoothed so many times more: the smaller a share is, the fewer of its rays see the sky.
-SMOOTHINGS_OF_FAINT = ((FAINT_SHARE, 2), (0.1, 4), (0.02, 16))
 UNEVEN = 0.1
 BEND = 0.004
 BENT = 1e-4
@@ -161,8 +163,10 @@ class Receivers:
         """
         coarsest = STRIDES[0]
         _, high = share.extremes(rows, steps=coarsest)
-        _, high_around = share.extremes(rows, steps=FAINT_STEPS * coarsest)
-        is_faint = (high_around > 0) & (high < FAINT_SHARE)
+        saw_sky_nearby = TexelField(share.layout, share.values.copy(), share.state)
+        for _ in range(FAINT_STEPS):
+            saw_sky_nearby.smooth(rows, steps=coarsest)
+        is_faint = (saw_sky_nearby.values[rows] > 0) & (high < FAINT_SHARE)
         faint = rows[is_faint]
         values, _ = self._shares(emitter, faint, RayGrid(side, is_spread=True), coarsest)
         share.set(faint, values)
