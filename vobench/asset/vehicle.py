@@ -33,6 +33,24 @@ LETTERS = "ABCDEFGHKLMNPRSTVX"
 SEAM_M = 0.006  # width of the gap around a door
 TYRE_RADIUS_M = 0.315
 CELLS = 3  # along each side of a patch
+# Cuts between frames and panes, as shares of a patch: across or along the car, and upwards
+SCREEN_CUTS_U = (0, 0.06, 0.94, 1)
+SCREEN_CUTS_V = (0, 0.09, 0.93, 1)
+SIDE_CUTS_U = (0.0, 0.13, 0.53, 0.57, 0.93, 1.0)
+SIDE_CUTS_V = (0, 0.08, 0.88, 1)
+SPOKES = 5
+TYRE_PROFILE_M = (
+    (0, -0.2),
+    (0.2, -0.2),
+    (TYRE_RADIUS_M - 0.03, -0.19),
+    (TYRE_RADIUS_M, -0.17),
+    (TYRE_RADIUS_M, -0.03),
+    (TYRE_RADIUS_M - 0.02, -0.005),
+    (0.225, 0),
+    (0.22, -0.07),
+    (0, -0.07),
+)
+RIM_PROFILE_M = ((0, -0.02), (0.222, -0.02), (0.224, -0.002), (0.2, -0.003), (0.195, -0.009), (0, -0.009))
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,12 +145,13 @@ def _sections(car: CarShape) -> Array:
     rings = []
     for x, share, low, top in zip(x_m, width_share, low_m, top_m, strict=True):
         half_width_m = share * car.width_m / 2
-        half = [
-            (0.93 * half_width_m, low),
-            (half_width_m, low + 0.5 * (top - low)),
-            (0.93 * half_width_m, top - 0.03),
-        ]
-        ring = [(-y, z) for y, z in half] + [(0.0, top + 0.03)] + half[::-1]
+        sill = (0.93 * half_width_m, low)
+        bulge = (half_width_m, low + 0.5 * (top - low))
+        shoulder = (0.93 * half_width_m, top - 0.03)
+        ridge = (0.0, top + 0.03)
+        left_half = [sill, bulge, shoulder]
+        right_half = [(-y, z) for y, z in left_half]
+        ring = [*right_half, ridge, *left_half[::-1]]
         rings.append([(x, y, z) for y, z in ring])
     return np.array(rings)
 
@@ -170,12 +189,10 @@ class _BulgedSurface:
         """The part between two values of u and of v."""
         us = np.linspace(*u, CELLS + 1)[:, None]
         vs = np.linspace(*v, CELLS + 1)[None, :]
-        c = self.corners_m
-        weights = np.stack([(1 - us) * (1 - vs), (1 - us) * vs, us * (1 - vs), us * vs])
-        flat_m = np.einsum("kuv,kj->uvj", weights, c.reshape(4, 3))
-        normal = unit(cross(c[1, 0] - c[0, 0], c[0, 1] - c[0, 0]))
-        bulge = self.bulge_m * 16 * us * (1 - us) * vs * (1 - vs)
-        return sheet_arrays(flat_m + bulge[..., None] * normal)
+        weights = np.stack([(1 - us) * (1 - vs), (1 - us) * vs, us * (1 - vs), us * vs])  # bilinear
+        flat_m = np.einsum("kuv,kj->uvj", weights, self.corners_m.reshape(4, 3))
+        bulge_m = self.bulge_m * 16 * us * (1 - us) * vs * (1 - vs)  # 0 at the edges, largest in the middle
+        return sheet_arrays(flat_m + bulge_m[..., None] * unit(_normal(self.corners_m)))
 
     def divided(self, u: Sequence[float], v: Sequence[float], is_glass: Array) -> tuple[MeshArrays, MeshArrays]:
         """The cells between the values of u and v that are not glass, and those that are."""
@@ -188,70 +205,105 @@ class _BulgedSurface:
         return joined_arrays(frames), joined_arrays(panes)
 
 
-def _cabin(car: CarShape, paint: Material) -> list[Part]:
-    """Windscreen, rear window and side windows in frames of the body's colour, and the roof."""
+@dataclass(frozen=True, slots=True)
+class _CabinEdges:
+    """The places between which the windows stand: along x at the foot and at the roof, and across and upwards."""
+
+    foot_front_m: float
+    foot_rear_m: float
+    roof_front_m: float
+    roof_rear_m: float
+    foot_y_m: float
+    roof_y_m: float
+    foot_z_m: float
+    roof_z_m: float
+
+    def screen_corners_m(self, foot_m: float, roof_m: float) -> Array:
+        """The corners (2, 2, 3) of the windscreen or the rear window: from right to left, then upwards."""
+        right = [[foot_m, -self.foot_y_m, self.foot_z_m], [roof_m, -self.roof_y_m, self.roof_z_m]]
+        left = [[foot_m, self.foot_y_m, self.foot_z_m], [roof_m, self.roof_y_m, self.roof_z_m]]
+        return np.array([right, left])
+
+    def side_corners_m(self, side: int) -> Array:
+        """The corners (2, 2, 3) of one side: from the rear to the front, then upwards."""
+        foot_y_m = side * self.foot_y_m
+        roof_y_m = side * self.roof_y_m
+        rear = [[self.foot_rear_m, foot_y_m, self.foot_z_m], [self.roof_rear_m, roof_y_m, self.roof_z_m]]
+        front = [[self.foot_front_m, foot_y_m, self.foot_z_m], [self.roof_front_m, roof_y_m, self.roof_z_m]]
+        return np.array([rear, front])
+
+    def roof_corners_m(self) -> Array:
+        """The corners (2, 2, 3) of the roof: from the rear to the front, then from right to left."""
+        rear = [[self.roof_rear_m, -self.roof_y_m, self.roof_z_m], [self.roof_rear_m, self.roof_y_m, self.roof_z_m]]
+        front = [[self.roof_front_m, -self.roof_y_m, self.roof_z_m], [self.roof_front_m, self.roof_y_m, self.roof_z_m]]
+        return np.array([rear, front])
+
+
+def _cabin_edges(car: CarShape) -> _CabinEdges:
     half_m = car.length_m / 2
     foot_front_m = half_m - car.bonnet_m
     foot_rear_m = -half_m + car.tail_m
-    roof_front_m = foot_front_m - car.screen_m
-    roof_rear_m = foot_rear_m + car.rear_m
-    base_y = 0.9 * car.width_m / 2
-    roof_y = car.roof_share * car.width_m / 2
-    base_z = car.waist_m - 0.03
-    roof_z = car.height_m - 0.05
-
-    paint_meshes = []
-    glass_meshes = []
-    for foot_m, roof_m, direction, has_glass in (
-        (foot_front_m, roof_front_m, 1.0, True),
-        (foot_rear_m, roof_rear_m, -1.0, car.has_rear_glass),
-    ):
-        corners = np.array(
-            [
-                [[foot_m, -base_y, base_z], [roof_m, -roof_y, roof_z]],
-                [[foot_m, base_y, base_z], [roof_m, roof_y, roof_z]],
-            ]
-        )
-        is_glass = np.zeros((3, 3), bool)
-        is_glass[1, 1] = has_glass
-        frames, panes = _bulged_surface(corners, 0.05, (direction, 0, 0.3)).divided(
-            (0, 0.06, 0.94, 1), (0, 0.09, 0.93, 1), is_glass
-        )
-        paint_meshes.append(_facing(frames, (direction, 0, 0.3)))
-        if has_glass:
-            glass_meshes.append(_facing(panes, (direction, 0, 0.3)))
-
-    for side in SIDES:
-        corners = np.array(
-            [
-                [[foot_rear_m, side * base_y, base_z], [roof_rear_m, side * roof_y, roof_z]],
-                [[foot_front_m, side * base_y, base_z], [roof_front_m, side * roof_y, roof_z]],
-            ]
-        )
-        patch = _bulged_surface(corners, 0.02, (0, side, 0))
-        cuts_u = (0.0, 0.13, 0.53, 0.57, 0.93, 1.0)
-        is_glass = np.zeros((5, 3), bool)
-        is_glass[[1, 3], 1] = [car.has_rear_glass, True]
-        frames, panes = patch.divided(cuts_u, (0, 0.08, 0.88, 1), is_glass)
-        paint_meshes.append(_facing(frames, (0, side, 0)))
-        glass_meshes.append(_facing(panes, (0, side, 0)))
-
-    roof_corners = np.array(
-        [
-            [[roof_rear_m, -roof_y, roof_z], [roof_rear_m, roof_y, roof_z]],
-            [[roof_front_m, -roof_y, roof_z], [roof_front_m, roof_y, roof_z]],
-        ]
+    return _CabinEdges(
+        foot_front_m=foot_front_m,
+        foot_rear_m=foot_rear_m,
+        roof_front_m=foot_front_m - car.screen_m,
+        roof_rear_m=foot_rear_m + car.rear_m,
+        foot_y_m=0.9 * car.width_m / 2,
+        roof_y_m=car.roof_share * car.width_m / 2,
+        foot_z_m=car.waist_m - 0.03,
+        roof_z_m=car.height_m - 0.05,
     )
-    roof = _bulged_surface(roof_corners, 0.05, (0, 0, 1)).part((0, 1), (0, 1))
-    paint_meshes.append(_facing(roof, (0, 0, 1)))
-    return [Part(joined_arrays(paint_meshes), paint), Part(joined_arrays(glass_meshes), GLASS)]
+
+
+def _cabin(car: CarShape, paint: Material) -> list[Part]:
+    """Windscreen, rear window and side windows in frames of the body's colour, and the roof."""
+    edges = _cabin_edges(car)
+    frames = list[MeshArrays]()
+    panes = list[MeshArrays]()
+
+    has_pane = np.zeros((3, 3), bool)
+    has_pane[1, 1] = True
+    has_rear_pane = np.zeros((3, 3), bool)
+    has_rear_pane[1, 1] = car.has_rear_glass
+    windscreen_m = edges.screen_corners_m(edges.foot_front_m, edges.roof_front_m)
+    rear_window_m = edges.screen_corners_m(edges.foot_rear_m, edges.roof_rear_m)
+    for corners_m, is_glass, outward in (
+        (windscreen_m, has_pane, (1.0, 0, 0.3)),
+        (rear_window_m, has_rear_pane, (-1.0, 0, 0.3)),
+    ):
+        surface = _bulged_surface(corners_m, 0.05, outward)
+        frame, pane = surface.divided(SCREEN_CUTS_U, SCREEN_CUTS_V, is_glass)
+        frames.append(_facing(frame, outward))
+        if is_glass.any():
+            panes.append(_facing(pane, outward))
+
+    has_side_panes = np.zeros((5, 3), bool)
+    has_side_panes[1, 1] = car.has_rear_glass
+    has_side_panes[3, 1] = True
+    for side in SIDES:
+        outward = (0, side, 0)
+        surface = _bulged_surface(edges.side_corners_m(side), 0.02, outward)
+        frame, pane = surface.divided(SIDE_CUTS_U, SIDE_CUTS_V, has_side_panes)
+        frames.append(_facing(frame, outward))
+        panes.append(_facing(pane, outward))
+
+    upwards = (0, 0, 1)
+    roof = _bulged_surface(edges.roof_corners_m(), 0.05, upwards).part((0, 1), (0, 1))
+    frames.append(_facing(roof, upwards))
+    return [Part(joined_arrays(frames), paint), Part(joined_arrays(panes), GLASS)]
 
 
 def _bulged_surface(corners_m: Array, bulge_m: float, outward: Sequence[float]) -> _BulgedSurface:
     """A patch that bulges outwards."""
-    normal = cross(corners_m[1, 0] - corners_m[0, 0], corners_m[0, 1] - corners_m[0, 0])
-    sign = 1.0 if normal @ np.asarray(outward, float) > 0 else -1.0
-    return _BulgedSurface(corners_m, sign * bulge_m)
+    is_outward = _normal(corners_m) @ np.asarray(outward, float) > 0
+    return _BulgedSurface(corners_m, bulge_m if is_outward else -bulge_m)
+
+
+def _normal(corners_m: Array) -> Array:
+    """A normal (3,) of a patch with corners (2, 2, 3), not of unit length."""
+    along_u = corners_m[1, 0] - corners_m[0, 0]
+    along_v = corners_m[0, 1] - corners_m[0, 0]
+    return cross(along_u, along_v)
 
 
 # --- What is fixed to the body ---
@@ -260,27 +312,13 @@ def _bulged_surface(corners_m: Array, bulge_m: float, outward: Sequence[float]) 
 @cache
 def _wheel() -> tuple[Part, ...]:
     """A wheel whose axis is z, with its outer side up at z = 0."""
-    r = TYRE_RADIUS_M
-    tyre = lathe(
-        [
-            [0, -0.2],
-            [0.2, -0.2],
-            [r - 0.03, -0.19],
-            [r, -0.17],
-            [r, -0.03],
-            [r - 0.02, -0.005],
-            [0.225, 0],
-            [0.22, -0.07],
-            [0, -0.07],
-        ],
-        sections=16,
-    )
-    rim = lathe([[0, -0.02], [0.222, -0.02], [0.224, -0.002], [0.2, -0.003], [0.195, -0.009], [0, -0.009]], sections=16)
+    tyre = lathe(TYRE_PROFILE_M, sections=16)
+    rim = lathe(RIM_PROFILE_M, sections=16)
+    spoke = put(block_arrays((0.15, 0.05, 0.014), bevel_m=0.004), GREY, 0.12, 0, -0.006)
     spokes = []
-    for angle_deg in 72.0 * np.arange(5):
-        spoke = block_arrays((0.15, 0.05, 0.014), bevel_m=0.004)
-        radial = put(spoke, GREY, 0.12, 0, -0.006)
-        spokes.append(radial.moved(at(yaw=float(angle_deg))).arrays)
+    for number in range(SPOKES):
+        yaw_deg = 360.0 / SPOKES * number
+        spokes.append(spoke.moved(at(yaw=yaw_deg)).arrays)
     return (Part(tyre, RUBBER), Part(rim, RIM), Part(joined_arrays(spokes), GREY))
 
 
@@ -297,34 +335,43 @@ def _wheels(car: CarShape, side: int) -> list[Part]:
 
 def _side_fittings(car: CarShape, paint: Material, side: int) -> list[Part]:
     """Mirror, door gaps and handles, and the lamps of one side."""
-    half_m = car.length_m / 2
-    foot_m = half_m - car.bonnet_m
-    y_m = side * car.width_m / 2
-    middle_z = 0.22 + (car.waist_m - 0.22) / 2
-    gap = block_arrays((SEAM_M, 0.012, car.waist_m - 0.34), bevel_m=0)
-    handle = block_arrays((0.16, 0.02, 0.026), bevel_m=0.006)
+    half_width_m = car.width_m / 2
+    y_m = side * half_width_m
+    foot_m = car.length_m / 2 - car.bonnet_m
+    front_gap_m = foot_m - 0.12
+    rear_gap_m = foot_m - 0.12 - 1.05
+    handle_z_m = car.waist_m - 0.12
     mirror = cushion((0.11, 0.2, 0.13), power=4, cells=4)
-    door_m = foot_m - 0.12 - 1.05
-    lamp = block_arrays((0.3, 0.36, 0.13), bevel_m=0.03)
-    rear = block_arrays((0.1, 0.3, 0.2 if car.tail_m < 0.3 else 0.13), bevel_m=0.02)
+    gap = block_arrays((SEAM_M, 0.012, car.waist_m - 0.34), bevel_m=0)
+    gap_z_m = 0.22 + (car.waist_m - 0.22) / 2
+    handle = block_arrays((0.16, 0.02, 0.026), bevel_m=0.006)
     parts = [
-        put(mirror, paint, foot_m - 0.32, side * (car.width_m / 2 + 0.09), car.waist_m + 0.06),
-        *(put(gap, BLACK, x_m, 0.994 * y_m, middle_z) for x_m in (foot_m - 0.12, door_m)),
-        put(handle, CHROME, door_m + 0.14, 0.992 * y_m, car.waist_m - 0.12),
-        put(
-            lamp,
-            HEADLAMP,
-            half_m - 0.2,
-            side * (0.92 * car.width_m / 2 - 0.2),
-            car.nose_height_m - 0.1,
-            yaw=-side * 16.0,
-        ),
-        put(rear, REAR_LAMP, -half_m + 0.035, side * (0.8 * car.width_m / 2 - 0.1), car.waist_m - 0.2, yaw=side * 12.0),
-        put(block_arrays((0.03, 0.14, 0.03), bevel_m=0), INDICATOR, half_m + 0.002, side * 0.55, 0.5),
+        put(mirror, paint, foot_m - 0.32, side * (half_width_m + 0.09), car.waist_m + 0.06),
+        put(gap, BLACK, front_gap_m, 0.994 * y_m, gap_z_m),
+        put(gap, BLACK, rear_gap_m, 0.994 * y_m, gap_z_m),
+        put(handle, CHROME, rear_gap_m + 0.14, 0.992 * y_m, handle_z_m),
+        *_lamps(car, side),
     ]
     if car.doors > 1:
-        parts.append(put(handle, CHROME, door_m - 0.8, 0.99 * y_m, car.waist_m - 0.12))
+        parts.append(put(handle, CHROME, rear_gap_m - 0.8, 0.99 * y_m, handle_z_m))
     return parts
+
+
+def _lamps(car: CarShape, side: int) -> list[Part]:
+    """Headlamp, rear lamp and indicator of one side."""
+    half_m = car.length_m / 2
+    half_width_m = car.width_m / 2
+    rear_lamp_m = 0.2 if car.tail_m < 0.3 else 0.13  # its height; a boot leaves less room
+    headlamp = block_arrays((0.3, 0.36, 0.13), bevel_m=0.03)
+    rear_lamp = block_arrays((0.1, 0.3, rear_lamp_m), bevel_m=0.02)
+    indicator = block_arrays((0.03, 0.14, 0.03), bevel_m=0)
+    headlamp_y_m = side * (0.92 * half_width_m - 0.2)
+    rear_lamp_y_m = side * (0.8 * half_width_m - 0.1)
+    return [
+        put(headlamp, HEADLAMP, half_m - 0.2, headlamp_y_m, car.nose_height_m - 0.1, yaw=-side * 16.0),
+        put(rear_lamp, REAR_LAMP, -half_m + 0.035, rear_lamp_y_m, car.waist_m - 0.2, yaw=side * 12.0),
+        put(indicator, INDICATOR, half_m + 0.002, side * 0.55, 0.5),
+    ]
 
 
 def _ends(car: CarShape, number: str) -> list[Part]:
