@@ -1,4 +1,4 @@
-"""Planar mirrors: faces that mirror sharply in one plane, which are drawn by a view from behind it."""
+"""Planar mirrors: faces in one plane that reflect sharply. Their reflections are drawn from behind the plane."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -16,22 +16,27 @@ from vobench.scene.weld import distinct_rows
 
 Indices = NDArray[np.int64]
 
-SMOOTH = 0.03  # GGX alpha below which a plane mirrors as if it were perfectly smooth
-STEEP_COSINE = 0.5  # of the angle of incidence at which mirrors are compared
-# between faces that mirror as one plane
+SMOOTH = 0.03  # the largest GGX alpha of a surface that is drawn as a perfectly smooth mirror
+STEEP_COSINE = 0.5  # the cosine of incidence at which the reflectances of mirrors are compared
+
+# The largest angle and the largest distance between the faces of one mirror.
 PLANE_TILT = np.deg2rad(0.1)
 PLANE_OFF_M = 1e-3
-CELLS = 500  # a unit of a plane's coefficients, in which faces of one plane are looked for
-LEAST_M2 = 0.05
+
+CELLS = (
+    500  # the number of grid cells per unit of the coefficients of a plane, in which faces of one plane are searched
+)
 MOST_MIRRORS = 64
-LEAST_FILL = 0.02  # of the rectangle around them: a rim is no mirror
+LEAST_M2 = 0.05  # the smallest area of a mirror
+LEAST_FILL = 0.02  # the smallest share of its bounding rectangle that a mirror fills, so that rims are no mirrors
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanarMirror:
-    """Faces that mirror sharply in one plane of their mover's frame.
+    """Faces that reflect sharply in one plane, in the frame of their mover.
 
-    outline_m (4, 3): corners around them all. strength: the share that they mirror of what comes from ahead, about.
+    `outline_m` (4, 3) are the corners of a rectangle around them.
+    `strength` is their approximate reflectance, at a steep angle.
     """
 
     index: int
@@ -44,9 +49,11 @@ class PlanarMirror:
 
 @dataclass(frozen=True, slots=True)
 class MirrorFaces:
-    """Faces (F,) of which planar mirrors are made: corners (F, 3, 3), normals (F, 3), areas, movers.
+    """F faces that can be parts of planar mirrors.
 
-    strength (F,): what they mirror, 0 for faces that do not; is_pane (F,): of glass, which mirrors on both sides.
+    `corners_m` (F, 3, 3), `normals` (F, 3), `area_m2` (F,) and `mover` (F,) are their properties.
+    `strength` (F,) is their reflectance, 0 for faces that do not reflect sharply.
+    `is_pane` (F,) is whether they are of glass, which reflects on both sides.
     """
 
     corners_m: Array
@@ -58,7 +65,7 @@ class MirrorFaces:
 
 
 def sharpness(material: Material) -> float:
-    """The share that a material mirrors as sharply as a perfect mirror, seen from a steep angle, 0 for none."""
+    """The reflectance of a material for sharp reflections at a steep angle, 0 if it has none."""
     if material.kind != "pane" and material.roughness > SMOOTH:
         return 0.0
     if material.kind == "mirror":
@@ -68,32 +75,29 @@ def sharpness(material: Material) -> float:
 
 
 def planar_mirrors(faces: MirrorFaces) -> tuple[Indices, list[PlanarMirror]]:
-    """Which mirror each face belongs to (F,), -1 for none, and the mirrors, the largest first."""
-    # Panes mirror on both sides: those that face away are the same plane.
+    """The mirror (F,) of each face, -1 for none, and the mirrors, the largest first."""
+    # Panes reflect on both sides, so opposite normals mean the same plane. The sign of their normals is made unique.
     faces_away = faces.is_pane & (faces.normals @ [1e-4, 1e-2, 1.0] < 0)
     sign = np.where(faces_away, -1.0, 1.0)
     normal = faces.normals * sign[:, None]
     offset_m = -np.einsum("ij,ij->i", normal, faces.corners_m[:, 0])
 
+    # Faces of one plane have similar coefficients of their planes, so most of them are in one cell of a grid.
     is_free = (faces.strength > 0) & normal.any(1)
-    index = np.full(len(faces.area_m2), -1)
-    mirrors = list[PlanarMirror]()
     keys = np.column_stack([CELLS * normal, CELLS * offset_m, faces.mover, faces.is_pane])
     cell = distinct_rows(np.round(keys)).inverse
     cell_areas_m2 = np.bincount(cell, faces.area_m2 * is_free)
     largest_first = np.argsort(-cell_areas_m2, kind="stable")
-    for nth in largest_first[: 4 * MOST_MIRRORS].tolist():
-        members = np.flatnonzero(is_free & (cell == nth))
+
+    index = np.full(len(faces.area_m2), -1)
+    mirrors = list[PlanarMirror]()
+    for candidate in largest_first[: 4 * MOST_MIRRORS].tolist():
+        members = np.flatnonzero(is_free & (cell == candidate))
         if len(members) == 0 or len(mirrors) == MOST_MIRRORS:
             continue
-        seed = members[np.argmax(faces.area_m2[members])]
+        seed = int(members[np.argmax(faces.area_m2[members])])
         plane = Plane(normal[seed], float(offset_m[seed]))
-        moves_along = faces.mover == faces.mover[seed]
-        is_alike = moves_along & (faces.is_pane == faces.is_pane[seed])
-        is_parallel = normal @ plane.normal > np.cos(PLANE_TILT)
-        in_plane = is_free & is_alike & is_parallel
-        heights_m = np.abs(faces.corners_m[in_plane] @ plane.normal + plane.offset_m)
-        in_plane[in_plane] = heights_m.max(1) < PLANE_OFF_M
+        in_plane = is_free & _are_in_plane(faces, normal, seed, plane)
 
         outline_m = _outline(faces.corners_m[in_plane].reshape(-1, 3), plane)
         sides_m = np.linalg.norm(np.diff(outline_m[:3], axis=0), axis=1)
@@ -115,13 +119,24 @@ def planar_mirrors(faces: MirrorFaces) -> tuple[Indices, list[PlanarMirror]]:
     return index, mirrors
 
 
+def _are_in_plane(faces: MirrorFaces, normal: Array, seed: int, plane: Plane) -> Mask:
+    """Whether faces (F,) with normals (F, 3) are in the plane of one of them, the seed, and can be in one mirror."""
+    has_same_mover = faces.mover == faces.mover[seed]
+    is_same_kind = faces.is_pane == faces.is_pane[seed]
+    is_parallel = normal @ plane.normal > np.cos(PLANE_TILT)
+    in_plane = np.asarray(has_same_mover & is_same_kind & is_parallel)
+    heights_m = np.abs(faces.corners_m[in_plane] @ plane.normal + plane.offset_m)
+    in_plane[in_plane] = heights_m.max(1) < PLANE_OFF_M
+    return in_plane
+
+
 def _outline(points_m: Array, plane: Plane) -> Array:
-    """The corners (4, 3) of the smallest rectangle around points (N, 3) in a plane; one side is the hull's."""
+    """The corners (4, 3) of the smallest rectangle around points (N, 3) in a plane. One side is on their hull."""
     plane_axes = np.linalg.svd(plane.normal[None])[2][1:]
     hull_m = points_m[ConvexHull(points_m @ plane_axes.T).vertices]
     along = unit(np.roll(hull_m, -1, axis=0) - hull_m)
     across = np.cross(plane.normal, along)
-    u = hull_m @ along.T  # (points, sides): each point along each side
+    u = hull_m @ along.T  # (points, sides): the coordinate of each point along each side
     v = hull_m @ across.T
     areas_m2 = np.ptp(u, axis=0) * np.ptp(v, axis=0)
     best = int(np.argmin(areas_m2))
