@@ -34,14 +34,14 @@ from vobench.scene.triangles import Triangles
 Report = Callable[[float], object]
 Instant = tuple[int, float]  # the index of a light, and a time in ns
 
-# The approximate shares of a bake that are done after its first stages.
+# The approximate shares of the work of a bake that are done after its first stages.
 PLACED_DONE = 0.1
 GATHER_DONE = 0.4
 
 CELL_TEXELS = 2.5  # the smallest side of a surfel, in distances between samples
-SKY_RAYS = 64  # the smallest number of rays that tell whether a surfel sees the sky
-BLIND = 0.02  # a surfel of which a smaller share of rays meets anything visible or escapes is inside something
-UNSEEN = 1e-3  # the hits that a texel counts with if no ray has found it
+SKY_RAYS = 64  # the smallest number of rays from a surfel if the scene has a sky
+BLIND = 0.02  # a surfel is inside something if a smaller share of its rays hits a surfel or escapes
+UNSEEN = 1e-3  # the weight of a point in its surfel if no ray has hit it; otherwise it is the number of hits
 
 
 def bake(
@@ -81,7 +81,7 @@ def bake(
     instants = [(index, t_ns) for index, light in enumerate(scene.lights) for t_ns in key_times_ns(light)]
     reflectors = Reflectors(gatherer, points, point_areas_m2, settings.seed)
     mirrored = _MirroredLight(scene, settings, reflectors, smoothing, instants=instants, area_m2=area_m2)
-    # A surfel is represented by its points that rays have found, not by those that lie hidden under a rug.
+    # The points of a surfel are weighted by the rays that hit them, so that points hidden under a rug hardly count.
     point_hits = np.bincount(layout.source, rounds.hits, len(points) + 1)
     weights = point_hits[: len(points)] + UNSEEN
     first_light = _first_light(
@@ -187,7 +187,7 @@ class _MirroredLight:
     def illuminance_lx(self, row: int, direct_lx: Floats, scattered_lm: float) -> Floats:
         """The illuminance (2, S) of surfels by each half of the photons of a light at the instant of a row.
 
-        direct_lx (P,): the direct light of points. scattered_lm: how much of it these scatter.
+        `direct_lx` (P,) is the direct illuminance of points, `scattered_lm` is the flux that they scatter.
         """
         index, t_ns = self._instants[row]
         light = self._scene.lights[index]
@@ -203,10 +203,13 @@ class _MirroredLight:
 
 @dataclass(frozen=True, slots=True)
 class _FirstLight:
-    """What K lights give before any bounce between bodies.
+    """The light of K lights before any bounce between bodies.
 
-    direct (L, H, W): as in BakedScene. Of surfels: reflectance (S, 3); illuminance_lx (K, S), direct; the radiosity
-    (K, S, 3) due to that if the light is white; mirrored_lx (2, K, S), by each half of the photons.
+    `direct` (L, H, W) is as in `BakedScene`. The other arrays are of S surfels.
+    `reflectance` (S, 3) is their reflectance.
+    `illuminance_lx` (K, S) is the direct illuminance.
+    `radiosity` (K, S, 3) is the radiosity due to the direct illuminance, for white light.
+    `mirrored_lx` (2, K, S) is the illuminance by way of reflecting faces, by each half of the photons.
     """
 
     direct: Floats
@@ -230,7 +233,7 @@ def _first_light(
 ) -> _FirstLight:
     """Compute the direct and the mirrored light at some instants.
 
-    weights (P,): those of points in the means of their surfels. area_m2 (S,): the areas of surfels.
+    `weights` (P,) are those of points in the means of their surfels. `area_m2` (S,) are the areas of surfels.
     """
     albedos = albedo(static.faces, scene.materials, static.points)
     freed_memory.give_back()
@@ -238,7 +241,7 @@ def _first_light(
     illuminance_lx = np.zeros((len(instants), len(groups)), np.float32)
     radiosity = np.zeros((len(instants), len(groups), 3), np.float32)
     mirrored_lx = np.zeros((2, len(instants), len(groups)), np.float32)
-    # Backwards, so that the layer of a moving sun is in the end that of its first instant.
+    # From the last to the first instant, so that the layer of a moving sun is that of its first instant in the end.
     for row in reversed(range(len(instants))):
         index, t_ns = instants[row]
         direct_lx = direct_points(scene, index, static, settings, t_ns=t_ns)
@@ -302,7 +305,10 @@ def _by_light(columns: Floats, shape: tuple[int, ...]) -> Floats:
 
 
 class _Lights:
-    """The lights of a scene at the instants (K,) that they are baked for. sky_weights: the luminances of the skies."""
+    """The lights of a scene at the instants (K,) for which they are baked.
+
+    `sky_weights` are the luminances of the colours of the skies.
+    """
 
     def __init__(self, scene: Scene, instants: list[Instant]) -> None:
         lights = [scene.lights[index] for index, _ in instants]
@@ -315,7 +321,7 @@ class _Lights:
         self.sky_weights = self._weights[self._sky_rows].sum(1)
 
     def luminance(self, values: Floats) -> Floats:
-        """The sum (S,) over all lights of what they give (K, S, C), weighted by the luminance of the channels."""
+        """The sum (S,) over all lights of the values (K, S, C), weighted by the luminance of each channel."""
         total = np.zeros(values.shape[1], np.float32)
         for weight, of_light in zip(self._weights, values, strict=True):
             has_colours = of_light.shape[-1] > 1
@@ -327,7 +333,7 @@ class _Lights:
         return np.asarray(self._weights[:, :channels].ravel())
 
     def of_skies(self, sky_lx: Floats) -> Floats:
-        """What the skies give (N, S), as a table of what all lights give (K, S)."""
+        """The light of the N skies (N, S) in a table of the light of all K lights (K, S)."""
         result = np.zeros((len(self._weights), sky_lx.shape[1]), np.float32)
         result[self._sky_rows] = sky_lx
         return result
@@ -348,7 +354,7 @@ def _tracks(
 
 
 def _root_mean_square(noise: Floats, area_m2: Floats) -> float:
-    """The root mean square of the noise (S,) of surfels over their areas (S,), 0 without surfels."""
+    """The root mean square of the noise (S,) of surfels, weighted by their areas (S,); 0 without surfels."""
     if area_m2.sum() > 0:
         return float(np.sqrt(np.average(noise**2, weights=area_m2)))
     return 0.0
@@ -362,7 +368,7 @@ def direct_points(
     *,
     t_ns: float,
 ) -> Floats:
-    """The direct light (P,) in lx of one light on points, at level 1."""
+    """The direct illuminance (P,) of points in lx by one light at level 1."""
     light = scene.lights[index]
     total = np.zeros(len(static.points), np.float32)
     side = round(np.sqrt(settings.light_rays))
@@ -388,7 +394,7 @@ def direct_layer(
     static: StaticScene,
     light: Floats,
 ) -> Floats:
-    """The map (H, W) of the direct light (P,) of one light on points; on a lamp π times its luminance."""
+    """The map (H, W) of the direct illuminance (P,) of points by one light. On a lamp it is π times the luminance."""
     layer = static.layout.filled(light)
     lamp = scene.lights[index]
     if isinstance(lamp, AreaLight):

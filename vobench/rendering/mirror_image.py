@@ -1,4 +1,4 @@
-"""The images of lamps and of the sun in flat mirrors, which are emitters too."""
+"""The images of lamps and of the sun in flat mirrors. They are emitters, too."""
 
 from dataclasses import dataclass, replace
 
@@ -16,9 +16,11 @@ from vobench.scene.light import Light, Sky
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MirrorImage(Emitter):
-    """The image of an emitter behind a mirror. Shadow rays go straight to the image, through the faces of the mirror.
+    """The image of an emitter behind a mirror. Shadow rays lead straight to the image, through the faces of the mirror.
 
-    ball: the bounding sphere of the image. caster: rays against the mirror alone. tint: the reflectance of the mirror.
+    `tint` is the reflectance of the mirror.
+    `caster` casts rays at the mirror alone.
+    `ball` is the bounding sphere of the image.
     """
 
     emitter: Emitter
@@ -29,21 +31,21 @@ class MirrorImage(Emitter):
 
     @property
     def least_side(self) -> int:
-        """As many as of the emitter itself."""
+        """That of the emitter itself."""
         return self.emitter.least_side
 
     @property
     def is_hard(self) -> bool:
-        """As hard as the emitter itself."""
+        """Whether the emitter itself is hard."""
         return self.emitter.is_hard
 
     def width_rad(self, points_m: Floats) -> Floats:
-        """As wide as the image is seen."""
+        """The angular width (P,) of the image."""
         return self.emitter.width_rad(self._images_m(points_m))
 
     def towards(self, texels: Texels) -> Aim:
         """Places on the image."""
-        # As seen from the image of a texel, the emitter itself is where its image is as seen from the texel.
+        # The emitter as seen from the image of a texel is the reflection of its image as seen from the texel.
         aim_from_image = self.emitter.towards(self._images(texels))
 
         def aim(a: Floats, b: Floats) -> tuple[Floats, Floats]:
@@ -53,23 +55,23 @@ class MirrorImage(Emitter):
         return aim
 
     def unshadowed_light(self, texels: Texels) -> Floats:
-        """The light of the whole image, as if the mirror had no end."""
+        """The light (P,) of the whole image, as if the mirror were infinitely large."""
         return np.float32(self.tint) * self.emitter.unshadowed_light(self._images(texels))
 
     def may_reach(self, points_m: Floats) -> Mask:
-        """Points (P, 3) in front of the mirror from which its outline may overlap the image, by bounding spheres."""
+        """Whether points (P, 3) are in front of the mirror, and its bounding sphere overlaps that of the image."""
         outline = bounding_sphere(self.mirror.corners_m)
         to_image_m = self.ball.centre_m - points_m.astype(float)
         height_m = self.mirror.height_m(points_m)
         depth_m = -(to_image_m @ self.mirror.normal)  # of the image below the point
-        share = np.clip(height_m / np.maximum(depth_m, 1e-9), 0, 1)
+        share = np.clip(height_m / np.maximum(depth_m, 1e-9), 0, 1)  # where the line to the image crosses the mirror
         crossing_m = points_m + share[:, None] * to_image_m
         aside_m = np.linalg.norm(crossing_m - outline.centre_m, axis=1)
         reach_m = outline.radius_m + share * self.ball.radius_m
         return np.asarray((height_m > 0) & (aside_m <= reach_m))
 
     def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
-        """The share (R,) of light that passes what is in front of the mirror, and then what hides the emitter."""
+        """The share (R,) of light that passes from the emitter to the mirror, and from there to the origins."""
         share = np.zeros(len(origins_m), np.float32)
         rays = self._through_mirror(origins_m, segments_m)
         origins_m = origins_m[rays]
@@ -106,7 +108,7 @@ class MirrorImage(Emitter):
         return crossing.astype(np.float32)
 
     def _through_mirror(self, points_m: Floats, segments_m: Floats) -> Rows:
-        """Which segments (P, 3) from points cross the faces of the mirror from their front."""
+        """The rows of the segments (P, 3) from points that cross the faces of the mirror from their front."""
         crossing = self._crossing(points_m, segments_m)
         leads_down = segments_m @ self.mirror.normal < 0
         rays = np.flatnonzero(leads_down & (crossing > 0) & (crossing < 1))
@@ -125,7 +127,7 @@ def mirror_images(
 ) -> list[Emitter]:
     """The images of a lamp or the sun in all smooth mirrors, at one instant.
 
-    The sky has none: the rays that gather indirect light follow mirrors to it.
+    There are none of the sky, because the rays that gather indirect light are reflected to the sky by mirrors.
     """
     if isinstance(light, Sky):
         return []

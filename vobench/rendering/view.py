@@ -22,26 +22,26 @@ class Plane:
     offset_m: float
 
     def distance_m(self, point_m: Array) -> float:
-        """Signed distance of a point (3,): positive on the side of the normal."""
+        """The signed distance of a point (3,), which is positive on the side of the normal."""
         return float(self.normal @ point_m + self.offset_m)
 
     def flipped(self) -> "Plane":
-        """The same plane, seen from its other side."""
+        """The same plane with the opposite normal."""
         return Plane(-self.normal, -self.offset_m)
 
     def moved(self, T_world_mover: Array) -> "Plane":
-        """The plane of a mover's frame where the mover is."""
+        """A plane that is given in the frame of a mover, in the world frame."""
         normal = T_world_mover[:3, :3] @ self.normal
         return Plane(normal, self.offset_m - float(normal @ T_world_mover[:3, 3]))
 
     @property
     def coefficients(self) -> Array:
-        """The normal, then the offset in metres, in one array (4,)."""
+        """The normal and the offset in metres, as one array (4,)."""
         return np.array([*self.normal, self.offset_m])
 
     @property
     def reflection(self) -> Array:
-        """Matrix (4, 4) that takes each point to its image behind the plane (Householder, 1958)."""
+        """The matrix (4, 4) that maps a point to its mirror image (Householder, 1958)."""
         reflection = np.eye(4)
         reflection[:3, :3] -= 2 * np.outer(self.normal, self.normal)
         reflection[:3, 3] = -2 * self.offset_m * self.normal
@@ -49,19 +49,19 @@ class Plane:
 
     @property
     def key(self) -> tuple[float, ...]:
-        """Equal for planes that coincide to 10 µm."""
+        """A key that is equal for planes that coincide to 10 µm."""
         coefficients = np.round(self.coefficients, 5)
         return tuple(float(coefficient) + 0.0 for coefficient in coefficients)
 
 
-NEAR_M = 0.05
-FARTHEST_PX = 1e6  # from the picture's corner; whatever lies beyond is as good as there
+NEAR_M = 0.05  # the distance of the near plane
+FARTHEST_PX = 1e6  # the largest pixel coordinate; larger ones are clipped
 
 
 def visible_boxes(camera: Pinhole, outlines_camera_m: Array) -> Array:
-    """First and end column, first and end row (M, 4) that convex outlines (M, K, 3) can touch, none where first >= end.
+    """The boxes (M, 4) of the pixels that convex outlines (M, K, 3) can cover: first and end column, first and end row.
 
-    Edges are cut at the near plane, behind which a projection has no meaning.
+    A box is empty if its first is not less than its end. Edges are clipped at the near plane.
     """
     start_m = outlines_camera_m
     end_m = np.roll(outlines_camera_m, -1, axis=1)
@@ -84,7 +84,7 @@ def visible_boxes(camera: Pinhole, outlines_camera_m: Array) -> Array:
 
 
 def within(box: Sequence[float], other: Sequence[float]) -> Box | None:
-    """The intersection of two boxes, None where it is empty."""
+    """The intersection of two boxes, None if it is empty."""
     u0 = max(box[0], other[0])
     u1 = min(box[1], other[1])
     v0 = max(box[2], other[2])
@@ -94,23 +94,26 @@ def within(box: Sequence[float], other: Sequence[float]) -> Box | None:
     return int(u0), int(u1), int(v0), int(v1)
 
 
-STATIC = -1
+STATIC = -1  # the index of no mover
 IDENTITY = np.eye(4)
 NO_GLINTS = np.zeros((0, GLINT_ROWS, 4))
-# OpenCV's camera faces +z with y down, OpenGL's -z with y up.
+# The camera of OpenCV looks along +z, with y down; that of OpenGL along -z, with y up.
 T_CV_GL = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True)
 class PinholeView:
-    """A pinhole at a place and time, perhaps by way of mirrors: then the picture is what the last one shows.
+    """The view of a pinhole camera at one instant, directly or by way of mirrors.
 
-    T_world_movers: the movers' poses. ambient_cd_m2 (3,) for mirrors that are not followed further.
-    view_projection (4, 4): from the world to OpenGL's screen, nearness from 1 at NEAR_M to 0; `direct` (4, 4) as if
-    there were no mirrors.
-    eye_m (3,) is behind the last mirror, if any.
-    images (4, 4) takes what the last mirror shows to where the camera sees it. glints (G, 4, 4) as in `glint`.
-    extinction_per_m and airlight_cd_m2 (3,) are those of fog; 0 where the air is clear.
+    `T_world_movers` are the poses of movers.
+    `ambient_cd_m2` (3,) is shown in mirrors whose reflections are not drawn.
+    `eye_m` (3,) is the position of the camera, or that of its image behind the last mirror.
+    `view_projection` (4, 4) maps the world to the screen of OpenGL. The depth on the screen is 1 at NEAR_M and
+    decreases to 0. `direct` (4, 4) is the same without mirrors.
+    `images` (4, 4) maps the world to the place where the camera sees it in the mirrors.
+    `glints` (G, 4, 4) are as in `glint`.
+    `mirrors` are the planes of the mirrors, from the camera on.
+    `extinction_per_m` and `airlight_cd_m2` (3,) are those of fog, 0 in clear air.
     """
 
     camera: Pinhole
@@ -140,32 +143,35 @@ class PinholeView:
 
     @property
     def depth(self) -> int:
-        """How many mirrors lie between."""
+        """The number of mirrors."""
         return len(self.mirrors)
 
     @property
     def mirror(self) -> Plane | None:
-        """The mirror whose picture it is."""
+        """The last mirror, None without mirrors."""
         return self.mirrors[-1] if self.mirrors else None
 
     @property
     def world_from_screen(self) -> Array:
-        """(3, 3): from (x, y, 1) on OpenGL's screen, -1 to 1 and upwards, to the ray there in the world."""
+        """The matrix (3, 3) that maps (x, y, 1) on the screen of OpenGL to the direction of the ray in the world.
+
+        x and y are from -1 to 1, and y is upwards.
+        """
         camera = self.camera
         half_width = camera.width_px / 2
         half_height = camera.height_px / 2
-        # The camera matrix's inverse, after the step from the screen to pixels.
+        # The conversion from the screen to pixels, followed by the inverse of the camera matrix.
         x_axis = [half_width / camera.fx_px, 0, (half_width - 0.5 - camera.cx_px) / camera.fx_px]
         y_axis = [0, -half_height / camera.fy_px, (half_height - 0.5 - camera.cy_px) / camera.fy_px]
         camera_from_screen = np.array([x_axis, y_axis, [0, 0, 1]])
         return np.asarray(self.images[:3, :3].T @ self.T_world_camera[:3, :3] @ camera_from_screen)
 
     def pose(self, mover: int) -> Array:
-        """T_world_mover, the identity for what is static."""
+        """T_world_mover (4, 4), the identity for STATIC."""
         return IDENTITY if mover == STATIC else self.T_world_movers[mover]
 
     def plane(self, mirror: Plane, mover: int) -> Plane:
-        """Where a plane of a mover's frame is."""
+        """A plane that is given in the frame of a mover, in the world frame."""
         return mirror if mover == STATIC else mirror.moved(self.T_world_movers[mover])
 
 
@@ -178,7 +184,7 @@ def pinhole_view(
     ambient_cd_m2: Array,
     glints: Array = NO_GLINTS,
 ) -> PinholeView:
-    """The view without a mirror."""
+    """The view of a camera without mirrors."""
     direct = _projection(camera) @ T_CV_GL @ se3.inverse(T_world_camera)
     return PinholeView(
         camera=camera,
@@ -195,9 +201,10 @@ def pinhole_view(
 
 
 def _projection(camera: Pinhole) -> Array:
-    """From OpenGL's camera to its screen (4, 4), which counts from the corner of the top-left pixel.
+    """The matrix (4, 4) from the camera of OpenGL to its screen, whose origin is the corner of the top-left pixel.
 
-    Depth is NEAR_M over the distance ahead: floats are then as fine far away as near by (Reed, 2015).
+    The depth is NEAR_M divided by the distance along the axis, because its relative resolution is then the same at all
+    distances (Reed, 2015).
     """
     P = np.zeros((4, 4))
     P[0, 0] = 2 * camera.fx_px / camera.width_px
