@@ -13,6 +13,8 @@ from vobench.geometry import se3
 from vobench.geometry.camera import Camera, DoubleSphere, KannalaBrandt, Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.se3 import Array
+from vobench.rendering.bake import bake
+from vobench.rendering.baked_scene import BakeSettings
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import View, single_instant
 from vobench.scene.light import Dimmer, Flicker, Sky
@@ -151,6 +153,11 @@ def test_a_mirror_that_moves_mirrors_from_where_it_is(draw: Any, even_light: Any
     )
     assert (np.abs(moving - standing) > 0.01 * standing).mean() < 0.002
     assert (standing != without).mean() > 0.01
+
+
+def test_without_any_light_a_place_with_movers_is_black(draw: Any) -> None:
+    picture = draw(bake(DARK, BakeSettings(0.2, bounces=0))).radiance(PINHOLE, single_instant(PINHOLE, AHEAD))
+    assert picture.max() == 0
 
 
 def test_a_light_counts_with_its_mean_over_each_sub_frame(draw: Any, even_light: Any) -> None:

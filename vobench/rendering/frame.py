@@ -44,7 +44,8 @@ class FrameRenderer:
         self._lamp_parts = lamp_parts(self._lights)
         self._fog = baked.scene.fog
         light_map = self._illumination.at(0, 0)
-        self._light = ShadedLight(baked, light_map) if self._movers else LightTexture(light_map)
+        is_shaded = bool(self._movers and self._lights)
+        self._light = ShadedLight(baked, light_map) if is_shaded else LightTexture(light_map)
         drawn = geometry(baked.faces, baked.light_uv, baked.scene.materials)
         panoramas = {index: PanoramaTexture(shown) for index, shown in self._background.panoramas.items()}
         self._draw = BatchDraw(drawn, self._light.id, panoramas)
