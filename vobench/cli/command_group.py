@@ -75,7 +75,7 @@ class CommandGroup(TyperGroup):
 
 
 def _targets() -> dict[str, str]:
-    """The target (module:function) of each command: first those of COMMANDS, then those of installed commands, sorted."""
+    """The target (module:function) of each command: first COMMANDS, then installed commands in alphabetical order."""
     installed = _installed_commands()
     targets = dict(COMMANDS)
     for name in sorted(installed.keys() - COMMANDS.keys()):

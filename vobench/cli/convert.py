@@ -69,8 +69,8 @@ def convert_command(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="Trajectory files (TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, detected from content) or folders of "
-            "sequences. Several trajectories are merged in order of time.",
+            help="Trajectory files (TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, detected from content) or folders "
+            "of sequences. Several trajectories are merged in order of time.",
         ),
     ],
     *,
