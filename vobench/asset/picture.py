@@ -673,30 +673,30 @@ class Spines:
 
 @cache
 def spines(seed: int = 0, count: int = 52) -> Spines:
-    """The spines of books, of series of books, and of ring binders."""
+    """The spines of single books, series of books and ring binders. There are `count` or slightly more of them."""
     rng = np.random.default_rng(seed)
     drawn: list[Image.Image] = []
     while len(drawn) < count:
         has_binders = rng.random() < 0.14
         drawn += _binders(rng) if has_binders else _series(rng)
 
-    # Spines are drawn horizontally, but are upright and side by side in the picture.
+    # Each spine was drawn horizontally. In the picture, they are upright and side by side.
     ends = np.cumsum([0, *(spine.height for spine in drawn)])
     height = round(0.325 * SPINE_PX_PER_M)
     image = Image.new("RGB", (int(ends[-1]), height), PAPER)
     for x, spine in zip(ends.tolist(), drawn, strict=False):
         image.paste(spine.transpose(Image.Transpose.ROTATE_270), (x, 0))
 
-    worn = 1 + 0.05 * noise(rng, 1024, 20, 500, slope=0.5)
-    repeated = np.tile(worn, (1, image.width // 1024 + 1))
-    pixels = _scaled(image, repeated[:height, : image.width, None])
+    wear = 1 + 0.05 * noise(rng, 1024, 20, 500, slope=0.5)
+    repeated_wear = np.tile(wear, (1, image.width // 1024 + 1))
+    pixels = _scaled(image, repeated_wear[:height, : image.width, None])
 
-    u = (ends / image.width).tolist()
+    border_u = (ends / image.width).tolist()
     cells = []
     sizes_m = []
     for k, spine in enumerate(drawn):
         last_v = spine.width / height
-        cells.append((u[k], u[k + 1], 0.0, last_v))
+        cells.append((border_u[k], border_u[k + 1], 0.0, last_v))
         thickness_m = spine.height / SPINE_PX_PER_M
         height_m = spine.width / SPINE_PX_PER_M
         sizes_m.append((thickness_m, height_m))
@@ -704,59 +704,60 @@ def spines(seed: int = 0, count: int = 52) -> Spines:
 
 
 def _binders(rng: Rng) -> list[Image.Image]:
-    """The spines of an owner's ring binders, drawn horizontally."""
+    """The spines of two to four ring binders of one owner, drawn horizontally."""
     colour = one_of(rng, NAVY, INK, BRICK, "#8a8d8f")
     owner = _words(rng, 1).upper()
-    w = round(0.07 * SPINE_PX_PER_M)
-    h = round(0.318 * SPINE_PX_PER_M)
+    width = round(0.07 * SPINE_PX_PER_M)
+    height = round(0.318 * SPINE_PX_PER_M)
     binders = []
     for volume in range(int(rng.integers(2, 5))):
-        image, draw = _canvas(h, w, colour)
-        label = [0.12 * h, 0.14 * w, 0.55 * h, 0.86 * w]
-        hole_x = 0.79 * h
-        hole = [hole_x, 0.28 * w, hole_x + 0.44 * w, 0.72 * w]
+        image, draw = _canvas(height, width, colour)
+        label = [0.12 * height, 0.14 * width, 0.55 * height, 0.86 * width]
+        hole_x = 0.79 * height
+        hole = [hole_x, 0.28 * width, hole_x + 0.44 * width, 0.72 * width]
         draw.rectangle(label, fill=PAPER)
         text = f"{owner} {2019 + volume}"
-        _text(draw, (0.15 * h, 0.5 * w), text, 0.34 * w, INK, anchor="lm")
+        _text(draw, (0.15 * height, 0.5 * width), text, 0.34 * width, INK, anchor="lm")
         draw.ellipse(hole, fill="#0c0d0e", outline="#b9bcbe", width=5)
         binders.append(image)
     return binders
 
 
 def _series(rng: Rng) -> list[Image.Image]:
-    """The spine of a book, or of each volume of a series, drawn horizontally."""
+    """The spines of the volumes of a series, or of a single book, drawn horizontally."""
     volumes = int(rng.choice([1, 1, 1, 1, 2, 5]))
-    w = round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
+    width = round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
     height_m = float(rng.choice([0.178, 0.2, 0.216, 0.235, 0.24, 0.28]))
-    h = round(height_m * SPINE_PX_PER_M)
+    height = round(height_m * SPINE_PX_PER_M)
     colour = one_of(rng, *INKS, INK, PAPER, "#e2d9c6", "#4a5a4d")
     accent = one_of(rng, *INKS, PAPER)
     title = _words(rng, int(rng.integers(2, 5))).title()
     author = _words(rng, 1).upper()
 
-    image, draw = _canvas(h, w, colour)
-    title_band = rng.uniform(-0.6, 0.6)  # the length of the band; no band if negative
+    image, draw = _canvas(height, width, colour)
+    title_band = rng.uniform(-0.6, 0.6)  # the length of the band behind the title; negative for no band
     thin_bands = [(start, 0.012) for start in rng.choice([0.05, 0.09, 0.84], 2)]
-    for start, length in ((0.13, max(title_band, 0)), *thin_bands):
+    bands = [(0.13, max(title_band, 0)), *thin_bands]
+    for start, length in bands:
         end = start + length
-        draw.rectangle([start * h, 0, end * h, w], fill=accent)
+        draw.rectangle([start * height, 0, end * height, width], fill=accent)
     title_ink = _on(accent if title_band > 0 else colour)
-    title_size = min(0.6 * w, 0.075 * h, 1.25 * h / len(title))
-    _text(draw, (0.15 * h, 0.5 * w), title, title_size, title_ink, anchor="lm")
+    title_size = min(0.6 * width, 0.075 * height, 1.25 * height / len(title))
+    _text(draw, (0.15 * height, 0.5 * width), title, title_size, title_ink, anchor="lm")
 
     spines_of_series = []
-    size = min(0.45 * w, 0.06 * h)
+    size = min(0.45 * width, 0.06 * height)
     for volume in range(1, volumes + 1):
         spine = image.copy()
         foot = author if volumes == 1 else str(volume)
-        _text(ImageDraw.Draw(spine), (0.97 * h, 0.5 * w), foot, size, _on(colour), anchor="rm")
+        _text(ImageDraw.Draw(spine), (0.97 * height, 0.5 * width), foot, size, _on(colour), anchor="rm")
         spines_of_series.append(spine)
     return spines_of_series
 
 
 @painted
 def screen(seed: int = 0) -> Picture:
-    """A display (1280 × 720) with a list of files, an editor, a chart, a log and a bar of icons."""
+    """The picture on a monitor (1280 × 720 px): a list of files, an editor, a chart, a log and a bar of icons."""
     rng = np.random.default_rng(seed)
     is_dark = rng.random() < 0.7
     background = "#1f252b" if is_dark else "#f2f1ec"
@@ -794,7 +795,7 @@ def screen(seed: int = 0) -> Picture:
 
 @painted
 def poster(style: str, seed: int = 0, width: int = 700, height: int = 1000) -> Picture:
-    """A poster in one of the styles of POSTERS."""
+    """A poster. `style` is one of POSTERS, and the size is in pixels."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(width, height, PAPER)
     POSTERS[style](draw, rng, width, height)
@@ -804,7 +805,7 @@ def poster(style: str, seed: int = 0, width: int = 700, height: int = 1000) -> P
 
 
 def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
-    """Draw ridges of hills in the haze below a sun."""
+    """Draw ridges of hazy hills below a sun."""
     sky_tones = np.linspace(rgb(SKY), rgb(PAPER), 40).astype(int)
     for k, tone in enumerate(sky_tones.tolist()):
         draw.rectangle([0, k * h / 40, w, h], fill=tuple(tone))
@@ -826,7 +827,7 @@ def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
 
 
 def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
-    """Draw a grid of squares with quarters and halves of circles."""
+    """Draw a grid of squares, each with a quarter or a half of a circle."""
     side = w // 5
     for y, x in product(range(0, h, side), range(0, w, side)):
         background = one_of(rng, *INKS[:6], PAPER)
@@ -850,7 +851,7 @@ def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
 
 
 def _talk(draw: Draw, rng: Rng, w: int, h: int) -> None:
-    """Draw a title above three columns of text and charts."""
+    """Draw the poster of a talk: a title above three columns of text and charts."""
     banner = one_of(rng, NAVY, TEAL, PLUM)
     draw.rectangle([0, 0, w, 0.12 * h], fill=banner)
     _text(draw, (0.04 * w, 0.03 * h), _words(rng, 4).title(), 0.04 * h, PAPER)
@@ -875,7 +876,7 @@ POSTERS: dict[str, Callable[[Draw, Rng, int, int], None]] = {
 
 @painted
 def whiteboard(seed: int = 0) -> Picture:
-    """A whiteboard (1440 × 900) with diagrams in four inks, and traces of wiped ones."""
+    """A whiteboard (1440 × 900 px) with diagrams in four colours, and traces of wiped diagrams."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(1440, 900, "#e9e9e5")
     wiped_diagrams = 8
@@ -927,7 +928,7 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
 
 @painted
 def sign(text: str, colour: str = PAPER) -> Picture:
-    """A sign (480 × 240) with a word inside a border."""
+    """A sign (480 × 240 px) with a word inside a border."""
     ink = _on(colour)
     image, draw = _canvas(480, 240, colour)
     draw.rectangle([8, 8, 471, 231], outline=ink, width=5)

@@ -49,9 +49,9 @@ def _print_stacks_on_crash() -> None:
 
 def _replace_unprintable_characters() -> None:
     """Print a question mark for each character that the encoding of the terminal lacks, such as °."""
-    for stream in (sys.stdout, sys.stderr):
-        if stream is not None:
-            stream.reconfigure(errors="replace")
+    open_streams = filter(None, (sys.stdout, sys.stderr))  # the shell can close either
+    for stream in open_streams:
+        stream.reconfigure(errors="replace")
 
 
 def _call_command() -> None:
