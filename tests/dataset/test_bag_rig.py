@@ -5,7 +5,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from vobench.dataset.bag_rig import FramedInfo, Info, between, by_projection, info_rig, plain, tree_of
+from vobench.dataset.bag_rig import (
+    FramedInfo,
+    Info,
+    find_transform,
+    frame_name,
+    info_rig,
+    static_transforms,
+    stereo_transform_from_projection,
+)
 from vobench.errors import InputError
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, Pinhole
@@ -22,18 +30,18 @@ TREE = {("a", "b"): A_B, ("b", "c"): B_C, ("d", "c"): D_C, ("x", "y"): A_B}
 
 
 def test_a_pose_between_frames_is_the_product_along_the_tree_and_its_inverse_backwards() -> None:
-    np.testing.assert_allclose(between(TREE, "a", "d"), A_B @ B_C @ se3.inverse(D_C), atol=1e-12)
-    np.testing.assert_allclose(between(TREE, "d", "a"), D_C @ se3.inverse(B_C) @ se3.inverse(A_B), atol=1e-12)
-    np.testing.assert_array_equal(between(TREE, "a", "a"), np.eye(4))
-    np.testing.assert_array_equal(between({}, "q", "q"), np.eye(4))
-    assert between(TREE, "a", "y") is None
-    assert between(TREE, "a", "nowhere") is None
+    np.testing.assert_allclose(find_transform(TREE, "a", "d"), A_B @ B_C @ se3.inverse(D_C), atol=1e-12)
+    np.testing.assert_allclose(find_transform(TREE, "d", "a"), D_C @ se3.inverse(B_C) @ se3.inverse(A_B), atol=1e-12)
+    np.testing.assert_array_equal(find_transform(TREE, "a", "a"), np.eye(4))
+    np.testing.assert_array_equal(find_transform({}, "q", "q"), np.eye(4))
+    assert find_transform(TREE, "a", "y") is None
+    assert find_transform(TREE, "a", "nowhere") is None
 
 
 def test_a_circle_of_frames_ends() -> None:
     tree = {("a", "b"): A_B, ("b", "a"): se3.inverse(A_B)}
-    assert between(tree, "a", "c") is None
-    np.testing.assert_allclose(between(tree, "a", "b"), A_B)
+    assert find_transform(tree, "a", "c") is None
+    np.testing.assert_allclose(find_transform(tree, "a", "b"), A_B)
 
 
 def transform(parent: str, child: str, T: np.ndarray, scale: float = 1.0) -> SimpleNamespace:
@@ -49,17 +57,17 @@ def transform(parent: str, child: str, T: np.ndarray, scale: float = 1.0) -> Sim
 
 def test_transforms_are_read_without_slashes_and_with_exact_rotations() -> None:
     message = SimpleNamespace(transforms=[transform("/a", "b", A_B, 1.0009), transform("b", "/c", B_C, 0.9991)])
-    tree = tree_of([message], "x.bag")
+    tree = static_transforms([message], "x.bag")
     assert list(tree) == [("a", "b"), ("b", "c")]
     np.testing.assert_allclose(tree["a", "b"], A_B, atol=1e-12)
-    assert plain("//a/b") == "a/b"
+    assert frame_name("//a/b") == "a/b"
 
 
 @pytest.mark.parametrize("scale", [1.0011, 0.9989, 0.0, np.nan, np.inf])
 def test_a_quaternion_that_is_none_is_refused(scale: float) -> None:
     message = SimpleNamespace(transforms=[transform("a", "b", A_B, scale)])
     with pytest.raises(InputError, match=r"^/tf_static: a to b should be finite with a unit quaternion in x\.bag$"):
-        tree_of([message], "x.bag")
+        static_transforms([message], "x.bag")
 
 
 def info(*, rectified: bool = False, upper: bool = False, **changes: Any) -> Info:
@@ -93,18 +101,22 @@ def test_numbers_that_are_none_are_refused_by_topic_and_name() -> None:
 
 
 def test_a_projection_says_where_the_right_camera_is() -> None:
-    np.testing.assert_allclose(by_projection(info(), info()), se3.transform(np.eye(3), [0.1, 0.0, 0.0]))
+    np.testing.assert_allclose(
+        stereo_transform_from_projection(info(), info()), se3.transform(np.eye(3), [0.1, 0.0, 0.0])
+    )
     R_left = Rotation.from_rotvec([0.01, 0.02, 0.03]).as_matrix()
     R_right = Rotation.from_rotvec([-0.02, 0.01, 0.01]).as_matrix()
-    T = by_projection(info(r=R_left.ravel()), info(r=R_right.ravel()))
+    T = stereo_transform_from_projection(info(r=R_left.ravel()), info(r=R_right.ravel()))
     np.testing.assert_allclose(T[:3, :3], R_left.T @ R_right, atol=1e-12)
     np.testing.assert_allclose(R_left @ T[:3, 3], [0.1, 0, 0], atol=1e-12)
-    flat = by_projection(info(r=R_left.ravel(), rectified=True), info(r=R_right.ravel(), rectified=True))
+    flat = stereo_transform_from_projection(
+        info(r=R_left.ravel(), rectified=True), info(r=R_right.ravel(), rectified=True)
+    )
     np.testing.assert_allclose(flat, se3.transform(np.eye(3), [0.1, 0.0, 0.0]))
     for shift, focal in ((0.0, 50.0), (5.0, 50.0), (-5.0, 0.0), (-5.0, -50.0)):
         P = np.array([focal, 0, 30, shift, 0, 50, 22, 0, 0, 0, 1, 0])
         with pytest.raises(InputError, match="neither /tf_static nor P of /info says where the right camera is"):
-            by_projection(info(), info(p=P))
+            stereo_transform_from_projection(info(), info(p=P))
 
 
 def test_a_rig_is_by_the_tree_where_the_frames_are_two_and_by_projection_where_they_are_one() -> None:

@@ -1,4 +1,4 @@
-"""Furniture of bedrooms and halls: beds, bedside tables, wardrobes, coats. The back is at x = 0; the front faces x."""
+"""Furniture of bedrooms and halls, such as beds and wardrobes. Its back is at x = 0, and its front faces x."""
 
 from typing import TYPE_CHECKING
 
@@ -14,17 +14,17 @@ if TYPE_CHECKING:
     from trimesh import Trimesh
 
 BED_LENGTH_M = 2.08
-MATTRESS_MIDDLE_M = 0.4  # height of its middle
-TWIN_PILLOWS_FROM_M = 1.2  # width of a bed from which on it has two pillows
+MATTRESS_CENTER_M = 0.4  # the height of the centre of the mattress
+MIN_WIDTH_FOR_TWO_PILLOWS_M = 1.2  # narrower beds have one pillow
 BLANKET_COLOURS = ("#b4533a", "#d39a3c", "#6b4353", "#27445c", "#d8c3a0")
 BEDSIDE_DEPTH_M = 0.38
 WARDROBE_DEPTH_M = 0.58
-PLINTH_M = 0.06  # height
-DOOR_WIDTH_M = 0.48  # of a wardrobe, at least about that
+PLINTH_M = 0.06  # the height of the plinth of a wardrobe
+DOOR_WIDTH_M = 0.48  # the approximate width of a door of a wardrobe
 BOX_COLOURS = ("#a67d52", "#8a9a7b", "#c9c2b4")
 ACCENT_COLOURS = ("#d39a3c", "#b4533a", "#27445c", "#f1ece0")
-RACK_M = 0.5  # the height of the board of a coat rack above the middle of the coats
-HOOK_PITCH_M = 0.18  # between hooks, at least about that
+HOOK_HEIGHT_M = 0.5  # the height of the board and the hooks of a coat rack above its origin
+HOOK_SPACING_M = 0.18  # the approximate distance between the hooks
 COAT_COLOURS = ("#27445c", "#3a3c3e", "#6b4353", "#6a6a4c", "#8f6b4d")
 SHOE_CABINET_DEPTH_M = 0.26
 SHOE_COLOURS = ("#2b2622", "#5a3a26", "#c9c5bb", "#3a4a5a")
@@ -37,10 +37,10 @@ def bed(
     linen: str = "#e6e1d6",
     cover: str = "#8a9a7b",
 ) -> list[Part]:
-    """A made bed with its headboard at the wall, pillows, a duvet that hangs over its sides, and a blanket."""
+    """A bed with its headboard at the wall, pillows, a duvet that hangs over the sides and, on some beds, a blanket."""
     parts = _bed_frame(rng, width_m, wood(tones))
     mattress = cushion((BED_LENGTH_M - 0.1, width_m - 0.06, 0.22), power=9, cells=4)
-    parts.append(put(mattress, cloth(linen), x=BED_LENGTH_M / 2 + 0.01, z=MATTRESS_MIDDLE_M))
+    parts.append(put(mattress, cloth(linen), x=BED_LENGTH_M / 2 + 0.01, z=MATTRESS_CENTER_M))
     parts += _pillows(rng, width_m, cloth(linen))
     parts.append(put(_quilt(rng, width_m), cloth(cover)))
 
@@ -53,7 +53,7 @@ def bed(
 
 
 def _bed_frame(rng: Rng, width_m: float, look: Material) -> list[Part]:
-    """The headboard, two side boards, the foot board and four legs."""
+    """The headboard, two side boards, the footboard and four legs."""
     head_height_m = float(rng.choice([0.85, 1.0, 1.15]))
     head_m = (0.05, width_m + 0.06, head_height_m)
     side_m = (BED_LENGTH_M - 0.08, 0.03, 0.18)
@@ -73,14 +73,14 @@ def _bed_frame(rng: Rng, width_m: float, look: Material) -> list[Part]:
 
 
 def _pillows(rng: Rng, width_m: float, linen: Material) -> list[Part]:
-    """Two pillows side by side, or one on a narrow bed, which lean against the headboard."""
-    count = 1 if width_m < TWIN_PILLOWS_FROM_M else 2
+    """Two pillows side by side, or one on a narrow bed. They lean against the headboard."""
+    count = 1 if width_m < MIN_WIDTH_FOR_TWO_PILLOWS_M else 2
     pillow_width_m = 0.68 if width_m > 1.3 else 0.55
     pillow = cushion((0.42, pillow_width_m, 0.16), power=2.8, cells=4)
     parts = []
     for index in range(count):
-        from_middle = index - (count - 1) / 2
-        y = from_middle * 0.5 * width_m
+        places_from_middle = index - (count - 1) / 2
+        y = places_from_middle * 0.5 * width_m
         lean_deg = rng.uniform(-24, -14)
         yaw_deg = rng.normal(0, 4)
         parts.append(put(pillow, linen, 0.3, y, 0.585, pitch=lean_deg, yaw=yaw_deg))
@@ -88,8 +88,13 @@ def _pillows(rng: Rng, width_m: float, linen: Material) -> list[Part]:
 
 
 def _quilt(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2.07, rise_m: float = 0.0) -> "Trimesh":
-    """A duvet or blanket over a mattress from `first_m` to `last_m`: it lies on top, and hangs down at both sides."""
-    # The profile of one half across the bed, from the middle to the lower edge. The other half mirrors it.
+    """A duvet or blanket that lies on a mattress and hangs down at both sides.
+
+    `first_m` is the x at which it starts.
+    `last_m` is the x at which it ends.
+    `rise_m` is its height above a quilt that lies directly on the mattress.
+    """
+    # The profile across the bed of one half, from the middle of the bed to the lower edge. The other half mirrors it.
     half_m = width_m / 2
     half_across_m = np.array([0.2 * half_m, 0.6 * half_m, half_m - 0.02, half_m + 0.03, half_m + 0.035])
     half_height_m = np.array([0.57, 0.565, 0.545, 0.42, 0.3])
@@ -98,15 +103,16 @@ def _quilt(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2
     along_m = np.linspace(first_m, last_m, 15)
     x, y = np.meshgrid(along_m, across_m, indexing="ij")
 
-    # Two waves across the quilt are its folds, and the ends lie lower.
+    # Two waves make the folds, and both ends are lower than the rest.
     phases_rad = rng.uniform(0, 6, 3)
     long_fold_m = 0.008 * np.sin(9 * x + 4 * y + phases_rad[0])
     short_fold_m = 0.006 * np.sin(17 * y - 6 * x + phases_rad[1])
     is_end = (along_m < first_m + 0.05) | (along_m > last_m - 0.05)
-    end_m = 0.03 * is_end
-    z = np.broadcast_to(height_m, x.shape) + (long_fold_m + short_fold_m) - end_m[:, None]
+    end_drop_m = 0.03 * is_end
+    fold_m = long_fold_m + short_fold_m
+    z = np.broadcast_to(height_m, x.shape) + fold_m - end_drop_m[:, None]
 
-    # What hangs down at the sides waves towards the bed and away from it.
+    # The parts that hang down at the sides wave towards the bed and away from it.
     is_hanging = np.abs(y) > half_m
     wave_m = 0.012 * np.sin(14 * x + phases_rad[2]) * np.sign(y)
     waved_y = y + np.where(is_hanging, wave_m, 0)
@@ -114,7 +120,7 @@ def _quilt(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2
 
 
 def bedside_table(rng: Rng, width_m: float = 0.45, tones: str = "oak") -> list[Part]:
-    """A small cupboard with a drawer above an open shelf, 0.5 m high."""
+    """A small cupboard that is 0.5 m high, with a drawer above an open shelf."""
     look = wood(tones)
     depth_m = BEDSIDE_DEPTH_M
     middle_x = depth_m / 2
@@ -139,7 +145,7 @@ def wardrobe(
     colour: str = "",
     tones: str = "oak",
 ) -> list[Part]:
-    """A wardrobe with doors, painted in a colour or of wood, often with a box on top."""
+    """A wardrobe with doors, often with a box on top. It is painted if it has a colour, otherwise it is of wood."""
     look = coated(colour, roughness=0.35) if colour else wood(tones)
     depth_m = WARDROBE_DEPTH_M
     body_m = (depth_m - 0.02, width_m, height_m - PLINTH_M)
@@ -154,23 +160,25 @@ def wardrobe(
     door_count = max(2, round(width_m / DOOR_WIDTH_M))
     door_m = width_m / door_count
     front_m = (0.02, door_m - 0.006, height_m - 0.11)
-    grip = tube(mm("0 0 -90, 28 0 -90, 28 0 90, 0 0 90"), 0.006, sections=6)
+    handle = tube(mm("0 0 -90, 28 0 -90, 28 0 90, 0 0 90"), 0.006, sections=6)
     for index in range(door_count):
         y = (index + 0.5) * door_m - width_m / 2
         parts.append(stood(front_m, look, depth_m - 0.008, y, 0.07, bevel=0.003, u=0.7 * index))
-        # The grips of two neighbouring doors are beside each other.
-        grip_side = 1 if index % 2 == 0 else -1
-        parts.append(put(grip, STEEL, depth_m, y + grip_side * (door_m / 2 - 0.05), 1.05))
+        # Doors open in pairs, so that the handles of both doors of a pair are next to each other.
+        handle_side = 1 if index % 2 == 0 else -1
+        handle_y = y + handle_side * (door_m / 2 - 0.05)
+        parts.append(put(handle, STEEL, depth_m, handle_y, 1.05))
 
     has_box = rng.random() < 0.4
     if has_box:
+        box_m = (0.4, 0.5, 0.24)
         box_colour = one_of(rng, *BOX_COLOURS)
-        parts.append(stood((0.4, 0.5, 0.24), cloth(box_colour), 0.28, 0.2 * width_m, height_m))
+        parts.append(stood(box_m, cloth(box_colour), 0.28, 0.2 * width_m, height_m))
     return parts
 
 
 def armchair(rng: Rng, colour: str = "#8a9a7b", tones: str = "oak") -> list[Part]:
-    """An armchair on wooden legs, often with a cushion; its middle is at the origin."""
+    """An armchair on wooden legs, often with a cushion. It is centred at the origin."""
     cover = cloth(colour)
     seat = cushion((0.66, 0.6, 0.18), power=6, cells=4)
     back = cushion((0.16, 0.62, 0.62), power=5, cells=4)
@@ -192,13 +200,13 @@ def armchair(rng: Rng, colour: str = "#8a9a7b", tones: str = "oak") -> list[Part
 
 
 def coat_rack(rng: Rng, width_m: float = 0.9, tones: str = "oak") -> list[Part]:
-    """A board with hooks and coats on a wall; with the coats, it reaches from -0.65 m to 0.65 m about z = 0."""
-    board = stood((0.02, width_m, 0.1), wood(tones), 0.011, z=RACK_M - 0.05, bevel=0.004)
+    """A board on a wall with hooks and coats. Together they reach from z = -0.65 m to z = 0.65 m."""
+    board = stood((0.02, width_m, 0.1), wood(tones), 0.011, z=HOOK_HEIGHT_M - 0.05, bevel=0.004)
 
-    hook_count = max(3, round(width_m / HOOK_PITCH_M))
-    hooks_y = (np.arange(hook_count) + 0.5) * width_m / hook_count - width_m / 2
+    hook_count = max(3, round(width_m / HOOK_SPACING_M))
+    hooks_y = (np.arange(hook_count) + 0.5) * width_m / hook_count - width_m / 2  # evenly spaced
     hook = tube(spline(mm("15 0 20, 60 0 10, 70 0 40"), 6), 0.006, sections=6)
-    hooks = [moved(hook, at(0, y, RACK_M)) for y in hooks_y.tolist()]
+    hooks = [moved(hook, at(0, y, HOOK_HEIGHT_M)) for y in hooks_y.tolist()]
 
     parts = [board, put(joined(hooks), CHROME)]
     for y in hooks_y[::2].tolist():
@@ -206,17 +214,18 @@ def coat_rack(rng: Rng, width_m: float = 0.9, tones: str = "oak") -> list[Part]:
         if is_used:
             coat = _coat(rng)
             colour = one_of(rng, *COAT_COLOURS)
-            parts.append(put(coat, cloth(colour), 0, y, RACK_M))
+            parts.append(put(coat, cloth(colour), 0, y, HOOK_HEIGHT_M))
     return parts
 
 
 def _coat(rng: Rng) -> "Trimesh":
-    """A coat on a hook: a closed surface in folds, narrow at its collar."""
+    """A coat on a hook: a surface with folds, which is closed around and narrow at the collar."""
     length_m = rng.uniform(0.75, 1.05)
     down = np.linspace(0, 1, 6)[:, None]  # from the collar to the hem
     angle_rad = np.linspace(0, 2 * np.pi, 19)[None]
-    width_share = 0.35 + 0.65 * np.minimum(1, 3.2 * down)  # it is at its widest below the shoulders
-    folds = 1 + 0.16 * down * np.sin(5 * angle_rad + rng.uniform(0, 6))
+    width_share = 0.35 + 0.65 * np.minimum(1, 3.2 * down)  # the full width is reached below the shoulders
+    phase_rad = rng.uniform(0, 6)
+    folds = 1 + 0.16 * down * np.sin(5 * angle_rad + phase_rad)
     x_m = 0.085 + 0.062 * width_share * folds * np.cos(angle_rad)
     y_m = 0.155 * width_share * folds * np.sin(angle_rad)
     z_m = np.broadcast_to(0.02 - length_m * down, x_m.shape)
@@ -224,7 +233,7 @@ def _coat(rng: Rng) -> "Trimesh":
 
 
 def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> list[Part]:
-    """A narrow cupboard with two tilting fronts, 0.28 m deep and 0.85 m high."""
+    """A narrow cupboard with two tilting fronts. It is 0.28 m deep and 0.85 m high."""
     paint = coated(colour, roughness=0.35)
     depth_m = SHOE_CABINET_DEPTH_M
     body_m = (depth_m, width_m, 0.85)
@@ -238,7 +247,7 @@ def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> lis
     slot = stood(slot_m, BLACK, depth_m + 0.008, bevel=0.002)
     for z in (0.05, 0.445):
         parts.append(stood(front_m, paint, depth_m + 0.002, z=z, bevel=0.003))
-        parts.append(slot.moved(at(0, 0, z + 0.34)))
+        parts.append(slot.moved(at(z_m=z + 0.34)))  # the slot is the handle of the front
     return parts
 
 

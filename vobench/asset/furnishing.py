@@ -1,4 +1,4 @@
-"""Furniture that rooms of several uses have: shelves, chests, dining tables, desks, armchairs, cartons, plants."""
+"""Adds furniture that several kinds of rooms have: shelves, chests, tables, desks, armchairs, cartons and plants."""
 
 from collections.abc import Sequence
 
@@ -18,31 +18,31 @@ from vobench.asset.tabletop import (
     tabletop_items,
 )
 
-# Shelves and chests. What stands at a wall has its origin in its middle: it is half its depth from its back.
-SHELF_M = 0.32  # depth: 0.3 m, and 2 cm in front of it
+# Shelves and chests. Their origin is the centre of the footprint, and *_BACK_M is its distance from the back.
+SHELF_DEPTH_M = 0.32  # that of the shelf, 0.3 m, and 2 cm of space in front of it
 SHELF_BACK_M = 0.155
-LOW_SHELF_M = 1.2  # lower shelves have things on top
-CHEST_M = 0.46  # depth: 0.42 m, and the knobs
+LOW_SHELF_M = 1.2  # shelves that are lower than this have things on top
+CHEST_DEPTH_M = 0.46  # that of the chest, 0.42 m, and that of the knobs
 CHEST_BACK_M = 0.216
 
 # Dining tables
 TABLE_WIDTHS_M = {2: 0.85, 4: 1.35, 6: 1.85}  # by the number of seats
 TABLE_DEPTH_M = 0.78
-LARGE_TABLE_DEPTH_M = 0.9  # for six
-CHAIR_REACH_M = 0.42  # of floor that a chair occupies beyond the edge of its table
-CHAIR_RISE_M = 0.003  # of a chair above the floor
+LARGE_TABLE_DEPTH_M = 0.9  # the depth of a table with six seats
+CHAIR_REACH_M = 0.42  # the depth of the floor that a chair occupies beyond the edge of its table
+CHAIR_RISE_M = 0.003  # the height of a chair above the floor, so that it does not intersect the floor
 
 # Desks
 DESK_DEPTH_M = 0.7
-DESK_CHAIR_M = 0.62  # of floor that the chair occupies in front of a desk
-SCREEN_SEEDS = 6  # pictures on monitors
-MONITORS_ON = 0.4  # the share that is switched on
-DESK_LAMPS = 0.6  # the share of desks with a lamp
+DESK_CHAIR_DEPTH_M = 0.62  # the depth of the floor that the chair occupies in front of a desk
+SCREEN_SEEDS = 6  # the number of different pictures on monitors
+MONITOR_ON_SHARE = 0.4  # the share of monitors that are switched on
+DESK_LAMP_SHARE = 0.6  # the share of desks with a lamp
 
 # Others
-ARMCHAIR_M = 0.96  # the side of its square footprint, which leaves it space to turn
+ARMCHAIR_SIDE_M = 0.96  # the side of the square footprint of an armchair, with the space to turn it
 ARMCHAIR_HEIGHT_M = 0.9
-ARMCHAIR_TURN_DEG = 20.0  # from the direction of its wall, at most
+ARMCHAIR_TURN_DEG = 20.0  # the largest angle between an armchair and the normal of its wall
 PLANT_SPREAD = 0.72  # the side of the square footprint of a plant relative to its height: twice houseplant.REACH
 CARTON_HEIGHT_M = 0.3
 
@@ -69,7 +69,7 @@ def add_floor_plant(layout: RoomLayout) -> None:
 
 
 def add_shelf(layout: RoomLayout, style: Style, widths_m: Sequence[float] = (0.8, 1.0, 1.6)) -> Spot | None:
-    """Add a bookcase of one of the widths at a wall, with things on top if it is low.
+    """Add a bookcase at a wall, with things on top if it is low. Its width is one of `widths_m`.
 
     Returns its spot; None if there is no space for it.
     """
@@ -78,7 +78,7 @@ def add_shelf(layout: RoomLayout, style: Style, widths_m: Sequence[float] = (0.8
     shelf = layout.add_at_wall(
         "shelf",
         furniture.shelf,
-        (SHELF_M, width_m, height_m),
+        (SHELF_DEPTH_M, width_m, height_m),
         back_m=SHELF_BACK_M,
         front_m=0.5,
         width_m=width_m,
@@ -90,7 +90,7 @@ def add_shelf(layout: RoomLayout, style: Style, widths_m: Sequence[float] = (0.8
         return None
     name, spot = shelf
     if height_m < LOW_SHELF_M:
-        top_m = height_m + 0.004  # above the upper board
+        top_m = height_m + 0.004  # slightly above the upper board
         items = ("plant", "box", "books")
         add_tabletop_items(layout, name, spot, items, x_m=GAP_M + 0.14, width_m=width_m - 0.1, z_m=top_m)
     return spot
@@ -103,7 +103,7 @@ def add_sideboard(layout: RoomLayout, style: Style) -> Spot | None:
     chest = layout.add_at_wall(
         "sideboard",
         household.low_board,
-        (CHEST_M, width_m, height_m),
+        (CHEST_DEPTH_M, width_m, height_m),
         back_m=CHEST_BACK_M,
         width_m=width_m,
         height_m=height_m,
@@ -137,25 +137,34 @@ def add_dining_table(layout: RoomLayout, style: Style, seats: int) -> bool:
         depth_m=depth_m,
         tones=style.tones,
     )
-    half_m = depth_m / 2 + CHAIR_REACH_M
-    layout.floor.occupy(spot.rectangle(-half_m, half_m, -width_m / 2, width_m / 2), TABLE_HEIGHT_M)
-    _add_dining_chairs(layout, style, table, spot, size_m=(depth_m, width_m), along=seats // 2)
+    half_depth_m = depth_m / 2 + CHAIR_REACH_M
+    footprint = spot.rectangle(-half_depth_m, half_depth_m, -width_m / 2, width_m / 2)
+    layout.floor.occupy(footprint, TABLE_HEIGHT_M)
+    _add_dining_chairs(layout, style, table, spot, size_m=(depth_m, width_m), chairs_per_side=seats // 2)
     items = _dining_items(layout)
     add_tabletop_items(layout, table, spot, items, x_m=0.0, width_m=width_m - 0.2, z_m=TABLE_HEIGHT_M)
     return True
 
 
 def _add_dining_chairs(
-    layout: RoomLayout, style: Style, table: str, spot: Spot, *, size_m: tuple[float, float], along: int
+    layout: RoomLayout,
+    style: Style,
+    table: str,
+    spot: Spot,
+    *,
+    size_m: tuple[float, float],
+    chairs_per_side: int,
 ) -> None:
-    """Add chairs at both long sides of a table of a depth and width, a number along each of them."""
+    """Add chairs at both long sides of a table. `size_m` is the depth and the width of the table."""
     rng = layout.rng
     depth_m, width_m = size_m
     for sign in (-1, 1):
-        for index in range(along):
-            y_m = ((index + 0.5) / along - 0.5) * width_m
+        for index in range(chairs_per_side):
+            y_share = (index + 0.5) / chairs_per_side - 0.5
+            y_m = y_share * width_m
             x_m = sign * (depth_m / 2 + float(rng.uniform(0.02, 0.1)))
-            turn_deg = (180.0 if sign > 0 else 0.0) + float(rng.normal(0, 4))
+            towards_table_deg = 180.0 if sign > 0 else 0.0
+            turn_deg = towards_table_deg + float(rng.normal(0, 4))
             layout.add(
                 "dining_chair",
                 _dining_chair,
@@ -168,18 +177,19 @@ def _add_dining_chairs(
 
 
 def _dining_chair(rng: Rng, style: Style) -> list[Part]:
-    """A chair of the kind that a home has."""
+    """A dining chair in the style of the home."""
     if style.has_slat_chairs:
         return household.slat_chair(rng, style.cloths[2], style.tones, has_pad=style.has_pads)
     return household.dining_chair(rng, style.cloths[2], style.tones)
 
 
 def _dining_items(layout: RoomLayout) -> list[str]:
-    """One to three things that lie on a dining table."""
+    """The names of one to three things that lie on a dining table."""
     last = "fruit" if layout.chance(0.3) else "books"
     names = ("mug", "papers", "bottle", "plant", last)
     shuffled = [names[index] for index in layout.rng.permutation(len(names)).tolist()]
-    return shuffled[: int(layout.rng.integers(1, 4))]
+    count = int(layout.rng.integers(1, 4))
+    return shuffled[:count]
 
 
 # --- Desks ---
@@ -192,7 +202,7 @@ def add_desk(layout: RoomLayout, style: Style) -> Spot | None:
     desk = layout.add_at_wall(
         "desk",
         furniture.desk,
-        (DESK_DEPTH_M + DESK_CHAIR_M, width_m, TABLE_HEIGHT_M),
+        (DESK_DEPTH_M + DESK_CHAIR_DEPTH_M, width_m, TABLE_HEIGHT_M),
         back_m=DESK_DEPTH_M / 2,
         front_m=0.2,
         width_m=width_m,
@@ -211,7 +221,7 @@ def add_desk(layout: RoomLayout, style: Style) -> Spot | None:
         colour=style.cloths[3],
     )
     _add_computer(layout, name, spot)
-    if layout.chance(DESK_LAMPS):
+    if layout.chance(DESK_LAMP_SHARE):
         layout.add(
             "desk_lamp",
             furniture.desk_lamp,
@@ -238,7 +248,7 @@ def _add_computer(layout: RoomLayout, desk: str, spot: Spot) -> None:
         support=desk,
         width_m=0.5,
         seed=int(rng.integers(SCREEN_SEEDS)),
-        is_on=layout.chance(MONITORS_ON),
+        is_on=layout.chance(MONITOR_ON_SHARE),
     )
     layout.add(
         "keyboard",
@@ -252,8 +262,8 @@ def _add_computer(layout: RoomLayout, desk: str, spot: Spot) -> None:
 
 def _add_desk_item(layout: RoomLayout, desk: str, spot: Spot, width_m: float) -> None:
     """Add a mug, pens or books at the left end of a desk."""
-    third = "books" if width_m > 1.5 else "mug"  # books need a wide desk
-    name = one_of(layout.rng, "mug", "pens", third)
+    third_name = "books" if width_m > 1.5 else "mug"  # only a wide desk has space for books
+    name = one_of(layout.rng, "mug", "pens", third_name)
     item = tabletop_items(layout)[name]
     y_m = -width_m / 2 + item.half_width_m + 0.04
     layout.add(
@@ -272,14 +282,15 @@ def _add_desk_item(layout: RoomLayout, desk: str, spot: Spot, width_m: float) ->
 
 def add_armchair(layout: RoomLayout, style: Style) -> None:
     """Add an armchair, in a corner if one is free, turned towards the middle of the room."""
-    size_m = (ARMCHAIR_M, ARMCHAIR_M, ARMCHAIR_HEIGHT_M)
-    spot = next(layout.free_spots_at_walls(size_m, front_m=0.5, in_corner=True), None)
+    size_m = (ARMCHAIR_SIDE_M, ARMCHAIR_SIDE_M, ARMCHAIR_HEIGHT_M)
+    spots = layout.free_spots_at_walls(size_m, front_m=0.5, in_corner=True)
+    spot = next(spots, None)
     if spot is None:
         return
     x_m, y_m = spot.point(GAP_M + 0.47)
     middle_x_m, middle_y_m = layout.room.rect.center_m
     towards_deg = float(np.rad2deg(np.arctan2(middle_y_m - y_m, middle_x_m - x_m)))
-    difference_deg = (towards_deg - spot.yaw_deg + 180) % 360 - 180
+    difference_deg = (towards_deg - spot.yaw_deg + 180) % 360 - 180  # from -180 to 180
     turn_deg = float(np.clip(difference_deg, -ARMCHAIR_TURN_DEG, ARMCHAIR_TURN_DEG))
     layout.add(
         "armchair",
@@ -289,7 +300,7 @@ def add_armchair(layout: RoomLayout, style: Style) -> None:
         colour=style.cloths[1],
         tones=style.tones,
     )
-    layout.floor.occupy(spot.footprint(ARMCHAIR_M, ARMCHAIR_M, GAP_M), ARMCHAIR_HEIGHT_M)
+    layout.floor.occupy(spot.footprint(ARMCHAIR_SIDE_M, ARMCHAIR_SIDE_M, GAP_M), ARMCHAIR_HEIGHT_M)
 
 
 def add_cartons(layout: RoomLayout) -> None:

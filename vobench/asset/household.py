@@ -1,4 +1,4 @@
-"""Furniture and lamps for homes and halls. They stand on z = 0 at the origin and face x."""
+"""Furniture and lamps for homes and halls. They stand on the plane z = 0 at the origin, and face x."""
 
 from itertools import product
 from typing import TYPE_CHECKING
@@ -40,23 +40,34 @@ from vobench.scene.mesh import flipped, joined, moved
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-Slat = tuple[tuple[float, float, float], float, float]  # the size of a bar, and the y and z of its middle
+Slat = tuple[tuple[float, float, float], float, float]  # the size of a slat, and the y and z of its centre
 
-SLAT_BACK_X_M = -0.2  # of the back of a chair with slats, at its middle
-SLAT_BACK_Z_M = 0.45
+# The back of a chair with slats
+SLAT_BACK_X_M = -0.2  # the x of its centre
+SLAT_BACK_Z_M = 0.45  # the z of its centre
 SLAT_BACK_TILT_DEG = -5
-SLAT_BACK_SLOPE = 0.0875  # the tangent of that angle
-THREE_SEATS_FROM_M = 1.95  # width of a couch
-SLIM_ARM_M = 0.12  # width of an arm up to which it is low
-LOZENGES = 16  # in a row of a woven rug, and rows
-BORDER_PX = 14  # width of each of the stripes around the rug
-SCREEN_ASPECT = 0.57  # height of a television over its width
-TELEVISION_CD_M2 = (120.0, 120.0, 120.0)  # luminance of white
-SHADE_M = 0.28  # height of the shade of a floor lamp
-SHADE_TAPER = 0.35  # by which the top of a shade is narrower, relative to the bottom
-INNER_SCALE = 0.985  # of the inside of a shade
-CEILING_LAMP_M = 0.07  # height of a ceiling lamp
-FRUITS = 7  # the last one lies on top of the others
+SLAT_BACK_SLOPE = 0.0875  # the tangent of the tilt
+
+# Couches
+MORE_THAN_TWO_SEATS_M = 1.95  # a wider couch has three seats instead of two
+SLIM_ARM_M = 0.12  # an arm that is wider is also higher
+
+# Rugs
+LOZENGES = 16  # the number of lozenges in each row of a woven rug, and the number of rows
+BORDER_PX = 14  # the width of each stripe of the border
+
+# Televisions
+SCREEN_ASPECT = 0.57  # the height divided by the width
+TELEVISION_CD_M2 = (120.0, 120.0, 120.0)  # the luminance of white
+
+# Lamps
+SHADE_M = 0.28  # the height of the shade of a floor lamp
+SHADE_TAPER = 0.35  # the top of a shade is narrower than the bottom by this share
+INNER_SCALE = 0.985  # the width of the inside of a shade relative to the outside
+CEILING_LAMP_M = 0.07  # the height of a ceiling lamp
+PENDANT_WIDTH_M = 0.4  # the width of a pendant lamp to which the profile of its shade applies
+
+FRUITS = 7  # the number of fruits in a bowl; the last one lies on top of the others
 FRUIT_COLOURS = ("#a62a22", "#8fa03a", "#d8812a", "#c9492c")
 
 
@@ -71,7 +82,7 @@ def table(
     look = wood(tones)
     leg_x = depth_m / 2 - 0.06
     leg_y = width_m / 2 - 0.06
-    leg_m = height_m - 0.03  # height of a leg
+    leg_m = height_m - 0.03  # the height of a leg
     leg_profile = np.array([[0, 0], [0.018, 0], [0.03, leg_m], [0, leg_m]])
     leg = lathe(leg_profile, sections=12)
     parts = [put(leg, look, end * leg_x, side * leg_y) for end, side in product(SIDES, SIDES)]
@@ -89,7 +100,7 @@ def table(
 
 
 def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
-    """A wooden chair with a cushion; a person on it looks along x."""
+    """A wooden chair with a cushion. A person who sits on it looks along x."""
     look = wood(tones)
     legs = []
     for side in SIDES:
@@ -115,11 +126,11 @@ def dining_chair(_: Rng, colour: str = SAND, tones: str = "oak") -> list[Part]:
 
 
 def slat_chair(rng: Rng, colour: str = SAND, tones: str = "oak", *, has_pad: bool = True) -> list[Part]:
-    """A chair of square bars with slats in its back; a person on it looks along x."""
+    """A chair made of square bars, with slats in its back. A person who sits on it looks along x."""
     look = wood(tones)
     seat_m = (0.42, 0.42, 0.028)
     leg_m = (0.036, 0.036, 0.43)
-    post = block((0.032, 0.036, 0.9), bevel_m=0.004)  # a hind leg, which continues upwards
+    post = block((0.032, 0.036, 0.9), bevel_m=0.004)  # a hind leg that continues upwards as a side of the back
     parts = [stood(seat_m, look, z=0.43, bevel=0.008, u=rng.uniform(0, 2))]
     for side in SIDES:
         y = side * 0.18
@@ -127,7 +138,8 @@ def slat_chair(rng: Rng, colour: str = SAND, tones: str = "oak", *, has_pad: boo
         parts.append(put(post, look, SLAT_BACK_X_M, y, SLAT_BACK_Z_M, pitch=SLAT_BACK_TILT_DEG))
 
     has_level_slats = rng.random() < 0.5
-    for size_m, y, z in _level_slats() if has_level_slats else _upright_slats():
+    slats = _level_slats() if has_level_slats else _upright_slats()
+    for size_m, y, z in slats:
         x = SLAT_BACK_X_M - SLAT_BACK_SLOPE * (z - SLAT_BACK_Z_M)
         parts.append(put(block(size_m, bevel_m=0.003), look, x, y, z, pitch=SLAT_BACK_TILT_DEG))
     if has_pad:
@@ -137,16 +149,18 @@ def slat_chair(rng: Rng, colour: str = SAND, tones: str = "oak", *, has_pad: boo
 
 
 def _level_slats() -> list[Slat]:
-    """Three level bars."""
+    """Three horizontal slats."""
     size_m = (0.016, 0.34, 0.06)
     return [(size_m, 0.0, z) for z in (0.58, 0.7, 0.82)]
 
 
 def _upright_slats() -> list[Slat]:
-    """Three upright bars below a level one."""
+    """Three vertical slats below a horizontal one."""
     size_m = (0.014, 0.03, 0.36)
     top_m = (0.02, 0.34, 0.06)
-    return [*((size_m, y, 0.68) for y in (-0.1, 0.0, 0.1)), (top_m, 0.0, 0.86)]
+    upright = [(size_m, y, 0.68) for y in (-0.1, 0.0, 0.1)]
+    top = (top_m, 0.0, 0.86)
+    return [*upright, top]
 
 
 def couch(
@@ -156,13 +170,13 @@ def couch(
     tones: str = "oak",
     accents: tuple[str, str] = (OCHRE, BRICK),
 ) -> list[Part]:
-    """A sofa 0.9 m deep for two or three on wooden legs, with cushions; its middle is at the origin."""
+    """A sofa with two or three seats on wooden legs, with cushions. It is 0.9 m deep, and centred at the origin."""
     cover = cloth(colour)
-    seats = 3 if width_m > THREE_SEATS_FROM_M else 2
+    seats = 3 if width_m > MORE_THAN_TWO_SEATS_M else 2
     arm_m = float(rng.choice([0.1, 0.16, 0.2]))
     arm_height_m = 0.42 if arm_m > SLIM_ARM_M else 0.34
     seat_m = (width_m - 2 * arm_m) / seats
-    base_z = float(rng.choice([0.12, 0.16]))  # height of the legs that is seen
+    base_z = float(rng.choice([0.12, 0.16]))  # the height of the visible part of the legs
 
     base = cushion((0.86, width_m - 0.02, 0.2), power=14, cells=4)
     back = cushion((0.2, width_m - 0.04, 0.5), power=9, cells=4)
@@ -192,7 +206,7 @@ def couch(
 
 @picture.painted
 def _weave(seed: int, px: int = 1024) -> Picture:
-    """A woven pattern: rows of lozenges in a few colours, inside a border."""
+    """A woven pattern: rows of lozenges in a few colours inside a border. It is symmetrical from top to bottom."""
     rng = np.random.default_rng(seed)
     inks = rng.permutation([NAVY, BRICK, OCHRE, SAGE, INK, "#7d6a58"]).tolist()
     *row_inks, border_ink = inks
@@ -222,7 +236,7 @@ def _weave(seed: int, px: int = 1024) -> Picture:
 
 
 def _draw_lozenge(draw: Draw, x: float, y: float, half_width_px: float, *, cell_px: float, ink: str) -> None:
-    """Draw a lozenge with a dot in its middle."""
+    """Draw a lozenge around (x, y), with a dot in its middle."""
     half_height_px = 0.45 * cell_px
     dot_px = 0.1 * cell_px
     corners_px = [
@@ -255,7 +269,7 @@ def television(
     width_m: float = 1.2,
     seed: int = 0,
 ) -> list[Part]:
-    """A flat screen on two feet that shows hills."""
+    """A flat television on two feet. It shows a picture of hills."""
     height_m = SCREEN_ASPECT * width_m
     glow = Material(
         colour=(0.02, 0.02, 0.02),
@@ -274,23 +288,23 @@ def television(
 
 
 def _shade(colour: str, width_m: float, height_m: float) -> list[Part]:
-    """A conical lampshade of cloth on z = 0, open at both ends and white inside."""
+    """A conical lampshade of cloth on the plane z = 0. It is open at both ends, and white inside."""
     angle = np.linspace(0, 2 * np.pi, 33)
-    share = np.array([0.0, 1.0])[:, None]
-    radius = width_m / 2 * (1 - SHADE_TAPER * share)
+    height_share = np.array([0.0, 1.0])[:, None]  # at the bottom and at the top
+    radius = width_m / 2 * (1 - SHADE_TAPER * height_share)
     x = radius * np.cos(angle)
     y = radius * np.sin(angle)
-    z = height_m * share + 0 * angle
+    z = height_m * height_share + 0 * angle
 
     cone = sheet(np.stack([x, y, z], axis=-1))
-    looks_outward = cone.vertex_normals[0] @ [1, 0, 0] > 0
-    outer = cone if looks_outward else flipped(cone)
+    faces_outward = cone.vertex_normals[0] @ [1, 0, 0] > 0
+    outer = cone if faces_outward else flipped(cone)
     inner = moved(flipped(outer), np.diag([INNER_SCALE, INNER_SCALE, 1, 1]))
     return [Part(outer, cloth(colour)), Part(inner, WHITE)]
 
 
 def bulb(x_m: float, y_m: float, z_m: float, width_m: float = 0.07) -> "Trimesh":
-    """A round bulb, for the mesh of a lamp."""
+    """The mesh of a round light bulb."""
     ball = cushion((width_m, width_m, width_m), power=2, cells=3)
     return moved(ball, at(x_m, y_m, z_m))
 
@@ -301,10 +315,12 @@ def floor_lamp(
     colour: str = SAND,
     wide_m: float = 0.42,
 ) -> list[Part]:
-    """A floor lamp with a cloth shade. The bulb belongs 0.15 m below `height_m`."""
-    foot_profile = mm("0 0, 130 0, 130 12, 40 22, 12 30, 0 30") * [1, 1]
-    foot = lathe(foot_profile * (0.6 + 0.25 * height_m))
-    stem = tube(np.array([[0, 0, 0.01], [0, 0, height_m - 0.2]]), 0.011)
+    """A floor lamp with a cloth shade. Its bulb has to be placed 0.15 m below `height_m`."""
+    foot_profile = mm("0 0, 130 0, 130 12, 40 22, 12 30, 0 30")
+    foot_scale = 0.6 + 0.25 * height_m  # a higher lamp needs a larger foot
+    foot = lathe(foot_profile * foot_scale)
+    stem_path = np.array([[0, 0, 0.01], [0, 0, height_m - 0.2]])
+    stem = tube(stem_path, 0.011)
     raised = at(z_m=height_m - SHADE_M)
     shade = [part.moved(raised) for part in _shade(colour, wide_m, SHADE_M)]
     return [put(foot, BLACK), put(stem, STEEL), *shade]
@@ -317,40 +333,42 @@ def pendant(
     wide_m: float = 0.4,
     sections: int = 36,
 ) -> list[Part]:
-    """A pendant lamp. Its shade ends `drop_m` below z = 0, and the bulb belongs 0.08 m above that."""
-    scale = wide_m / 0.4
-    profile = mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232") * [scale, scale]
-    shade = lathe(profile, sections=sections)
+    """A pendant lamp. Its shade ends `drop_m` below z = 0. Its bulb has to be placed 0.08 m above that end."""
+    scale = wide_m / PENDANT_WIDTH_M
+    profile = mm("200 0, 196 60, 160 130, 70 190, 30 230, 0 232")
+    shade = lathe(profile * scale, sections=sections)
     inner = moved(flipped(shade), np.diag([INNER_SCALE, INNER_SCALE, INNER_SCALE, 1]))
     paint = coated(colour or one_of(rng, NAVY, INK, "#5c6b5a"), roughness=0.3)
-    cord = tube(np.array([[0, 0, 0.2 - drop_m], [0, 0, 0]]), 0.004, sections=6)
-    rose = lathe(mm("0 -30, 50 -25, 50 0, 0 0"))
+    cord_path = np.array([[0, 0, 0.2 - drop_m], [0, 0, 0]])
+    cord = tube(cord_path, 0.004, sections=6)
+    ceiling_rose = lathe(mm("0 -30, 50 -25, 50 0, 0 0"))
     return [
         put(shade, paint, z=-drop_m),
         put(inner, WHITE, z=-drop_m),
         put(cord, DARK),
-        put(rose, WHITE),
+        put(ceiling_rose, WHITE),
     ]
 
 
 def diffuser(x_m: float, y_m: float, z_m: float, width_m: float) -> "Trimesh":
-    """A disc that looks down, for the mesh of a lamp in a shade."""
+    """The mesh of a disc that faces down, for the light that leaves a shade."""
     angle = np.linspace(0, 2 * np.pi, 17)
     ring = np.stack([width_m / 2 * np.cos(angle), width_m / 2 * np.sin(angle), 0 * angle], axis=-1)
     middle = np.zeros_like(ring)
     disc = sheet(np.stack([middle, ring]))
-    looks_down = disc.face_normals[0, 2] < 0
-    return moved(disc if looks_down else flipped(disc), at(x_m, y_m, z_m))
+    faces_down = disc.face_normals[0, 2] < 0
+    downward_disc = disc if faces_down else flipped(disc)
+    return moved(downward_disc, at(x_m, y_m, z_m))
 
 
 def glowing_shade(x_m: float, y_m: float, top_m: float, width_m: float) -> "Trimesh":
-    """The outside of the shade of a floor lamp whose top is at `top_m`, for the mesh of a lamp."""
+    """The mesh of the outside of a floor lamp's shade, which emits light. Its top is at `top_m`."""
     outer = _shade(SAND, 1.01 * width_m, SHADE_M)[0]
     return moved(outer.mesh, at(x_m, y_m, top_m - SHADE_M))
 
 
 def ceiling_lamp(_: Rng, width_m: float = 0.4, *, is_round: bool = True) -> list[Part]:
-    """The body of a flat lamp below z = 0, round or square. What shines is to be at its lower face."""
+    """The body of a flat lamp below z = 0, round or square. Its light has to be placed at the lower face."""
     paint = matt("#dcdbd6")
     if is_round:
         profile = [[0, -CEILING_LAMP_M], [width_m / 2, -CEILING_LAMP_M], [width_m / 2, 0], [0, 0]]
@@ -364,10 +382,10 @@ def fruit_bowl(rng: Rng) -> list[Part]:
     parts = [put(bowl, coated("#d8d2c4", roughness=0.15))]
 
     fruit = cushion((0.074, 0.074, 0.066), power=2.1, cells=5)
-    in_ring = FRUITS - 1
+    ring_count = FRUITS - 1
     for number in range(FRUITS):
-        is_on_top = number == in_ring
-        angle = 2 * np.pi * number / in_ring
+        is_on_top = number == ring_count
+        angle = 2 * np.pi * number / ring_count
         radius = 0.0 if is_on_top else 0.068
         x = radius * np.cos(angle)
         y = radius * np.sin(angle)
@@ -384,10 +402,10 @@ def low_board(
     depth_m: float = 0.42,
     tones: str = "oak",
 ) -> list[Part]:
-    """A low cupboard on a recessed foot, with doors and an open bay of boxes in its middle."""
+    """A low cupboard on a recessed base. It has two doors, and between them an open compartment with boxes."""
     look = wood(tones)
     third_m = width_m / 3
-    inner_m = height_m - 0.1  # height between foot and top
+    inner_m = height_m - 0.1  # the height between the base and the top
     foot_m = (depth_m - 0.1, width_m - 0.12, 0.06)
     board_m = (depth_m, width_m, 0.022)
     back_m = (0.01, width_m - 0.04, inner_m)
@@ -410,5 +428,7 @@ def low_board(
 
     cardboard = cloth(one_of(rng, SAGE, SAND, NAVY))
     box_m = (0.28, 0.42 * third_m, 0.6 * inner_m)
-    parts += [stood(box_m, cardboard, 0, side * 0.24 * third_m, 0.083) for side in SIDES]
+    for side in SIDES:
+        box_y = side * 0.24 * third_m
+        parts.append(stood(box_m, cardboard, 0, box_y, 0.083))
     return parts

@@ -1,4 +1,4 @@
-"""The place of a row of kitchen units at a wall, and the floor that it leaves."""
+"""Finds a place for a row of kitchen units at a wall, and the largest free part of the floor."""
 
 from dataclasses import dataclass
 
@@ -10,20 +10,22 @@ from vobench.asset.room_layout import FRONT_M, RoomLayout
 from vobench.asset.spot import Spot
 from vobench.asset.wall_space import region_around
 
-LENGTHS_M = (3.6, 3.3, 3.0, 2.7, 2.4, 2.1, 1.8)  # of rows, in the order in which they are tried
-WALL_END_M = 0.01  # between a row and the end of its wall
-WORKTOP_HEIGHT_M = 0.92  # of what stands below a window: the worktop, and 2 cm above it
-ROW_HEIGHT_M = 2.2  # of the fridge and the wall cupboards
-END_UNIT_M = 0.66  # at either end of a row without a window behind it: the fridge with its side panels
-WALL_GAP_M = 0.002  # between the row and the wall, so that their surfaces are apart
-WORKTOP_EDGE_M = 0.03  # by which fronts and handles reach beyond the worktop
+LENGTHS_M = (3.6, 3.3, 3.0, 2.7, 2.4, 2.1, 1.8)  # the lengths of rows, in the order in which they are tried
+WALL_END_M = 0.01  # the distance of a row from the end of its wall
+WORKTOP_HEIGHT_M = 0.92  # the height of a row below a window: that of the worktop, and 2 cm above it
+ROW_HEIGHT_M = 2.2  # the height of the fridge and the wall cupboards
+END_UNIT_M = 0.66  # the width of the high unit at each end of a row: the fridge with its side panels
+WALL_GAP_M = 0.002  # the distance of a row from the wall, so that their surfaces do not coincide
+WORKTOP_EDGE_M = 0.03  # the distance by which fronts and handles project beyond the worktop
 
 
 @dataclass(frozen=True, slots=True)
 class _RowPlace:
-    """A place for a row at a wall: the spot at its middle, its length, and the windows behind it.
+    """A place for a row of kitchen units at a wall.
 
-    `windows_m` are the first and last coordinates of the windows along the wall.
+    `spot` is the spot at the middle of the row.
+    `length_m` is the length of the row.
+    `windows_m` are the windows behind the row: the first and the last coordinate of each along the wall.
     """
 
     spot: Spot
@@ -42,24 +44,35 @@ class _RowPlace:
 
     @property
     def window_y_m(self) -> tuple[float, float] | None:
-        """The first and last y of the windows behind the row in the frame of its spot; None if there are none."""
+        """The range of y, in the frame of the spot, that the windows behind the row cover; None without windows."""
         if not self.windows_m:
             return None
         start_m = min(start for start, _ in self.windows_m) - self.spot.along_m
         end_m = max(end for _, end in self.windows_m) - self.spot.along_m
         sign = _sign_along(self.spot)
-        return min(sign * start_m, sign * end_m), max(sign * start_m, sign * end_m)
+        first_y_m, last_y_m = sorted([sign * start_m, sign * end_m])
+        return first_y_m, last_y_m
+
+    @property
+    def has_clear_ends(self) -> bool:
+        """Whether no window is behind the units at the ends. They are too high to stand in front of a window."""
+        for window_start_m, window_end_m in self.windows_m:
+            to_start_m = window_start_m - self.start_m
+            to_end_m = self.end_m - window_end_m
+            if to_start_m <= END_UNIT_M or to_end_m <= END_UNIT_M:
+                return False
+        return True
 
 
 def _sign_along(spot: Spot) -> int:
-    """Whether y of a spot runs along the coordinate of its wall (1) or against it (-1)."""
+    """1 if the y axis of a spot has the direction of the coordinate along its wall, and -1 if it is opposite."""
     x_m, y_m = spot.point(0, 1)
     along_m = y_m if spot.side in ("east", "west") else x_m
     return 1 if along_m > spot.along_m else -1
 
 
 def add_kitchen_row(layout: RoomLayout, style: Style) -> Spot | None:
-    """Add a row of kitchen units at the end of a wall, as long a one as fits. Its worktop may pass below a window.
+    """Add the longest row of kitchen units that fits, at an end of a wall. Its worktop may pass below a window.
 
     Returns the spot at the middle of the row; None if there is no space for it.
     """
@@ -71,8 +84,8 @@ def add_kitchen_row(layout: RoomLayout, style: Style) -> Spot | None:
                 continue
             first_m = start_m + length_m / 2 + WALL_END_M
             last_m = end_m - length_m / 2 - WALL_END_M
-            for along in (first_m, last_m):
-                place = _row_place(layout, layout.spot(side, along), length_m)
+            for middle_m in (first_m, last_m):
+                place = _row_place(layout, layout.spot(side, middle_m), length_m)
                 if _fits(layout, place):
                     _add_row(layout, style, place)
                     return place.spot
@@ -80,32 +93,32 @@ def add_kitchen_row(layout: RoomLayout, style: Style) -> Spot | None:
 
 
 def _row_place(layout: RoomLayout, spot: Spot, length_m: float) -> _RowPlace:
-    """The place of a row at a spot, with the windows behind it."""
+    """The place of a row of a length at a spot, with the windows behind it."""
+    row_start_m = spot.along_m - length_m / 2
+    row_end_m = spot.along_m + length_m / 2
     windows_m = []
     for window in layout.plan.windows_of(layout.room):
         start_m, end_m = along_m(spot.side, window.rect)
-        is_behind = start_m < spot.along_m + length_m / 2 and end_m > spot.along_m - length_m / 2
-        if is_behind and layout.room.side_at(window.rect) == spot.side:
+        is_in_wall = layout.room.side_at(window.rect) == spot.side
+        is_behind_row = start_m < row_end_m and end_m > row_start_m
+        if is_in_wall and is_behind_row:
             windows_m.append((start_m, end_m))
     return _RowPlace(spot, length_m, tuple(windows_m))
 
 
 def _fits(layout: RoomLayout, place: _RowPlace) -> bool:
-    """Whether a row can stand at a place."""
-    # The fridge and the unit at the other end are too high to stand in front of a window.
-    ends_are_clear = all(
-        start_m - place.start_m > END_UNIT_M and place.end_m - end_m > END_UNIT_M for start_m, end_m in place.windows_m
-    )
+    """Whether a row can stand at a place: its ends, the wall and the floor are free."""
     height_m = WORKTOP_HEIGHT_M if place.windows_m else ROW_HEIGHT_M
     spot = place.spot
     region = region_around(spot.along_m, place.length_m, 0.0, height_m)
     footprint = spot.footprint(kitchen.ROW_DEPTH_M, place.length_m)
     front = spot.footprint(FRONT_M, place.length_m, kitchen.ROW_DEPTH_M)
     is_wall_free = layout.walls.is_free(spot.side, region)
-    return ends_are_clear and is_wall_free and layout.floor.fits([footprint], [front])
+    return place.has_clear_ends and is_wall_free and layout.floor.fits([footprint], [front])
 
 
 def _add_row(layout: RoomLayout, style: Style, place: _RowPlace) -> None:
+    """Add a row at a place, and mark its part of the floor and the wall as occupied."""
     spot = place.spot
     layout.add(
         "kitchen_row",
@@ -117,12 +130,14 @@ def _add_row(layout: RoomLayout, style: Style, place: _RowPlace) -> None:
         style=style.kitchen,
         window=place.window_y_m,
     )
-    layout.floor.occupy(spot.footprint(kitchen.ROW_DEPTH_M + WORKTOP_EDGE_M, place.length_m), ROW_HEIGHT_M)
-    layout.walls.occupy(spot.side, region_around(spot.along_m, place.length_m, 0.0, ROW_HEIGHT_M))
+    footprint = spot.footprint(kitchen.ROW_DEPTH_M + WORKTOP_EDGE_M, place.length_m)
+    region = region_around(spot.along_m, place.length_m, 0.0, ROW_HEIGHT_M)
+    layout.floor.occupy(footprint, ROW_HEIGHT_M)
+    layout.walls.occupy(spot.side, region)
 
 
 def middle_of_free_floor(layout: RoomLayout) -> tuple[float, float]:
-    """The middle (x, y) of a room, or of the largest rectangle that a row of kitchen units leaves of it."""
+    """The centre (x, y) of a room or, if it has a row of kitchen units, of the largest rectangle beside the row."""
     rect = layout.room.rect
     row = next((piece for piece in layout.placed if ".kitchen_row_" in piece.name), None)
     if row is None:
@@ -140,5 +155,5 @@ def middle_of_free_floor(layout: RoomLayout) -> tuple[float, float]:
 
 
 def _area_m2(rect: Rect) -> float:
-    """The area of a rectangle; 0 if its ends are in the wrong order."""
+    """The area of a rectangle; 0 if its last coordinate is less than its first one on an axis."""
     return max(rect.width_m, 0) * max(rect.depth_m, 0)

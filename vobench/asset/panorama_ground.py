@@ -1,4 +1,4 @@
-"""Ground and ranges of hills of panoramas."""
+"""Paints the ground and ranges of hills into panoramas."""
 
 import numpy as np
 
@@ -10,18 +10,21 @@ ASPHALT: Albedo = (0.075, 0.075, 0.078)
 PAVING: Albedo = (0.2, 0.19, 0.175)
 LAWN: Albedo = (0.075, 0.1, 0.035)
 
-# The profile of a range of hills: a sum of waves around the horizon, and on the crest noise as of trees.
+# The crest of a range of hills is a sum of sine waves around the horizon, plus noise that looks like trees.
 WAVES = 39
-WAVE_EXPONENT = -1.3  # of the amplitude by the number of the wave
-LOWEST_CREST = 0.35  # of the rise
-TREE_TANGENT = 0.0012
-WOODS_CONTRAST = 0.35  # of the logarithm of the luminance
-HILL_LIGHT = 0.6  # of the light on level ground: hills face the viewer, and woods have shadows
-HILL_FOOT = -0.002  # tangent of the elevation below which the ground is painted
+WAVE_EXPONENT = -1.3  # the amplitude of wave n is proportional to n to this power
+LOWEST_CREST = 0.35  # the lowest point of the crest relative to the highest
+TREE_TANGENT = 0.0012  # the standard deviation of the noise, as the tangent of an elevation
+WOODS_CONTRAST = 0.35  # the standard deviation of the logarithm of the luminance
+HILL_LIGHT = 0.6  # illuminance relative to level ground: slopes face the viewer, and woods cast shadows
+HILL_FOOT_TANGENT = -0.002  # hills are painted only above this tangent of the elevation
 
 
 def ground_places(canvas: PanoramaCanvas) -> tuple[Floats, Floats, Floats]:
-    """x, y in metres and the length in metres that a row covers, of the rows (ROWS / 2) below the horizon."""
+    """The ground point of each pixel below the horizon, and the length of ground that a row of pixels covers.
+
+    Returns x_m (ROWS / 2, COLUMNS), y_m (ROWS / 2, COLUMNS) and footprint_m (ROWS / 2, 1).
+    """
     tangent = canvas.tangent[ROWS // 2 :, None]
     tangent_step = canvas.tangent_step[ROWS // 2 :, None]
     distance_m = canvas.eye_m / -tangent
@@ -32,30 +35,36 @@ def ground_places(canvas: PanoramaCanvas) -> tuple[Floats, Floats, Floats]:
 
 
 def paint_ground(canvas: PanoramaCanvas, albedo: Floats) -> None:
-    """Fill what is below the horizon with ground of an albedo (ROWS / 2, COLUMNS, 3) in the haze."""
+    """Paint ground with an albedo (ROWS / 2, COLUMNS, 3) below the horizon. It fades into haze with the distance."""
     distance_m = canvas.eye_m / -canvas.tangent[ROWS // 2 :, None, None]
-    clear = np.exp(-distance_m / HAZE_M)
+    transmittance = np.exp(-distance_m / HAZE_M)
     ground_cd_m2 = reflected_cd_m2(albedo, canvas.daylight.level_lx)
-    canvas.colour[ROWS // 2 :] = clear * ground_cd_m2 + (1 - clear) * canvas.haze_cd_m2
+    canvas.colour[ROWS // 2 :] = transmittance * ground_cd_m2 + (1 - transmittance) * canvas.haze_cd_m2
 
 
 def paint_hills(canvas: PanoramaCanvas, *, rise: float, distance_m: float, albedo: Albedo) -> None:
-    """A range of hills whose crest rises to a tangent of the elevation; woods and fields lie on it."""
+    """Paint a range of hills with woods and fields.
+
+    `rise` is the tangent of the elevation of the highest point, not including trees.
+    `distance_m` is the distance of the hills, which determines how hazy they are.
+    `albedo` is their mean albedo.
+    """
     crest = _crest(canvas, rise)
     rows = canvas.rows(-0.01, float(crest.max()))
     tangent = canvas.tangent[rows, None]
-    cover = np.clip((crest - tangent) / canvas.tangent_step[rows, None] + 0.5, 0, 1)
-    cover *= tangent > HILL_FOOT
+    rows_below_crest = (crest - tangent) / canvas.tangent_step[rows, None]
+    coverage = np.clip(rows_below_crest + 0.5, 0, 1)  # the share of each pixel that is below the crest
+    coverage *= tangent > HILL_FOOT_TANGENT
 
     woods = canvas.grain(canvas.azimuth[None, :] * 0.9, tangent * 6)
     tone = np.exp(WOODS_CONTRAST * woods)[..., None]
     light_lx = HILL_LIGHT * canvas.daylight.level_lx
     colour = reflected_cd_m2(albedo, light_lx) * tone
-    canvas.paint(rows, np.arange(COLUMNS), colour, cover, distance_m=distance_m)
+    canvas.paint(rows, np.arange(COLUMNS), colour, coverage, distance_m=distance_m)
 
 
 def _crest(canvas: PanoramaCanvas, rise: float) -> Floats:
-    """The tangent (COLUMNS,) of the elevation of a crest, at most `rise` but for the trees on it."""
+    """The tangent (COLUMNS,) of the elevation of a crest. It is at most `rise`, not including the trees."""
     wave = np.arange(1, WAVES + 1)
     phase = 2 * np.pi * canvas.rng.random(WAVES)
     amplitude = wave**WAVE_EXPONENT * canvas.rng.standard_normal(WAVES)
@@ -63,6 +72,8 @@ def _crest(canvas: PanoramaCanvas, rise: float) -> Floats:
     profile = (profile - profile.min()) / np.ptp(profile)
 
     roughness = noise(canvas.rng, 512, 20, 256, slope=0.8)[0]
-    closed = [*roughness, roughness[0]]
-    trees = np.interp(canvas.azimuth, np.linspace(-np.pi, np.pi, len(closed)), closed)
-    return np.asarray(rise * (LOWEST_CREST + 0.65 * profile) + TREE_TANGENT * trees)
+    closed_roughness = [*roughness, roughness[0]]
+    sample_azimuth = np.linspace(-np.pi, np.pi, len(closed_roughness))
+    trees = np.interp(canvas.azimuth, sample_azimuth, closed_roughness)
+    hills = rise * (LOWEST_CREST + 0.65 * profile)
+    return np.asarray(hills + TREE_TANGENT * trees)

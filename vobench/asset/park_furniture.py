@@ -1,4 +1,4 @@
-"""What is built in parks: boards with a map, monuments and pavilions. They stand on z = 0 at the origin."""
+"""Structures of parks: map boards, monuments and pavilions. They stand on the plane z = 0 at the origin."""
 
 import numpy as np
 
@@ -10,25 +10,29 @@ from vobench.geometry.se3 import Array
 from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 
 STONE_TINTS = ("#cfc8ba", "#a8a49a", "#c9b49a", "#8f938f")
-FOUNDATION_M = 0.25  # depth of the lowest step of a monument below the ground
-LOWEST_STEP_M = 0.5  # height of that step with its foundation
-STEPS_M = 0.45  # height of the steps above the ground
-# What stands on a plinth: profiles (N, 2) of radius and height
-MONUMENTS = {
+FOUNDATION_M = 0.25  # the depth of the lower step of a monument below the ground
+LOWER_STEP_M = 0.5  # the height of the lower step, including the foundation
+UPPER_STEP_M = 0.2  # the height of the upper step
+STEPS_M = 0.45  # the height of both steps above the ground
+CORNICE_M = 0.12  # the height of the cornice on the plinth
+STEPS_AND_CORNICE_M = 0.57  # STEPS_M + CORNICE_M
+PLATE_GAP_M = 0.004  # the distance of the plate from the plinth, so that their surfaces do not coincide
+# The profiles (N, 2) of the figures that stand on a plinth: radius and height, for a plinth that is 1.25 m wide.
+FIGURES = {
     "obelisk": np.array([[0, 0], [0.3, 0], [0.2, 2.0], [0, 2.3]]),
     "urn": np.array([[0, 0], [0.22, 0], [0.1, 0.12], [0.3, 0.4], [0.34, 0.62], [0.2, 0.74], [0.28, 0.8], [0, 0.8]]),
     "sphere": np.array([[0, 0.0], [0.2, 0.04], [0.37, 0.22], [0.42, 0.42], [0.37, 0.62], [0.2, 0.8], [0, 0.84]]),
 }
 
-PAVILION_SIDES = 6
+PAVILION_SIDES = 6  # the number of sides, and of posts
 PAVILION_PAINTS = ("#e4e2dc", "#5f7468", "#6d6472", "#46586a")
 ROOF_TINTS = ("#8d4a36", "#4f5a58", "#5a5142")
-EAVES_M = 2.45  # height of the edge of the roof
-RAIL_HEIGHTS_M = (0.5, 1.0)
+EAVES_M = 2.45  # the height of the edge of the roof
+RAIL_HEIGHTS_M = (0.5, 1.0)  # the heights of the rails between the posts
 
 
 def map_board(seed: int) -> list[Part]:
-    """A board with a map of the park under a small roof; it faces x."""
+    """A board with a map of the park under a small roof. It faces x."""
     timber = wood("walnut")
     posts = [stood((0.09, 0.09, 1.9), timber, 0, side * 0.62) for side in SIDES]
     map_picture = matt(texture=picture.poster("circles", seed, 1000, 700))
@@ -41,45 +45,51 @@ def map_board(seed: int) -> list[Part]:
 
 
 def monument(rng: Rng) -> list[Part]:
-    """Steps and a plinth with an obelisk, an urn or a sphere on it."""
+    """A monument: two steps, and a plinth that bears an obelisk, an urn or a sphere."""
     tint = one_of(rng, *STONE_TINTS)
     stone = matt(tint, picture.ground("concrete", int(rng.integers(4)), 1024, 1.4))
-    width_m = float(rng.uniform(0.8, 1.3))  # of the plinth
-    height_m = float(rng.uniform(0.8, 1.5))
+    width_m = float(rng.uniform(0.8, 1.3))  # the width of the plinth
+    height_m = float(rng.uniform(0.8, 1.5))  # the height of the plinth
     plinth_top_m = STEPS_M + height_m
 
-    lower_step_m = (2.2 * width_m, 2.2 * width_m, LOWEST_STEP_M)
-    upper_step_m = (1.5 * width_m, 1.5 * width_m, 0.2)
+    lower_step_m = (2.2 * width_m, 2.2 * width_m, LOWER_STEP_M)
+    upper_step_m = (1.5 * width_m, 1.5 * width_m, UPPER_STEP_M)
     plinth_m = (width_m, width_m, height_m)
-    cornice_m = (1.2 * width_m, 1.2 * width_m, 0.12)
+    cornice_m = (1.2 * width_m, 1.2 * width_m, CORNICE_M)
+    texture_offset = float(rng.uniform(0, 1))
     base = [
         stood(lower_step_m, stone, z=-FOUNDATION_M, bevel=0.02),
         stood(upper_step_m, stone, z=0.25, bevel=0.02),
-        stood(plinth_m, stone, z=STEPS_M, bevel=0.03, u=float(rng.uniform(0, 1))),
+        stood(plinth_m, stone, z=STEPS_M, bevel=0.03, u=texture_offset),
         stood(cornice_m, stone, z=plinth_top_m, bevel=0.03),
     ]
 
     year = int(rng.integers(1780, 1960))
-    plate = put(card_arrays((0.6 * width_m, 0.3 * width_m)), matt(texture=picture.sign(f"{year}")))
-    T_monument_plate = at(width_m / 2 + 0.004, 0, STEPS_M + 0.6 * height_m)
+    year_picture = matt(texture=picture.sign(f"{year}"))
+    plate = put(card_arrays((0.6 * width_m, 0.3 * width_m)), year_picture)
+    T_monument_plate = at(width_m / 2 + PLATE_GAP_M, 0, STEPS_M + 0.6 * height_m)
 
-    kind = one_of(rng, *MONUMENTS)
+    kind = one_of(rng, *FIGURES)
     sections = 4 if kind == "obelisk" else 24
-    figure = lathe(MONUMENTS[kind] * (0.8 * width_m), sections=sections)
-    return [*base, plate.moved(T_monument_plate), put(figure, stone, z=0.57 + height_m, yaw=45)]
+    figure_scale = 0.8 * width_m
+    figure = lathe(FIGURES[kind] * figure_scale, sections=sections)
+    figure_z_m = STEPS_AND_CORNICE_M + height_m
+    return [*base, plate.moved(T_monument_plate), put(figure, stone, z=figure_z_m, yaw=45)]
 
 
 def pavilion(rng: Rng) -> list[Part]:
-    """A roof on six posts above a floor of boards, with rails between the posts."""
+    """A pavilion: a floor of boards, and a roof on six posts, with rails between the posts."""
     radius_m = float(rng.uniform(1.6, 2.3))
     timber = wood(one_of(rng, "oak", "walnut"))
     paint = coated(one_of(rng, *PAVILION_PAINTS), roughness=0.4)
     shingles = matt(one_of(rng, *ROOF_TINTS), picture.boards("walnut", 3, 512, 0.8))
 
-    floor_m = radius_m + 0.2  # radius of the floor
-    eaves_m = radius_m + 0.5  # radius of the edge of the roof
-    floor_profile = np.array([[0, -0.3], [floor_m, -0.3], [floor_m, 0.12], [0, 0.12]])
-    roof_profile = np.array([[0, EAVES_M], [eaves_m, EAVES_M], [eaves_m, EAVES_M + 0.08], [0, EAVES_M + 1.3]])
+    floor_radius_m = radius_m + 0.2
+    roof_radius_m = radius_m + 0.5
+    edge_top_m = EAVES_M + 0.08
+    apex_m = EAVES_M + 1.3
+    floor_profile = np.array([[0, -0.3], [floor_radius_m, -0.3], [floor_radius_m, 0.12], [0, 0.12]])
+    roof_profile = np.array([[0, EAVES_M], [roof_radius_m, EAVES_M], [roof_radius_m, edge_top_m], [0, apex_m]])
     return [
         put(lathe(floor_profile, sections=PAVILION_SIDES), timber),
         put(lathe(roof_profile, sections=PAVILION_SIDES), shingles),
@@ -89,7 +99,7 @@ def pavilion(rng: Rng) -> list[Part]:
 
 
 def _corner_m(radius_m: float, number: int) -> Array:
-    """A corner (2,) of a pavilion."""
+    """The position (2,) of a corner of a pavilion."""
     angle_rad = np.deg2rad(360 // PAVILION_SIDES * number)
     return radius_m * np.array([np.cos(angle_rad), np.sin(angle_rad)])
 
@@ -105,7 +115,7 @@ def _posts(radius_m: float) -> MeshArrays:
 
 
 def _rails(radius_m: float) -> MeshArrays:
-    """Two rails on each side of a pavilion but the first one, which is the entrance."""
+    """Two rails on each side of a pavilion, except on the first one, which is the entrance."""
     rails = []
     for number in range(1, PAVILION_SIDES):
         ends_m = np.stack([_corner_m(radius_m, number), _corner_m(radius_m, number + 1)])

@@ -1,4 +1,7 @@
-"""Procedural colour textures: wood, stone, cloth and printed matter, with detail down to a millimetre."""
+"""Procedural colour textures: wood, stone, cloth and printed matter, with detail down to a millimetre.
+
+A tile is the part of a plane that a texture covers before it repeats. Frequencies are in cycles per tile.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,9 +22,9 @@ from vobench.scene.material import Map, Picture, Texture
 Rng = np.random.Generator
 Bytes = NDArray[np.uint8]
 Draw = ImageDraw.ImageDraw
-Box = tuple[float, float, float, float]
+Box = tuple[float, float, float, float]  # left, top, right and bottom in pixels
 
-# Colours of each palette from dark to light.
+# The colours of each palette, from dark to light.
 TONES = {
     "oak": ("#6b4a2c", "#a87d50", "#c9a271", "#dcbd8f"),
     "walnut": ("#33231a", "#573c29", "#77543a", "#8f6b4d"),
@@ -44,8 +47,10 @@ TONES = {
 class Octave:
     """A band of noise.
 
-    `low` and `high` are frequencies in cycles per tile. The spectrum is f^-slope. `amount` is the standard deviation;
-    1 is the whole palette.
+    `low` is the lowest frequency in cycles per tile.
+    `high` is the highest frequency in cycles per tile.
+    `slope` is the exponent of the spectrum, which is f^-slope.
+    `amount` is the standard deviation of the tone, for which 1 is the whole palette.
     """
 
     low: float
@@ -58,8 +63,10 @@ class Octave:
 class Pits:
     """Spots where a band of noise exceeds a threshold.
 
-    `low` and `high` are frequencies in cycles per tile. `depth` is the change of the tone in a spot; it is negative
-    for a darker spot.
+    `low` is the lowest frequency of the noise in cycles per tile.
+    `high` is the highest frequency of the noise in cycles per tile.
+    `threshold` is the threshold, in standard deviations of the noise.
+    `depth` is the change of the tone in a spot. It is negative if spots are darker.
     """
 
     low: float
@@ -70,7 +77,11 @@ class Pits:
 
 @dataclass(frozen=True, slots=True)
 class Ground:
-    """A uniform surface: noise in several bands, and pits."""
+    """A uniform surface.
+
+    `octaves` are bands of noise, which are added.
+    `pits` are spots of another tone.
+    """
 
     octaves: tuple[Octave, ...]
     pits: Pits
@@ -110,8 +121,8 @@ STONES = ("#d9d3c7", "#b9b1a4", "#6e6a66", "#45474a", "#9a7a62", "#7d8a84")
 CEMENT = "#aaa49a"
 MORTAR = "#b9b2a6"
 BRASS = (122, 104, 70)
-SPINE_PX_PER_M = 1300.0
-# Colours of prints, cloths and paints.
+SPINE_PX_PER_M = 1300.0  # the resolution of the spines of books
+# The colours of prints, cloths and paints.
 NAVY = "#27445c"
 TEAL = "#3d7a7c"
 SKY = "#8fb3c7"
@@ -134,8 +145,10 @@ WORDS = (
 class LazyTexture:
     """A texture whose pixels are computed when they are first needed.
 
-    `planks` is not empty for a floor of planks along u: for each row of planks in the tile, the places along u where
-    the row is cut, as shares of the tile. A floor can then lay the planks in another order.
+    `pixels` computes the pixels.
+    `tile_m` is the side of the tile.
+    `planks` is for floors with planks along u, and empty otherwise: for each row of planks, the positions along u
+    where the row is cut, as shares of the tile. They make it possible to lay the planks in another order.
     """
 
     pixels: Callable[[], NDArray[Any]]
@@ -144,10 +157,10 @@ class LazyTexture:
 
 
 def painted(paint: Callable[..., Picture]) -> Callable[..., Texture]:
-    """A decorator: the function returns a lazy texture, the same one for equal arguments.
+    """Decorate a function that paints a picture, so that it returns a lazy texture instead.
 
-    The picture is painted when its pixels are first needed; many uses of a scene, such as planning a path, need none.
-    The parameter `tile_m` of the function becomes that of the texture.
+    The picture is painted when its pixels are first needed. Many uses of a scene, such as planning a path, need none.
+    Calls with equal arguments return the same texture. If the function has a parameter `tile_m`, the texture gets it.
     """
     parameters = signature(paint)
 
@@ -163,7 +176,7 @@ def painted(paint: Callable[..., Picture]) -> Callable[..., Texture]:
 
 
 def rgb(colour: str) -> tuple[int, int, int]:
-    """The three bytes of #rrggbb."""
+    """Red, green and blue, from 0 to 255, of a colour #rrggbb."""
     red = int(colour[1:3], 16)
     green = int(colour[3:5], 16)
     blue = int(colour[5:7], 16)
@@ -171,7 +184,7 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 
 def _ramp(values: ArrayLike, tones: str) -> Bytes:
-    """Colours (..., 3) of values (...) from 0, the darkest tone of a palette, to 1, the lightest."""
+    """The colours (..., 3) of values (...) in a palette: 0 is the darkest tone, and 1 is the lightest."""
     colours = np.array([rgb(tone) for tone in TONES[tones]])
     stops = np.linspace(0, 1, len(colours))
     levels = np.linspace(0, 1, 256)
@@ -183,7 +196,7 @@ def _ramp(values: ArrayLike, tones: str) -> Bytes:
 
 
 def _scaled(picture: ArrayLike | Image.Image, factor: ArrayLike) -> Bytes:
-    """A picture multiplied by a factor, as bytes."""
+    """A picture multiplied by a factor, which can be an array, as bytes."""
     scaled = np.asarray(picture) * np.asarray(factor, np.float32)
     return np.asarray(np.clip(scaled, 0, 255).astype(np.uint8))
 
@@ -197,10 +210,13 @@ def noise(
     slope: float = 1.0,
     stretch: float = 1.0,
 ) -> Map:
-    """Periodic noise (px, px) of unit variance between two frequencies per tile.
+    """Periodic noise (px, px) with unit variance in a band of frequencies.
 
-    The features are `stretch` times as long along u. Above 1024 pixels, the noise repeats within the tile if its
-    lowest frequency allows that.
+    `low` and `high` are the lowest and the highest frequency in cycles per tile.
+    `slope` is the exponent of the spectrum, which is f^-slope.
+    `stretch` is the length of features along u relative to their length along v.
+
+    With more than 1024 pixels, the noise repeats within the tile if the lowest frequency is high enough for that.
     """
     repeats = max(1, min(px // 1024, int(low) // 16))
     n = px // repeats
@@ -217,7 +233,7 @@ def noise(
 
 @lru_cache(maxsize=8)  # textures of one kind have the same bands
 def _band(n: int, low: float, high: float, slope: float, stretch: float) -> Map:
-    """The gain (n, n // 2 + 1) of each frequency of a spectrum, zero outside of a band."""
+    """The gain (n, n // 2 + 1) at each frequency of a spectrum. It is zero outside the band."""
     f_u = (np.arange(n // 2 + 1) * stretch).astype(np.float32)
     f_v = (scipy.fft.fftfreq(n)[:, None] * n).astype(np.float32)
     f = np.hypot(f_u, f_v)
@@ -234,9 +250,12 @@ def _polygons(
     *,
     is_open: bool = False,
 ) -> Map:
-    """The image, on which polygons (N, K, 2) in pixels are drawn in order, as an array.
+    """Draw polygons on an image, and return it as an array (px, px).
 
-    A polygon across a border continues at the opposite border. With `is_open`, polylines are drawn instead.
+    `shapes` (N, K, 2) are the vertices of the polygons in pixels. Later polygons are drawn over earlier ones. A
+    polygon that crosses a border continues at the opposite border.
+    `tones` (N,) are the values of their pixels.
+    `is_open` draws polylines instead of polygons.
     """
     draw = ImageDraw.Draw(image)
     draw_shape = draw.line if is_open else draw.polygon
@@ -252,7 +271,7 @@ def _polygons(
 
 
 def _repeats(low: float, high: float, px: int) -> list[int]:
-    """The shifts at which a shape that covers [low, high] appears in a tile of [0, px]."""
+    """The shifts by which a shape that extends from `low` to `high` has to be drawn in a periodic tile from 0 to px."""
     shifts = [0]
     if low < 0:
         shifts.append(px)
@@ -262,7 +281,7 @@ def _repeats(low: float, high: float, px: int) -> list[int]:
 
 
 def _scratches(rng: Rng, px: int, count: int) -> Map:
-    """An image (px, px) in [0, 1] of thin, slightly bent lines."""
+    """An image (px, px) of thin, slightly bent lines, with values from 0 to 1."""
     start = rng.uniform(0, px, (count, 1, 2))
     step = rng.normal(0, 0.03 * px, (count, 1, 2))
     bend = rng.normal(0, 0.004 * px, (count, 1, 2))
@@ -275,9 +294,10 @@ def _scratches(rng: Rng, px: int, count: int) -> Map:
 
 
 def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
-    """The index (px, px) of the cell at each pixel, and the distance in pixels to the nearest joint.
+    """The cells into which joints divide rows, such as planks or bricks.
 
     `cuts` (rows, K) are the positions of the joints in each row, as shares of its length.
+    Returns the index (px, px) of the cell of each pixel, and the distance (px, px) in pixels to the nearest joint.
     """
     rows, count = cuts.shape
     x = np.arange(px)
@@ -287,11 +307,11 @@ def _cells(px: int, cuts: Array) -> tuple[NDArray[np.int64], Map]:
     columns = [np.searchsorted(np.sort(cut * px), x) % count for cut in cuts]
     cell = np.stack(columns) + np.arange(rows)[:, None] * count
 
-    # Distances along a row are periodic: from -px / 2 to px / 2.
+    # Distances along a row are periodic, and are from -px / 2 to px / 2.
     to_cut = (x - cuts[..., None] * px + px / 2) % px - px / 2
     to_nearest_cut = np.abs(to_cut).min(axis=1)
-    below = x % row_px
-    to_row_border = np.minimum(below, row_px - below)
+    from_row_start = x % row_px
+    to_row_border = np.minimum(from_row_start, row_px - from_row_start)
     to_joint = np.minimum(to_nearest_cut[row], to_row_border[:, None])
     return cell[row], to_joint.astype(np.float32)
 
@@ -306,60 +326,91 @@ def boards(
     rows: int = 8,
     joint_m: float = 0,
 ) -> Texture:
-    """Planks along u with growth rings, pores, fibres and scratches; each plank has its own tone."""
+    """Planks along u with growth rings, pores, fibres and scratches. Each plank has a different tone.
+
+    `tones` is the name of a palette.
+    `rows` is the number of rows of planks in the tile.
+    `joint_m` is the width of the joints; with 0, the planks have no visible joints.
+    """
     pixels = cache(lambda: _boards(tones, seed, px, tile_m, rows=rows, joint_m=joint_m))
     if not joint_m:
         return LazyTexture(pixels, tile_m)
-    cuts = np.sort(_plank_cuts(np.random.default_rng(seed), rows, joint_m), axis=1)
-    return LazyTexture(pixels, tile_m, tuple(tuple(row) for row in cuts.tolist()))
+    cuts = _plank_cuts(np.random.default_rng(seed), rows, joint_m)
+    sorted_cuts = np.sort(cuts, axis=1)
+    planks = tuple(tuple(row) for row in sorted_cuts.tolist())
+    return LazyTexture(pixels, tile_m, planks)
 
 
 def _plank_cuts(rng: Rng, rows: int, joint_m: float) -> Array:
-    """The places (rows, K) where each row of planks is cut, as shares of its length."""
-    return rng.uniform(0, 1, (rows, 2 if joint_m else 1))
+    """The positions (rows, K) where each row of planks is cut, as shares of its length."""
+    cuts_per_row = 2 if joint_m else 1
+    return rng.uniform(0, 1, (rows, cuts_per_row))
 
 
 def _boards(tones: str, seed: int, px: int, tile_m: float, *, rows: int, joint_m: float) -> Bytes:
     """The pixels of `boards`."""
     rng = np.random.default_rng(seed)
-    variety = 0.08 if joint_m else 0.05
+    variety = 0.08 if joint_m else 0.05  # the standard deviation of the tones of planks
     cuts = _plank_cuts(rng, rows, joint_m)
     planks = cuts.size
-    cell, to_joint = _cells(px, cuts)
+    plank_of_pixel, to_joint_px = _cells(px, cuts)
 
-    # Each plank is cut at a random distance from the centre of its trunk. Late wood is the dark part of a ring.
-    row_share = (np.arange(px) / px * rows) % 1
-    v = (row_share[:, None] * tile_m / rows).astype(np.float32)
-    heart = rng.uniform(-0.05, 0.15, planks).astype(np.float32)
-    depth = rng.uniform(0.01, 0.07, planks)
-    phase = rng.uniform(0, 7, planks)
-    angle_u = 2 * np.pi * np.arange(px) / px
-    wave = np.sin(angle_u + phase[:, None]) * 0.02
-    depth_along_u = (depth[:, None] + wave).astype(np.float32)  # (planks, px)
-    bend = noise(rng, px, 1, 12, slope=1.6, stretch=3)
-    across = v - heart[cell] + np.float32(0.004) * bend
-    depth_of_pixel = depth_along_u[cell, np.arange(px)]
-    radius = np.sqrt(across * across + depth_of_pixel * depth_of_pixel)
-    rings_per_m = (1 / rng.uniform(0.005, 0.009, planks)).astype(np.float32)
-    ring = radius * rings_per_m[cell]
-    place_in_ring = ring - np.floor(ring)
-    late_wood = place_in_ring * place_in_ring * place_in_ring
-
+    late_wood = _late_wood(rng, plank_of_pixel, planks=planks, tile_m=tile_m, rows=rows)
     fibre = noise(rng, px, 30, 500, slope=0.4, stretch=30)
     pores = noise(rng, px, 60, 500, slope=0.0, stretch=12) > 1.9
     plank_tone = rng.normal(0, variety, planks).astype(np.float32)
-    tone = 0.62 - 0.3 * late_wood + 0.09 * fibre - np.float32(0.22) * pores + plank_tone[cell]
+    tone = 0.62 - 0.3 * late_wood + 0.09 * fibre - np.float32(0.22) * pores + plank_tone[plank_of_pixel]
 
-    stains = noise(rng, px, 1, 20)
-    scratches = _scratches(rng, px, px // 4)
-    wear = 1 + np.float32(0.03) * stains + np.float32(0.12) * scratches
+    wear = _wear(rng, px)
     hue = 1 + rng.normal(0, 0.15 * variety, (planks, 3)).astype(np.float32)
     joint_shade = np.float32(1)
     if joint_m:
         joint_px = joint_m / tile_m * px
-        joint_shade = np.minimum(0.3 + 0.7 * to_joint / joint_px, 1)
-    light = hue[cell] * (wear * joint_shade)[..., None]
+        joint_shade = np.minimum(0.3 + 0.7 * to_joint_px / joint_px, 1)
+    shade = wear * joint_shade
+    light = hue[plank_of_pixel] * shade[..., None]
     return _scaled(_ramp(tone, tones), light)
+
+
+def _late_wood(
+    rng: Rng,
+    plank_of_pixel: NDArray[np.int64],
+    *,
+    planks: int,
+    tile_m: float,
+    rows: int,
+) -> Map:
+    """The share (px, px) of late wood, which is the dark part of a growth ring, at each pixel.
+
+    Each plank is a cut through a trunk, at a random distance from the centre of the trunk.
+    """
+    px = len(plank_of_pixel)
+    row_share = (np.arange(px) / px * rows) % 1
+    across_plank_m = (row_share[:, None] * tile_m / rows).astype(np.float32)
+    center_m = rng.uniform(-0.05, 0.15, planks).astype(np.float32)
+    depth_m = rng.uniform(0.01, 0.07, planks)
+    phase = rng.uniform(0, 7, planks)
+    angle_u = 2 * np.pi * np.arange(px) / px
+    wave_m = np.sin(angle_u + phase[:, None]) * 0.02
+    depth_along_u_m = (depth_m[:, None] + wave_m).astype(np.float32)  # (planks, px)
+
+    bend = noise(rng, px, 1, 12, slope=1.6, stretch=3)
+    from_center_m = across_plank_m - center_m[plank_of_pixel] + np.float32(0.004) * bend
+    depth_of_pixel_m = depth_along_u_m[plank_of_pixel, np.arange(px)]
+    radius_m = np.sqrt(from_center_m * from_center_m + depth_of_pixel_m * depth_of_pixel_m)
+
+    ring_width_m = rng.uniform(0.005, 0.009, planks)
+    rings_per_m = (1 / ring_width_m).astype(np.float32)
+    ring = radius_m * rings_per_m[plank_of_pixel]
+    place_in_ring = ring - np.floor(ring)
+    return np.asarray(place_in_ring * place_in_ring * place_in_ring)
+
+
+def _wear(rng: Rng, px: int) -> Map:
+    """The factor (px, px) by which stains and scratches change the luminance of wood."""
+    stains = noise(rng, px, 1, 20)
+    scratches = _scratches(rng, px, px // 4)
+    return np.asarray(1 + np.float32(0.03) * stains + np.float32(0.12) * scratches)
 
 
 @painted
@@ -373,7 +424,12 @@ def masonry(
     columns: int = 8,
     bond: float = 0.5,
 ) -> Picture:
-    """Bricks, slabs or tiles in courses; every other course is shifted by `bond` of their length."""
+    """Bricks, slabs or tiles in courses.
+
+    `tones` is the name of a palette.
+    `rows` and `columns` are the numbers of courses, and of bricks in a course, in the tile.
+    `bond` is the shift of every other course, as a share of the length of a brick.
+    """
     rng = np.random.default_rng(seed)
     variety = 0.14 if columns > 3 else 0.05
     shift = bond * (np.arange(rows) % 2)[:, None]
@@ -382,23 +438,23 @@ def masonry(
 
     coarse = noise(rng, px, 4, 60, slope=0.6)
     fine = noise(rng, px, 60, 400, slope=0.2)
-    rough = coarse * 0.6 + fine
+    roughness = coarse * 0.6 + fine
     pits = noise(rng, px, 40, 200, slope=0.2) > 2.3
     brick_tone = rng.normal(0, variety, rows * columns)
-    tone = 0.5 + brick_tone[cell] + variety * 0.5 * rough - 0.2 * pits
+    tone = 0.5 + brick_tone[cell] + variety * 0.5 * roughness - 0.2 * pits
 
     joint_px = 0.006 / tile_m * px
-    is_joint = (to_joint + 0.6 * rough < joint_px)[..., None]
+    is_joint = (to_joint + 0.6 * roughness < joint_px)[..., None]
     stains = 0.3 * variety * noise(rng, px, 1, 8)
     edge = 0.1 * np.exp(-to_joint / 3)
-    light = 1 + stains - edge + 0.04 * rough
+    light = 1 + stains - edge + 0.04 * roughness
     colours = np.where(is_joint, rgb(MORTAR), _ramp(tone, tones))
     return Picture(_scaled(colours, light[..., None]), tile_m)
 
 
 @painted
 def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Picture:
-    """A uniform surface, one of GROUNDS: blotches, grain, pits and scratches."""
+    """A uniform surface with blotches, grain, pits and scratches. `kind` is one of GROUNDS."""
     rng = np.random.default_rng(seed)
     surface = GROUNDS[kind]
     bands = []
@@ -417,7 +473,7 @@ def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Pic
 
 @painted
 def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
-    """A plain weave of threads in slightly different greys; its material gives it a colour."""
+    """A plain weave of threads in slightly different greys. A material that uses it gives it a colour."""
     rng = np.random.default_rng(seed)
     thread = np.arange(px) // 4
     bulge = np.abs(np.sin(np.arange(px) * np.pi / 4 + 0.4))
@@ -438,7 +494,7 @@ def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
 
 @painted
 def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
-    """Stone chips of all sizes in cement, with brass strips, stains and scratches."""
+    """Terrazzo: stone chips of various sizes in cement, with brass strips, stains and scratches."""
     rng = np.random.default_rng(seed)
     chips, stone_colours = _stone_chips(rng, px, tile_m)
     grain = 0.045 * noise(rng, px, 20, 1500, slope=0.6)
@@ -447,17 +503,18 @@ def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
     light = 1 + grain
     pixels = _scaled(stone_colours[chips], light[..., None])
 
-    strip = slice(round(0.004 / tile_m * px))
-    pixels[strip] = BRASS
-    pixels[:, strip] = BRASS
+    strip_px = round(0.004 / tile_m * px)
+    pixels[:strip_px] = BRASS
+    pixels[:, :strip_px] = BRASS
     return Picture(pixels, tile_m)
 
 
 def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
-    """The index (px, px) of the stone at each pixel, 0 for cement, and the colours (stones + 1, 3) by index."""
+    """The index (px, px) of the colour at each pixel, where 0 is cement, and the colours (N, 3) by index."""
     count = round(11700 * tile_m**2)
-    random_size_m = 0.0016 * rng.uniform(0, 1, count) ** -0.55
-    size_m = np.sort(random_size_m)[::-1].clip(max=0.014)
+    random_size_m = 0.0016 * rng.uniform(0, 1, count) ** -0.55  # a power law: many small and few large chips
+    largest_first_m = np.sort(random_size_m)[::-1]
+    size_m = largest_first_m.clip(max=0.014)
     radius_px = size_m / tile_m * px
     angle = np.sort(rng.uniform(0, 2 * np.pi, (count, 6)), axis=1)
     circle = np.stack([np.cos(angle), np.sin(angle)], -1)
@@ -473,8 +530,9 @@ def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
     return chips.astype(np.uint8), shaded.clip(0, 255).astype(np.uint8)
 
 
-# Printed matter: a picture fills the texture coordinates from 0 to 1, and cells of it can be shown.
+# Printed matter: a picture fills the texture coordinates from 0 to 1. A mesh can show a rectangular part of it.
 def _canvas(width: int, height: int, colour: str) -> tuple[Image.Image, Draw]:
+    """An image of a colour, in pixels, and an object that draws on it."""
     image = Image.new("RGB", (width, height), colour)
     return image, ImageDraw.Draw(image)
 
@@ -493,28 +551,29 @@ def _text(
     *,
     anchor: str = "lt",
 ) -> None:
-    """Draw a line of text with its anchor at a place; it is at least 6 pixels high, so that it can be read."""
+    """Draw a line of text with its anchor at a place. It is at least 6 pixels high, so that it is legible."""
     font = _font(max(6, round(size)))
     draw.text(place, text, font=font, fill=colour, anchor=anchor)
 
 
 def _words(rng: Rng, count: int) -> str:
+    """A number of random words."""
     return " ".join(rng.choice(WORDS.split(), count))
 
 
 def _on(colour: str) -> str:
-    """The colour of text on a background: light on dark, else dark."""
+    """The colour of text on a background: light on a dark background, and dark on a light one."""
     is_dark = sum(rgb(colour)) < 380
     return PAPER if is_dark else INK
 
 
 def one_of(rng: Rng, *colours: str) -> str:
-    """One of the colours."""
+    """A random one of the colours."""
     return str(rng.choice(colours))
 
 
 def _chart(draw: Draw, rng: Rng, box: Box) -> None:
-    """Draw axes with bars or curves into a box."""
+    """Draw a chart into a box: axes with bars, or with three curves."""
     x0, y0, x1, y1 = box
     draw.line([x0, y0, x0, y1, x1, y1], fill="#777777")
     xs = np.linspace(x0, x1, int(rng.integers(8, 16)))[1:-1]
@@ -537,9 +596,10 @@ def _bars(
     bottom: float,
     ink: str,
 ) -> None:
-    half = 0.3 * (xs[1] - xs[0])
+    """Draw a bar from the bottom of a chart to each of the points (xs, ys)."""
+    half_width = 0.3 * (xs[1] - xs[0])
     for x, y in zip(xs, ys, strict=True):
-        draw.rectangle([x - half, y, x + half, bottom], fill=ink)
+        draw.rectangle([x - half_width, y, x + half_width, bottom], fill=ink)
 
 
 def _curve(
@@ -548,6 +608,7 @@ def _curve(
     ys: Array,
     ink: str,
 ) -> None:
+    """Draw a line through the points (xs, ys), with a square at each point."""
     for x, y in zip(xs, ys, strict=True):
         draw.rectangle([x - 2, y - 2, x + 2, y + 2], fill=ink)
     points = np.stack([xs, ys], axis=1)
@@ -555,7 +616,7 @@ def _curve(
 
 
 def _column(draw: Draw, rng: Rng, box: Box, size: float) -> None:
-    """Fill a box with paragraphs of text, and a chart now and then."""
+    """Fill a box with paragraphs of text and occasional charts. `size` is the size of the font in pixels."""
     x0, y, x1, y1 = box
     characters = (x1 - x0) / (0.52 * size)
     while y < y1 - size:
@@ -565,15 +626,17 @@ def _column(draw: Draw, rng: Rng, box: Box, size: float) -> None:
             y += 10.5 * size
 
         ends_paragraph = rng.random() < 0.14
-        length = characters * (rng.uniform(0.2, 0.8) if ends_paragraph else 1)
-        line = _words(rng, 16)[: int(length)]
+        filled_share = rng.uniform(0.2, 0.8) if ends_paragraph else 1
+        length = int(characters * filled_share)
+        line = _words(rng, 16)[:length]
         _text(draw, (x0, y), line, size, "#3a3d42")
-        y += (2.4 if ends_paragraph else 1.35) * size
+        line_spacing = 2.4 if ends_paragraph else 1.35
+        y += line_spacing * size
 
 
 @painted
 def pages(seed: int = 0) -> Picture:
-    """Six sheets of A4 (480 × 680 px each), in three columns and two rows, with titles, text and charts."""
+    """Six A4 pages of 480 × 680 px with titles, text and charts, in three columns and two rows."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(1440, 1360, PAPER)
     for y, x in product((0, 680), (0, 480, 960)):
@@ -582,7 +645,7 @@ def pages(seed: int = 0) -> Picture:
 
 
 def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
-    """Draw a sheet with its upper left corner at x, y: a title above one or two columns."""
+    """Draw a page with its upper left corner at (x, y): a title above one or two columns."""
     band = one_of(rng, PAPER, PAPER, *INKS)
     split = rng.choice([220, 440])
     paper = one_of(rng, "#f4f2ec", PAPER, "#ebe8df")
@@ -596,9 +659,11 @@ def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Spines:
-    """A picture of the spines of books. Its lowest row has the colour of paper.
+    """The spines of books, side by side in one picture.
 
-    `cells` has the part of the picture of each book, and `sizes_m` its thickness and height.
+    `picture` is the picture. Its lowest row has the colour of paper.
+    `cells` are the part of the picture of each book: first u, last u, first v and last v, as shares of the picture.
+    `sizes_m` are the thickness and the height of each book.
     """
 
     picture: Picture
@@ -608,30 +673,30 @@ class Spines:
 
 @cache
 def spines(seed: int = 0, count: int = 52) -> Spines:
-    """The spines of books, of series of books, and of ring binders."""
+    """The spines of single books, series of books and ring binders. There are `count` or slightly more of them."""
     rng = np.random.default_rng(seed)
     drawn: list[Image.Image] = []
     while len(drawn) < count:
         has_binders = rng.random() < 0.14
         drawn += _binders(rng) if has_binders else _series(rng)
 
-    # Spines are drawn horizontally, but are upright and side by side in the picture.
+    # Each spine was drawn horizontally. In the picture, they are upright and side by side.
     ends = np.cumsum([0, *(spine.height for spine in drawn)])
     height = round(0.325 * SPINE_PX_PER_M)
     image = Image.new("RGB", (int(ends[-1]), height), PAPER)
     for x, spine in zip(ends.tolist(), drawn, strict=False):
         image.paste(spine.transpose(Image.Transpose.ROTATE_270), (x, 0))
 
-    worn = 1 + 0.05 * noise(rng, 1024, 20, 500, slope=0.5)
-    repeated = np.tile(worn, (1, image.width // 1024 + 1))
-    pixels = _scaled(image, repeated[:height, : image.width, None])
+    wear = 1 + 0.05 * noise(rng, 1024, 20, 500, slope=0.5)
+    repeated_wear = np.tile(wear, (1, image.width // 1024 + 1))
+    pixels = _scaled(image, repeated_wear[:height, : image.width, None])
 
-    u = (ends / image.width).tolist()
+    border_u = (ends / image.width).tolist()
     cells = []
     sizes_m = []
     for k, spine in enumerate(drawn):
         last_v = spine.width / height
-        cells.append((u[k], u[k + 1], 0.0, last_v))
+        cells.append((border_u[k], border_u[k + 1], 0.0, last_v))
         thickness_m = spine.height / SPINE_PX_PER_M
         height_m = spine.width / SPINE_PX_PER_M
         sizes_m.append((thickness_m, height_m))
@@ -639,59 +704,60 @@ def spines(seed: int = 0, count: int = 52) -> Spines:
 
 
 def _binders(rng: Rng) -> list[Image.Image]:
-    """The spines of an owner's ring binders, drawn horizontally."""
+    """The spines of two to four ring binders of one owner, drawn horizontally."""
     colour = one_of(rng, NAVY, INK, BRICK, "#8a8d8f")
     owner = _words(rng, 1).upper()
-    w = round(0.07 * SPINE_PX_PER_M)
-    h = round(0.318 * SPINE_PX_PER_M)
+    width = round(0.07 * SPINE_PX_PER_M)
+    height = round(0.318 * SPINE_PX_PER_M)
     binders = []
     for volume in range(int(rng.integers(2, 5))):
-        image, draw = _canvas(h, w, colour)
-        label = [0.12 * h, 0.14 * w, 0.55 * h, 0.86 * w]
-        hole_x = 0.79 * h
-        hole = [hole_x, 0.28 * w, hole_x + 0.44 * w, 0.72 * w]
+        image, draw = _canvas(height, width, colour)
+        label = [0.12 * height, 0.14 * width, 0.55 * height, 0.86 * width]
+        hole_x = 0.79 * height
+        hole = [hole_x, 0.28 * width, hole_x + 0.44 * width, 0.72 * width]
         draw.rectangle(label, fill=PAPER)
         text = f"{owner} {2019 + volume}"
-        _text(draw, (0.15 * h, 0.5 * w), text, 0.34 * w, INK, anchor="lm")
+        _text(draw, (0.15 * height, 0.5 * width), text, 0.34 * width, INK, anchor="lm")
         draw.ellipse(hole, fill="#0c0d0e", outline="#b9bcbe", width=5)
         binders.append(image)
     return binders
 
 
 def _series(rng: Rng) -> list[Image.Image]:
-    """The spine of a book, or of each volume of a series, drawn horizontally."""
+    """The spines of the volumes of a series, or of a single book, drawn horizontally."""
     volumes = int(rng.choice([1, 1, 1, 1, 2, 5]))
-    w = round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
+    width = round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
     height_m = float(rng.choice([0.178, 0.2, 0.216, 0.235, 0.24, 0.28]))
-    h = round(height_m * SPINE_PX_PER_M)
+    height = round(height_m * SPINE_PX_PER_M)
     colour = one_of(rng, *INKS, INK, PAPER, "#e2d9c6", "#4a5a4d")
     accent = one_of(rng, *INKS, PAPER)
     title = _words(rng, int(rng.integers(2, 5))).title()
     author = _words(rng, 1).upper()
 
-    image, draw = _canvas(h, w, colour)
-    title_band = rng.uniform(-0.6, 0.6)  # the length of the band; no band if negative
+    image, draw = _canvas(height, width, colour)
+    title_band = rng.uniform(-0.6, 0.6)  # the length of the band behind the title; negative for no band
     thin_bands = [(start, 0.012) for start in rng.choice([0.05, 0.09, 0.84], 2)]
-    for start, length in ((0.13, max(title_band, 0)), *thin_bands):
+    bands = [(0.13, max(title_band, 0)), *thin_bands]
+    for start, length in bands:
         end = start + length
-        draw.rectangle([start * h, 0, end * h, w], fill=accent)
+        draw.rectangle([start * height, 0, end * height, width], fill=accent)
     title_ink = _on(accent if title_band > 0 else colour)
-    title_size = min(0.6 * w, 0.075 * h, 1.25 * h / len(title))
-    _text(draw, (0.15 * h, 0.5 * w), title, title_size, title_ink, anchor="lm")
+    title_size = min(0.6 * width, 0.075 * height, 1.25 * height / len(title))
+    _text(draw, (0.15 * height, 0.5 * width), title, title_size, title_ink, anchor="lm")
 
     spines_of_series = []
-    size = min(0.45 * w, 0.06 * h)
+    size = min(0.45 * width, 0.06 * height)
     for volume in range(1, volumes + 1):
         spine = image.copy()
         foot = author if volumes == 1 else str(volume)
-        _text(ImageDraw.Draw(spine), (0.97 * h, 0.5 * w), foot, size, _on(colour), anchor="rm")
+        _text(ImageDraw.Draw(spine), (0.97 * height, 0.5 * width), foot, size, _on(colour), anchor="rm")
         spines_of_series.append(spine)
     return spines_of_series
 
 
 @painted
 def screen(seed: int = 0) -> Picture:
-    """A display (1280 × 720) with a list of files, an editor, a chart, a log and a bar of icons."""
+    """The picture on a monitor (1280 × 720 px): a list of files, an editor, a chart, a log and a bar of icons."""
     rng = np.random.default_rng(seed)
     is_dark = rng.random() < 0.7
     background = "#1f252b" if is_dark else "#f2f1ec"
@@ -729,7 +795,7 @@ def screen(seed: int = 0) -> Picture:
 
 @painted
 def poster(style: str, seed: int = 0, width: int = 700, height: int = 1000) -> Picture:
-    """A poster in one of the styles of POSTERS."""
+    """A poster. `style` is one of POSTERS, and the size is in pixels."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(width, height, PAPER)
     POSTERS[style](draw, rng, width, height)
@@ -739,7 +805,7 @@ def poster(style: str, seed: int = 0, width: int = 700, height: int = 1000) -> P
 
 
 def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
-    """Draw ridges of hills in the haze below a sun."""
+    """Draw ridges of hazy hills below a sun."""
     sky_tones = np.linspace(rgb(SKY), rgb(PAPER), 40).astype(int)
     for k, tone in enumerate(sky_tones.tolist()):
         draw.rectangle([0, k * h / 40, w, h], fill=tuple(tone))
@@ -761,7 +827,7 @@ def _hills(draw: Draw, rng: Rng, w: int, h: int) -> None:
 
 
 def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
-    """Draw a grid of squares with quarters and halves of circles."""
+    """Draw a grid of squares, each with a quarter or a half of a circle."""
     side = w // 5
     for y, x in product(range(0, h, side), range(0, w, side)):
         background = one_of(rng, *INKS[:6], PAPER)
@@ -785,7 +851,7 @@ def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
 
 
 def _talk(draw: Draw, rng: Rng, w: int, h: int) -> None:
-    """Draw a title above three columns of text and charts."""
+    """Draw the poster of a talk: a title above three columns of text and charts."""
     banner = one_of(rng, NAVY, TEAL, PLUM)
     draw.rectangle([0, 0, w, 0.12 * h], fill=banner)
     _text(draw, (0.04 * w, 0.03 * h), _words(rng, 4).title(), 0.04 * h, PAPER)
@@ -810,7 +876,7 @@ POSTERS: dict[str, Callable[[Draw, Rng, int, int], None]] = {
 
 @painted
 def whiteboard(seed: int = 0) -> Picture:
-    """A whiteboard (1440 × 900) with diagrams in four inks, and traces of wiped ones."""
+    """A whiteboard (1440 × 900 px) with diagrams in four colours, and traces of wiped diagrams."""
     rng = np.random.default_rng(seed)
     image, draw = _canvas(1440, 900, "#e9e9e5")
     wiped_diagrams = 8
@@ -862,7 +928,7 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
 
 @painted
 def sign(text: str, colour: str = PAPER) -> Picture:
-    """A sign (480 × 240) with a word inside a border."""
+    """A sign (480 × 240 px) with a word inside a border."""
     ink = _on(colour)
     image, draw = _canvas(480, 240, colour)
     draw.rectangle([8, 8, 471, 231], outline=ink, width=5)

@@ -1,4 +1,8 @@
-"""Creates meshes of basic shapes. Lengths and texture coordinates are in metres, and normals point outwards."""
+"""Creates meshes of basic shapes. Lengths and texture coordinates are in metres, and normals point outwards.
+
+In shapes of arrays, F is the number of faces, and R and C are the numbers of rows and columns of a grid of vertices.
+A grid is visible from its front. Its front is the side to which cross(column direction, row direction) points.
+"""
 
 from collections.abc import Sequence
 from functools import cache
@@ -21,12 +25,12 @@ from vobench.scene.mesh_arrays import Faces, MeshArrays, joined_arrays, quad_arr
 if TYPE_CHECKING:
     from trimesh import Trimesh
 
-SMOOTH_DEG = 40.0  # a corner of a profile with a smaller angle is shaded as round
-LEAST_AREA_M2 = 1e-12  # faces of a grid are omitted if twice their area is smaller
+SMOOTH_DEG = 40.0  # corners of a profile with a smaller angle are shaded as round
+MIN_DOUBLE_AREA_M2 = 1e-12  # faces of a grid are omitted if twice their area is smaller
 WHOLE_PICTURE: Hole = (0.0, 1.0, 0.0, 1.0)
-LARGEST_BEVEL = 0.45  # the largest bevel, relative to half the shortest side of a block
-BEVEL_OF_CUBE = 0.1  # the bevel of the bevelled unit cube, whose normals and uv axes do not depend on it
-LEVEL_COSINE = 0.9  # faces of a lathe whose normals are closer to z have the texture of a disc
+MAX_BEVEL = 0.45  # the largest bevel, relative to half the shortest side of a block
+BEVEL_OF_CUBE = 0.1  # the bevel of the bevelled unit cube; its normals and uv axes do not depend on this value
+LEVEL_COSINE = 0.9  # faces of a lathe are level, and have the texture of a disc, if the z of their normal is larger
 
 
 def at(
@@ -38,7 +42,7 @@ def at(
     pitch: float = 0.0,
     roll: float = 0.0,
 ) -> Array:
-    """The pose (4, 4) at a position, rotated by Rz(yaw) Ry(pitch) Rx(roll) in degrees."""
+    """The pose (4, 4) with a position and the rotation Rz(yaw) Ry(pitch) Rx(roll), with angles in degrees."""
     angles_rad = np.deg2rad([yaw, pitch, roll])
     cz, cy, cx = np.cos(angles_rad)
     sz, sy, sx = np.sin(angles_rad)
@@ -58,11 +62,17 @@ def block(
 ) -> "Trimesh":
     """A box around the origin with bevelled edges that are shaded as round.
 
-    uv_m: the texture coordinates at its centre. upright: on the sides, u runs to the right and v down instead, as on a
-    printed carton. transform: the pose (4, 4) of the box; the identity by default.
+    `size_m` (3,) is the size along x, y and z.
+    `bevel_m` is the width of the bevels. It is reduced if the box is too thin for it.
+    `uv_m` (2,) are the texture coordinates at the centre of the box.
+    `upright` makes u run to the right and v run down on the sides, as on a printed carton. By default, u runs along
+    the longest edge of each side.
+    `transform` (4, 4) is the pose of the box; the identity by default.
     """
     arrays = block_arrays(size_m, bevel_m=bevel_m, uv_m=uv_m, upright=upright)
-    return as_mesh(arrays if transform is None else arrays.moved(transform))
+    if transform is not None:
+        arrays = arrays.moved(transform)
+    return as_mesh(arrays)
 
 
 def block_arrays(
@@ -74,7 +84,7 @@ def block_arrays(
 ) -> MeshArrays:
     """The arrays of `block`."""
     half_m = np.asarray(size_m, float) / 2
-    bevel = min(bevel_m, LARGEST_BEVEL * half_m.min())
+    bevel = min(bevel_m, MAX_BEVEL * half_m.min())
     if bevel > 0:
         cube = _bevelled_cube()
         vertices_m = cube.signs * (half_m - bevel * (1 - cube.sides))
@@ -84,7 +94,7 @@ def block_arrays(
 
     corners_m = vertices_m[cube.faces]
     has_thickness = half_m.all()
-    # The rim of a plate without thickness has no area, so its normals are 0.
+    # The sides of a box without thickness have no area, so their normals are 0.
     normals = cube.normals if has_thickness else _flat_normals(corners_m)
 
     if upright:
@@ -102,12 +112,13 @@ def block_arrays(
 
 
 def _upright_uv(corners_m: Array) -> Array:
-    """The texture coordinates (F, 3, 2) of faces (F, 3, 3) of a box: u to the right and v down, seen from outside.
+    """The texture coordinates (F, 3, 2) of the corners of the faces (F, 3, 3) of a box.
 
-    Upwards is z on the sides, and y on the top and the bottom.
+    Seen from outside, u runs to the right and v runs down. Upwards is z on the sides, and y on the top and the bottom.
     """
     axis = _projection_axes(corners_m)
-    normals = np.eye(3)[axis] * np.sign(np.take_along_axis(face_normals(corners_m), axis[:, None], axis=1))
+    component_along_axis = np.take_along_axis(face_normals(corners_m), axis[:, None], axis=1)
+    normals = np.eye(3)[axis] * np.sign(component_along_axis)
     is_side = axis < 2
     up = np.where(is_side[:, None], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0])
     right = cross(up, normals)
@@ -117,14 +128,15 @@ def _upright_uv(corners_m: Array) -> Array:
 
 
 def _flat_normals(corners_m: Array) -> Array:
-    """The normal of each face, repeated for its three corners (F, 3, 3)."""
+    """The normals (F, 3, 3) at the corners of faces (F, 3, 3). All corners of a face have the normal of the face."""
     return np.repeat(face_normals(corners_m)[:, None], 3, axis=1)
 
 
 def _uv_axes(corners_m: Array, order: Sequence[int]) -> NDArray[np.int64]:
-    """The axes (F, 2) of u and v of each face (F, 3, 3), for a texture that is projected along x, y or z.
+    """The axes (F, 2) along which u and v of each face (F, 3, 3) run, for a texture that is projected along x, y or z.
 
-    The axis of projection is the one closest to the normal of the face. u and v run along the other two, in `order`.
+    The axis of projection is the one that is closest to the normal of the face. u runs along the first of the other
+    two axes in `order`, and v runs along the second one.
     """
     uv_axes = np.array([_without(order, axis) for axis in range(3)])
     return np.asarray(uv_axes[_projection_axes(corners_m)])
@@ -132,8 +144,8 @@ def _uv_axes(corners_m: Array, order: Sequence[int]) -> NDArray[np.int64]:
 
 def _projection_axes(corners_m: Array) -> NDArray[np.int64]:
     """The axis (F,) that is closest to the normal of each face (F, 3, 3)."""
-    prefers_x = np.array([2e-6, 1e-6, 0])  # so that faces at 45° have the same axis on every machine
-    alignment = np.abs(face_normals(corners_m)) + prefers_x
+    tie_breaker = np.array([2e-6, 1e-6, 0])  # makes the axis of faces at 45° independent of rounding
+    alignment = np.abs(face_normals(corners_m)) + tie_breaker
     return np.asarray(np.argmax(alignment, axis=1))
 
 
@@ -146,10 +158,11 @@ class _Cube:
     """A cube around the origin that determines the vertices, normals and texture axes of blocks of any size."""
 
     def __init__(self, signs: Array, faces: Faces, sides: Array) -> None:
-        """Create a cube, which is bevelled if `sides` are not 0.
+        """Create a cube with V vertices. It is bevelled if `sides` are not 0.
 
-        `signs` (V, 3) are the octants of the vertices, ±1 per axis. `faces` are (F, 3). `sides` (V, 3) are unit vectors
-        along the axis of the side that contains a vertex.
+        `signs` (V, 3) are the signs of the coordinates of each vertex.
+        `faces` (F, 3) are the indices of the vertices of each face.
+        `sides` (V, 3) are unit vectors along the axis of the side that contains each vertex.
         """
         self.signs = signs
         self.faces = faces
@@ -164,7 +177,7 @@ class _Cube:
         self._uv_indices: dict[tuple[int, ...], tuple[NDArray[np.int64], ...]] = {}
 
     def uv_index(self, order: tuple[int, ...]) -> tuple[NDArray[np.int64], ...]:
-        """The index that selects u and v (F, 3, 2) from the corners (F, 3, 3) of a block, as in `_uv_axes`."""
+        """The index that selects u and v (F, 3, 2) from the corners (F, 3, 3) of a block; see `_uv_axes`."""
         if order not in self._uv_indices:
             axes = _uv_axes(self._corners, order)
             face = np.arange(len(self.faces))[:, None, None]
@@ -175,7 +188,7 @@ class _Cube:
 
 @cache
 def _bevelled_cube() -> _Cube:
-    """A cube with 44 faces and 24 vertices, three at each corner. Vertex 3 c + a is on the side of axis a."""
+    """A bevelled cube with 44 faces and 24 vertices. Vertex 3 c + a is at corner c, on the side of axis a."""
     signs = np.repeat(_cube().signs, 3, axis=0)
     sides = np.eye(3)[np.arange(24) % 3]
     vertices = _bevelled_vertices(signs, sides)
@@ -184,13 +197,13 @@ def _bevelled_cube() -> _Cube:
 
 
 def _bevelled_vertices(signs: Array, sides: Array) -> Array:
-    """Vertices (V, 3) of a bevelled cube from -1 to 1."""
+    """The vertices (V, 3) of a bevelled cube whose sides are at -1 and 1."""
     return np.asarray(signs * (1 - BEVEL_OF_CUBE * (1 - sides)))
 
 
 @cache
 def _cube() -> _Cube:
-    """A cube of 8 vertices and 12 faces."""
+    """A cube without bevels, with 8 vertices and 12 faces."""
     grid = np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0], indexing="ij")
     signs = np.stack(grid, axis=-1).reshape(-1, 3)
     quadrilaterals = np.array(
@@ -209,21 +222,23 @@ def _cube() -> _Cube:
 
 
 def _outward(vertices: Array, faces: Faces) -> Faces:
-    """The faces of a convex body around the origin, with the orientation that makes them visible from outside."""
+    """The faces (F, 3) of a convex body that contains the origin, oriented so that they are visible from outside."""
     corners = vertices[faces]
     a = corners[:, 0]
     b = corners[:, 1]
     c = corners[:, 2]
     area_vectors = cross(b - a, c - a)
     is_inward = np.einsum("fk,fk->f", area_vectors, a) < 0
-    turned = faces[:, ::-1]
-    return np.where(is_inward[:, None], turned, faces).astype(np.int64)
+    reversed_faces = faces[:, ::-1]
+    return np.where(is_inward[:, None], reversed_faces, faces).astype(np.int64)
 
 
 def _grids(points_m: Array, normals: Array, uv: Array) -> MeshArrays:
-    """Two faces per cell of B grids of vertices (B, R, C, 3), without those that have no area.
+    """A mesh of B grids of vertices, with two faces per cell. Faces without an area are omitted.
 
-    The faces are visible from the side to which the cross product of the column and the row direction points.
+    `points_m` (B, R, C, 3) are the positions of the vertices.
+    `normals` (B, R, C, 3) are their normals.
+    `uv` (B, R, C, 2) are their texture coordinates.
     """
     grids, rows, columns = points_m.shape[:3]
     index = np.arange(grids * rows * columns).reshape(grids, rows, columns)
@@ -238,7 +253,7 @@ def _grids(points_m: Array, normals: Array, uv: Array) -> MeshArrays:
     q = vertices_m[faces[:, 1]]
     r = vertices_m[faces[:, 2]]
     double_area_m2 = np.linalg.norm(cross(q - p, r - p), axis=1)
-    has_area = double_area_m2 > LEAST_AREA_M2
+    has_area = double_area_m2 > MIN_DOUBLE_AREA_M2
     return MeshArrays(vertices_m, faces[has_area], uv.reshape(-1, 2), normals.reshape(-1, 3))
 
 
@@ -254,7 +269,7 @@ def _circle(sections: int) -> tuple[Array, Array]:
 
 
 def _arc_length_m(steps_m: Array) -> Array:
-    """The distances (N + 1,) along a polyline with segments `steps_m` (N, K) of its vertices from its start."""
+    """The distance (N + 1,) of each vertex from the start, along a polyline with segments `steps_m` (N, K)."""
     lengths_m = np.linalg.norm(steps_m, axis=1)
     return np.concatenate([[0.0], np.cumsum(lengths_m)])
 
@@ -262,8 +277,9 @@ def _arc_length_m(steps_m: Array) -> Array:
 def lathe(profile_m: ArrayLike, *, sections: int = 24) -> "Trimesh":
     """A solid of revolution about z.
 
-    `profile_m` (K, 2) are points (radius, height), from the bottom on the axis, along the outside, to the top on the
-    axis.
+    `profile_m` (K, 2) are points (radius, height). They run from the bottom along the outside to the top, and start and
+    end on the axis.
+    `sections` is the number of faces around the axis.
     """
     profile = np.asarray(profile_m, float)
     segments = np.stack([profile[:-1], profile[1:]], axis=1)  # (K - 1, 2, 2), both ends of each segment
@@ -303,9 +319,10 @@ def _profile_normals(outward: Array) -> Array:
 
 
 def _revolved(vectors: Array, circle: Array) -> Array:
-    """The vectors (K, 2, C, 3) from turning vectors (K, 2, 2), which are radius and height, around z.
+    """Vectors in a profile, rotated around z by C angles. Returns vectors (K, 2, C, 3).
 
-    `circle` (C, 2) are the directions of the radius.
+    `vectors` (K, 2, 2) are the components along the radius and the height.
+    `circle` (C, 2) are the directions of the radius at the C angles.
     """
     radius = vectors[..., None, :1]
     height = vectors[..., None, 1:]
@@ -315,7 +332,10 @@ def _revolved(vectors: Array, circle: Array) -> Array:
 
 
 def spline(points_m: ArrayLike, count: int = 16) -> Array:
-    """Points (count, 3) on a cubic spline through the given points (N, 3), which are evenly spaced in its parameter."""
+    """Points (count, 3) on a cubic spline through the points (N, 3).
+
+    The spacing of the given points is uniform in the parameter of the spline, and so is that of the result.
+    """
     points = np.asarray(points_m, float)
     t = np.linspace(0, 1, count)
     if len(points) == 3:
@@ -386,9 +406,12 @@ def _cross_section_axes(tangents: Array) -> Array:
 
 
 def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> MeshArrays:
-    """A disc that fills a ring (C, 3) of vertices, which have texture coordinates uv (C, 2).
+    """A disc that is visible from the side to which its normal points.
 
-    It is visible from the side to which the normal points.
+    `center_m` (3,) is its centre.
+    `ring_m` (C, 3) are the vertices on its edge.
+    `normal` (3,) is its unit normal.
+    `uv` (C, 2) are the texture coordinates of the vertices on its edge; those of the centre are 0.
     """
     rows = np.stack([np.broadcast_to(center_m, ring_m.shape), ring_m])
     rows_uv = np.stack([0 * uv, uv])
@@ -404,8 +427,9 @@ def _disc(center_m: Array, ring_m: Array, normal: Array, uv: Array) -> MeshArray
 def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimesh":
     """A superellipsoid around the origin: |x/a|^p + |y/b|^p + |z/c|^p = 1.
 
-    `power` is p: 2 gives an ellipsoid, and a larger value a shape closer to a box. `cells` is the number of cells
-    along each edge of the cube that is projected onto it.
+    `size_m` (3,) is its size along x, y and z, which is 2a, 2b and 2c.
+    `power` is p. The shape is an ellipsoid with p = 2, and is closer to a box with a larger p.
+    `cells` is the number of cells along each edge of the cube that is projected onto it.
     """
     half_m = np.asarray(size_m, float) / 2
     steps = np.linspace(-1, 1, cells + 1)
@@ -432,7 +456,7 @@ def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimes
 
 
 def sheet(points_m: ArrayLike) -> "Trimesh":
-    """A smooth surface through a grid of points (R, C, 3). It is visible from the side of column × row direction."""
+    """A smooth surface through a grid of points (R, C, 3). It is visible only from its front; see the module."""
     return as_mesh(sheet_arrays(points_m))
 
 
@@ -455,9 +479,10 @@ def _grid_length_m(points_m: Array, axis: int) -> Array:
 
 
 def card(size_m: tuple[float, float], *, cell: Hole = WHOLE_PICTURE) -> "Trimesh":
-    """An upright rectangle around the origin that faces x and shows a cell of a picture.
+    """An upright rectangle around the origin that faces x and shows a rectangular part of a picture.
 
-    `cell` is the first and last u, and the first and last v, as shares of the picture.
+    `size_m` is its width along y and its height along z.
+    `cell` is the part of the picture: the first u, last u, first v and last v, as shares of the picture.
     """
     return as_mesh(card_arrays(size_m, cell=cell))
 
@@ -469,14 +494,18 @@ def card_arrays(
 ) -> MeshArrays:
     """The arrays of `card`."""
     width, height = size_m
-    u0, u1, v0, v1 = cell
+    first_u, last_u, first_v, last_v = cell
     rectangle = quad_arrays((0, -width / 2, -height / 2), (0, width, 0), (0, 0, height))
-    uv = np.array([[u0, v1], [u1, v1], [u1, v0], [u0, v0]])
+    uv = np.array([[first_u, last_v], [last_u, last_v], [last_u, first_v], [first_u, first_v]])
     return MeshArrays(rectangle.vertices_m, rectangle.faces, uv, rectangle.normals)
 
 
 def cards(sizes_m: ArrayLike, poses: ArrayLike) -> "Trimesh":
-    """One mesh of rectangles with sizes (N, 2) at rigid poses (N, 4, 4), visible from both sides; see `card`."""
+    """One mesh of N rectangles that are visible from both sides; see `card`.
+
+    `sizes_m` (N, 2) are their widths and heights.
+    `poses` (N, 4, 4) are their poses, which must be rigid.
+    """
     return as_mesh(cards_arrays(sizes_m, poses))
 
 
@@ -511,7 +540,11 @@ def cards_arrays(sizes_m: ArrayLike, poses: ArrayLike) -> MeshArrays:
 
 
 def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayLike] = ()) -> "Trimesh":
-    """A prism from z = 0 to `height_m` over a polygon (N, 2) with holes. Polygons can have either orientation."""
+    """A prism from z = 0 to `height_m` over a polygon with holes.
+
+    `polygon_m` (N, 2) are the vertices of the polygon.
+    `holes_m` are the vertices of each hole. All polygons can have either orientation.
+    """
     outline = oriented(polygon_m, counter_clockwise=True)
     holes = [oriented(hole, counter_clockwise=False) for hole in holes_m]
     rings = [outline, *holes]
@@ -530,7 +563,7 @@ def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayL
 
 
 def _cap(corners_m: Array) -> MeshArrays:
-    """The mesh of level faces (F, 3, 3), with x and y as texture coordinates."""
+    """The mesh of horizontal faces (F, 3, 3). Its texture coordinates are x and y."""
     axes = _uv_axes(corners_m, range(3))
     uv = np.take_along_axis(corners_m, axes[:, None, :], axis=2)
     return MeshArrays(

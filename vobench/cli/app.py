@@ -41,20 +41,21 @@ def run() -> None:
 
 
 def _print_stacks_on_crash() -> None:
-    """Let Python print the call stack of every thread if a library crashes."""
+    """Make Python print the call stacks of all threads if a library crashes."""
     # Standard error can be closed, missing, or an object that is not a file; each raises another error.
     with suppress(OSError, ValueError, AttributeError, RuntimeError):
         faulthandler.enable()
 
 
 def _replace_unprintable_characters() -> None:
-    """Let a terminal that cannot show a character, such as °, show a question mark."""
-    for stream in filter(None, (sys.stdout, sys.stderr)):
+    """Print a question mark for each character that the encoding of the terminal lacks, such as °."""
+    open_streams = filter(None, (sys.stdout, sys.stderr))  # the shell can close either
+    for stream in open_streams:
         stream.reconfigure(errors="replace")
 
 
 def _call_command() -> None:
-    """Call the command that the arguments name, and flush its output. It ends by SystemExit or an error."""
+    """Call the command that the arguments name, and flush its output. This always raises SystemExit or an error."""
     try:
         with trust.gate(warn, trusted_folders=_trusted_folders, hash_folder=_hash_folder):
             # --debug is accepted before and after the command; `report_and_exit` looks for it in sys.argv. An argument

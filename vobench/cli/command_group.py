@@ -70,14 +70,17 @@ class CommandGroup(TyperGroup):
     def format_commands(self, _: Any, formatter: Any) -> None:
         """Write the name and summary of every command."""
         with formatter.section("Commands"):
-            formatter.write_dl([(name, _summary(target)) for name, target in _targets().items()])
+            rows = [(name, _summary(target)) for name, target in _targets().items()]
+            formatter.write_dl(rows)
 
 
 def _targets() -> dict[str, str]:
-    """The targets (module:function) of all commands: those of COMMANDS, then those of installed commands, sorted."""
+    """The target (module:function) of each command: first COMMANDS, then installed commands in alphabetical order."""
     installed = _installed_commands()
-    names = sorted(installed.keys() - COMMANDS.keys())
-    return {**COMMANDS, **{name: installed[name] for name in names}}
+    targets = dict(COMMANDS)
+    for name in sorted(installed.keys() - COMMANDS.keys()):
+        targets[name] = installed[name]
+    return targets
 
 
 def _installed_commands() -> dict[str, str]:

@@ -13,41 +13,43 @@ from vobench.runner.convert_trajectory import TrajectoryEdit, convert_trajectori
 from vobench.runner.trajectory_pair import TrajectorySource
 from vobench.trajectory.nanoseconds import NS_PER_S
 
-MOST_S = 9e9  # seconds that fit into stamps of 64 bits in nanoseconds
+MOST_S = 9e9  # the largest time in seconds that fits into a stamp of 64 bits in nanoseconds
 
 
 @option_group
 class ReadingOptions:
-    """How the files are read."""
+    """Options that specify how trajectory files are read."""
 
     topic: Topic = None
     read_as: Annotated[list[str] | None, typer.Option("--as", help=CONVENTIONS_HELP)] = None
     times: Annotated[
         list[Path] | None,
-        typer.Option(help="A file with stamps in seconds, one a line, for forms without stamps; can be repeated."),
+        typer.Option(help="A file with a stamp in seconds per line, for formats without stamps; can be repeated."),
     ] = None
 
     def source(self, path: Path) -> TrajectorySource:
-        """A file and how it is read."""
+        """A trajectory file, with the options that specify how it is read."""
         return TrajectorySource(path, self.topic, tuple(self.read_as or ()))
 
 
 @option_group
 class EditOptions:
-    """What becomes of the poses."""
+    """Options that edit a trajectory before it is written: time offset, time range and downsampling."""
 
-    t_offset: Annotated[float, typer.Option(min=-MOST_S, max=MOST_S, help="Seconds added to all stamps.")] = 0.0
+    t_offset: Annotated[
+        float, typer.Option(min=-MOST_S, max=MOST_S, help="The time in seconds to add to all stamps.")
+    ] = 0.0
     t_start: Annotated[
-        float | None, typer.Option(min=-MOST_S, max=MOST_S, help="The first stamp that is kept, in seconds.")
+        float | None, typer.Option(min=-MOST_S, max=MOST_S, help="Remove the poses before this stamp, in seconds.")
     ] = None
     t_end: Annotated[
-        float | None, typer.Option(min=-MOST_S, max=MOST_S, help="The last stamp that is kept, in seconds.")
+        float | None, typer.Option(min=-MOST_S, max=MOST_S, help="Remove the poses after this stamp, in seconds.")
     ] = None
-    downsample: Annotated[int | None, typer.Option(min=2, help="Keep at most this many poses, evenly.")] = None
+    downsample: Annotated[int | None, typer.Option(min=2, help="Keep at most this many poses, evenly spaced.")] = None
 
     @property
     def edit(self) -> TrajectoryEdit:
-        """The options, with stamps in nanoseconds."""
+        """The same options as an edit, with times in nanoseconds."""
         return TrajectoryEdit(
             offset_ns=round(self.t_offset * NS_PER_S),
             first_ns=_nanoseconds(self.t_start),
@@ -57,6 +59,7 @@ class EditOptions:
 
 
 def _nanoseconds(time_s: float | None) -> int | None:
+    """A time in nanoseconds; None if there is none."""
     return None if time_s is None else round(time_s * NS_PER_S)
 
 
@@ -66,8 +69,8 @@ def convert_command(
         list[Path],
         typer.Argument(
             metavar="FILE...",
-            help="Trajectories: TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, detected from content, or the folder of "
-            "a sequence. Several are merged in order of time.",
+            help="Trajectory files (TUM, KITTI, TartanAir, EuRoC, MCAP or ROS bag, detected from content) or folders "
+            "of sequences. Several trajectories are merged in order of time.",
         ),
     ],
     *,
@@ -78,13 +81,8 @@ def convert_command(
     json: Json = False,
 ) -> None:
     """Convert trajectory files between formats, frames, axes and units of time, and merge them."""
-    converted = convert_trajectories(
-        [reading.source(file) for file in files],
-        out,
-        form,
-        times=reading.times or (),
-        edit=editing.edit,
-    )
+    sources = [reading.source(file) for file in files]
+    converted = convert_trajectories(sources, out, form, times=reading.times or (), edit=editing.edit)
     if json:
         written = [str(file) for file in converted.files]
         terminal.print_json({"files": written, "poses": converted.pose_count, "notes": converted.notes})

@@ -33,22 +33,27 @@ def drive_command(
     suite: SuiteName,
     *,
     trajectory: Annotated[
-        str | None, typer.Option("--trajectory", "-t", help="Drive only this trajectory of the suite.")
+        str | None, typer.Option("--trajectory", "-t", help="Simulate only this trajectory of the suite.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Plot paths in the plan of their place, and speeds, to this .svg, .png or .pdf.")
+        Path | None,
+        typer.Option(help="Plot the paths on the floor plan, and the speeds over time, to this .svg, .png or .pdf."),
     ] = None,
     tum: Annotated[
-        Path | None, typer.Option(help="Write the true path of the body on one trajectory, in TUM format.")
+        Path | None,
+        typer.Option(help="Write the true poses of the body on one trajectory to this file, in TUM format."),
     ] = None,
     csv: Annotated[
-        Path | None, typer.Option(help="Write the path, speeds, wheels, references and voltages as CSV.")
+        Path | None,
+        typer.Option(
+            help="Write the path, speeds, wheel angles, references and voltages of one trajectory to this CSV."
+        ),
     ] = None,
     trust: Trust = False,
     json: Json = False,
 ) -> None:
-    """Drive the trajectories of a suite without rendering, and print a summary or plots."""
-    del trust  # its callback has the effect
+    """Simulate the trajectories of a suite without rendering, and print a summary or plot them."""
+    del trust  # the callback of the option has done its work
     plan = read_plan(suite)
     names = chosen_trajectories(plan, trajectory=trajectory)
     exports = [path for path in (tum, csv) if path]
@@ -56,7 +61,8 @@ def drive_command(
 
     driven = drive_plan(plan, trajectory=trajectory)
     if out:
-        save_drive_plot(out, [drive_log(drive, has_plan=True) for drive in driven.drives])
+        logs = [drive_log(drive, has_plan=True) for drive in driven.drives]
+        save_drive_plot(out, logs)
     if tum:
         tum.write_text(driven.drives[0].tum(), encoding="utf-8")
     if csv:
@@ -70,17 +76,21 @@ def drive_command(
 
 
 def _check_files(out: Path | None, exports: Sequence[Path], names: Sequence[str]) -> None:
-    """Raise InputError, before anything is driven, for files that cannot be written."""
+    """Raise InputError for files that cannot be written. It is called before the simulation, which takes time."""
     if out and out.suffix not in ENDINGS:
         raise InputError(f"--out should end in {', '.join(ENDINGS)}, got {out}")
     if exports and len(names) > 1:
         raise InputError(f"--tum and --csv need one trajectory; choose one with --trajectory: {', '.join(names)}")
     for path in [out, *exports]:
-        if path and (path.is_dir() or not path.parent.is_dir()):
+        if path is None:
+            continue
+        can_be_file = path.parent.is_dir() and not path.is_dir()
+        if not can_be_file:
             raise InputError(f"should be a file in an existing folder: {path}")
 
 
 def _print_drives(driven: SuiteDrive, files: Sequence[str]) -> None:
+    """Print a table of the drives, the reasons why `vobench run` would refuse the suite, and the written files."""
     console = terminal.console()
     rows = [_row(facts) for facts in driven.as_dict()["trajectories"]]
     console.print(terminal.table("", HEADINGS, rows))
@@ -91,6 +101,7 @@ def _print_drives(driven: SuiteDrive, files: Sequence[str]) -> None:
 
 
 def _row(facts: dict[str, Any]) -> list[str]:
+    """The cells of a drive in the table, in the order of HEADINGS."""
     wheel_error_m = facts["wheel_error_m"]
     peak_V = facts["peak_V"]
     reached_s = facts["reached_s"] or []

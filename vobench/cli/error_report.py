@@ -21,7 +21,10 @@ def report_and_exit(error: Exception) -> NoReturn:
     if JSON in sys.argv:
         content = {"error": sentence, **_mistakes(error)}
         _print_to_stdout(json.dumps(content, ensure_ascii=False))
-    lines = str(error).splitlines() if isinstance(error, SuiteError) else [sentence]
+
+    lines = [sentence]
+    if isinstance(error, SuiteError):
+        lines = str(error).splitlines()  # a line for each mistake in the file
     for line in lines:
         warn(line)
     raise SystemExit(1) from None

@@ -13,7 +13,8 @@ from vobench.dataset.export import export as export_sequence
 from vobench.errors import counted
 from vobench.runner.import_recording import import_dataset
 
-COMMAND_CLASS = FormCommand  # `CommandGroup` reads it: both commands list the known forms in their help
+# `CommandGroup` uses this class for both commands, so that their help lists the known dataset formats.
+COMMAND_CLASS = FormCommand
 
 
 @with_option_groups
@@ -25,12 +26,18 @@ def import_command(
     imu: ImuFile = None,
     json: Json = False,
 ) -> None:
-    """Convert a dataset's folder or a bag to a sequence, and print what was assumed or left out."""
+    """Convert a dataset or a bag to a sequence, and print what was assumed and what was left out."""
     options = recording_options.read_options(imu)
     imported = import_dataset(path, out, form=recording_options.form, options=options)
     if json:
-        content = {"form": imported.form, "path": str(out), "frames": imported.frame_count, "notes": imported.notes}
-        terminal.print_json(content)
+        terminal.print_json(
+            {
+                "form": imported.form,
+                "path": str(out),
+                "frames": imported.frame_count,
+                "notes": imported.notes,
+            }
+        )
         return
     frames = counted(imported.frame_count, "frame")
     _print_result(imported.notes, f"imported {frames} (form: {imported.form}): {out}")
@@ -40,20 +47,27 @@ def export_command(
     sequence: Annotated[Path, typer.Argument(metavar="SEQUENCE", help="The folder of a sequence.")],
     out: Annotated[Path, typer.Argument(metavar="OUT", help="The folder to write; it must not exist.")],
     *,
-    form: Annotated[str, typer.Option(help="The form to write")],
+    form: Annotated[str, typer.Option(help="The dataset format to write")],
     json: Json = False,
 ) -> None:
-    """Write a sequence in another layout, and print what was lost."""
+    """Export a sequence to another dataset format, and print what the format cannot store."""
     exported = export_sequence(sequence, out, form)
     if json:
-        content = {"form": form, "path": str(out), "files": len(exported.files), "notes": exported.notes}
-        terminal.print_json(content)
+        terminal.print_json(
+            {
+                "form": form,
+                "path": str(out),
+                "files": len(exported.files),
+                "notes": exported.notes,
+            }
+        )
         return
     files = counted(len(exported.files), "file")
     _print_result(exported.notes, f"exported {files} (form: {form}): {out}")
 
 
 def _print_result(notes: Iterable[str], sentence: str) -> None:
+    """Print the notes as a list, and a sentence about the result after them."""
     for note in notes:
         print(f"- {note}")
     print(sentence)

@@ -15,11 +15,23 @@ from vobench.suite.file_kind import Kind
 
 COLUMNS = ("kind", "name", "seeds", "summary", "origin", "path")
 
-# The top-level key `summary` with a value that needs no YAML parser: on one line, in quotes without escapes, or as two
-# words or more of plain text without a colon or a comment.
-QUOTED = r"""(?:"(?P<double>[^"\\\x00-\x1f]*)"|'(?P<single>[^'\x00-\x1f]*)') *$"""
-PLAIN = r"(?P<plain>[^\W\d_][^:#\x00-\x1f]* [^:#\x00-\x1f]*\w[.!?)]?) *$(?=\n+\S|\s*\Z)"
-SUMMARY = re.compile(rf"^summary: +(?:{QUOTED}|{PLAIN})", re.MULTILINE)
+# The top-level key `summary`, if its value needs no YAML parser. It is faster to search for most summaries with this
+# pattern than to parse and check all files, which takes seconds.
+SUMMARY = re.compile(
+    r"""
+    ^summary:[ ]+
+    (?:
+        "(?P<double>[^"\\\x00-\x1f]*)"[ ]*$           # in double quotes, without escapes
+    |   '(?P<single>[^'\x00-\x1f]*)'[ ]*$              # in single quotes, without escaped quotes
+    |   (?P<plain>
+            [^\W\d_]                                  # a letter first
+            [^:\#\x00-\x1f]*[ ][^:\#\x00-\x1f]*        # two words or more, without a colon or a comment
+            \w[.!?)]?                                 # a word last, with at most one mark after it
+        )[ ]*$(?=\n+\S|\s*\Z)                         # no continuation on the next line
+    )
+    """,
+    re.MULTILINE | re.VERBOSE,
+)
 GENERATOR_KEY = re.compile(r"^generator *:", re.MULTILINE)
 SUMMARY_KEY = re.compile(r"^[\"']?summary\b", re.MULTILINE)
 
@@ -31,14 +43,14 @@ def list_command(
     *,
     json: Json = False,
 ) -> None:
-    """List the suites, scenes and estimators that can be found, and where they are; which scenes have seeds."""
-    kinds = [known for known in KINDS if kind in (None, known, f"{known}s")]
+    """List the suites, scenes and estimators that can be found, where they are, and which scenes have seeds."""
+    kinds = [known_kind for known_kind in KINDS if kind in (None, known_kind, f"{known_kind}s")]
     if not kinds:
-        known_kinds = [f"{known}s" for known in KINDS]
+        known_kinds = [f"{known_kind}s" for known_kind in KINDS]
         raise UnknownNameError(unknown_name_sentence("kind", str(kind), known_kinds))
     rows = list[dict[str, Any]]()
-    for each in kinds:
-        rows += _entry_rows(each)
+    for listed_kind in kinds:
+        rows += _entry_rows(listed_kind)
     if json:
         terminal.print_json({"entries": rows})
         return
@@ -47,7 +59,7 @@ def list_command(
 
 
 def _entry_rows(kind: Kind) -> list[dict[str, Any]]:
-    """The facts about each entry of a kind. Of entries with one name, the first hides the others."""
+    """A row for each entry of a kind. If several entries have the same name, the first one hides the others."""
     rows = list[dict[str, Any]]()
     names = set[str]()
     for entry in catalog.entries(kind):
@@ -67,13 +79,14 @@ def _entry_rows(kind: Kind) -> list[dict[str, Any]]:
 
 
 def _cells(row: dict[str, Any]) -> list[str]:
+    """The cells of a row in the printed table."""
     name = f"{row['name']} (hidden)" if row["hidden"] else row["name"]
     cells = {**row, "name": name, "seeds": "yes" if row["seeds"] else ""}
     return [cells[column] for column in COLUMNS]
 
 
 def _has_seeds(entry: CatalogEntry) -> bool:
-    """Whether an entry is a scene with a generator, whose places have seeds."""
+    """Whether an entry is a scene with a generator, which creates a different place for each seed."""
     is_file = entry.kind == "scene" and entry.path.suffix not in MODEL_SUFFIXES
     return is_file and GENERATOR_KEY.search(_text(entry)) is not None
 
@@ -83,8 +96,10 @@ def _summary(entry: CatalogEntry) -> str:
     if entry.path.suffix in MODEL_SUFFIXES:
         return "a model; inspect it with vobench scene"
     match = SUMMARY.search(_text(entry))
-    if match and len(SUMMARY_KEY.findall(match.string)) == 1:
-        return next(value for value in match.groups() if value is not None)
+    if match:
+        is_only_summary = len(SUMMARY_KEY.findall(match.string)) == 1
+        if is_only_summary:
+            return next(value for value in match.groups() if value is not None)
     try:
         return _parsed_summary(entry)
     except VobenchError as error:
@@ -103,7 +118,7 @@ def _text(entry: CatalogEntry) -> str:
 
 
 def _parsed_summary(entry: CatalogEntry) -> str:
-    """The summary in an entry's file, which is parsed and checked as a whole. Raises VobenchError."""
+    """The summary in an entry's file, which is parsed and checked. Raises VobenchError if the file is not valid."""
     from vobench.suite import yaml_file
     from vobench.suite.manifest import read_manifest
     from vobench.suite.scenario import ScenarioFile

@@ -15,44 +15,48 @@ from vobench.errors import InputError, require_known
 from vobench.suite.scene_entry import DRAWN
 from vobench.suite.scene_spec import LIGHTINGS, MOST_SEED
 
-MOST_CELLS = 100  # of a contact sheet
+MOST_SHEET_PLACES = 100  # the largest number of places on a contact sheet
 
 
 def scene_command(
     scene: Annotated[
-        str, typer.Argument(metavar="SCENE", help="The name of a scene, or the path of its YAML or of a model.")
+        str, typer.Argument(metavar="SCENE", help="The name of a scene, or the path of a scene's YAML or of a model.")
     ],
     *,
     out: Annotated[
-        Path | None, typer.Option(help="Draw a plan and four views to this PNG, with computed light.")
+        Path | None, typer.Option(help="Render a plan and four views with computed light, and write them to this PNG.")
     ] = None,
     seed: Annotated[
-        int | None, typer.Option(min=0, max=MOST_SEED, help="Use the place that the scene's generator creates.")
+        int | None, typer.Option(min=0, max=MOST_SEED, help="The seed of the place that the scene's generator creates.")
     ] = None,
     seeds: Annotated[
         int | None,
-        typer.Option(min=1, max=MOST_CELLS, help="Draw this many places of the generator to --out, from --seed on."),
+        typer.Option(
+            min=1, max=MOST_SHEET_PLACES, help="Draw the places with this many seeds to --out, starting at --seed."
+        ),
     ] = None,
     lighting: Annotated[
-        str, typer.Option(help=f"The lighting of these places: {', '.join(LIGHTINGS)}, or drawn by the seed.")
+        str,
+        typer.Option(
+            help=f"The lighting of generated places: {', '.join(LIGHTINGS)}, or drawn: chosen at random by the seed."
+        ),
     ] = DRAWN,
     trust: Trust = False,
     json: Json = False,
 ) -> None:
-    """Print what is in a scene, where a body can drive, and what looks wrong in its models.
+    """Print the contents of a scene, the free space to drive in, and probable faults of its models.
 
     With --seeds, draw a contact sheet of the places that its generator creates.
     """
-    del trust  # its callback has the effect
+    del trust  # the callback of the option has done its work
     require_known("lighting", lighting, (*LIGHTINGS, DRAWN))
     if out:
         require_png(out)
     if seeds is not None:
         if out is None:
             raise InputError("--seeds draws a sheet; add --out sheet.png")
-        save_place_sheet(
-            scene, out, seeds=seeds, first_seed=1 if seed is None else seed, lighting=lighting, progress=Bars()
-        )
+        first_seed = 1 if seed is None else seed
+        save_place_sheet(scene, out, seeds=seeds, first_seed=first_seed, lighting=lighting, progress=Bars())
         return
     if seed is None and lighting != DRAWN:
         raise InputError("--lighting is for the places of a generator; add --seed")
@@ -61,5 +65,6 @@ def scene_command(
         report.save_picture(out, progress=Bars())
     if json:
         terminal.print_json(report.as_dict())
-    else:
-        print("\n".join([*report.lines(), *report.notes, *report.doubts()]))
+        return
+    for line in [*report.lines(), *report.notes, *report.doubts()]:
+        print(line)

@@ -21,9 +21,11 @@ def schema_command(
         str, typer.Argument(metavar="[suite|scenario|scene|estimator]", help="The kind of file.")
     ] = "suite",
     *,
-    json: Annotated[bool, typer.Option("--json", help="The output is JSON in any case.")] = False,
+    json: Annotated[
+        bool, typer.Option("--json", help="Accepted as in other commands; the output is always JSON.")
+    ] = False,
 ) -> None:
     """Print the JSON Schema of a suite's, scenario's, scene's or estimator's YAML, for editors and other programs."""
-    del json
+    del json  # the output is always JSON
     settings = FILES[require_known("schema", kind, FILES)]
     terminal.print_json({"$schema": DIALECT, **json_schema(settings)})

@@ -1,5 +1,6 @@
 """vobench view."""
 
+import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,25 +15,26 @@ from vobench.report.viewer import TrialRecording, open_viewer, save_recordings
 from vobench.runner.folder import open_run
 
 IMAGE_FORMS: dict[str, PictureForm] = {"jpeg": "jpeg", "png": "png"}
+FRAME_RANGE = re.compile(r"(?P<first>\d*):(?P<end>\d*)")  # A:B, in which both numbers are optional
 
 
 @option_group
 class TrialSelection:
-    """Which trials of the run are shown."""
+    """Options that select the trials of a run, and the frames of them, that are shown."""
 
     case: Annotated[
-        str | None, typer.Option(help="The case; by default that of the worst failure or the largest error.")
+        str | None, typer.Option(help="The case; by default the one with the worst failure or the largest error.")
     ] = None
     estimator: Annotated[
-        str | None, typer.Option(help="The estimator; by default one that failed, or else the best.")
+        str | None, typer.Option(help="The estimator; by default one that failed, otherwise the best one.")
     ] = None
     compare: Annotated[
         tuple[str, str] | None,
-        typer.Option(metavar="A B", help="Two estimators side by side, on the worst case of A."),
+        typer.Option(metavar="A B", help="Show two estimators side by side, on the worst case of A."),
     ] = None
-    worst: Annotated[int, typer.Option(min=1, help="The number of trials, the worst failure first.")] = 1
+    worst: Annotated[int, typer.Option(min=1, help="The number of trials to show, the worst failure first.")] = 1
     frames: Annotated[
-        str | None, typer.Option(metavar="A:B", help="Only the frames from A up to, not including, B, as in 40:80.")
+        str | None, typer.Option(metavar="A:B", help="Show only the frames from A to B - 1, as in 40:80.")
     ] = None
 
     def require_consistent(self) -> None:
@@ -41,12 +43,15 @@ class TrialSelection:
             raise InputError("--compare names two estimators on one case; remove --estimator and --worst")
 
     def window(self) -> slice:
-        """The frames that are shown. Raises InputError."""
-        first, colon, end = (self.frames or ":").partition(":")
-        are_numbers = all(part.isdigit() for part in (first, end) if part)
-        if not colon or not are_numbers:
+        """The frames that are shown. Raises InputError if --frames is not A:B."""
+        if not self.frames:
+            return slice(None)
+        match = FRAME_RANGE.fullmatch(self.frames)
+        if match is None:
             raise InputError(f"--frames should be A:B, two frame numbers, as in 40:80 (got {self.frames!r})")
-        return slice(int(first) if first else None, int(end) if end else None)
+        first = int(match["first"]) if match["first"] else None
+        end = int(match["end"]) if match["end"] else None
+        return slice(first, end)
 
 
 @with_option_groups
@@ -54,12 +59,12 @@ def view_command(
     run: RunPath,
     *,
     selection: TrialSelection,
-    pictures: Annotated[str, typer.Option(help="The form of the images: jpeg, smaller; or png, lossless.")] = "jpeg",
-    save: Annotated[Path | None, typer.Option(help="Write this .rrd instead of opening the viewer.")] = None,
-    web: Annotated[bool, typer.Option("--web", help="Show it in a browser, served on this machine only.")] = False,
+    pictures: Annotated[str, typer.Option(help="The format of the images: jpeg (smaller) or png (lossless).")] = "jpeg",
+    save: Annotated[Path | None, typer.Option(help="Write to this .rrd instead of opening the viewer.")] = None,
+    web: Annotated[bool, typer.Option("--web", help="Show it in a browser, which must be on this machine.")] = False,
     json: Json = False,
 ) -> None:
-    """Show a run in Rerun, failures first."""
+    """Show trials of a run in Rerun, failures first."""
     form = IMAGE_FORMS[require_known("form of pictures", pictures, IMAGE_FORMS)]
     selection.require_consistent()
     recordings = save_recordings(
@@ -77,16 +82,19 @@ def view_command(
         return
     for recording in recordings:
         print(f"{_trial_names(recording)}: {recording.path}")
-    if save is None or web:
+    opens_viewer = save is None or web
+    if opens_viewer:
         open_viewer([recording.path for recording in recordings], web=web)
 
 
 def _trial_names(recording: TrialRecording) -> str:
-    return " and ".join(f"{trial.estimator} on {trial.case} ({trial.status})" for trial in recording.trials)
+    """The estimator, case and status of each trial in a recording."""
+    names = [f"{trial.estimator} on {trial.case} ({trial.status})" for trial in recording.trials]
+    return " and ".join(names)
 
 
 def _facts(recordings: Sequence[TrialRecording]) -> dict[str, Any]:
-    """The first recording, and all of them, as JSON."""
+    """The facts about the recordings for the JSON output. Those about the first one are also at the top level."""
     first = recordings[0]
     first_trial = first.trials[0]
     return {

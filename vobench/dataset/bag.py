@@ -12,7 +12,15 @@ import numpy as np
 from mcap.opcode import Opcode
 
 from vobench.dataset.bag_picture import MOSAICS, picture
-from vobench.dataset.bag_rig import FramedInfo, Info, Tree, between, info_rig, plain, tree_of
+from vobench.dataset.bag_rig import (
+    FramedInfo,
+    Info,
+    StaticTransforms,
+    find_transform,
+    frame_name,
+    info_rig,
+    static_transforms,
+)
 from vobench.dataset.bag_topics import SelectedTopics, choose
 from vobench.dataset.bag_writer import write_ros2
 from vobench.dataset.kalibr import chain_has_imu, chain_rig, find_imu, read_imu
@@ -51,11 +59,11 @@ class BagContents:
     stamps: dict[str, Stamps]
     first: dict[str, Any]
     imu: ImuReadings | None
-    tree: Tree
+    transforms: StaticTransforms
 
     def frame_of(self, topic: str) -> str:
         """The name of the coordinate frame of a topic's messages."""
-        return plain(self.first[topic].header.frame_id)
+        return frame_name(self.first[topic].header.frame_id)
 
 
 def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
@@ -135,7 +143,7 @@ def _contents(reader: Any, chosen: SelectedTopics, path: Path) -> BagContents:
     imu = None
     if chosen.imu in stamps:
         imu = _readings(chosen.imu, stamps[chosen.imu], messages.readings, path)
-    return BagContents(stamps, messages.first, imu, tree_of(messages.static, str(path)))
+    return BagContents(stamps, messages.first, imu, static_transforms(messages.static, str(path)))
 
 
 class _Messages(NamedTuple):
@@ -285,10 +293,10 @@ def _body(chosen: SelectedTopics, contents: BagContents) -> tuple[str | None, No
     """
     left_frame = contents.frame_of(chosen.left)
     truth_frame = _truth_frame(chosen, contents)
-    if truth_frame and between(contents.tree, truth_frame, left_frame) is not None:
+    if truth_frame and find_transform(contents.transforms, truth_frame, left_frame) is not None:
         return truth_frame, (f"The body is {truth_frame}.",)
     topic = chosen.truth_topic
-    if between(contents.tree, BASE, left_frame) is not None:
+    if find_transform(contents.transforms, BASE, left_frame) is not None:
         assumed = f", and the frame of {topic} was assumed to be the body" if topic else ""
         return BASE, (f"The body is {BASE}{assumed}.",)
     if truth_frame:
@@ -303,7 +311,7 @@ def _truth_frame(chosen: SelectedTopics, contents: BagContents) -> str:
     if child:
         return child
     first = contents.first.get(chosen.truth_topic)
-    return plain(getattr(first, "child_frame_id", ""))
+    return frame_name(getattr(first, "child_frame_id", ""))
 
 
 def _rig(
@@ -326,7 +334,7 @@ def _rig(
         camera_info = Info(info, contents.first[info], is_rectified)
         cameras.append(FramedInfo(camera_info, contents.frame_of(topic)))
 
-    rig, notes = info_rig(cameras, contents.tree, body)
+    rig, notes = info_rig(cameras, contents.transforms, body)
     if any(camera.info.rectified for camera in cameras):
         notes = (*notes, "The topics' names say that the pictures are rectified: the calibration is their matrix P.")
     return CalibratedRig(rig, str(path), notes)
@@ -357,7 +365,7 @@ def _imu(
     T_body_imu: Array | None = np.eye(4)
     if options.calibration is None:
         body_frame = body or contents.frame_of(chosen.left)
-        T_body_imu = between(contents.tree, body_frame, contents.frame_of(chosen.imu))
+        T_body_imu = find_transform(contents.transforms, body_frame, contents.frame_of(chosen.imu))
     if T_body_imu is None:
         return CalibratedImu(None, None, (f"{chosen.imu} was dropped: its position on the body is not known.",))
     calibration = read_imu(noise, T_body_imu)

@@ -1,4 +1,4 @@
-"""Finds the picture files of a dataset, from lists of stamps and names or from their numbers, and pairs them."""
+"""Finds the picture files of a dataset, from lists of stamps and file names or from numbered files, and pairs them."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -24,14 +24,19 @@ LONGEST_ROW_SHOWN = 80  # the largest number of characters of a row in a message
 
 @dataclass(frozen=True, slots=True)
 class PictureList:
-    """The pictures of one camera in order of time: stamps (N,) and paths of files, which may not exist."""
+    """The pictures of one camera in order of time.
+
+    `name` is the path of the list, for messages.
+    `t_ns` (N,) are the stamps.
+    `paths` are the paths of the N files, which need not exist.
+    """
 
     name: str
     t_ns: Stamps
     paths: tuple[Path, ...]
 
     def at(self, index: Stamps) -> "PictureList":
-        """The pictures with some indices (K,)."""
+        """The pictures with the given indices (K,)."""
         paths = tuple(self.paths[i] for i in index.tolist())
         return PictureList(self.name, self.t_ns[index], paths)
 
@@ -43,12 +48,20 @@ def read_list(
     separator: str | None,
     unit: StampUnit,
 ) -> PictureList:
-    """Read a list of stamps and names of pictures below `folder`. Raises InputError with file and line."""
+    """Read a list of the stamps and file names of pictures.
+
+    `path` is the file with the list.
+    `folder` is the folder to which the file names are relative.
+    `separator` is the separator of the two columns; None for white space.
+    `unit` is the unit of the stamps.
+    Raises InputError with the file and line if the list is empty or a row is not valid.
+    """
     lines = content_lines(read_text(path))
     if not lines:
         raise InputError(f"the list has no picture: {path}")
-    cells = [_stripped(line.text.split(separator, 1)) for line in lines]
-    has_header = separator == "," and not NUMBER.fullmatch(cells[0][0])  # one that does not begin with #
+    cells = [_split_row(line.text, separator) for line in lines]
+    # `content_lines` removes a header that begins with #, but some CSV files have one without it.
+    has_header = separator == "," and not NUMBER.fullmatch(cells[0][0])
     if has_header:
         lines = lines[1:]
         cells = cells[1:]
@@ -58,7 +71,7 @@ def read_list(
         file_name=str(path),
         line_numbers=[line.number for line in lines],
         first_fields=[row[0] for row in cells],
-        values=np.empty((len(lines), 0)),  # the names of pictures are no numbers
+        values=np.empty((len(lines), 0)),  # there are no columns of numbers besides the stamps
     )
     t_ns = stamps_ns(table, unit)
     paths = [inside(folder, row[1], table.place(index)) for index, row in enumerate(cells)]
@@ -77,8 +90,9 @@ def _require_stamps_and_names(
             raise InputError(f"{path}:{line.number}: a row should be a stamp and a picture's name, but is {start!r}")
 
 
-def _stripped(cells: list[str]) -> list[str]:
-    return [cell.strip() for cell in cells]
+def _split_row(text: str, separator: str | None) -> list[str]:
+    """The stamp and the file name of a row; fewer cells if the row has no separator."""
+    return [cell.strip() for cell in text.split(separator, 1)]
 
 
 def listed_pictures(
@@ -89,8 +103,10 @@ def listed_pictures(
 ) -> tuple[list[PictureList], Notes]:
     """The existing pictures of one or two cameras, and notes on what was dropped.
 
-    Each of `lists` is the file with the list of a camera, and the folder at which its names start. Two pictures are a
-    pair if their stamps differ by at most `within_ns`. Raises InputError as in `read_list`, and if there is no pair.
+    Each of `lists` is the file with the list of a camera, and the folder to which its file names are relative.
+    `separator` and `unit` are those of `read_list`.
+    `within_ns` is the largest difference between the stamps of a pair.
+    Raises InputError if a list is not valid, if there is no pair, or if all files are missing.
     """
     cameras = [read_list(path, folder, separator=separator, unit=unit) for path, folder in lists]
     notes = Notes()
@@ -99,66 +115,79 @@ def listed_pictures(
         pairs = partners(left.t_ns, right.t_ns, within_ns, f"{left.name} and {right.name}")
         cameras = [left.at(pairs.left), right.at(pairs.right)]
         notes = pairs.notes
-    present, absence_notes = _present(cameras)
-    return present, (*notes, *absence_notes)
+    existing, missing_notes = _drop_missing(cameras)
+    return existing, (*notes, *missing_notes)
 
 
-def _present(cameras: list[PictureList]) -> tuple[list[PictureList], Notes]:
-    """The pictures whose files exist for every camera, and a note on the others."""
-    rows = list(zip(*(camera.paths for camera in cameras), strict=True))
-    # Path.is_file raises an error for a name that is too long.
-    exists = np.array([all(map(isfile, paths)) for paths in rows])
+def _drop_missing(cameras: list[PictureList]) -> tuple[list[PictureList], Notes]:
+    """The pictures whose files exist for all cameras, and a note on the others.
+
+    Raises InputError if no files exist.
+    """
+    camera_paths = [camera.paths for camera in cameras]
+    shots = list(zip(*camera_paths, strict=True))  # the paths of the one or two pictures that belong together
+    exists = np.array([_all_exist(paths) for paths in shots])
     if exists.all():
         return cameras, ()
 
-    first_incomplete = rows[int(np.flatnonzero(~exists)[0])]
-    first_absent = next(path for path in first_incomplete if not isfile(path))
-    what = "pairs" if len(cameras) > 1 else "pictures"
+    first_incomplete = int(np.argmin(exists))
+    first_missing = next(path for path in shots[first_incomplete] if not isfile(path))
+    noun = "pairs" if len(cameras) > 1 else "pictures"
     if not exists.any():
         names = " and ".join(camera.name for camera in cameras)
         raise InputError(
-            f"the files of all {len(exists)} {what} in {names} are missing; the first missing file is {first_absent}"
+            f"the files of all {len(exists)} {noun} in {names} are missing; the first missing file is {first_missing}"
         )
-    ending = "/".join(first_absent.parts[-3:])
-    note = f"{_dropped(exists, cameras[0].t_ns, what)} The first is {ending}."
+    short_path = "/".join(first_missing.parts[-3:])
+    note = f"{_missing_note(exists, cameras[0].t_ns, noun)} The first is {short_path}."
     indices = np.flatnonzero(exists)
     return [camera.at(indices) for camera in cameras], (note,)
 
 
-def _dropped(
+def _all_exist(paths: Sequence[Path]) -> bool:
+    """Whether all files exist. Unlike Path.is_file, isfile raises no error for a name that is too long."""
+    return all(isfile(path) for path in paths)
+
+
+def _missing_note(
     exists: NDArray[np.bool_],
     t_ns: Stamps,
-    what: str,
+    noun: str,
 ) -> str:
-    """The number of missing pictures, and how many of them leave gaps between others."""
+    """A sentence with the number of dropped pictures, and where in the recording they are.
+
+    `exists` (N,) is whether the files exist, `t_ns` (N,) are the stamps, and `noun` is "pairs" or "pictures".
+    """
     indices = np.flatnonzero(exists)
     dropped = len(exists) - len(indices)
     at_start = int(indices[0])
     at_end = len(exists) - 1 - int(indices[-1])
     between = dropped - (at_start + at_end)
-    longest_s = np.diff(t_ns[indices]).max(initial=0) / NS_PER_S
+    longest_gap_ns = np.diff(t_ns[indices]).max(initial=0)
+    longest_gap_s = longest_gap_ns / NS_PER_S
 
     places = []
     if at_start:
         places.append(f"{at_start} at the start")
     if between:
-        places.append(f"{between} between others (a gap of up to {longest_s:.3g} s)")
+        places.append(f"{between} between others (a gap of up to {longest_gap_s:.3g} s)")
     if at_end:
         places.append(f"{at_end} at the end")
-    return f"{dropped} of {len(exists)} {what} were dropped because files are missing: {', '.join(places)}."
+    return f"{dropped} of {len(exists)} {noun} were dropped because files are missing: {', '.join(places)}."
 
 
-NUMBERED = re.compile(r"([0-9]{1,12})[A-Za-z_]*\.(?:png|jpg|jpeg)", re.IGNORECASE)
+NUMBERED_NAME = re.compile(r"([0-9]{1,12})[A-Za-z_]*\.(?:png|jpg|jpeg)", re.IGNORECASE)
 
 
 def numbered(*folders: Path) -> list[tuple[Path, ...]]:
-    """The numbered pictures of one or two cameras.
+    """The paths of the numbered pictures of one or two cameras, in order of the numbers.
 
-    Raises InputError with a picture if a number is missing or repeated, or if the cameras have different numbers.
+    `folders` are the folder of each camera.
+    Raises InputError if a number is missing or repeated, or if the cameras have different numbers.
     """
-    cameras = [_numbered(folder) for folder in folders]
+    cameras = [_pictures_by_number(folder) for folder in folders]
     first_camera = cameras[0]
-    last_camera = cameras[-1]
+    last_camera = cameras[-1]  # the same one if there is only one camera
     left = tuple(first_camera.values())
     right = tuple(last_camera.values())
     if len(left) != len(right):
@@ -169,35 +198,43 @@ def numbered(*folders: Path) -> list[tuple[Path, ...]]:
     return [left] if len(folders) == 1 else [left, right]
 
 
-def _numbered(folder: Path) -> dict[int, Path]:
-    """The pictures in a folder by number. Raises InputError if a number is missing or repeated."""
-    names = []
+def _pictures_by_number(folder: Path) -> dict[int, Path]:
+    """The paths of the pictures in a folder by number, in order.
+
+    Raises InputError if a number is missing or repeated.
+    """
+    numbered_names = []
     for name in listed(folder):
-        match = NUMBERED.fullmatch(name)
+        match = NUMBERED_NAME.fullmatch(name)
         if match:
-            names.append((int(match[1]), name))
-    if not names:
+            numbered_names.append((int(match[1]), name))
+    if not numbered_names:
         raise InputError(f"no numbered PNG or JPEG picture in {folder}")
 
-    names.sort()
-    first_number, first_name = names[0]
-    for expected, (number, name) in enumerate(names, first_number):
+    numbered_names.sort()
+    first_number, first_name = numbered_names[0]
+    for expected, (number, name) in enumerate(numbered_names, first_number):
         if number < expected:
             raise InputError(f"two pictures have the number {number}: {folder / name}")
         if number > expected:
             raise InputError(f"a picture is missing: {folder / _renumbered(first_name, expected)}")
-    return {number: folder / name for number, name in names}
+    return {number: folder / name for number, name in numbered_names}
 
 
 def _renumbered(name: str, number: int) -> str:
-    """The name of a numbered picture with another number."""
+    """The name of a numbered picture, with its number replaced."""
     stem = name.partition(".")[0]
     width = sum(character.isdigit() for character in stem)
     return f"{number:0{width}d}{name[width:]}"
 
 
 class Partners(NamedTuple):
-    """The indices (K,) of the left and right pictures of all pairs, and notes on them."""
+    """The pairs of the pictures of two cameras.
+
+    `left` (K,) are the indices of the left pictures of the pairs.
+    `right` (K,) are the indices of the right pictures of the pairs.
+    `notes` are sentences for the user, on pictures without a partner and on differences between stamps.
+    """
 
     left: Stamps
     right: Stamps
@@ -210,7 +247,12 @@ def partners(
     within_ns: int,
     name: str,
 ) -> Partners:
-    """The pairs of pictures whose stamps differ by at most `within_ns`. Raises InputError if there are none."""
+    """The pairs of pictures whose stamps differ by at most `within_ns`.
+
+    `left_ns` and `right_ns` are the stamps of the pictures of both cameras.
+    `name` is the name of the recording, for messages.
+    Raises InputError if there are no pairs.
+    """
     pairs = associate(left_ns, right_ns, max_diff_ns=within_ns)
     if not len(pairs):
         raise InputError(f"no left and right picture have stamps within {within_ns} ns of each other in {name}")
@@ -220,21 +262,24 @@ def partners(
     right_alone = len(right_ns) - len(pairs)
     if left_alone or right_alone:
         notes.append(f"{left_alone} left and {right_alone} right pictures without a partner were dropped.")
-    apart_ns = np.abs(left_ns[pairs.gt] - right_ns[pairs.est]).max()
-    if apart_ns:
-        notes.append(f"Stamps of a pair are up to {apart_ns} ns apart; the left picture's stamp was used for both.")
+    differences_ns = np.abs(left_ns[pairs.gt] - right_ns[pairs.est])
+    largest_ns = differences_ns.max()
+    if largest_ns:
+        notes.append(f"Stamps of a pair are up to {largest_ns} ns apart; the left picture's stamp was used for both.")
     return Partners(pairs.gt, pairs.est, tuple(notes))
 
 
 def picture_files(t_ns: Stamps, *cameras: Sequence[Path]) -> PictureStream:
-    """The pictures of one or two cameras. Each file is read when it is iterated.
+    """A stream of the pictures of one or two cameras. A file is read only when the stream reaches it.
 
+    `t_ns` (N,) are the stamps, and each of `cameras` are the paths of the N pictures of a camera.
     Raises InputError if the first pictures cannot be read.
     """
 
-    def shots() -> Iterator[RecordedFrame]:
-        for t, paths in zip(t_ns.tolist(), zip(*cameras, strict=True), strict=True):
+    def frames() -> Iterator[RecordedFrame]:
+        paths_by_frame = zip(*cameras, strict=True)
+        for frame_ns, paths in zip(t_ns.tolist(), paths_by_frame, strict=True):
             pictures = [EncodedPicture(str(path), read_bytes(path)) for path in paths]
-            yield RecordedFrame(t, tuple(pictures))
+            yield RecordedFrame(frame_ns, tuple(pictures))
 
-    return PictureStream.open(shots)
+    return PictureStream.open(frames)

@@ -5,13 +5,13 @@ from numpy.typing import ArrayLike
 
 from vobench.geometry.se3 import Array
 
-# Components of the factors of a cross product: x from y and z, y from z and x, z from x and y.
+# Component k of a cross product is made of the next axis after k and the one after that, in cyclic order.
 NEXT_AXIS = np.array([1, 2, 0])
 LAST_AXIS = np.array([2, 0, 1])
 
 
 def unit(vectors: ArrayLike) -> Array:
-    """Directions (..., n): vectors scaled to length 1. A zero vector stays zero, and one with a NaN is all NaN."""
+    """Scale vectors (..., n) to length 1. A zero vector stays zero; a vector with a NaN component becomes all NaN."""
     vectors = np.asarray(vectors, float)
     squared_length = (vectors * vectors).sum(-1, keepdims=True)
     length = np.sqrt(squared_length)
@@ -20,12 +20,12 @@ def unit(vectors: ArrayLike) -> Array:
 
 
 def cross(a: Array, b: Array) -> Array:
-    """Cross products a x b (..., 3), bit-equal to those of np.cross and faster for few vectors."""
+    """Cross products a x b (..., 3). They are bit-equal to those of np.cross, and faster for few vectors."""
     positive = a[..., NEXT_AXIS] * b[..., LAST_AXIS]
     negative = a[..., LAST_AXIS] * b[..., NEXT_AXIS]
     return np.asarray(positive - negative)
 
 
 def cross_2d(a: Array, b: Array) -> Array:
-    """Cross products (...) of vectors (..., 2): positive where b points to the left of a."""
+    """Cross products (...) of vectors a and b (..., 2). They are positive if b points to the left of a."""
     return np.asarray(a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0])

@@ -1,7 +1,7 @@
 """Coverage of the ground truth by an estimate: the share with poses, the gaps and the tracks.
 
-A slot is a frame, which is one true pose, or an interval of SLOT_NS. A gap is a run of slots without an estimated pose,
-a track is a run of slots with one:
+The ground truth is divided into slots. A slot is either a frame, which is one true pose, or an interval of SLOT_NS.
+A gap is a sequence of slots without an estimated pose, and a track is a sequence of slots with estimated poses:
 
     slots      1   2   3   4   5   6   7   8   9
     poses      x   x   x               x   x
@@ -37,13 +37,14 @@ class Coverage:
     Every track after the first one is a relocalisation.
 
     `ratio` is the share of slots with an estimated pose.
-    `gaps` and `relocalisations` are counts.
-    `longest_gap_frames` and `longest_gap_s` are the number of true poses in the gap with the most slots, and the
-    duration of this gap.
-    `first_lost_frame` is the index of the first true pose in a gap, None without gaps.
-    `time_to_first_pose_s` is measured from the start of the ground truth; it is None without poses.
-    `longest_track_s` is the longest duration of a track, 0 without poses.
-    `slot_kind` is what a slot is.
+    `gaps` is the number of gaps.
+    `longest_gap_frames` is the number of true poses in the gap with the most slots.
+    `longest_gap_s` is the duration of this gap.
+    `first_lost_frame` is the index of the first true pose in a gap; None if there are no gaps.
+    `slot_kind` is "frames" if a slot is a frame, and "time" if it is an interval.
+    `time_to_first_pose_s` is the time from the start of the ground truth to the first pose; None without poses.
+    `longest_track_s` is the duration of the longest track; 0 without poses.
+    `relocalisations` is the number of tracks after the first one.
     `ends_lost` is whether the estimate is lost at the end; see `_ends_lost`.
     """
 
@@ -61,7 +62,11 @@ class Coverage:
 
 @dataclass(frozen=True, slots=True)
 class Slots:
-    """The slots of N true poses: the index (N,) of the slot of each pose, from 0, and what a slot is."""
+    """The slots of N true poses.
+
+    `of_frame` (N,) is the index of the slot of each true pose, from 0.
+    `kind` is "frames" if each true pose is a slot, and "time" if the slots are intervals.
+    """
 
     of_frame: Index
     kind: SlotKind
@@ -79,15 +84,23 @@ def slots(gt_t_ns: Stamps, rule: CoverageOf) -> Slots:
     motion capture, which has more poses than a camera has frames; then each interval of SLOT_NS is a slot.
     Slots do not depend on the estimate, so a missing pose cannot increase the coverage.
     """
-    steps_ns = np.diff(gt_t_ns)
-    has_frames = not len(steps_ns) or np.median(steps_ns) >= MOTION_CAPTURE_STEP_NS
-    if rule == "frames" or has_frames:
+    if rule == "frames" or not _is_motion_capture(gt_t_ns):
         return Slots(np.arange(len(gt_t_ns)), "frames")
+
     elapsed_ns = gt_t_ns - gt_t_ns[0]
     interval_count = max(int(elapsed_ns[-1] // SLOT_NS), 1)
-    interval = np.minimum(elapsed_ns // SLOT_NS, interval_count - 1)  # the last interval includes the remainder
-    _, slot_of_frame = np.unique(interval, return_inverse=True)  # intervals without a true pose are not slots
+    last_interval = interval_count - 1
+    interval_of_frame = np.minimum(elapsed_ns // SLOT_NS, last_interval)  # the last interval includes the remainder
+    _, slot_of_frame = np.unique(interval_of_frame, return_inverse=True)  # intervals without a true pose are not slots
     return Slots(slot_of_frame, "time")
+
+
+def _is_motion_capture(gt_t_ns: Stamps) -> bool:
+    """Whether ground truth with stamps (N,) has more poses per second than a camera has frames."""
+    steps_ns = np.diff(gt_t_ns)
+    if len(steps_ns) == 0:
+        return False
+    return bool(np.median(steps_ns) < MOTION_CAPTURE_STEP_NS)
 
 
 def coverage(gt_t_ns: Stamps, estimated_frames: Index, *, rule: CoverageOf = "frames") -> Coverage:
@@ -107,8 +120,10 @@ def coverage(gt_t_ns: Stamps, estimated_frames: Index, *, rule: CoverageOf = "fr
         time_to_first_pose_s = float(intervals.end_ns[0] - gt_t_ns[0]) / NS_PER_S
         longest_track_s = _longest_track_ns(intervals) / NS_PER_S
 
+    covered_slots = np.unique(gt_slots.of_frame[frames])
+    is_inner_gap = is_gap[1:-1]  # not before the first pose, and not after the last one
     return Coverage(
-        ratio=len(np.unique(gt_slots.of_frame[frames])) / gt_slots.count,
+        ratio=len(covered_slots) / gt_slots.count,
         gaps=int(np.count_nonzero(is_gap)),
         longest_gap_frames=longest_gap.frames,
         longest_gap_s=longest_gap.duration_ns / NS_PER_S,
@@ -116,19 +131,20 @@ def coverage(gt_t_ns: Stamps, estimated_frames: Index, *, rule: CoverageOf = "fr
         slot_kind=gt_slots.kind,
         time_to_first_pose_s=time_to_first_pose_s,
         longest_track_s=longest_track_s,
-        relocalisations=int(np.count_nonzero(is_gap[1:-1])),
+        relocalisations=int(np.count_nonzero(is_inner_gap)),
         ends_lost=_ends_lost(intervals, gt_slots.kind),
     )
 
 
 @dataclass(frozen=True, slots=True)
 class _Intervals:
-    """The K + 1 intervals that K estimated poses divide the ground truth into.
+    """The K + 1 intervals before, between and after K estimated poses. N is the number of true poses.
 
-    `begin_frame` and `end_frame` (K + 1,) are the indices of the true poses at both ends of each interval; the first
-    interval begins at -1, and the last one ends at N.
-    `begin_ns` and `end_ns` (K + 1,) are the stamps of these poses, limited to the time span of the ground truth.
-    `lost_slots` (K + 1,) is the number of slots inside each interval, which have no pose.
+    `begin_frame` (K + 1,) is the index of the true pose at the beginning of each interval; -1 for the first interval.
+    `end_frame` (K + 1,) is the index of the true pose at the end of each interval; N for the last interval.
+    `begin_ns` (K + 1,) is the stamp at the beginning of each interval; the start of the ground truth for the first.
+    `end_ns` (K + 1,) is the stamp at the end of each interval; the end of the ground truth for the last.
+    `lost_slots` (K + 1,) is the number of slots inside each interval. They have no estimated pose.
     """
 
     begin_frame: Index
@@ -139,7 +155,7 @@ class _Intervals:
 
 
 def _intervals(gt_t_ns: Stamps, frames: Index, gt_slots: Slots) -> _Intervals:
-    """The intervals between the frames (K,) that have a pose."""
+    """The intervals before, between and after the frames (K,) that have an estimated pose."""
     frame_count = len(gt_t_ns)
     border_frames = np.concatenate([[-1], frames, [frame_count]])
     border_slots = np.concatenate([[-1], gt_slots.of_frame[frames], [gt_slots.count]])
@@ -154,7 +170,11 @@ def _intervals(gt_t_ns: Stamps, frames: Index, gt_slots: Slots) -> _Intervals:
 
 
 class _Gap(NamedTuple):
-    """The number of true poses in a gap, and its duration."""
+    """A gap.
+
+    `frames` is the number of true poses in it.
+    `duration_ns` is its duration.
+    """
 
     frames: int
     duration_ns: float
@@ -165,13 +185,13 @@ def _longest_gap(intervals: _Intervals) -> _Gap:
     longest = int(np.argmax(intervals.lost_slots))
     if intervals.lost_slots[longest] == 0:
         return _Gap(0, 0.0)
-    frames = int(intervals.end_frame[longest] - intervals.begin_frame[longest] - 1)
-    duration_ns = float(intervals.end_ns[longest] - intervals.begin_ns[longest])
-    return _Gap(frames, duration_ns)
+    inner_frames = intervals.end_frame[longest] - intervals.begin_frame[longest] - 1
+    duration_ns = intervals.end_ns[longest] - intervals.begin_ns[longest]
+    return _Gap(int(inner_frames), float(duration_ns))
 
 
 def _first_lost_frame(intervals: _Intervals) -> int | None:
-    """The index of the first true pose in a gap, None without gaps."""
+    """The index of the first true pose in a gap; None if there are no gaps."""
     is_gap = intervals.lost_slots > 0
     if not is_gap.any():
         return None
@@ -180,7 +200,7 @@ def _first_lost_frame(intervals: _Intervals) -> int | None:
 
 
 def _longest_track_ns(intervals: _Intervals) -> float:
-    """The duration of the longest run of poses without a gap. There must be at least one pose."""
+    """The duration of the longest sequence of poses without a gap. There must be at least one pose."""
     pose_ns = intervals.end_ns[:-1]  # (K,)
     is_gap_between = intervals.lost_slots[1:-1] > 0  # (K - 1,)
     is_first = np.concatenate([[True], is_gap_between])
@@ -190,7 +210,10 @@ def _longest_track_ns(intervals: _Intervals) -> float:
 
 
 def _ends_lost(intervals: _Intervals, slot_kind: SlotKind) -> bool:
-    """Whether the last slot has no pose or, if slots are intervals, the last END_NS have none."""
+    """Whether the estimate is lost at the end of the recording.
+
+    It is lost if the last slot has no pose or, with slots that are intervals, if the last END_NS have no pose.
+    """
     time_after_last_pose_ns = intervals.end_ns[-1] - intervals.begin_ns[-1]
     is_last_slot_lost = intervals.lost_slots[-1] > 0
     is_end_late = slot_kind == "time" and time_after_last_pose_ns > END_NS

@@ -1,10 +1,10 @@
-"""Units of inference: means of trials over repeats, over the cases of one drive, and over the drives in one place.
+"""Units of inference: the mean over repeats, over the cases of a drive, and over the drives in a place.
 
-Estimators differ from place to place far more than from one repeat to the next, and cases that share a place share
-that difference. What a board concludes should hold for other places and drives of the same kind, so all that one
-place contributes is a single value, however many cases and repeats it consists of.
+The error of an estimator varies far more between places than between repeats, and all cases in a place share the
+effect of that place, so they are not independent. The conclusions of a board should hold for other places of the same
+kind. Each place therefore contributes one value, no matter how many cases and repeats it has.
 
-Symbols: E estimators, C cases, R repeats, P places.
+In shapes, C is the number of cases, D of drives and P of places.
 """
 
 from collections.abc import Hashable, Sequence
@@ -20,9 +20,10 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, slots=True)
 class Design:
-    """Where the cases of a board take place.
+    """The drive and the place of each case of a board.
 
-    drive_of_case (C,) numbers the drive of each case, place_of_drive (D,) the place of each drive.
+    `drive_of_case` (C,) is the index of the drive of each case, from 0.
+    `place_of_drive` (D,) is the index of the place of each drive, from 0.
     """
 
     drive_of_case: Indices
@@ -39,37 +40,43 @@ class Design:
         return int(self.place_of_drive.max(initial=-1)) + 1
 
     def means(self, values: Array) -> Array:
-        """The means (..., P) over places of values (..., C) by case; a drive counts as much as any other in its place.
+        """The mean value (..., P) of each place, from the values (..., C) of the cases. NaN is a missing value.
 
-        NaN marks a missing value. A drive is the mean of the cases that have one, and a place that of its drives.
+        The value of a drive is the mean over its cases, and the value of a place is the mean over its drives. All
+        drives in a place therefore have the same weight. Missing values are ignored; the mean of none is NaN.
         """
         by_drive = _group_means(values, self.drive_of_case, self.drives)
         return _group_means(by_drive, self.place_of_drive, self.places)
 
 
 def make_design(places: Sequence[Hashable], drives: Sequence[Hashable]) -> Design:
-    """The design of cases, by the place and the drive of each; drives of the same name in two places are two."""
-    place_numbers = dict[Hashable, int]()
-    drive_numbers = dict[tuple[Hashable, Hashable], int]()
+    """The design of cases, from the place (C,) and the drive (C,) of each case.
+
+    Drives with the same name in different places are different drives.
+    """
+    place_indices = dict[Hashable, int]()
+    drive_indices = dict[tuple[Hashable, Hashable], int]()
     drive_of_case = list[int]()
     place_of_drive = list[int]()
     for place, drive in zip(places, drives, strict=True):
-        unit = place, drive
-        if unit not in drive_numbers:
-            drive_numbers[unit] = len(drive_numbers)
-            place_of_drive.append(place_numbers.setdefault(place, len(place_numbers)))
-        drive_of_case.append(drive_numbers[unit])
+        unit = (place, drive)
+        if place not in place_indices:
+            place_indices[place] = len(place_indices)
+        if unit not in drive_indices:
+            drive_indices[unit] = len(drive_indices)
+            place_of_drive.append(place_indices[place])
+        drive_of_case.append(drive_indices[unit])
     return Design(np.array(drive_of_case, np.intp), np.array(place_of_drive, np.intp))
 
 
 def separate_places(cases: int) -> Design:
-    """The design of cases that have nothing in common: each is a place of its own."""
-    numbers = np.arange(cases)
-    return Design(numbers, numbers)
+    """The design of a number of independent cases: each has its own drive in its own place."""
+    indices = np.arange(cases)
+    return Design(drive_of_case=indices, place_of_drive=indices)
 
 
 def mean_of_known(values: Array) -> Array:
-    """The means (...) of values (..., N), of repeats or places, over the known ones; NaN where none is known."""
+    """The means (...) of values (..., N) over the last axis, without NaNs. The mean is NaN if all values are NaN."""
     is_known = ~np.isnan(values)
     counts = is_known.sum(axis=-1)
     sums = np.where(is_known, values, 0.0).sum(axis=-1)
@@ -79,12 +86,17 @@ def mean_of_known(values: Array) -> Array:
 
 
 def _group_means(values: Array, group: Indices, groups: int) -> Array:
-    """The means (..., G) of the known among values (..., N) whose groups (N,) are given, NaN where none is known."""
+    """The mean (..., G) of each group of values (..., N), without NaNs. It is NaN for a group without values.
+
+    `group` (N,) is the index of the group of each value, and `groups` is the number of groups.
+    """
     rows = values.reshape(-1, values.shape[-1])
     means = np.full((len(rows), groups), np.nan)
-    for row, mean in zip(rows, means, strict=True):
+    for row, row_means in zip(rows, means, strict=True):
         is_known = ~np.isnan(row)
-        counts = np.bincount(group[is_known], minlength=groups)
-        sums = np.bincount(group[is_known], row[is_known], minlength=groups)
-        np.divide(sums, counts, out=mean, where=counts > 0)
+        known_groups = group[is_known]
+        known_values = row[is_known]
+        counts = np.bincount(known_groups, minlength=groups)
+        sums = np.bincount(known_groups, known_values, minlength=groups)
+        np.divide(sums, counts, out=row_means, where=counts > 0)
     return means.reshape(*values.shape[:-1], groups)

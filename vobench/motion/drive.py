@@ -281,7 +281,7 @@ def drive(
         target = targets[min(leg, len(targets) - 1)]
         return vehicle.references(state, target)
 
-    return _driven(reference, vehicle, disturbances(legs.longest), start, legs)
+    return _driven(reference, vehicle, disturbances(legs.max_frames), start, legs)
 
 
 def follow(
@@ -379,7 +379,7 @@ def _driven(
         if frame > MOST_FRAMES:
             raise MotionError(f"the drive takes more than {MOST_FRAMES} frames; at most these are possible")
         if legs:
-            ends += legs.ended(positions_m, ends)
+            ends += legs.newly_ended(positions_m, ends)
         references.append(reference(state, frame, len(ends)))
         if frame == last_frame or (legs and legs.are_over(frame, ends)):
             break

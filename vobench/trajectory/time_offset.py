@@ -1,4 +1,8 @@
-"""Estimates the time offset between two clocks from angular speeds and speeds."""
+"""Estimates the time offset between the clocks of two trajectories, by correlating angular speeds and speeds.
+
+The angular speed and the speed of a body do not depend on the frame of a trajectory, and a correlation does not depend
+on the scale, so that the trajectories need not be aligned.
+"""
 
 from dataclasses import dataclass
 
@@ -10,38 +14,47 @@ from vobench.geometry.se3 import Array
 from vobench.trajectory.associate import nearest
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 
-MIN_OVERLAP = 0.5  # the smallest share of the shorter recording that must overlap
-MIN_SAMPLES = 20
-WINDOW_STEPS = 5  # the number of steps over which a speed is measured, to average the noise of single poses
-# Each search is REFINEMENT times as fine as the one before: 1/500 of a step at the end.
+# The search over all offsets
+MIN_OVERLAP = 0.5  # the smallest overlap, as a share of the shorter recording
+MIN_SAMPLES = 20  # the smallest number of samples of the speed in the overlap
+MAX_SAMPLES = 2_000_000  # the largest number of samples of a recording
+WINDOW_STEPS = 5  # a speed is measured over this many steps, to average the noise of single poses
+
+# The refinement around an offset: each round divides the search range by REFINEMENT. The last one resolves 1/500 step.
 ROUNDS = 3
-TRIES = 17
+TRIES = 17  # offsets per round
 REFINEMENT = 8
-STRETCHES = 8
-INSTANTS = 800  # compared in a finer search
+MAX_INSTANTS = 800  # the approximate number of instants at which speeds are compared
 MIN_INSTANTS = 8
-SAME_CLOCK_NS = 1_000_000  # stamps that stay this close to a constant difference come from one clock
-RESOLVED = 5  # digits of ns that an offset is rounded to if stamps do not make it exact: 0.1 ms
-FLAT = 1e-3  # a speed that varies by less than this share of its mean does not determine an offset
-MAX_SAMPLES = 2_000_000
-CONSTANT_STD = 1e-12
-NO_VARIANCE = 1e-9  # of two standardised signals: below it either is constant within the overlap
+
+STRETCHES = 8  # the number of parts of a trajectory whose offsets are estimated separately
+SAME_CLOCK_NS = 1_000_000  # both trajectories have one clock if their stamps differ by a constant up to this error
+ROUNDED_DIGITS = 5  # with different clocks, offsets are rounded to 10^5 ns = 0.1 ms
+
+MIN_VARIATION = 1e-3  # a speed determines no offset if its standard deviation is a smaller share of its mean
+CONSTANT_STD = 1e-12  # a signal with a smaller standard deviation is constant
+MIN_VARIANCE_PRODUCT = 1e-9  # if the variances of two standardised signals have a smaller product, one is constant
 
 
 @dataclass(frozen=True, slots=True)
 class TimeOffset:
-    """The time to add to the stamps of the estimate, and the correlation (-1..1) of both motions after that."""
+    """The time offset of an estimate.
+
+    `offset_ns` is the time to add to the stamps of the estimate.
+    `correlation` is the correlation of both motions after that, from -1 to 1.
+    """
 
     offset_ns: int
     correlation: float
 
 
 def estimate_offset(gt: Trajectory, est: Trajectory) -> TimeOffset:
-    """The offset of the estimate's clock for which angular speeds, or otherwise speeds, correlate best.
+    """The time offset for which the motions correlate best.
 
-    Neither depends on the frames, and correlation does not depend on the scale, so no alignment is needed.
-    All offsets are tried for which half of the shorter recording overlaps. Source: Furgale et al. (2013).
-    Raises AlignmentError for recordings that are too short or without motion.
+    All offsets are tried for which at least half of the shorter recording overlaps, with angular speeds and with
+    speeds; the better of the two results is refined.
+    Raises AlignmentError if a recording is too short, or if the trajectories have no correlated motion.
+    Source: Furgale et al. (2013).
     """
     step_ns = int(_step_ns(gt, est))
     _require_samples(gt, est, step_ns)
@@ -49,14 +62,15 @@ def estimate_offset(gt: Trajectory, est: Trajectory) -> TimeOffset:
     gt_speeds = speeds(gt, _grid_ns(gt, step_ns, window_ns), window_ns)
     est_speeds = speeds(est, _grid_ns(est, step_ns, window_ns), window_ns)
     start_ns = int(gt.t_ns[0] - est.t_ns[0])
-    offsets = []
+    candidates = []
     for gt_speed, est_speed in zip(gt_speeds, est_speeds, strict=True):
         correlations = _correlations(gt_speed, est_speed)
         best = int(np.argmax(correlations))
         lag = best - len(est_speed) + 1
-        offsets.append(TimeOffset(start_ns + lag * step_ns, float(correlations[best])))
+        offset_ns = start_ns + lag * step_ns
+        candidates.append(TimeOffset(offset_ns, float(correlations[best])))
 
-    coarse = max(offsets, key=lambda offset: offset.correlation)
+    coarse = max(candidates, key=lambda candidate: candidate.correlation)
     if coarse.correlation <= 0:
         raise AlignmentError("a time offset needs motion, but the trajectories have no correlated motion")
     refined_ns = _refined(gt, est, coarse.offset_ns, step_ns)
@@ -68,23 +82,27 @@ def estimate_offset(gt: Trajectory, est: Trajectory) -> TimeOffset:
 
 
 def _grid_ns(trajectory: Trajectory, step_ns: int, window_ns: int) -> Stamps:
-    """Starts of the windows (N,) that fit into a trajectory, one per step."""
+    """The starts (N,) of all windows that fit into a trajectory, one step apart."""
     first = trajectory.t_ns[0]
     last = trajectory.t_ns[-1] - window_ns
     return np.arange(first, last, step_ns, dtype=np.int64)
 
 
 def motion_correlation(gt: Trajectory, est: Trajectory, offset_ns: int) -> float | None:
-    """The correlation (-1..1) of both motions with the estimate's stamps shifted; None if it is undetermined."""
+    """The correlation of both motions, from -1 to 1, if an offset is added to the stamps of the estimate.
+
+    It is None if the trajectories hardly overlap, or if no speed changes.
+    """
     step_ns = int(_step_ns(gt, est))
-    correlations = _likeness(gt, est, np.array([offset_ns]), WINDOW_STEPS * step_ns)
+    correlations = _mean_correlations(gt, est, np.array([offset_ns]), WINDOW_STEPS * step_ns)
     return correlations[0] if correlations else None
 
 
 def offsets_in_stretches(gt: Trajectory, est: Trajectory, *, within_ns: int) -> Array:
-    """The offset (N,) of each of 8 parts of the estimate, of offsets up to `within_ns`.
+    """The time offset (N,) of each part of the estimate, which is divided into STRETCHES parts with as many poses each.
 
-    It is 0 for a part that is too short to determine an offset.
+    `within_ns` is the largest offset that is tried; at least one step is tried.
+    An offset is 0 if its part does not determine it. A part with less than two poses is omitted.
     """
     step_ns = _step_ns(gt, est)
     reach_ns = max(step_ns, within_ns)
@@ -97,7 +115,7 @@ def offsets_in_stretches(gt: Trajectory, est: Trajectory, *, within_ns: int) -> 
 
 
 def _step_ns(gt: Trajectory, est: Trajectory) -> float:
-    """The longer of the median times between poses."""
+    """The median time between the poses of a trajectory; the longer one of both trajectories."""
     for trajectory in (gt, est):
         if len(trajectory) < 2:
             raise AlignmentError(f"a time offset needs two poses or more, got {len(trajectory)}")
@@ -105,7 +123,7 @@ def _step_ns(gt: Trajectory, est: Trajectory) -> float:
 
 
 def _require_samples(gt: Trajectory, est: Trajectory, step_ns: int) -> None:
-    """Raise AlignmentError for recordings of too few or too many steps."""
+    """Raise AlignmentError if a recording has too few or too many steps."""
     gt_steps = int(gt.t_ns[-1] - gt.t_ns[0]) // step_ns
     est_steps = int(est.t_ns[-1] - est.t_ns[0]) // step_ns
     fewest = MIN_SAMPLES + WINDOW_STEPS
@@ -117,7 +135,10 @@ def _require_samples(gt: Trajectory, est: Trajectory, step_ns: int) -> None:
 
 
 def speeds(trajectory: Trajectory, t_ns: Stamps, window_ns: int) -> tuple[Array, Array]:
-    """The angles (N,) and distances (N,) that a body moves in the windows that begin at instants (N,)."""
+    """The angles (N,) in rad and the distances (N,) in m by which a body moves in windows of time.
+
+    `t_ns` (N,) are the starts of the windows, and `window_ns` is their duration.
+    """
     T_begin = poses_at(trajectory, t_ns)
     T_end = poses_at(trajectory, t_ns + window_ns)
     R_begin_end = se3.transposed(T_begin[:, :3, :3]) @ T_end[:, :3, :3]
@@ -126,7 +147,10 @@ def speeds(trajectory: Trajectory, t_ns: Stamps, window_ns: int) -> tuple[Array,
 
 
 def _correlations(a: Array, b: Array) -> Array:
-    """Pearson's correlation of a[k + lag] with b[k] for each lag from 1 - len(b); -1 with too little overlap."""
+    """Pearson's correlation of a[k + lag] with b[k], for all lags from 1 - len(b) to len(a) - 1.
+
+    It is -1 if the overlap is too short or if a signal is constant in it.
+    """
     ones_a = np.ones(len(a))
     ones_b = np.ones(len(b))
     n = np.round(_sliding_products(ones_a, ones_b))
@@ -143,20 +167,22 @@ def _correlations(a: Array, b: Array) -> Array:
     variances = variance_a * variance_b
     shortest = min(len(a), len(b))
     has_overlap = n >= max(MIN_OVERLAP * shortest, MIN_SAMPLES)
-    is_determined = has_overlap & (variances > NO_VARIANCE * n**4)
+    has_variance = variances > MIN_VARIANCE_PRODUCT * n**4
+    is_determined = has_overlap & has_variance
     spread = np.sqrt(np.where(is_determined, variances, 1.0))
-    return np.asarray(np.where(is_determined, covariance / spread, -1.0))
+    correlation = covariance / spread
+    return np.asarray(np.where(is_determined, correlation, -1.0))
 
 
 def _standardised(signal: Array) -> Array:
-    """A signal with mean 0 and standard deviation 1, or 0 if it is constant."""
+    """A signal, shifted and scaled to mean 0 and standard deviation 1. A constant signal becomes 0."""
     centred = signal - signal.mean()
     std = centred.std()
     return centred / std if std > CONSTANT_STD else np.zeros_like(signal)
 
 
 def _sliding_products(a: Array, b: Array) -> Array:
-    """Σ_k a[k + lag] b[k] for every lag, by the fast Fourier transform."""
+    """The sum over k of a[k + lag] b[k] for all lags from 1 - len(b), by the fast Fourier transform."""
     n = len(a) + len(b) - 1
     size = 1 << (n - 1).bit_length()
     spectrum = np.fft.rfft(a, size) * np.fft.rfft(b[::-1], size)
@@ -172,14 +198,18 @@ def _refined(
     *,
     reach_ns: float | None = None,
 ) -> int:
-    """The best offset within a step or `reach_ns` of the coarse one, from a search that is refined several times."""
+    """The offset near a coarse one for which the motions correlate best.
+
+    `reach_ns` is the largest difference from the coarse offset that is tried; it is one step by default.
+    Returns the coarse offset if the motions do not determine a better one.
+    """
     best_ns = coarse_ns
     reach_ns = step_ns if reach_ns is None else reach_ns
     window_ns = round(WINDOW_STEPS * step_ns)
     for _ in range(ROUNDS):
         shifts_ns = np.linspace(-reach_ns, reach_ns, TRIES).round()
         offsets_ns = best_ns + shifts_ns.astype(np.int64)
-        correlations = _likeness(gt, est, offsets_ns, window_ns)
+        correlations = _mean_correlations(gt, est, offsets_ns, window_ns)
         if correlations is None:
             return coarse_ns
         best_ns = int(offsets_ns[np.argmax(correlations)])
@@ -187,28 +217,30 @@ def _refined(
     return best_ns
 
 
-def _likeness(
+def _mean_correlations(
     gt: Trajectory,
     est: Trajectory,
     offsets_ns: Stamps,
     window_ns: int,
 ) -> list[float] | None:
-    """The mean correlation of angular speeds and of speeds for each offset, at the same instants.
+    """The mean of the correlations of angular speeds and of speeds, for each of the offsets (N,).
 
-    None if the trajectories hardly overlap, or if no speed changes.
+    All offsets are compared at the same instants of the estimate.
+    Returns None if the trajectories hardly overlap, or if no speed changes.
     """
     first = max(int(gt.t_ns[0]) - int(offsets_ns.min()), int(est.t_ns[0]))
     end = min(int(gt.t_ns[-1]) - int(offsets_ns.max()), int(est.t_ns[-1]))
     last = end - window_ns
-    spacing = max(window_ns // WINDOW_STEPS, (last - first) // INSTANTS, 1)
-    grid = np.arange(first, last, spacing, dtype=np.int64)
-    if len(grid) < MIN_INSTANTS:
+    step_ns = window_ns // WINDOW_STEPS
+    spacing_ns = max(step_ns, (last - first) // MAX_INSTANTS, 1)
+    grid_ns = np.arange(first, last, spacing_ns, dtype=np.int64)
+    if len(grid_ns) < MIN_INSTANTS:
         return None
 
-    est_speeds = speeds(est, grid, window_ns)
+    est_speeds = speeds(est, grid_ns, window_ns)
     correlations = []
     for offset_ns in offsets_ns.tolist():
-        gt_speeds = speeds(gt, grid + offset_ns, window_ns)
+        gt_speeds = speeds(gt, grid_ns + offset_ns, window_ns)
         correlation = _mean_correlation(gt_speeds, est_speeds)
         if correlation is None:
             return None
@@ -217,7 +249,7 @@ def _likeness(
 
 
 def _mean_correlation(gt_speeds: tuple[Array, Array], est_speeds: tuple[Array, Array]) -> float | None:
-    """The mean correlation of the speeds that vary on both sides; None if none does."""
+    """The mean correlation over the kinds of speed that vary in both trajectories; None if no kind does."""
     correlations = []
     for gt_speed, est_speed in zip(gt_speeds, est_speeds, strict=True):
         if _varies(gt_speed) and _varies(est_speed):
@@ -227,7 +259,8 @@ def _mean_correlation(gt_speeds: tuple[Array, Array], est_speeds: tuple[Array, A
 
 def _varies(speed: Array) -> bool:
     """Whether a speed (N,) varies enough to determine a time offset."""
-    return bool(speed.std() - FLAT * speed.mean() > 0)
+    smallest_std = MIN_VARIATION * speed.mean()
+    return bool(speed.std() - smallest_std > 0)
 
 
 def _correlation(a: Array, b: Array) -> float:
@@ -244,16 +277,23 @@ def _snapped_to_stamps(
     offset_ns: int,
     step_ns: float,
 ) -> int:
-    """The nearby offset that makes stamps equal, if both trajectories have poses at the same instants."""
+    """The offset, corrected so that stamps become equal if both trajectories have poses at the same instants.
+
+    If they have not, the stamps come from different clocks, and the offset is rounded to ROUNDED_DIGITS.
+    """
     shifted_ns = est.t_ns + offset_ns
     is_inside = (shifted_ns >= gt.t_ns[0]) & (shifted_ns <= gt.t_ns[-1])
     shifted_ns = shifted_ns[is_inside]
-    rounded_ns = round(offset_ns, -RESOLVED)
+    rounded_ns = round(offset_ns, -ROUNDED_DIGITS)
     if not len(shifted_ns):
         return rounded_ns
-    left_ns = gt.t_ns[nearest(shifted_ns, gt.t_ns)] - shifted_ns
-    median_ns = float(np.median(left_ns))
-    spread_ns = np.percentile(np.abs(left_ns - median_ns), 90)
+
+    nearest_ns = gt.t_ns[nearest(shifted_ns, gt.t_ns)]
+    residuals_ns = nearest_ns - shifted_ns
+    median_ns = float(np.median(residuals_ns))
+    spread_ns = np.percentile(np.abs(residuals_ns - median_ns), 90)
     is_same_clock = spread_ns <= SAME_CLOCK_NS
     is_nearby = abs(median_ns) < step_ns / 2
-    return offset_ns + round(median_ns) if is_same_clock and is_nearby else rounded_ns
+    if not (is_same_clock and is_nearby):
+        return rounded_ns
+    return offset_ns + round(median_ns)
