@@ -61,7 +61,7 @@ class SkyPane(Emitter):
 
         Only rays that may cross another pane (P,) are tested for it.
         """
-        transmitted = self.visibility.pane_passes(self.pane, directions)
+        transmitted = self.visibility.pane_transmittance(self.pane, directions)
         luminance_cd_m2 = self.light.luminance_cd_m2(directions) * transmitted
         rows = np.flatnonzero(may_cross_other)
         beyond_m = places_m[rows] + 2 * RAY_OFFSET_M * directions[rows]
@@ -72,15 +72,15 @@ class SkyPane(Emitter):
         """The width of its bounding sphere."""
         return sphere_width_rad(self.ball, points_m)
 
-    def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
+    def transmittance(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
         """The share (R,) of light that is not blocked, and that panes between the points and this pane transmit."""
-        share = occluder.clear(origins_m, segments_m).astype(np.float32)
+        share = occluder.is_unoccluded(origins_m, segments_m).astype(np.float32)
         rays = np.flatnonzero(share)
         start_m = origins_m[rays]
         ray_m = segments_m[rays]
         pane_at = -self.pane.height_m(start_m) / (ray_m @ self.pane.normal)  # in lengths of the segment
         before_pane = ((1 - 1e-4) * pane_at[:, None]).astype(np.float32)
-        share[rays] *= occluder.through_panes(start_m, ray_m * before_pane)
+        share[rays] *= occluder.transmittance_of_panes(start_m, ray_m * before_pane)
         return share
 
     def _places(self, texels: Texels) -> Aim:
@@ -138,9 +138,9 @@ class OpenSky(Emitter):
         """The square root of the solid angle of a hemisphere."""
         return np.full(len(points_m), np.sqrt(2 * np.pi), np.float32)
 
-    def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
+    def transmittance(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
         """The share (R,) of light that faces and panes transmit; 0 through panes that are emitters themselves."""
-        share = occluder.passing(origins_m, segments_m)
+        share = occluder.transmittance(origins_m, segments_m)
         rays = np.flatnonzero(share)
         share[rays] *= ~self.visibility.crosses_sky_pane(origins_m[rays], segments_m[rays])
         return share
