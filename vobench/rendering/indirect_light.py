@@ -74,8 +74,8 @@ class Photons:
     `origins_m` (R, 3) are their origins in the world.
     `directions` (R, 3) are their unit directions in the world.
     `flux_lm` (R,) is the flux of each photon in lumens.
-    `is_shown` (R,) is whether the light of a photon is already counted on the first face that it meets, because that
-    face shows the image of the lamp in a mirror.
+    `is_shown` (R,) is whether the light of a photon is already counted on the first face that it meets, as direct light
+    from the image of a lamp in a mirror.
     `dither` (R, 2) are two random numbers of each photon in [0, 1).
     """
 
