@@ -71,7 +71,7 @@ class MirrorImage(Emitter):
         return np.asarray((height_m > 0) & (aside_m <= reach_m))
 
     def transmittance(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
-        """The share (R,) of light that passes from the emitter to the mirror, and from there to the origins."""
+        """The transmittance (R,) from the emitter to the mirror, times that from the mirror to the origins."""
         share = np.zeros(len(origins_m), np.float32)
         rays = self._through_mirror(origins_m, segments_m)
         origins_m = origins_m[rays]
