@@ -413,7 +413,7 @@ def traced(baked: BakedScene, bulb: PointLight, *, count: int, paths: int) -> tu
         way = (bulb.position_m - points).astype(np.float32)
         squared = np.einsum("ij,ij->i", way, way)
         cosine = np.maximum(np.einsum("ij,ij->i", way, normals), 0) / np.sqrt(squared)
-        straight = bulb.power_lm / (4 * np.pi) * cosine / squared * visibility.clear(points, way)
+        straight = bulb.power_lm / (4 * np.pi) * cosine / squared * visibility.is_unoccluded(points, way)
         total[path] += carried * straight[:, None]
     return place, total.reshape(count, paths, 3).mean(1)
 

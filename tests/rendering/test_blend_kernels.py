@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vobench.geometry.se3 import Array
-from vobench.rendering.blend_kernels import LEAST, WIDTH, Blending, count_weights, write_weights
+from vobench.rendering.blend_kernels import LEAST_SHARE, SQUARED_WIDTH, Blending, count_weights, write_weights
 
 Z = np.array([0.0, 0.0, 1.0], np.float32)
 SPACING_M = 0.1
@@ -47,7 +47,7 @@ def row_of_surfels(*points_m: float, hidden: tuple[int, ...] = (), turned: tuple
 def test_weights_add_up_to_one_and_fall_with_the_square_of_the_distance() -> None:
     weights = row_of_surfels(0.0, 0.02, -0.05)
     np.testing.assert_allclose(weights.sum(1), 1, atol=1e-6)
-    assert weights[0, 3] / weights[0, 2] == pytest.approx(np.exp(-1 / WIDTH), rel=1e-5)
+    assert weights[0, 3] / weights[0, 2] == pytest.approx(np.exp(-1 / SQUARED_WIDTH), rel=1e-5)
     np.testing.assert_allclose(weights[0], weights[0, ::-1], rtol=1e-6)
     assert weights[1, 3] > weights[1, 1]
     assert weights[2, 1] == pytest.approx(weights[2, 2], rel=1e-5)
@@ -62,5 +62,5 @@ def test_hidden_surfels_and_those_that_look_elsewhere_give_no_light() -> None:
 
 def test_small_weights_are_dropped() -> None:
     weights = row_of_surfels(0.05)
-    assert (weights[weights > 0] >= LEAST).all()
+    assert (weights[weights > 0] >= LEAST_SHARE).all()
     assert weights[0, 0] == 0

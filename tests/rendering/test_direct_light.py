@@ -95,13 +95,13 @@ def test_a_soft_shadow_is_that_of_many_rays_and_takes_a_fraction_of_them(monkeyp
     rows = np.arange(len(points))
     exact_lx = cast_shadow_rays(emitter, points, rows, visibility, RayGrid(16, is_spread=True)).light
     sent = []
-    passing = visibility.passing
+    transmittance = visibility.transmittance
 
     def counted(origins_m: Floats, segments_m: Floats) -> Floats:
         sent.append(len(origins_m))
-        return passing(origins_m, segments_m)
+        return transmittance(origins_m, segments_m)
 
-    monkeypatch.setattr(visibility, "passing", counted)
+    monkeypatch.setattr(visibility, "transmittance", counted)
     cells = np.arange(len(points), dtype=np.int32)
     light_lx = direct_light(emitter, points, layout, cells, visibility, side=4, among=np.ones(len(points), bool))
     assert sum(sent) < 4 * len(points)

@@ -49,4 +49,4 @@ def test_its_light_passes_where_nothing_is_in_the_way() -> None:
     visibility = open_floor(roof)[2]
     origins_m = np.array([[0, 0, 0.5], [0, 0, 1.5]], np.float32)
     segments_m = EMITTER.ball.centre_m.astype(np.float32) - origins_m
-    assert EMITTER.passing(visibility, origins_m, segments_m).tolist() == [0, 1]
+    assert EMITTER.transmittance(visibility, origins_m, segments_m).tolist() == [0, 1]

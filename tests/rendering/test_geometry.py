@@ -137,4 +137,4 @@ def test_panes_one_behind_the_other_multiply_and_from_either_side() -> None:
     start, way = np.array([[0.2, 0.1, -1.0]], np.float32), np.array([[0.3, 0.4, 3.0]], np.float32)
     once = 0.9 * (1 - pane_reflectance(np.array(3 / np.sqrt(9.25)), 1.5))
     for origin, direction in ((start, way), (start + way, -way)):
-        np.testing.assert_allclose(seen.passing(origin, direction), once**3, rtol=1e-5)
+        np.testing.assert_allclose(seen.transmittance(origin, direction), once**3, rtol=1e-5)

@@ -5,7 +5,7 @@ import pytest
 
 from tests.rendering.gathered_room import gathered_room
 from tests.rendering.rectangles import rectangle, room
-from vobench.rendering.indirect_light import Photons, turned
+from vobench.rendering.indirect_light import Photons, with_new_random_numbers
 from vobench.scene.light import Sky
 
 X, Y, Z = np.eye(3)
@@ -31,8 +31,8 @@ def test_the_floor_sees_the_ceiling_by_the_view_factor_of_a_cube() -> None:
 
 def test_near_and_far_light_add_up_to_what_the_table_gives() -> None:
     radiosity = np.random.default_rng(0).random((len(CLOSED.groups), 2)).astype(np.float32)
-    sample = CLOSED.gatherer.sample(CLOSED.middles, side=4, turn=3)
-    near, far, _ = CLOSED.gatherer.light(CLOSED.middles, radiosity, side=4, turn=3)
+    sample = CLOSED.gatherer.sample(CLOSED.middles, side=4, pass_index=3)
+    near, far, _ = CLOSED.gatherer.light(CLOSED.middles, radiosity, side=4, pass_index=3)
     np.testing.assert_allclose(near, sample.near @ radiosity, rtol=1e-5)
     np.testing.assert_allclose(far, sample.far @ radiosity, rtol=1e-5)
     assert near.sum() > 0
@@ -81,8 +81,8 @@ def test_photons_bring_all_their_flux_unless_it_is_shown_already() -> None:
     assert CLOSED.gatherer.deposited(photons(500, is_shown=True)).sum() == 0
 
 
-def test_each_turn_has_sample_offsets_of_its_own() -> None:
-    first, second = (turned(CLOSED.middles, turn).dither for turn in (0, 1))
+def test_each_pass_has_sample_offsets_of_its_own() -> None:
+    first, second = (with_new_random_numbers(CLOSED.middles, index).dither for index in (0, 1))
     np.testing.assert_array_equal(first, CLOSED.middles.dither)
     assert (first != second).all()
     assert second.min() >= 0

@@ -54,8 +54,8 @@ def test_a_room_with_a_skylight_has_one_pane_of_sky_and_the_open_sky() -> None:
     # Straight up, rays pass the pane; they count for the pane alone.
     up = np.array([[0.0, 0, 10.0]], np.float32)
     origin = np.array([[0.0, 0, 1.0]], np.float32)
-    assert pane.passing(visibility, origin, up)[0] == 1
-    assert rest.passing(visibility, origin, up)[0] == 0
+    assert pane.transmittance(visibility, origin, up)[0] == 1
+    assert rest.transmittance(visibility, origin, up)[0] == 0
 
 
 def test_a_pane_far_above_gives_its_solid_angle_times_what_it_lets_through() -> None:

@@ -33,16 +33,16 @@ COSINE = 5 / np.sqrt(25.25)
 def test_each_pane_lets_its_share_through_and_the_way_back_is_as_clear(count: int) -> None:
     visibility = seen((9.0, "wall"), *((1.0 + nth, "glass") for nth in range(count)))
     share = 0.9 * (1 - float(pane_reflectance(np.array(COSINE), 1.5)))
-    assert visibility.passing(START, AHEAD)[0] == pytest.approx(share**count, rel=1e-5)
-    assert visibility.passing(START + AHEAD, -AHEAD)[0] == pytest.approx(share**count, rel=1e-5)
+    assert visibility.transmittance(START, AHEAD)[0] == pytest.approx(share**count, rel=1e-5)
+    assert visibility.transmittance(START + AHEAD, -AHEAD)[0] == pytest.approx(share**count, rel=1e-5)
 
 
 def test_a_wall_stops_all_light_but_a_segment_that_ends_before_it_is_clear() -> None:
     visibility = seen((3.0, "wall"), (1.0, "glass"))
-    assert visibility.passing(START, AHEAD)[0] == 0
-    assert not visibility.clear(START, AHEAD)[0]
-    assert visibility.clear(START, AHEAD / 2)[0]
-    assert visibility.through_panes(START, AHEAD)[0] < 1
+    assert visibility.transmittance(START, AHEAD)[0] == 0
+    assert not visibility.is_unoccluded(START, AHEAD)[0]
+    assert visibility.is_unoccluded(START, AHEAD / 2)[0]
+    assert visibility.transmittance_of_panes(START, AHEAD)[0] < 1
 
 
 def test_the_first_pane_of_a_ray_is_the_nearest_one() -> None:

@@ -42,4 +42,4 @@ def test_sentences_on_access_and_origin_follow_the_legend(scored, placed):
 
 
 def test_the_legend_keeps_its_tilde(scored):
-    assert "; \\~ not decided" in markdown(make_board([scored("a")], {}))
+    assert "; \\~ not significantly worse" in markdown(make_board([scored("a")], {}))

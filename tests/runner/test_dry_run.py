@@ -6,7 +6,7 @@ import pytest
 
 from tests.runner.conftest import Bench
 from vobench.runner import dry_run
-from vobench.runner.dry_run import ToDo, to_do
+from vobench.runner.dry_run import StageEstimate, pending_tasks
 from vobench.runner.folder import RunFolder
 from vobench.runner.store import Store
 from vobench.runner.task import Task, plan
@@ -17,28 +17,30 @@ def _nothing_is_kept():
     dry_run._stored.cache_clear()
 
 
-def said(bench: Bench, *changes: tuple[str, str]) -> dict[str, ToDo]:
-    return {each.stage: each for each in to_do(plan(bench.plan(*changes), {}), bench.folder / "cache")}
+def said(bench: Bench, *changes: tuple[str, str]) -> dict[str, StageEstimate]:
+    return {each.stage: each for each in pending_tasks(plan(bench.plan(*changes), {}), bench.folder / "cache")}
 
 
 def test_of_what_is_in_the_cache_nothing_is_to_do_and_its_stages_have_taken_time(bench: Bench, first: RunFolder):
-    assert [each.to_do for each in said(bench).values()] == [0, 0, 0, 0]
+    assert [each.pending for each in said(bench).values()] == [0, 0, 0, 0]
     assert all(len(Store(bench.folder / "cache").seconds(stage)) >= 1 for stage in ("bake", "estimate"))
 
 
 def test_a_change_is_named_where_it_enters_and_what_hangs_on_it_names_that(bench: Bench, first: RunFolder):
     found = said(bench, ("seed: 1", "seed: 77"))
-    assert found["bake"].to_do == 0
+    assert found["bake"].pending == 0
     assert found["sequence"].reasons == {"case.seed: 1 → 77": 2}
-    assert found["estimate"].reasons == found["score"].reasons == {"its sequence is to be made": 4}
+    after_sequence = {"the sequence that it requires must be computed first": 4}
+    assert found["estimate"].reasons == after_sequence
+    assert found["score"].reasons == after_sequence
     assert found["sequence"].seconds > 0
 
 
 def test_another_estimator_renders_nothing_and_another_lighting_makes_one_sequence(bench: Bench, first: RunFolder):
     more = said(bench, ("stand_still]", "stand_still, constant_velocity]"))
-    assert [more[stage].to_do for stage in ("bake", "sequence", "estimate", "score")] == [0, 0, 2, 2]
+    assert [more[stage].pending for stage in ("bake", "sequence", "estimate", "score")] == [0, 0, 2, 2]
     lit = said(bench, ("{full: {}", "{dusk: {lamp: {power_lm: 20}}, full: {}"))
-    assert [lit[stage].to_do for stage in ("bake", "sequence", "estimate", "score")] == [0, 1, 2, 2]
+    assert [lit[stage].pending for stage in ("bake", "sequence", "estimate", "score")] == [0, 1, 2, 2]
 
 
 def test_damage_is_named(bench: Bench, first: RunFolder):
@@ -56,9 +58,9 @@ def test_damage_is_named(bench: Bench, first: RunFolder):
 
 def test_changed_code_and_changed_limits_are_told_apart(bench: Bench, first: RunFolder):
     root, limited = bench.folder / "cache", bench.plan().limited(trial_s=5.0)
-    found = {each.stage: each for each in to_do(plan(limited, {}), root)}
+    found = {each.stage: each for each in pending_tasks(plan(limited, {}), root)}
     assert found["estimate"].reasons == {"limits.trial_s: 7200.0 → 5.0": 4}
     changed = [replace(one, inputs={**one.inputs, "code": "x"}) for one in plan(bench.plan(), {})]
-    assert {*to_do([one for one in changed if one.stage == "estimate"], root)[0].reasons} == {
+    assert {*pending_tasks([one for one in changed if one.stage == "estimate"], root)[0].reasons} == {
         "its code in vobench changed"
     }

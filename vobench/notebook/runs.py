@@ -153,9 +153,11 @@ class Run:
     ) -> Path:
         """Write one trial as a Rerun recording, open it in the viewer, and return the path of the recording.
 
-        Without `case` and `estimator` it is the gravest failure, or else the trial with the largest error. With `save`
-        the recording is written there and no viewer is opened. `web` serves it to a browser on this machine until
-        interrupted. Raises MissingDependencyError if there is no display, and UnknownNameError.
+        If `case` and `estimator` are not given, the most severe failure is chosen. If no trial failed, the trial with
+        the largest error is chosen. With `save`, the recording is written there, and no viewer is opened. With `web`,
+        it is served to a browser on this machine until interrupted.
+
+        Raises MissingDependencyError if there is no display, and UnknownNameError for an unknown case or estimator.
         """
         from vobench.report.viewer import open_viewer, save_recordings
 

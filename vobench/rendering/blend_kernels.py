@@ -1,4 +1,4 @@
-"""Compiled kernels of the weights by which the light of surfels is laid on the light map."""
+"""Compiled kernels for the weights with which the light of surfels is blended into the light map."""
 
 import math
 from typing import NamedTuple
@@ -8,17 +8,22 @@ import numpy as np
 from vobench.rendering.array_types import Floats, Indices, Mask, Rows
 from vobench.rendering.compiled import compiled
 
-WIDTH = 1.2  # the square of the width of the blend, in cells
-TURNED = 2.0  # the distance in cells that counts as much as two normals whose difference has the length 1
-LEAST = 0.02  # the share of the weights of a texel below which a weight counts as 0
+SQUARED_WIDTH = 1.2  # the squared distance, in squared cells, at which a weight falls by a factor of e
+NORMAL_WEIGHT = 2.0  # the distance in cells that is equivalent to a difference of length 1 between two unit normals
+LEAST_SHARE = 0.02  # a weight that is a smaller share of the weights of its texel is set to 0
 
 
 class Blending(NamedTuple):
-    """The points (P,) whose light is that of surfels (S,), and the surfels near to each surfel.
+    """P points, the S surfels that they take their light from, and the K neighbours of each surfel.
 
-    `points_m` and `point_normals` (P, 3) are those of the points, and `surfel_of_point` (P,) is the surfel of each.
-    `neighbours` (S, K) are the surfels near to each surfel, and `is_hidden` (S, K) is whether something is in between.
-    `middles_m` and `normals` (S, 3) are those of surfels, and `step_m` (S,) is the side of their cells.
+    `points_m` (P, 3) are the positions of the points.
+    `point_normals` (P, 3) are the unit normals at the points.
+    `surfel_of_point` (P,) is the index of the surfel that each point belongs to.
+    `neighbours` (S, K) are the indices of the surfels near each surfel, which include the surfel itself.
+    `is_hidden` (S, K) is whether an opaque face is between a surfel and its neighbour.
+    `middles_m` (S, 3) are the middles of the surfels.
+    `normals` (S, 3) are the unit normals of the surfels.
+    `step_m` (S,) is the side of the cell of each surfel.
     """
 
     points_m: Floats
@@ -33,74 +38,95 @@ class Blending(NamedTuple):
 
 @compiled
 def _write_squared_distances(blending: Blending, point: int, squared: Floats) -> None:
-    """Write the squared distances (K,) of a point from the neighbours of its surfel, in cells; infinity if hidden.
+    """Write the squared distances (K,), in squared cells, between a point and the neighbours of its surfel.
 
-    Normals that differ count as a distance, too.
+    A difference between the normals counts as a distance, too. The distance of a hidden neighbour is infinite.
     """
     surfel = blending.surfel_of_point[point]
     step_m = blending.step_m[surfel]
     for k in range(len(squared)):
         neighbour = blending.neighbours[surfel, k]
+        if blending.is_hidden[surfel, k]:
+            squared[k] = np.inf
+            continue
         distance_m2 = 0.0
-        turn2 = 0.0
+        normal_difference2 = 0.0
         for axis in range(3):
             distance_m2 += (blending.points_m[point, axis] - blending.middles_m[neighbour, axis]) ** 2
-            turn2 += (blending.point_normals[point, axis] - blending.normals[neighbour, axis]) ** 2
-        in_cells = distance_m2 / (step_m * step_m) + turn2 * TURNED * TURNED
-        squared[k] = np.inf if blending.is_hidden[surfel, k] else in_cells
+            normal_difference2 += (blending.point_normals[point, axis] - blending.normals[neighbour, axis]) ** 2
+        distance_cells2 = distance_m2 / (step_m * step_m)
+        squared[k] = distance_cells2 + normal_difference2 * NORMAL_WEIGHT * NORMAL_WEIGHT
 
 
 @compiled
-def _weigh(blending: Blending, point: int, weights: Floats) -> int:
-    """Write the weights (K,) of the neighbours of a point's surfel; they add up to 1. How many are not 0."""
-    _write_squared_distances(blending, point, weights)
-    nearest = np.inf
-    for k in range(len(weights)):
-        nearest = min(nearest, weights[k])
+def _write_point_weights(blending: Blending, point: int, squared: Floats, weights: Floats) -> int:
+    """Write the normalised weights (K,) of the neighbours of a point's surfel. Returns how many of them are not 0.
 
+    `squared` (K,) is a buffer for the squared distances.
+    """
+    _write_squared_distances(blending, point, squared)
+    smallest = np.inf
+    for k in range(len(squared)):
+        smallest = min(smallest, squared[k])
+
+    # Gaussian weights. Subtracting the smallest distance prevents that all of them are rounded to 0.
     total = 0.0
     for k in range(len(weights)):
-        weights[k] = 0.0 if math.isinf(weights[k]) else math.exp(-(weights[k] - nearest) / WIDTH)
+        weights[k] = 0.0
+        if not math.isinf(squared[k]):
+            weights[k] = math.exp(-(squared[k] - smallest) / SQUARED_WIDTH)
         total += weights[k]
 
-    kept_total = 0.0
+    # Drop small weights, so that the table of weights has few entries.
+    remaining_total = 0.0
     count = 0
     for k in range(len(weights)):
-        if weights[k] < LEAST * total:
+        if weights[k] < LEAST_SHARE * total:
             weights[k] = 0.0
         if weights[k] > 0:
-            kept_total += weights[k]
+            remaining_total += weights[k]
             count += 1
+
     for k in range(len(weights)):
-        weights[k] /= kept_total
+        weights[k] /= remaining_total
     return count
 
 
 @compiled
 def count_weights(source: Indices, blending: Blending, counts: Indices) -> None:
-    """Write how many surfels each of the texels takes its light from (N,).
+    """Write the number (N,) of surfels that each texel takes its light from.
 
-    `source` (N,) is the point that stands for each texel, the number of points for none.
+    `source` (N,) is the index of the point that each texel belongs to, or the number of points if it belongs to none.
     """
-    weights = np.empty(blending.neighbours.shape[1])
+    neighbour_count = blending.neighbours.shape[1]
+    squared = np.empty(neighbour_count)
+    weights = np.empty(neighbour_count)
     for texel in range(len(source)):
-        has_point = source[texel] < len(blending.points_m)
-        counts[texel] = _weigh(blending, source[texel], weights) if has_point else 0
+        point = source[texel]
+        counts[texel] = 0
+        if point < len(blending.points_m):
+            counts[texel] = _write_point_weights(blending, point, squared, weights)
 
 
 @compiled
 def write_weights(source: Indices, blending: Blending, columns: Indices, values: Floats) -> None:
-    """Write the surfels that texels take their light from, and their weights, one texel after the other.
+    """Write the surfels that each texel takes its light from, and their weights, one texel after the other.
 
-    The sum of what `count_weights` writes is the length of `columns` and of `values`.
+    `source` (N,) is as in `count_weights`.
+    `columns` (M,) receives the indices of the surfels.
+    `values` (M,) receives their weights.
+
+    M is the sum of the counts that `count_weights` writes.
     """
-    weights = np.empty(blending.neighbours.shape[1])
+    neighbour_count = blending.neighbours.shape[1]
+    squared = np.empty(neighbour_count)
+    weights = np.empty(neighbour_count)
     entry = 0
     for texel in range(len(source)):
         point = source[texel]
         if point >= len(blending.points_m):
             continue
-        _weigh(blending, point, weights)
+        _write_point_weights(blending, point, squared, weights)
         surfel = blending.surfel_of_point[point]
         for k in range(len(weights)):
             if weights[k] > 0:

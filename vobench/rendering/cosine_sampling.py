@@ -9,16 +9,19 @@ from vobench.rendering.geometry import tangents
 
 
 def disc(a: Floats, b: Floats) -> tuple[Floats, Floats]:
-    """Points x, y uniform over the unit disc, by two uniform random numbers in [0, 1)."""
+    """The coordinates x and y of points that are uniform on the unit disc.
+
+    `a` and `b` are uniform random numbers in [0, 1).
+    """
     radius = np.sqrt(a)
     angle = np.float32(2 * np.pi) * b
     return radius * np.cos(angle), radius * np.sin(angle)
 
 
 def cosine_weighted(normals: Floats) -> Callable[[Floats, Floats], Floats]:
-    """A function of two uniform random numbers (..., P) that gives cosine-weighted directions around normals (P, 3).
+    """A function that maps random numbers to cosine-weighted directions around unit normals (P, 3).
 
-    The directions (..., P, 3) are unit vectors.
+    Its two arguments are uniform random numbers (..., P) in [0, 1). It returns unit vectors (..., P, 3).
     """
     u_axis, v_axis = tangents(normals)
 

@@ -1,4 +1,4 @@
-"""The devices that EGL can draw with, and which of them are tried first."""
+"""The devices that EGL can render with, and the order in which they are tried."""
 
 import ctypes
 from collections.abc import Iterable, Sequence
@@ -18,7 +18,13 @@ RENDERER_NAME = 0x335F
 
 @dataclass(frozen=True, slots=True)
 class EglDevice:
-    """A device that EGL can draw with; its handle is None for the default display."""
+    """A device that EGL can render with.
+
+    `index` is its position in EGL's list of devices.
+    `name` is the name of its renderer and of its device file, as far as EGL reports them.
+    `is_software` is whether it renders on the CPU.
+    `handle` is EGL's handle of the device, or None for the default display.
+    """
 
     index: int
     name: str
@@ -31,13 +37,14 @@ class EglDevice:
 
 
 def ordered(found: Sequence[EglDevice], wanted: str) -> list[EglDevice]:
-    """The devices to try, in order: what VOBENCH_EGL_DEVICE asks for, or the CPU before GPUs.
+    """The devices to try, in order. The environment variable VOBENCH_EGL_DEVICE restricts them.
 
-    Mesa draws the same bytes on every machine. A GPU's pictures differ from them by a grey value here and there.
+    `found` are the devices that EGL lists.
+    `wanted` is the value of the variable: "cpu", "gpu", the index of a device, or "" for all devices. If it is "", CPU
+    renderers come before GPUs, because Mesa's CPU renderer draws the same bytes on every machine. Some pixels of a
+    picture from a GPU differ from them by one grey value.
 
-    wanted: "" for all, "cpu", "gpu", or a device's index.
-
-    Raises MissingDependencyError where no such device is listed.
+    Raises MissingDependencyError if EGL lists no such device.
     """
     match wanted.strip().lower():
         case "":
@@ -57,12 +64,12 @@ def ordered(found: Sequence[EglDevice], wanted: str) -> list[EglDevice]:
 
 
 def listed(found: Iterable[EglDevice]) -> str:
-    """Devices in one line."""
+    """The devices in one line of text, or "none" if there are none."""
     return ", ".join(map(str, found)) or "none"
 
 
 def devices() -> list[EglDevice]:
-    """All devices that EGL lists, in its order; the default display where it cannot list them."""
+    """All devices that EGL lists, in its order. If EGL cannot list devices, the default display is the only one."""
     query = egl_function("eglQueryDevicesEXT", ctypes.c_uint, ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
     query_string = egl_function("eglQueryDeviceStringEXT", ctypes.c_char_p, ctypes.c_void_p, ctypes.c_int)
     if query is None or query_string is None:
@@ -72,7 +79,8 @@ def devices() -> list[EglDevice]:
     query(0, None, ctypes.byref(count))
     handles = (ctypes.c_void_p * count.value)()
     query(count.value, handles, ctypes.byref(count))
-    return [_device(index, handle, query_string) for index, handle in enumerate(handles[: count.value])]
+    listed_handles = handles[: count.value]
+    return [_device(index, handle, query_string) for index, handle in enumerate(listed_handles)]
 
 
 def _device(
@@ -80,23 +88,25 @@ def _device(
     handle: int | None,
     query_string: Any,
 ) -> EglDevice:
-    """The device of a handle. `query_string` is eglQueryDeviceStringEXT."""
+    """The device of a handle. `query_string` is the function eglQueryDeviceStringEXT."""
     from OpenGL import EGL
 
-    words = (query_string(handle, EGL.EGL_EXTENSIONS) or b"").decode("ascii", "replace").split()
-    is_software = "EGL_MESA_device_software" in words
-    names = []
-    if "EGL_EXT_device_query_name" in words:
-        names.append(query_string(handle, RENDERER_NAME))
-    if "EGL_EXT_device_drm" in words:
-        names.append(query_string(handle, DRM_DEVICE_FILE))
-    known = [name.decode("utf-8", "replace") for name in names if name]
-    unnamed = "Mesa software driver" if is_software else "unnamed device"
-    return EglDevice(index, " ".join(known) or unnamed, is_software, handle)
+    extension_bytes = query_string(handle, EGL.EGL_EXTENSIONS) or b""
+    extensions = extension_bytes.decode("ascii", "replace").split()
+    is_software = "EGL_MESA_device_software" in extensions
+    name_bytes = []
+    if "EGL_EXT_device_query_name" in extensions:
+        name_bytes.append(query_string(handle, RENDERER_NAME))
+    if "EGL_EXT_device_drm" in extensions:
+        name_bytes.append(query_string(handle, DRM_DEVICE_FILE))
+    known_names = [name.decode("utf-8", "replace") for name in name_bytes if name]
+    default_name = "Mesa software driver" if is_software else "unnamed device"
+    name = " ".join(known_names) or default_name
+    return EglDevice(index, name, is_software, handle)
 
 
 def display_of(device: EglDevice) -> Any:
-    """The EGL display of a device, the same for every context of the process."""
+    """The EGL display of a device. All contexts of the process share it."""
     from OpenGL import EGL
 
     if device.handle is None:
@@ -110,7 +120,11 @@ def display_of(device: EglDevice) -> Any:
 
 
 def egl_function(name: str, result: Any, *arguments: Any) -> Any:
-    """A function of an EGL extension with types of ctypes, None if EGL has no function of that name."""
+    """A function of an EGL extension, or None if EGL has no function of that name.
+
+    `result` is the ctypes type of its result.
+    `arguments` are the ctypes types of its arguments.
+    """
     from OpenGL import EGL
 
     address = EGL.eglGetProcAddress(name.encode())

@@ -12,16 +12,16 @@ from vobench.rendering.texel import Texels
 
 
 class Occluder(Protocol):
-    """What can hide an emitter from points. Rays lead from origins to origins + segments (R, 3)."""
+    """What can hide an emitter from points. Rays lead from origins (R, 3) to origins + segments (R, 3)."""
 
-    def clear(self, origins_m: Floats, segments_m: Floats) -> Mask:
-        """Whether nothing opaque is on each ray."""
+    def is_unoccluded(self, origins_m: Floats, segments_m: Floats) -> Mask:
+        """Whether no opaque face (R,) is on each ray."""
 
-    def passing(self, origins_m: Floats, segments_m: Floats) -> Floats:
-        """The share (R,) of light that opaque faces and panes transmit."""
+    def transmittance(self, origins_m: Floats, segments_m: Floats) -> Floats:
+        """The transmittance (R,) of opaque faces and panes together. It is 0 behind an opaque face."""
 
-    def through_panes(self, origins_m: Floats, segments_m: Floats) -> Floats:
-        """The share (R,) of light that panes transmit."""
+    def transmittance_of_panes(self, origins_m: Floats, segments_m: Floats) -> Floats:
+        """The transmittance (R,) of panes. Opaque faces are ignored."""
 
 
 # A function of two random numbers (P,) in [0, 1). It returns the vectors (P, 3) in m from points to random places on an
@@ -58,9 +58,9 @@ class Emitter(ABC):
     def width_rad(self, points_m: Floats) -> Floats:
         """Its approximate angular width (P,) seen from points (P, 3); 0 if its shadows are hard."""
 
-    def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
-        """The share (R,) of light that reaches origins from origins + segments (R, 3)."""
-        return occluder.passing(origins_m, segments_m)
+    def transmittance(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
+        """The transmittance (R,) between origins (R, 3) and places on the emitter at origins + segments (R, 3)."""
+        return occluder.transmittance(origins_m, segments_m)
 
     def may_reach(self, points_m: Floats) -> Mask:
         """Whether its light can reach points (P, 3), as far as this is known without casting rays."""

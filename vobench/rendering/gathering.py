@@ -95,7 +95,7 @@ class Rounds:
                 if done:
                     done((half + share) / 2)
 
-            sample = gatherer.sample(middles, side=side, turn=half, done=half_done)
+            sample = gatherer.sample(middles, side=side, pass_index=half, done=half_done)
             hits.append(gatherer.hits(sample))
             halves.append(replace(sample, texels=sample.texels[:0]))  # they are counted, and take memory
         self._halves = halves
@@ -175,8 +175,8 @@ class Rounds:
         middles = self._middles.take(rows)
         for repeat in range(round_count):
             for half in (0, 1):
-                turn = 2 * (round_count + repeat) + half
-                near, far, sky = self._gatherer.light(middles, radiosity, side=self._side, turn=turn)
+                pass_index = 2 * (round_count + repeat) + half
+                near, far, sky = self._gatherer.light(middles, radiosity, side=self._side, pass_index=pass_index)
                 totals.near[half, rows] += near
                 totals.far[half, rows] += far
                 totals.sky[half][:, rows] += sky

@@ -22,21 +22,25 @@ from vobench.scene.light import Sky
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-TURN = np.array([0.4142135624, 0.7320508076], np.float32)  # the step of the random numbers from one turn to the next
-MIRRORS = 4  # the largest number of reflections of a ray
-POINTS = 1 << 9  # the number of points whose rays are traced at a time
+# The step of the two random numbers of a point from one pass to the next: the fractional parts of √2 and √3.
+PASS_STEP = np.array([0.4142135624, 0.7320508076], np.float32)
+MOST_REFLECTIONS = 4  # the largest number of mirror reflections of a ray
+POINTS_PER_CHUNK = 1 << 9  # the number of points whose rays are traced at a time
 MOST_RAYS = 25_000_000  # the largest number of rays in a table
-PHOTONS = 1 << 16  # the number of photons that are traced at a time
+PHOTONS_PER_CHUNK = 1 << 16  # the number of photons that are traced at a time
 
 
 @dataclass(frozen=True, slots=True)
 class FinalGather:
     """The result of rays from P points.
 
-    The illuminance of the points is the product of `table` (P, S + L) with the radiosity of the S surfels and L lamps,
-    plus `sky` (K, P), the light of each of K skies by mirrors.
-    `hits` (H·W,) is the number of rays that ended on each texel.
-    `escaped` (P,) is the share of rays that left the scene, except through panes that show the sky.
+    `table` (P, S + L) is the illuminance of each point for a radiosity of 1 of each of S surfels and L lamps.
+    `sky` (K, P) is the illuminance in lx of each point by each of K skies, as reflected by mirrors.
+    `hits` (H·W,) is the number of rays that ended on each texel of the light map.
+    `escaped` (P,) is the share of the rays of each point that left the scene without a reflection. Rays that left it
+    through a pane that shows the sky are not counted.
+
+    The illuminance of the points is the product of `table` and the radiosity (S + L,) of surfels and lamps, plus `sky`.
     """
 
     table: "csr_matrix"
@@ -49,9 +53,11 @@ class FinalGather:
 class Sample:
     """The result of some of the rays from P points.
 
-    `near` and `far` (P, S + L) are tables as in `FinalGather`: of the rays whose last segment is shorter than NEAR_M,
-    and of the other rays. `sky` (K, P) and `escaped` (P,) are as there.
-    `texels` (R,) are the texels on which rays ended.
+    `near` (P, S + L) is a table as in `FinalGather`, of the rays whose last segment is shorter than NEAR_M.
+    `far` (P, S + L) is the same table of the other rays.
+    `sky` (K, P) is the illuminance in lx by each sky, as in `FinalGather`.
+    `escaped` (P,) is the share of rays that left the scene, as in `FinalGather`.
+    `texels` (R,) are the indices of the texels on which rays ended, one for each ray that ended on a face.
     """
 
     near: "csr_matrix"
@@ -65,9 +71,12 @@ class Sample:
 class Photons:
     """R photons that leave reflecting faces.
 
-    `origins_m` and `directions` (R, 3) are in the world, `flux_lm` (R,) is the flux of each photon in lumens.
-    `is_shown` (R,) is whether the first face that it meets already shows its light, as the image of a lamp in a mirror.
-    `dither` (R, 2) are random numbers.
+    `origins_m` (R, 3) are their origins in the world.
+    `directions` (R, 3) are their unit directions in the world.
+    `flux_lm` (R,) is the flux of each photon in lumens.
+    `is_shown` (R,) is whether the light of a photon is already counted on the first face that it meets, as direct light
+    from the image of a lamp in a mirror.
+    `dither` (R, 2) are two random numbers of each photon in [0, 1).
     """
 
     origins_m: Floats
@@ -81,8 +90,13 @@ class Photons:
 class Gatherer:
     """Casts rays from points, and records where they end.
 
-    `surfel_of` (H·W,) is the surfel of each texel, -1 for none.
-    `surfels` and `lamps` are their numbers, S and L.
+    `atlas` is the layout of the light map, which has H x W texels.
+    `visibility` casts the rays at the static faces.
+    `response` is how each face scatters light.
+    `skies` are the K skies.
+    `surfel_of` (H·W,) is the index of the surfel of each texel, -1 for none.
+    `surfels` is the number S of surfels.
+    `lamps` is the number L of lamps.
     """
 
     atlas: Atlas
@@ -111,10 +125,19 @@ class Gatherer:
         rays: int,
         done: Callable[[float], object] | None = None,
     ) -> FinalGather:
-        """Cast about `rays` rays from every point. `done` is called with the share of the work that is done."""
-        rays_each = min(rays, MOST_RAYS / max(len(points), 1))
-        sample = self.sample(points, side=int(np.sqrt(rays_each)), done=done)
-        return FinalGather(sample.near + sample.far, sample.sky, self.hits(sample), sample.escaped)
+        """Cast about `rays` rays from every point, or fewer if there would be more than MOST_RAYS in total.
+
+        `done` is called with the share of the work that is done.
+        """
+        rays_per_point = min(rays, MOST_RAYS / max(len(points), 1))
+        side = int(np.sqrt(rays_per_point))
+        sample = self.sample(points, side=side, done=done)
+        return FinalGather(
+            table=sample.near + sample.far,
+            sky=sample.sky,
+            hits=self.hits(sample),
+            escaped=sample.escaped,
+        )
 
     def hits(self, sample: Sample) -> Rows:
         """The number of rays of a sample that ended on each texel of the map (H·W,)."""
@@ -125,21 +148,21 @@ class Gatherer:
         points: Texels,
         *,
         side: int,
-        turn: int = 0,
+        pass_index: int = 0,
         done: Callable[[float], object] | None = None,
     ) -> Sample:
-        """Cast side x side rays from every point, in other directions in each turn.
+        """Cast side x side rays from every point. Passes with another `pass_index` cast them in other directions.
 
         `done` is called with the share of the work that is done.
         """
         if not side or not len(points):
             return self._empty_sample(len(points))
-        points = turned(points, turn)
+        points_of_pass = with_new_random_numbers(points, pass_index)
 
         def sample_of(part: slice) -> Sample:
-            return self._sample(points.take(part), side)
+            return self._sample(points_of_pass.take(part), side)
 
-        parts = in_chunks(sample_of, len(points), chunk=POINTS, done=done)
+        parts = in_chunks(sample_of, len(points), chunk=POINTS_PER_CHUNK, done=done)
         return Sample(
             near=scipy.sparse.vstack([part.near for part in parts], "csr"),
             far=scipy.sparse.vstack([part.far for part in parts], "csr"),
@@ -165,30 +188,38 @@ class Gatherer:
         radiosity: Floats,
         *,
         side: int,
-        turn: int,
+        pass_index: int,
     ) -> tuple[Floats, Floats, Floats]:
-        """The light that side x side rays from every point find: near and far (P, C), and the skies by mirrors (K, P).
+        """The light that side x side rays from every point gather.
 
-        `radiosity` (S, C) is that of surfels in C channels.
+        `radiosity` (S, C) is the radiosity of the surfels in C channels.
+        `pass_index` is as in `sample`.
+
+        Returns three arrays: the light (P, C) from near surfels, the light (P, C) from far surfels, and the illuminance
+        (K, P) in lx by each sky, as reflected by mirrors.
         """
-        points = turned(points, turn)
+        points_of_pass = with_new_random_numbers(points, pass_index)
 
         def light_of(part: slice) -> tuple[Floats, Floats, Floats]:
-            sample = self._sample(points.take(part), side)
-            return sample.near @ radiosity, sample.far @ radiosity, sample.sky
+            sample = self._sample(points_of_pass.take(part), side)
+            near = sample.near @ radiosity
+            far = sample.far @ radiosity
+            return near, far, sample.sky
 
-        parts = in_chunks(light_of, len(points), chunk=POINTS)
+        parts = in_chunks(light_of, len(points), chunk=POINTS_PER_CHUNK)
         near, far, sky = zip(*parts, strict=True)
         return np.concatenate(near), np.concatenate(far), np.concatenate(sky, 1)
 
     def deposited(self, photons: Photons) -> Floats:
-        """The flux (S,) in lumens that photons bring to surfels. Under a coat it is the flux that enters the coat."""
+        """The flux (S,) in lumens that photons deposit on surfels. On a coated surfel it is the flux below the coat."""
         flux_lm = np.zeros(self.surfels)
+        photon_count = len(photons.flux_lm)
+        rows = np.arange(photon_count, dtype=np.int32)
 
         def trace(part: slice) -> Floats:
-            return self._deposited(photons, np.arange(len(photons.flux_lm), dtype=np.int32)[part])
+            return self._deposited(photons, rows[part])
 
-        for part_lm in in_chunks(trace, len(photons.flux_lm), chunk=PHOTONS):
+        for part_lm in in_chunks(trace, photon_count, chunk=PHOTONS_PER_CHUNK):
             flux_lm += part_lm
         return flux_lm
 
@@ -199,7 +230,7 @@ class Gatherer:
         escaped = np.zeros(len(points), np.float32)
         batch = hemisphere_rays(points, side)
         parts = []
-        for depth in range(MIRRORS + 1):
+        for depth in range(MOST_REFLECTIONS + 1):
             followed = self._tracer.follow(batch, points.dither, is_first=depth == 0)
             parts.append(followed.ends)
             if depth == 0:
@@ -220,7 +251,7 @@ class Gatherer:
         )
 
     def _deposited(self, photons: Photons, rows: Indices) -> Floats:
-        """The flux (S,) in lumens that the photons at rows (N,) bring to surfels."""
+        """The flux (S,) in lumens that the photons at rows (N,) deposit on surfels."""
         flux_lm = np.zeros(self.surfels)
         batch = RayBatch(
             point=rows,
@@ -229,13 +260,15 @@ class Gatherer:
             weight=np.ones(len(rows), np.float32),
             is_direct=photons.is_shown[rows],
         )
-        # The first face of the shown photons shows their light already. Only the light that it reflects counts.
+        # The light of shown photons on the first face is already known. They count only after their first reflection.
         shown = batch.take(batch.is_direct)
         batch = batch.take(~batch.is_direct)
         from_shown = self._tracer.follow(shown, photons.dither, is_first=False).onward
-        for depth in range(MIRRORS):
+        for depth in range(MOST_REFLECTIONS):
             followed = self._tracer.follow(batch, photons.dither, is_first=False)
-            batch = followed.onward.joined(from_shown) if depth == 0 else followed.onward
+            batch = followed.onward
+            if depth == 0:
+                batch = batch.joined(from_shown)
             ends = followed.ends
             is_surfel = ends.column < self.surfels
             arriving_lm = ends.share[is_surfel] * photons.flux_lm[ends.point[is_surfel]]
@@ -245,7 +278,7 @@ class Gatherer:
         return flux_lm
 
     def _table(self, ends: RayEnds, selected: Mask, point_count: int) -> "csr_matrix":
-        """The table (P, S + L) of the ends of the selected rays (R,), with an entry for each ray."""
+        """The sparse table (P, S + L) of the ends of the selected rays (R,), with one entry for each ray."""
         count = np.count_nonzero(selected)
         starts = np.empty(point_count + 1, np.int32)
         columns = np.empty(count, np.int32)
@@ -254,20 +287,20 @@ class Gatherer:
         return scipy.sparse.csr_matrix((shares, columns, starts), (point_count, self.surfels + self.lamps))
 
     def _escaped_counts(self, escaped: RayBatch, point_count: int) -> Floats:
-        """The number (P,) of escaped rays of each point that crossed no pane that shows the sky."""
+        """The number (P,) of escaped rays of each point, without those that crossed a pane that shows the sky."""
         crosses_no_pane = ~self.visibility.crosses_sky_pane(escaped.origins_m, FAR_M * escaped.directions)
         return np.bincount(escaped.point, crosses_no_pane, minlength=point_count).astype(np.float32)
 
     def _add_sky(self, sky: Floats, escaped: RayBatch) -> None:
-        """Add the illuminance of points (K, P) by each sky along escaped rays."""
+        """Add the light of each sky along escaped rays to `sky` (K, P), which is in lx."""
         for index, light in enumerate(self.skies):
             luminance_cd_m2 = light.luminance_cd_m2(escaped.directions)
             ray_lx = np.pi * luminance_cd_m2 * escaped.weight
             sky[index] += np.bincount(escaped.point, ray_lx, minlength=sky.shape[1])
 
 
-def turned(points: Texels, turn: int) -> Texels:
-    """The points with random numbers that differ from those of any other turn."""
-    dither = points.dither + np.float32(turn) * TURN
+def with_new_random_numbers(points: Texels, pass_index: int) -> Texels:
+    """The points with other random numbers for each pass. In pass 0 the random numbers stay the same."""
+    dither = points.dither + np.float32(pass_index) * PASS_STEP
     dither -= np.floor(dither)
     return replace(points, dither=dither)

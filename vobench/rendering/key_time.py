@@ -14,7 +14,8 @@ SUN_STEP_RAD = np.deg2rad(3)  # the largest angle between successive instants of
 
 def moving_suns(scene: Scene) -> tuple[int, ...]:
     """The indices of the lights that are moving suns."""
-    return tuple(index for index, light in enumerate(scene.lights) if light.moves)
+    indices = [index for index, light in enumerate(scene.lights) if light.moves]
+    return tuple(indices)
 
 
 def key_times_ns(light: Light) -> tuple[float, ...]:
@@ -24,8 +25,9 @@ def key_times_ns(light: Light) -> tuple[float, ...]:
     if not light.moves:
         return (light.times_s[0] * NS_PER_S,)
     times_ns = np.array(light.times_s) * NS_PER_S
-    steps = np.ceil(np.diff(travelled_rad(light)) / SUN_STEP_RAD)
-    step_counts = np.maximum(steps, 1).astype(int)
+    angles_rad = np.diff(travelled_rad(light))  # between successive times
+    needed_steps = np.ceil(angles_rad / SUN_STEP_RAD)
+    step_counts = np.maximum(needed_steps, 1).astype(int)
     inner_ns = []
     for (start_ns, end_ns), count in zip(pairwise(times_ns), step_counts, strict=True):
         inner_ns.append(np.linspace(start_ns, end_ns, count, endpoint=False))
@@ -33,11 +35,12 @@ def key_times_ns(light: Light) -> tuple[float, ...]:
 
 
 def travelled_rad(sun: Sun) -> Array:
-    """The angle (K,) that a sun has travelled along its path, at most, at each of its K times."""
+    """An upper bound (K,) in rad on the angle that a sun has travelled from its first time to each of its K times."""
     azimuth_rad = np.deg2rad(sun.azimuth_deg)
     elevation_rad = np.deg2rad(sun.elevation_deg)
     height_rad = np.abs(elevation_rad)
     lower_rad = np.minimum(height_rad[1:], height_rad[:-1])
-    across_rad = np.diff(azimuth_rad) * np.cos(lower_rad)  # along the wider circle of equal elevation
+    # The change of azimuth, along the wider of the two circles of equal elevation.
+    across_rad = np.diff(azimuth_rad) * np.cos(lower_rad)
     steps_rad = np.hypot(across_rad, np.diff(elevation_rad))
     return np.concatenate([[0.0], np.cumsum(steps_rad)])

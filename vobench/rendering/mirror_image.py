@@ -70,20 +70,20 @@ class MirrorImage(Emitter):
         reach_m = outline.radius_m + share * self.ball.radius_m
         return np.asarray((height_m > 0) & (aside_m <= reach_m))
 
-    def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
-        """The share (R,) of light that passes from the emitter to the mirror, and from there to the origins."""
+    def transmittance(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
+        """The transmittance (R,) from the emitter to the mirror, times that from the mirror to the origins."""
         share = np.zeros(len(origins_m), np.float32)
         rays = self._through_mirror(origins_m, segments_m)
         origins_m = origins_m[rays]
         segments_m = segments_m[rays]
         crossing = self._crossing(origins_m, segments_m)[:, None]
         to_mirror_m = crossing * segments_m
-        share[rays] = occluder.passing(origins_m, to_mirror_m)
+        share[rays] = occluder.transmittance(origins_m, to_mirror_m)
 
         lift_m = (RAY_OFFSET_M * self.mirror.normal).astype(np.float32)
         reflection_points_m = origins_m + to_mirror_m + lift_m
         onwards_m = self._reflected((1 - crossing) * segments_m)
-        share[rays] *= self.emitter.passing(occluder, reflection_points_m, onwards_m)
+        share[rays] *= self.emitter.transmittance(occluder, reflection_points_m, onwards_m)
         return share
 
     def _images(self, texels: Texels) -> Texels:

@@ -10,7 +10,8 @@ from vobench.rendering.mitsuba_sun import PLUGIN as SUN_PLUGIN
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import Map
 
-# Rows and columns of the picture of a sky. A row is a third of a degree. With an even number none is on the horizon.
+# The rows and columns of the picture of a sky. A row spans about a third of a degree. The number of rows is even, so
+# that no row is on the horizon.
 SKY_PX = (512, 1024)
 PANORAMA_PX = (1024, 2048)
 
@@ -76,6 +77,7 @@ def emitter_plugin(mi: Any, light: Light) -> Plugin:
 
 
 def _spot(mi: Any, light: SpotLight) -> Plugin:
+    """The emitter of a spot light."""
     target_m = light.position_m + light.direction
     up = np.eye(3)[np.argmin(np.abs(light.direction))]  # the axis that is the least parallel to the direction
     to_world = mi.ScalarTransform4f().look_at(origin=list(light.position_m), target=list(target_m), up=list(up))
@@ -98,13 +100,14 @@ def _environment_map(mi: Any, sky: Sky) -> Plugin:
 
 
 def _sky_picture(sky: Sky) -> Map:
-    """The luminance (rows, columns, 3) float32 of a sky from the zenith to the nadir, in cd/m²."""
+    """The luminance (rows, columns, 3) float32 of a sky in cd/m². The first row is the zenith, the last the nadir."""
     rows, columns = SKY_PX if sky.panorama is None else PANORAMA_PX
-    theta = np.pi * np.arange(rows)[:, None] / (rows - 1)  # from the zenith
-    phi = 2 * np.pi * (np.arange(columns) + 0.5) / columns
-    # The rotation of the emitter maps (x, y, z) of the environment map to (x, -z, y) in the world.
-    x = np.sin(theta) * np.sin(phi)
-    y = np.sin(theta) * np.cos(phi)
-    z = np.cos(theta)
-    directions = np.stack(np.broadcast_arrays(x, y, z), -1)
+    theta = np.pi * np.arange(rows)[:, None] / (rows - 1)  # the angle from the zenith in rad, (rows, 1)
+    phi = 2 * np.pi * (np.arange(columns) + 0.5) / columns  # the azimuth in rad, (columns,)
+    # The directions of the pixels in the environment map, whose y axis points upwards.
+    map_x = np.sin(theta) * np.sin(phi)
+    map_y = np.cos(theta)
+    map_z = -np.sin(theta) * np.cos(phi)
+    # The emitter is rotated: (x, y, z) in the environment map is (x, -z, y) in the world.
+    directions = np.stack(np.broadcast_arrays(map_x, -map_z, map_y), -1)
     return np.asarray(sky.seen_cd_m2(directions), np.float32)

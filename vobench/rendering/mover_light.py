@@ -277,7 +277,7 @@ class MoverLight:
         rows = np.flatnonzero(light_lx > 0)
         origins_m = (places_m + LIFT_M * normals)[rows].astype(np.float32)
         segments_m = (FAR_M * directions[rows]).astype(np.float32)
-        is_visible = self._visibility.clear(origins_m, segments_m)
+        is_visible = self._visibility.is_unoccluded(origins_m, segments_m)
         if not is_on_pane:
             is_visible = is_visible & ~self._visibility.crosses_sky_pane(origins_m, segments_m)
         light_lx[rows] *= is_visible
@@ -318,8 +318,8 @@ class MoverLight:
         is_sky = np.array([isinstance(light, Sky) for light in self._scene.lights])[light_of]
         segments_m = np.where(is_sky[:, None], FAR_M * unit(vectors_m), SHORT_OF_END * vectors_m).astype(np.float32)
         origins_m = np.broadcast_to(probes_m[:, None], segments_m.shape).astype(np.float32)
-        passing = self._visibility.passing(origins_m.reshape(-1, 3), segments_m.reshape(-1, 3))
-        transmission = passing.reshape(segments_m.shape[:2])
+        flat_transmittance = self._visibility.transmittance(origins_m.reshape(-1, 3), segments_m.reshape(-1, 3))
+        transmission = flat_transmittance.reshape(segments_m.shape[:2])
 
         # Light through a pane already belongs to the emitter of this pane.
         open_sky = np.flatnonzero(is_open_sky)
@@ -366,7 +366,7 @@ class MoverLight:
         cosine = points.cosine(vectors_m)
         light_lx = strength * np.maximum(cosine, 0) * points.entering(cosine)
         rows = np.flatnonzero(light_lx > 0)
-        light_lx[rows] *= emitter.passing(self._visibility, points.points_m[rows], vectors_m[rows])
+        light_lx[rows] *= emitter.transmittance(self._visibility, points.points_m[rows], vectors_m[rows])
         return np.asarray(light_lx, np.float32)
 
 

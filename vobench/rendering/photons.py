@@ -120,7 +120,7 @@ class Reflectors:
         """The reflectance (P,) of faces (P,) at the given cosines of incidence."""
         share = self._gatherer.response.mirrored(face, cosine)
         panes = np.flatnonzero(self._is_pane[face])
-        share[panes] = self._gatherer.visibility.pane_mirrors(face[panes], cosine[panes])
+        share[panes] = self._gatherer.visibility.pane_reflectance(face[panes], cosine[panes])
         return share
 
     def flux_lm(
@@ -231,7 +231,7 @@ class Reflectors:
         points = points.take(lit)
         vectors_m = vectors_m[lit]
         flux_lm = flux_lm[lit] * self._mirrored(points.face, cosine[lit])
-        flux_lm *= emitter.passing(visibility, points.points_m, vectors_m)
+        flux_lm *= emitter.transmittance(visibility, points.points_m, vectors_m)
         passed = np.flatnonzero(flux_lm > 0)
         points = points.take(passed)
         incoming = vectors_m[passed] / np.linalg.norm(vectors_m[passed], axis=1, keepdims=True)

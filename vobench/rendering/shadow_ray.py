@@ -19,7 +19,7 @@ from vobench.rendering.sobol_pattern import SobolPattern
 from vobench.rendering.texel import Texels
 from vobench.rendering.thread_pool import chunked
 
-# The angular widths of an emitter up to which fewer rays are needed.
+# Angular widths of emitters. The wider an emitter is, the more shadow rays are cast at it.
 NARROW_RAD = 0.15
 WIDE_RAD = 0.6
 WIDER_RAD = 1.5
@@ -27,9 +27,10 @@ WIDER_RAD = 1.5
 
 @dataclass(frozen=True, slots=True)
 class RayGrid:
-    """The shadow rays of a texel: one to each cell of an emitter that is divided into side x side cells.
+    """The shadow rays of a texel: one ray to each of the side x side cells of an emitter.
 
-    `is_spread` is whether the rays start at points in the area of the texel, instead of its centre.
+    `side` is the number of cells along each side of the emitter.
+    `is_spread` is whether the rays start at random points on the area of the texel instead of its centre.
     """
 
     side: int
@@ -40,9 +41,9 @@ class RayGrid:
 class ArrivedLight:
     """The light that arrives at N points along shadow rays.
 
-    `light` (N,) is the illuminance in lx, under a coat only the light that enters it.
-    `clear_share` (N,) is the share of rays that hit nothing opaque, NaN without rays.
-    `unshadowed` (N,) is the illuminance without any obstacle.
+    `light` (N,) is the illuminance in lx. At points with a coat, only the light that enters the coat is counted.
+    `clear_share` (N,) is the share of the rays that hit no opaque face. It is NaN if no ray was cast.
+    `unshadowed` (N,) is the illuminance in lx that there would be without any obstacle.
     """
 
     light: Floats
@@ -51,15 +52,20 @@ class ArrivedLight:
 
 
 def reachable(emitter: Emitter, points: Texels, rows: Rows) -> Rows:
-    """The points among the rows (N,) that the light of an emitter can reach, as far as this is known without rays."""
+    """The rows of the points, among `rows` (N,), that the light of an emitter may reach.
+
+    Points that face away from the emitter, and those that it cannot reach for another reason, are excluded. No rays are
+    cast, so an obstacle may still block the light.
+    """
 
     def reachable_part(part: slice) -> Rows:
         part_rows = rows[part]
         is_ahead = np.empty(len(part_rows), bool)
         ball = emitter.ball
         ahead_of(points.points_m, points.normals, part_rows, ball.centre_m, ball.radius_m, is_ahead)
-        part_rows = part_rows[is_ahead]
-        return np.asarray(part_rows[emitter.may_reach(points.points_m[part_rows])])
+        rows_ahead = part_rows[is_ahead]
+        may_reach = emitter.may_reach(points.points_m[rows_ahead])
+        return np.asarray(rows_ahead[may_reach])
 
     return chunked(reachable_part, len(rows))
 
@@ -69,21 +75,24 @@ def first_sides(
     points_m: Floats,
     side: int,
 ) -> NDArray[np.int64]:
-    """The side (P,) of the first grid of rays from points (P, 3) to an emitter; 1 if its shadows are hard.
+    """The side (P,) of the first grid of rays from each of the points (P, 3) to an emitter.
 
-    It depends on the angular width of the emitter. `side` is the one for a medium width.
+    It grows with the angular width of the emitter, and is 1 if the shadows of the emitter are hard. `side` is the side
+    from which the others are derived, as fractions of it.
     """
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
     half = max(side // 2, 1)
     three_quarters = max(3 * side // 4, 1)
-    # An open sky needs many rays, because few of them pass through a small opening. A pane needs many rays because its
-    # frame reflects much of its light into the room.
     one_and_a_half = 3 * side // 2
+    # A pane needs many rays, because its frame reflects much of its light into the room. An open sky needs many rays,
+    # because few of them pass through a small opening.
     if emitter.sky == "pane":
-        conditions = [width_rad < NARROW_RAD, width_rad < WIDE_RAD, width_rad < WIDER_RAD]
-        return np.select(conditions, [half, three_quarters, side], one_and_a_half)
-    conditions = [width_rad == 0, width_rad < WIDE_RAD, width_rad < WIDER_RAD]
-    return np.select(conditions, [1, half, three_quarters], one_and_a_half)
+        is_narrower = [width_rad < NARROW_RAD, width_rad < WIDE_RAD, width_rad < WIDER_RAD]
+        sides = [half, three_quarters, side]
+    else:
+        is_narrower = [width_rad == 0, width_rad < WIDE_RAD, width_rad < WIDER_RAD]
+        sides = [1, half, three_quarters]
+    return np.select(is_narrower, sides, default=one_and_a_half)
 
 
 def cast_shadow_rays(  # noqa: PLR0917
@@ -96,16 +105,18 @@ def cast_shadow_rays(  # noqa: PLR0917
 ) -> ArrivedLight:
     """Cast a grid of shadow rays from each of the points at rows (N,) to an emitter.
 
-    With a pattern, the rays of neighbouring texels are stratified together.
+    If a pattern is given, the rays of neighbouring texels are stratified together.
     """
 
     def cast(part: slice) -> Floats:
         texels = points.take(rows[part])
         if pattern:
-            texels = replace(texels, dither=pattern.offsets(texels.index, texels.dither))
+            offsets = pattern.offsets(texels.index, texels.dither)
+            texels = replace(texels, dither=offsets)
         return _cast(emitter, texels, occluder, grid)
 
-    return ArrivedLight(*chunked(cast, len(rows)).T)
+    light, clear_share, unshadowed = chunked(cast, len(rows)).T
+    return ArrivedLight(light, clear_share, unshadowed)
 
 
 def _cast(
@@ -114,9 +125,13 @@ def _cast(
     occluder: Occluder,
     grid: RayGrid,
 ) -> Floats:
-    """The columns (P, 3) of `ArrivedLight` at texels."""
+    """The fields of `ArrivedLight` as the columns of an array (P, 3), for texels (P,)."""
     count = len(texels)
-    total, unshadowed, passed_count, ray_count = np.zeros((4, count), np.float32)
+    total_lx = np.zeros(count, np.float32)
+    total_unshadowed_lx = np.zeros(count, np.float32)
+    clear_count = np.zeros(count, np.float32)
+    ray_count = np.zeros(count, np.float32)
+    # Buffers for the rays of one cell, of which only the lit ones are cast.
     rows = np.empty(count, np.int32)
     origins_m = np.empty((count, 3), np.float32)
     segments_m = np.empty((count, 3), np.float32)
@@ -126,13 +141,32 @@ def _cast(
         lit_count = lit_rays(texels.points_m, vectors_m, light, rows, origins_m, segments_m)
         lit = slice(lit_count)
         if grid.is_spread:
-            steps_m = (texels.step_u_m, texels.step_v_m)
-            spread_over_texels(texels.dither, *steps_m, cell, rows[lit], origins_m[lit], segments_m[lit])
-        share = emitter.passing(occluder, origins_m[lit], segments_m[lit])
-        add_arrived(rows[lit], share.astype(np.float32), light, total, unshadowed, passed_count, ray_count)
-    with np.errstate(invalid="ignore"):
-        clear_share = passed_count / ray_count
-    return np.stack([total / grid.side**2, clear_share, unshadowed / grid.side**2], -1)
+            spread_over_texels(
+                texels.dither,
+                texels.step_u_m,
+                texels.step_v_m,
+                cell,
+                rows[lit],
+                origins_m[lit],
+                segments_m[lit],
+            )
+        transmittance = emitter.transmittance(occluder, origins_m[lit], segments_m[lit])
+        add_arrived(
+            rows[lit],
+            transmittance.astype(np.float32),
+            light,
+            total_lx,
+            total_unshadowed_lx,
+            clear_count,
+            ray_count,
+        )
+
+    cell_count = grid.side**2
+    with np.errstate(invalid="ignore"):  # 0 / 0 is NaN, for texels without rays
+        clear_share = clear_count / ray_count
+    mean_lx = total_lx / cell_count
+    mean_unshadowed_lx = total_unshadowed_lx / cell_count
+    return np.stack([mean_lx, clear_share, mean_unshadowed_lx], -1)
 
 
 def unshadowed_light(
@@ -141,9 +175,10 @@ def unshadowed_light(
     rows: Rows,
     side: int,
 ) -> tuple[Floats, Mask]:
-    """The unshadowed illuminance (N,) of the points at rows, and whether each value is sampled (N,).
+    """The unshadowed illuminance (N,) in lx of the points at `rows`, and whether each value is sampled (N,).
 
-    It is computed with a formula if there is one, otherwise it is sampled at side x side places of the emitter or more.
+    If the emitter has a formula for the illuminance of a point, the formula is used. Otherwise the illuminance is
+    sampled at side x side places of the emitter, or at more if the emitter requires it.
     """
     light = chunked(lambda part: emitter.unshadowed_light(points.take(rows[part])), len(rows))
     is_sampled = np.isnan(light)
@@ -158,7 +193,7 @@ def unshadowed_light(
 
 
 def _mean_light(emitter: Emitter, texels: Texels, side: int) -> Floats:
-    """The mean illuminance (P,) of side x side places on an emitter."""
+    """The illuminance (P,) in lx of texels by an emitter, as the mean over side x side places on it."""
     aim = emitter.towards(texels)
     total = np.zeros(len(texels), np.float32)
     for cell in range(side**2):
@@ -173,8 +208,14 @@ def _light_of_cell(
     cell: int,
     side: int,
 ) -> tuple[Floats, Floats]:
-    """The vectors (P, 3) to places in one of side x side cells of an emitter, and the unshadowed illuminance (P,)."""
-    a, b, light = np.empty((3, len(texels)), np.float32)
+    """Random places in one of the side x side cells of an emitter, one for each texel.
+
+    Returns the vectors (P, 3) in m from the texels to the places, and the unshadowed illuminance (P,) in lx.
+    """
+    count = len(texels)
+    a = np.empty(count, np.float32)
+    b = np.empty(count, np.float32)
+    light = np.empty(count, np.float32)
     places_in_cell(texels.dither, cell, side, a, b)
     vectors_m, strength = aim(a, b)
     vectors_m = np.ascontiguousarray(vectors_m, np.float32)

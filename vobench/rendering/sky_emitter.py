@@ -61,7 +61,7 @@ class SkyPane(Emitter):
 
         Only rays that may cross another pane (P,) are tested for it.
         """
-        transmitted = self.visibility.pane_passes(self.pane, directions)
+        transmitted = self.visibility.pane_transmittance(self.pane, directions)
         luminance_cd_m2 = self.light.luminance_cd_m2(directions) * transmitted
         rows = np.flatnonzero(may_cross_other)
         beyond_m = places_m[rows] + 2 * RAY_OFFSET_M * directions[rows]
@@ -72,16 +72,19 @@ class SkyPane(Emitter):
         """The width of its bounding sphere."""
         return sphere_width_rad(self.ball, points_m)
 
-    def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
-        """The share (R,) of light that is not blocked, and that panes between the points and this pane transmit."""
-        share = occluder.clear(origins_m, segments_m).astype(np.float32)
-        rays = np.flatnonzero(share)
+    def transmittance(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
+        """The transmittance (R,) between the points and this pane. It is 0 behind an opaque face.
+
+        The transmittance of this pane is not included, because it is a part of the strength of the emitter.
+        """
+        transmittance = occluder.is_unoccluded(origins_m, segments_m).astype(np.float32)
+        rays = np.flatnonzero(transmittance)
         start_m = origins_m[rays]
         ray_m = segments_m[rays]
         pane_at = -self.pane.height_m(start_m) / (ray_m @ self.pane.normal)  # in lengths of the segment
         before_pane = ((1 - 1e-4) * pane_at[:, None]).astype(np.float32)
-        share[rays] *= occluder.through_panes(start_m, ray_m * before_pane)
-        return share
+        transmittance[rays] *= occluder.transmittance_of_panes(start_m, ray_m * before_pane)
+        return transmittance
 
     def _places(self, texels: Texels) -> Aim:
         """A function that returns vectors to places on the pane, and the solid angle in sr that each represents."""
@@ -138,12 +141,12 @@ class OpenSky(Emitter):
         """The square root of the solid angle of a hemisphere."""
         return np.full(len(points_m), np.sqrt(2 * np.pi), np.float32)
 
-    def passing(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
-        """The share (R,) of light that faces and panes transmit; 0 through panes that are emitters themselves."""
-        share = occluder.passing(origins_m, segments_m)
-        rays = np.flatnonzero(share)
-        share[rays] *= ~self.visibility.crosses_sky_pane(origins_m[rays], segments_m[rays])
-        return share
+    def transmittance(self, occluder: Occluder, origins_m: Floats, segments_m: Floats) -> Floats:
+        """The transmittance (R,) of faces and panes. It is 0 through panes that are emitters themselves."""
+        transmittance = occluder.transmittance(origins_m, segments_m)
+        rays = np.flatnonzero(transmittance)
+        transmittance[rays] *= ~self.visibility.crosses_sky_pane(origins_m[rays], segments_m[rays])
+        return transmittance
 
     def unshadowed_light(self, texels: Texels) -> Floats:
         """The illuminance (P,), read from a table by the normal; NaN where the normal is not that of the flat face."""

@@ -91,11 +91,11 @@ class SpecularTracer:
         rays, panes = self._visibility.first_panes(batch.origins_m, batch.directions, reach_m)
         at_panes = batch.take(rays)
         segments_m = at_panes.directions * reach_m[rays, None]
-        batch.weight[rays] *= self._visibility.through_panes(at_panes.origins_m, segments_m)
+        batch.weight[rays] *= self._visibility.transmittance_of_panes(at_panes.origins_m, segments_m)
 
         normals = self._visibility.normals[panes.face]
         along_normal = np.einsum("ij,ij->i", at_panes.directions, normals)
-        weight = at_panes.weight * self._visibility.pane_mirrors(panes.face, along_normal)
+        weight = at_panes.weight * self._visibility.pane_reflectance(panes.face, along_normal)
         selected = np.empty(len(weight), np.int64)
         selected = selected[: chosen_rays(weight, at_panes.point, dither, selected)]
         reflected = at_panes.take(selected)

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from vobench.rendering.array_types import Floats, Mask, Rows
-from vobench.rendering.blend_kernels import TURNED, Blending, count_weights, write_weights
+from vobench.rendering.blend_kernels import NORMAL_WEIGHT, Blending, count_weights, write_weights
 from vobench.rendering.surfel import RAISED, Surfels
 from vobench.rendering.texel import Texels
 from vobench.rendering.texel_layout import TexelLayout
@@ -51,7 +51,7 @@ def blend(
 
 def _neighbours(middles: Texels, step_m: Floats, usable_surfels: Rows) -> Rows:
     """The usable surfels (S, K) that are nearest to each surfel, in position and direction."""
-    places = np.hstack([middles.points_m, TURNED * step_m[:, None] * middles.normals])  # (S, 6)
+    places = np.hstack([middles.points_m, NORMAL_WEIGHT * step_m[:, None] * middles.normals])  # (S, 6)
     tree = scipy.spatial.cKDTree(places[usable_surfels])
     _, nearest = tree.query(places, k=min(NEIGHBOURS, len(usable_surfels)))
     return np.sort(usable_surfels[nearest.reshape(len(middles), -1)], axis=1)

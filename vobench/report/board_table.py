@@ -18,31 +18,36 @@ SIGNIFICANT_DIGITS = 3
 MOST_DECIMALS = 5
 LEAST_SCORE_DECIMALS = 3
 MOST_SCORE_DECIMALS = 7
-LEAST_MAGNITUDE = 1e-9  # smaller numbers are printed like this one, as log10(0) does not exist
+LEAST_MAGNITUDE = 1e-9  # smaller numbers have the exponent of this one, because log10(0) is undefined
 LEGEND = (
-    "* best of its case; ~ not decided against the best on this very case, which takes at least four trials per cell. "
-    "With several trials: median and range. ATE: RMSE of position after SE(3) alignment, or Sim(3) alignment where "
-    "marked; the median over cases. × best: error relative to the first-ranked estimator where both survive, with its "
-    "95 % interval for other places and drives of this kind. Lost: failed trials. Estimators are ordered by the score "
-    "(1 is perfect), in which a failed trial loses at least 1/2. Ranks in brackets: their 95 % interval. Decided: "
-    "against the estimator above, by a t test over places (2 %, Holm). Baselines, oracles and estimates that equal the "
-    "truth have no rank."
+    "* best in its case; ~ not significantly worse than the best in this case (tested only with four or more trials "
+    "per cell). Cells with several trials show their median and range. ATE: RMSE of position after SE(3) alignment, or "
+    "Sim(3) alignment where marked; the totals show the median over cases. × best: error relative to the first-ranked "
+    "estimator, on cases where neither fails, with the 95 % confidence interval for other places and drives of this "
+    "kind. Lost: failed trials. Estimators are ordered by the score (1 is perfect), in which a failed trial loses at "
+    "least 1/2. The 95 % confidence interval of a rank is in brackets. Decided: whether the difference to the "
+    "estimator above is significant, by a t test over places (2 %, Holm). Baselines, oracles and estimates that equal "
+    "the ground truth have no rank."
 )
 
 
-# The same for a terminal.
+# A shorter legend, for terminals.
 SHORT_LEGEND = (
-    "* best of its case; ~ not decided against it, by four repeats or more. × best: error relative to the first, where "
-    "both survive. ◆ nothing better is cheaper. leaderboard.html explains the rest."
+    "* best in its case; ~ not significantly worse (tested only with four or more trials per cell). × best: error "
+    "relative to the first, on cases where neither fails. ◆ no estimator with a better score is cheaper. "
+    "leaderboard.html explains the rest."
 )
 
 
 @dataclass(frozen=True, slots=True)
 class ShownCell:
-    """The text of a cell.
+    """A cell as it is printed.
 
-    text: the median of its trials, or the status if all of them failed. range: lowest and highest value, and how many
-    trials failed. mark: `*` or `~`, see LEGEND.
+    `text` is the median of the trials, or their status if all of them failed.
+    `range` gives the lowest and the highest value, and the number of failed trials. It is empty if all values are equal
+    and no trial failed.
+    `mark` is `*`, `~` or empty. LEGEND explains the marks.
+    `failed` is whether any trial failed.
     """
 
     text: str
@@ -56,7 +61,7 @@ class ShownCell:
 
 
 def matrix(board: Board, metric: str) -> list[tuple[str, list[ShownCell]]]:
-    """Each case with its cells, one per estimator; the best estimator comes first."""
+    """The rows of the matrix of a metric: the name of each case, and its cells, one per estimator, the best first."""
     marked = marks(board, metric)
     rows = []
     for case in board.cases:
@@ -64,12 +69,14 @@ def matrix(board: Board, metric: str) -> list[tuple[str, list[ShownCell]]]:
         for estimator in board.estimators:
             cell = board.cell(case, estimator)
             mark = marked.get((case, estimator), "")
-            shown.append(_shown(cell, metric, mark) if cell else ShownCell(""))
+            shown_cell = _shown(cell, metric, mark) if cell else ShownCell("")
+            shown.append(shown_cell)
         rows.append((case, shown))
     return rows
 
 
 def _shown(cell: Cell, metric: str, mark: str) -> ShownCell:
+    """The text of a cell for a metric. A cell whose trials all failed shows their status, but for costs its value."""
     failures = f"{cell.failed}/{cell.trials} {cell.status}"
     all_failed = cell.failed == cell.trials
     if all_failed and metric not in COSTS:
@@ -81,7 +88,7 @@ def _shown(cell: Cell, metric: str, mark: str) -> ShownCell:
         return ShownCell(NO_VALUE)
 
     format_value = _score_text if METRICS[metric].higher_is_better else number
-    median, lowest, highest = (format_value(value) for value in spread)
+    median, lowest, highest = map(format_value, spread)
     remarks_in_brackets = []
     if lowest != highest:
         remarks_in_brackets.append(f"{lowest}–{highest}")
@@ -95,38 +102,48 @@ def _score_text(value: float) -> str:
 
 
 def number(value: float | None) -> str:
-    """A number with three significant digits and at most five decimals."""
+    """A number with three significant digits and at most five decimals; a dash for None."""
     if value is None:
         return NO_VALUE
     if value == 0:
         return "0"
-    decimals = min(max(SIGNIFICANT_DIGITS - 1 - _exponent(value), 0), MOST_DECIMALS)
+    wanted_decimals = SIGNIFICANT_DIGITS - 1 - _exponent(value)
+    decimals = min(max(wanted_decimals, 0), MOST_DECIMALS)
     return f"{value:.{decimals}f}"
 
 
 def named(estimator: str, claims: Sequence[str]) -> str:
     """The name of an estimator, with the claims of its manifest in brackets."""
-    return f"{estimator} [{', '.join(claims)}]" if claims else estimator
+    if not claims:
+        return estimator
+    return f"{estimator} [{', '.join(claims)}]"
 
 
 def rank(total: Total) -> str:
-    """The rank of an estimator, with its interval if there is one wider than one rank; empty if it has no rank."""
+    """The rank of an estimator, with its confidence interval if that has more than one rank.
+
+    The text is empty if the estimator has no rank.
+    """
     if total.rank is None:
         return ""
     low, high = total.ranks or (total.rank, total.rank)
-    return f"{total.rank}" if low == high else f"{total.rank} ({low}–{high})"
+    if low == high:
+        return f"{total.rank}"
+    return f"{total.rank} ({low}–{high})"
 
 
 def total_score(total: Total) -> str:
-    """The score of an estimator, with as many decimals as its loss needs for two digits."""
+    """The score of an estimator, with enough decimals for two significant digits of its loss."""
     loss = 1 - total.score
-    decimals = min(max(1 - _exponent(loss), LEAST_SCORE_DECIMALS), MOST_SCORE_DECIMALS)
+    wanted_decimals = 1 - _exponent(loss)
+    decimals = min(max(wanted_decimals, LEAST_SCORE_DECIMALS), MOST_SCORE_DECIMALS)
     return f"{total.score:.{decimals}f}"
 
 
 def _exponent(value: float) -> int:
-    """The decimal exponent of a number's magnitude, -2 of 0.05."""
-    return floor(log10(max(abs(value), LEAST_MAGNITUDE)))
+    """The decimal exponent of a number, such as -2 for 0.05."""
+    magnitude = max(abs(value), LEAST_MAGNITUDE)
+    return floor(log10(magnitude))
 
 
 def _name(total: Total) -> str:
@@ -166,7 +183,7 @@ def _memory(total: Total) -> str:
 COST = "CPU ms/frame"
 MEMORY = "MiB"
 DECIDED = "decided"
-# The columns of the totals: the heading of each, and the text of its cells.
+# The columns of the totals: the heading of each column, and the function that returns the text of its cells.
 COLUMNS: dict[str, Callable[[Total], str]] = {
     "#": rank,
     "estimator": _name,
@@ -182,9 +199,9 @@ HEADINGS = tuple(COLUMNS)
 
 
 def totals(board: Board) -> list[tuple[str, list[list[str]]]]:
-    """The title of each division, with a row of headings and the rows of its estimators.
+    """The tables of totals, one per division: its title, and its rows, of which the first has the headings.
 
-    The columns of costs are left out if no cost is known, and that of decisions if nothing is tested.
+    The columns of costs are omitted if no cost is known. The column of decisions is omitted if nothing is tested.
     """
     headings = _headings_of_totals(board.totals)
     totals_by_group: dict[str, list[Total]] = {}
@@ -209,9 +226,14 @@ def _headings_of_totals(totals: Sequence[Total]) -> list[str]:
 
 
 def _division_title(group: str, total: Total) -> str:
-    """The name of a division, if it has one, and how many cases, drives and places its totals are over."""
-    counts = [counted(total.cases, "case"), counted(total.drives, "drive"), counted(total.places, "place")]
-    return ", ".join([group, *counts] if group else counts)
+    """The name of a division, if it has one, and the numbers of cases, drives and places that its totals cover."""
+    counts = [
+        counted(total.cases, "case"),
+        counted(total.drives, "drive"),
+        counted(total.places, "place"),
+    ]
+    words = [group, *counts] if group else counts
+    return ", ".join(words)
 
 
 def _total_row(total: Total, headings: Sequence[str]) -> list[str]:
@@ -219,13 +241,18 @@ def _total_row(total: Total, headings: Sequence[str]) -> list[str]:
 
 
 def board_notes(board: Board) -> list[str]:
-    """All sentences below the tables of a board, the most important first."""
+    """All sentences that follow the tables of a board, the most important first."""
     unbroken = [curve.sentence for curve in board.curves if curve.breaks_at is None]
     return [*remarks(board), *cell_notes(board), *unbroken]
 
 
 def remarks(board: Board) -> list[str]:
-    """Sentences on the totals: what they cover, who breaks down where, and how undecided orders could be decided."""
+    """Sentences about the totals, in this order.
+
+    1. which cases the totals cover,
+    2. at which severity estimators break down,
+    3. which neighbours have an undecided order, and how many more places would decide it.
+    """
     breaking = [curve.sentence for curve in board.curves if curve.breaks_at is not None]
     undecided = []
     for above, total in zip(board.totals, board.totals[1:], strict=False):
@@ -235,32 +262,41 @@ def remarks(board: Board) -> list[str]:
 
 
 def _undecided(above: Total, total: Total) -> str:
-    """A sentence on two undecided neighbours: the ratio that would have been decided, and what a chosen one takes."""
+    """The sentence about two neighbours whose order is not decided.
+
+    It states the ratio of losses that the test would have detected, and the number of further places that are needed to
+    detect CHOSEN_RATIO.
+    """
     order = f"The order of {above.estimator} and {total.estimator} is not decided (p = {total.p_above:.2g})"
-    found = f"a ratio of losses of {number(total.smallest_ratio)} would have been"
-    more = (total.places_needed or 0) - total.places
-    if more <= 0:
-        return f"{order}; {found}"
-    return f"{order}; {found}, and {CHOSEN_RATIO:g} takes about {counted(more, 'more place')}"
+    detectable = f"a ratio of losses of {number(total.smallest_ratio)} would have been"
+    more_places = (total.places_needed or 0) - total.places
+    if more_places <= 0:
+        return f"{order}; {detectable}"
+    return f"{order}; {detectable}, and {CHOSEN_RATIO:g} takes about {counted(more_places, 'more place')}"
 
 
 def cell_notes(board: Board) -> list[str]:
-    """The notes on all cells without duplicates; each names its first case if the board has several cases."""
-    cases_of = dict[str, list[str]]()
+    """The notes on all cells, each of them once.
+
+    If the board has several cases, each note begins with the first case that it is about, and the number of the others.
+    """
+    cases_by_note = dict[str, list[str]]()
     for cell in board.cells:
         for note in notes(cell):
-            cases_of.setdefault(note, []).append(cell.case)
+            cases_by_note.setdefault(note, []).append(cell.case)
     if len(board.cases) == 1:
-        return list(cases_of)
+        return list(cases_by_note)
 
     sentences = []
-    for note, cases in cases_of.items():
+    for note, cases in cases_by_note.items():
         others = f" and {len(cases) - 1} more" if len(cases) > 1 else ""
         sentences.append(f"{cases[0]}{others}: {note}")
     return sentences
 
 
 def origin(board: Board) -> str:
-    """The processor, driver and versions of the run in one line; empty if they are unknown."""
-    line = board.environment.line() if board.environment else ""
+    """One line with the processor, driver and versions of the run; empty if they are unknown."""
+    if not board.environment:
+        return ""
+    line = board.environment.line()
     return f"Made on {line}" if line else ""

@@ -1,6 +1,7 @@
 """The figure of breakdown curves: the lost-aware score of each estimator as a scenario grows more severe."""
 
 from collections.abc import Iterable, Mapping
+from math import ceil
 from statistics import median
 
 from matplotlib.artist import Artist
@@ -15,7 +16,7 @@ from vobench.report.figure_style import LINE_WIDTH, NEUTRAL, line_style, marker_
 from vobench.report.inline_figure import new_figure
 from vobench.report.path_figure import LEGEND_INCHES
 
-LEAST_PANEL_INCHES = 1.6  # the width of the curves of one scenario
+LEAST_PANEL_INCHES = 1.6  # the smallest width of the panel of a scenario
 PANEL_HEIGHT_INCHES = 1.35
 MOST_COLUMNS = 5
 BAND_ALPHA = 0.15
@@ -24,34 +25,59 @@ Scenario = tuple[str, str]  # the group of the cases, and the scenario
 
 
 def breakdown_figure(cells: Iterable[Cell], index_of: Mapping[str, int], width_inches: float) -> Figure:
-    """The median score over severity, one panel for each scenario; bands span all trials.
+    """The median score over severity, with one panel for each scenario. Bands span the scores of all trials.
 
     Raises InputError if no scenario has two severities.
     """
     curves = _curves_by_scenario(scores_by_severity(cells))
     if not curves:
         raise InputError("no scenario of this run has two severities")
-    columns = min(len(curves), MOST_COLUMNS, max(1, int(width_inches / LEAST_PANEL_INCHES)))
-    rows = -(-len(curves) // columns)
-    with new_figure(width_inches, rows * PANEL_HEIGHT_INCHES + LEGEND_INCHES) as figure:
+    panels_per_row = max(1, int(width_inches / LEAST_PANEL_INCHES))
+    columns = min(len(curves), MOST_COLUMNS, panels_per_row)
+    rows = ceil(len(curves) / columns)
+    height_inches = rows * PANEL_HEIGHT_INCHES + LEGEND_INCHES
+
+    with new_figure(width_inches, height_inches) as figure:
         grid = figure.subplots(rows, columns, sharey=True, squeeze=False)
         panels = list(grid.flat)
-        handle_of: dict[str, Artist] = {}
         for axes, (scenario, scores_by_estimator) in zip(panels, curves.items(), strict=False):
-            for estimator, scores in scores_by_estimator.items():
-                _draw_curve(axes, scores, index_of[estimator], estimator)
-            axes.axhline(BREAKDOWN_SCORE, color=NEUTRAL, lw=0.8, ls=":")
-            axes.set_title(", ".join(filter(None, scenario)), fontsize=8)
-            axes.set_ylim(0, 1.03)
-            axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-            for handle, label in zip(*axes.get_legend_handles_labels(), strict=True):
-                handle_of.setdefault(label, handle)
-        for axes in panels[len(curves) :]:
-            axes.set_axis_off()
+            _draw_panel(axes, scenario, scores_by_estimator, index_of)
+        for unused_axes in panels[len(curves) :]:
+            unused_axes.set_axis_off()
+
         figure.supxlabel("severity", fontsize=8)
         figure.supylabel("lost-aware score", fontsize=8)
-        figure.legend(list(handle_of.values()), list(handle_of), loc="outside lower center", ncols=3)
+        handle_of_label = _handle_of_label(panels)
+        handles = list(handle_of_label.values())
+        labels = list(handle_of_label)
+        figure.legend(handles, labels, loc="outside lower center", ncols=3)
     return figure
+
+
+def _draw_panel(
+    axes: Axes,
+    scenario: Scenario,
+    scores_by_estimator: Mapping[str, Mapping[int, list[float]]],
+    index_of: Mapping[str, int],
+) -> None:
+    """Draw the curves of all estimators for one scenario."""
+    for estimator, scores in scores_by_estimator.items():
+        _draw_curve(axes, scores, index_of[estimator], estimator)
+    axes.axhline(BREAKDOWN_SCORE, color=NEUTRAL, lw=0.8, ls=":")
+    title = ", ".join(filter(None, scenario))
+    axes.set_title(title, fontsize=8)
+    axes.set_ylim(0, 1.03)
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
+
+
+def _handle_of_label(panels: Iterable[Axes]) -> dict[str, Artist]:
+    """The first legend handle of each label in the panels."""
+    handle_of_label: dict[str, Artist] = {}
+    for axes in panels:
+        handles, labels = axes.get_legend_handles_labels()
+        for handle, label in zip(handles, labels, strict=True):
+            handle_of_label.setdefault(label, handle)
+    return handle_of_label
 
 
 def _curves_by_scenario(

@@ -12,13 +12,15 @@ from vobench.report.inline_figure import new_figure
 from vobench.report.path_figure import LEGEND_INCHES
 from vobench.report.total import Total
 
-HEIGHT = 0.7  # of a panel, relative to its width
+RELATIVE_PANEL_HEIGHT = 0.7  # the height of a panel relative to its width
 
 
 def cost_figure(totals: Sequence[Total], index_of: Mapping[str, int], width_inches: float) -> Figure:
-    """The median ATE over CPU time per frame, with a panel for each group of the board.
+    """The median ATE over CPU time per frame, with one panel for each group of the board.
 
-    A line joins the estimators that no cheaper one beats. Those without a rank, such as oracles, are left out.
+    A line joins the efficient estimators, which have a smaller error than all cheaper estimators. Estimators without a
+    rank, such as oracles, are omitted.
+
     Raises InputError if no estimator has both numbers.
     """
     points_by_group: dict[str, list[_Point]] = {}
@@ -27,7 +29,9 @@ def cost_figure(totals: Sequence[Total], index_of: Mapping[str, int], width_inch
     if not points_by_group:
         raise InputError("no ranked estimator has both an error and a CPU time")
     rows = len(points_by_group)
-    with new_figure(width_inches, HEIGHT * width_inches * rows + LEGEND_INCHES) as figure:
+    panel_height_inches = RELATIVE_PANEL_HEIGHT * width_inches
+    height_inches = rows * panel_height_inches + LEGEND_INCHES
+    with new_figure(width_inches, height_inches) as figure:
         panels = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
         for axes, (group, points) in zip(panels, points_by_group.items(), strict=True):
             _draw_points(axes, points, index_of)
@@ -65,13 +69,14 @@ class _Point:
 
 
 def _points(totals: Sequence[Total]) -> Iterator[_Point]:
+    """The ranked estimators that have both a CPU time and an error."""
     for total in totals:
         if total.rank is not None and total.cpu_ms and total.ate_percent:
             yield _Point(total, total.cpu_ms, total.ate_percent)
 
 
 def _label(total: Total) -> str:
-    """The name of an estimator, with the number of failed trials if there are any."""
+    """The name of an estimator, followed by the number of its failed trials if any failed."""
     if not total.failed:
         return total.estimator
     return f"{total.estimator} ({total.failed} of {total.trials} failed)"

@@ -13,13 +13,13 @@ from vobench.report.scored_case import ScoredCase, ScoredEstimate
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
-RELATIVE_SIZE = 1.5  # side of the square from above, relative to the longer side of the ground truth
-LEAST_HALF_SIDE_M = 0.05  # of that square, for a stationary robot
+RELATIVE_SIZE = 1.5  # the side of the square view from above, relative to the longer side of the ground truth
+LEAST_HALF_SIDE_M = 0.05  # the smallest half side of that square, which a stationary robot has
 LEGEND_INCHES = 0.5  # the height of a legend below the axes
-ROW_HEIGHT = 0.32  # of one of three axes, relative to the width of the figure
-RELATIVE_MARGIN = 0.25  # of a coordinate over time, beyond the range of the ground truth
-LEAST_MARGIN = 0.05  # the same, relative to the largest range of the three coordinates
-LEAST_RANGE_M = 0.1  # of the coordinates of a stationary robot
+ROW_HEIGHT = 0.32  # the height of the axes of one coordinate, relative to the width of the figure
+RELATIVE_MARGIN = 0.25  # the margin around a coordinate over time, relative to its range in the ground truth
+LEAST_MARGIN = 0.05  # the smallest margin, relative to the largest range of the three coordinates
+LEAST_RANGE_M = 0.1  # the smallest range that is assumed, which a stationary robot has
 TRUTH_STYLE: Any = {"color": "black", "lw": 2.2, "alpha": 0.45}
 
 
@@ -34,9 +34,9 @@ def path_figure(case: ScoredCase, width_inches: float) -> Figure:
 
 
 def draw_paths(axes: Axes, case: ScoredCase) -> None:
-    """Draw a case from above. An estimate without a score appears in the legend only.
+    """Draw a case from above. An estimate without a score appears only in the legend.
 
-    The axes are a square around the ground truth. A diverged estimate leaves it instead of shrinking the other paths.
+    The view is limited to a square around the ground truth, so that a diverged estimate cannot shrink the other paths.
     """
     x_m, y_m, _ = case.truth.positions_m.T
     axes.plot(x_m, y_m, **TRUTH_STYLE, label="ground truth")
@@ -60,6 +60,7 @@ def _mark_end(axes: Axes, estimate: ScoredEstimate) -> None:
 
 
 def _limit_to_truth(axes: Axes, truth: Trajectory) -> None:
+    """Limit the axes to a square around the ground truth."""
     low_m = truth.positions_m[:, :2].min(axis=0)  # (2,)
     high_m = truth.positions_m[:, :2].max(axis=0)
     centre_x_m, centre_y_m = (low_m + high_m) / 2
@@ -72,7 +73,9 @@ def _limit_to_truth(axes: Axes, truth: Trajectory) -> None:
 
 def axes_figure(case: ScoredCase, width_inches: float) -> Figure:
     """The x, y and z of the ground truth and of the aligned estimates of a case over time."""
-    with new_figure(width_inches, 3 * ROW_HEIGHT * width_inches + LEGEND_INCHES) as figure:
+    row_height_inches = ROW_HEIGHT * width_inches
+    height_inches = 3 * row_height_inches + LEGEND_INCHES
+    with new_figure(width_inches, height_inches) as figure:
         rows = figure.subplots(3, 1, sharex=True)
         for axis, axes in enumerate(rows):
             _draw_coordinate(axes, case, axis)
@@ -84,7 +87,7 @@ def axes_figure(case: ScoredCase, width_inches: float) -> Figure:
 
 
 def _draw_coordinate(axes: Axes, case: ScoredCase, axis: int) -> None:
-    """Draw one coordinate over time, within a range around that of the ground truth."""
+    """Draw one coordinate over time. The view is limited to the range of the ground truth and a margin around it."""
     start_ns = case.truth.t_ns[0]
     truth_s = (case.truth.t_ns - start_ns) / NS_PER_S
     truth_m = case.truth.positions_m[:, axis]
@@ -95,21 +98,25 @@ def _draw_coordinate(axes: Axes, case: ScoredCase, axis: int) -> None:
         axes.plot(time_s, coordinate_m, lw=LINE_WIDTH, label=estimate.label, **line_style(estimate.index))
     low_m = float(truth_m.min())
     high_m = float(truth_m.max())
-    largest_range_m = max(float(np.ptp(case.truth.positions_m, axis=0).max()), LEAST_RANGE_M)
+    ranges_m = np.ptp(case.truth.positions_m, axis=0)  # (3,)
+    largest_range_m = max(float(ranges_m.max()), LEAST_RANGE_M)
     margin_m = max(RELATIVE_MARGIN * (high_m - low_m), LEAST_MARGIN * largest_range_m)
     axes.set_ylim(low_m - margin_m, high_m + margin_m)
     axes.set_ylabel(f"{'xyz'[axis]} (m)")
 
 
 def _positions_with_gaps(estimate: ScoredEstimate) -> Array:
-    """The aligned positions (N, 3), with a row of NaN where frames have no pose; empty without a score."""
+    """The aligned positions (N, 3) of an estimate, with a row of NaN where frames have no pose.
+
+    The array is empty if the estimate has no score.
+    """
     if estimate.score is None:
         return np.zeros((0, 3))
     return with_gaps(estimate.score.aligned_positions_m, estimate.score.gt_frames)
 
 
 def _times_with_gaps_s(estimate: ScoredEstimate, start_ns: int) -> Array:
-    """The times (N,) of the positions since the start of the case."""
+    """The times (N,) of these positions in seconds since the start of the case."""
     if estimate.score is None:
         return np.zeros(0)
     time_s = (estimate.score.gt_t_ns - start_ns) / NS_PER_S
@@ -117,7 +124,7 @@ def _times_with_gaps_s(estimate: ScoredEstimate, start_ns: int) -> Array:
 
 
 def with_gaps(values: Array, frames: Stamps) -> Array:
-    """Values (K, ...) of frames (K,), with a row of NaN wherever frames are missing, so that a line is interrupted."""
+    """Values (K, ...) of frames (K,), with a row of NaN where frames are missing, so that a line has gaps there."""
     after_gap = np.flatnonzero(np.diff(frames) > 1) + 1
     interrupted: Array = np.insert(np.asarray(values, float), after_gap, np.nan, axis=0)
     return interrupted

@@ -23,15 +23,18 @@ MOST_DOTS = 3000
 # Limits of the axis that all statistics share: 0 is the low end of a statistic's band, 1 the high end.
 SCALE_LOW = -2.0
 SCALE_HIGH = 3.0
-RECORDING_SPACING = 0.28  # between recordings on the row of a statistic
+RECORDING_SPACING = 0.28  # the distance between recordings in the row of a statistic, relative to that between rows
 LINE_SAMPLES = 30
 LEAST_REACH_PX = 0.3
-FIT_QUANTILES = (0.005, 0.995)  # of the matches' positions, between which the fit is drawn
-MADS_SHOWN = 4  # median absolute deviations of the row errors, up and down
+FIT_QUANTILES = (0.005, 0.995)  # the fit is drawn between these quantiles of the positions of the matches
+MADS_SHOWN = 4  # the number of median absolute deviations of the row errors that are shown to each side of 0
 
 
 def save_realism_plot(path: Path, recordings: Mapping[str, Realism]) -> None:
-    """Plot recordings, by name, in the same panels, as SVG, PNG or PDF. Raises InputError for another ending."""
+    """Plot the statistics of recordings, by name, to an SVG, PNG or PDF file.
+
+    Raises InputError for another ending of the file name.
+    """
     check_ending(path)
     import matplotlib as mpl
     from matplotlib.figure import Figure
@@ -53,15 +56,16 @@ def save_realism_plot(path: Path, recordings: Mapping[str, Realism]) -> None:
 
 
 def _bands(axes: "Axes", recordings: Mapping[str, Realism]) -> None:
-    """Each statistic on a row of its own, scaled so that its band of real pictures lies between 0 and 1."""
+    """Plot each statistic in a separate row. It is scaled so that the band of real pictures lies between 0 and 1."""
+    middle_index = (len(recordings) - 1) / 2
     axes.axvspan(0, 1, color=BAND, lw=0)
     for index, (name, colour) in enumerate(zip(recordings, COLOURS, strict=False)):
         axes.plot([], [], "o", color=colour, ms=6, label=name)
-        offset = RECORDING_SPACING * (index - (len(recordings) - 1) / 2)
+        y_offset = RECORDING_SPACING * (index - middle_index)
         for row, statistic in enumerate(STATISTICS):
             value = recordings[name].values.get(statistic.name)
             if value is not None:
-                _band_marker(axes, statistic, value, row + offset, colour)
+                _band_marker(axes, statistic, value, row + y_offset, colour)
 
     axes.set_yticks(range(len(STATISTICS)), [_band_label(statistic) for statistic in STATISTICS])
     axes.set(ylim=(len(STATISTICS) - 0.4, -0.6), xlim=(SCALE_LOW - 0.3, SCALE_HIGH + 0.3))
@@ -76,7 +80,7 @@ def _band_label(statistic: Statistic) -> str:
 
 
 def _band_marker(axes: "Axes", statistic: Statistic, value: float, y: float, colour: str) -> None:
-    """Draw a value as a dot, or as an arrow at the edge if the axis does not reach that far."""
+    """Draw a value as a dot. If it is outside the limits of the axis, draw an arrow at the edge."""
     x = (value - statistic.low) / (statistic.high - statistic.low)
     x_shown = float(np.clip(x, SCALE_LOW, SCALE_HIGH))
     marker = "o"
@@ -98,7 +102,7 @@ def _band_marker(axes: "Axes", statistic: Statistic, value: float, y: float, col
 
 
 def _rows(across: "Axes", down: "Axes", recordings: Mapping[str, Realism]) -> None:
-    """Row errors of stereo matches along the width and along the height of the picture."""
+    """Plot the row errors of stereo matches along the width and along the height of the picture."""
     for realism, colour in zip(recordings.values(), COLOURS, strict=False):
         if realism.pair:
             _row_errors(across, realism.pair, 0, colour)

@@ -38,7 +38,7 @@ from vobench.trajectory.trajectory import Stamps, Trajectory
 
 PictureForm = Literal["jpeg", "png"]
 FrameRange = tuple[int, int]
-Unit = tuple[float, str]  # how many of it are a metre, and its name
+Unit = tuple[float, str]  # the number of units in a metre, and the name of the unit
 
 STATUS_COLORS: dict[str, Color] = {
     "init": (90, 140, 220),
@@ -50,18 +50,20 @@ STATUS_COLORS: dict[str, Color] = {
 }
 OTHER_STATUS_COLOR = (128, 128, 128)
 FAILED = ("lost", NO_OUTPUT)
-FRAMES_AROUND_REPLAY = 15  # before and after the frame that is replayed
-FRUSTUM_LINE = -1.5  # negative: in points of the screen, whatever the zoom
-FRAME_BYTES = 45_000  # of both pictures of a frame, out of 60,000 with tracks
+FRAMES_AROUND_REPLAY = 15  # the number of frames that are replayed before a failure, and after it
+FRUSTUM_LINE = -1.5  # the width of lines; negative widths are in points of the screen, independent of the zoom
+FRAME_BYTES = 45_000  # the largest size of both pictures of a frame together; with its tracks a frame has 60,000 bytes
 BEST_QUALITY = 85
 WORST_QUALITY = 10
 QUALITY_STEP = 5
 
 
 def save_trial(path: Path, trial: TrialView, *others: TrialView, form: PictureForm = "jpeg") -> None:
-    """Write a trial to an .rrd file that opens in Rerun with a layout of its own; `others` are on the same case.
+    """Write trials of one case to an .rrd file, with the layout in which Rerun opens it.
 
-    Pictures are JPEG of at most FRAME_BYTES a frame, or the PNG of the sequence.
+    `others` are further trials of the same case, which are shown side by side.
+    `form` is the format of the pictures: "jpeg" for JPEG with at most FRAME_BYTES per frame, or "png" for the PNG files
+    of the sequence.
     """
     trials = (trial, *others)
     title = ", ".join(view.title for view in trials)
@@ -72,7 +74,8 @@ def save_trial(path: Path, trial: TrialView, *others: TrialView, form: PictureFo
     ):
         stream.save(part)
         stream.send_recording_name(title)
-        log = FrameStream(stream, _log_pictures(stream, trial.frames(), form), trial.first)
+        stamps = _log_pictures(stream, trial.frames(), form)
+        log = FrameStream(stream, stamps, trial.first)
         _log_truth_path(log, trial)
         if trial.scene is not None:
             log_scene(log, trial.scene)
@@ -88,8 +91,12 @@ def save_trial(path: Path, trial: TrialView, *others: TrialView, form: PictureFo
 
 
 def application_id(title: str) -> str:
-    """The application of a trial, of the characters that Rerun accepts; one each, as Rerun keeps a layout for each."""
-    return "vobench-" + re.sub(r"[^A-Za-z0-9_]+", "-", title).strip("-")
+    """The Rerun application id of a trial.
+
+    Rerun stores one layout per application, so each trial has its own id. Characters that Rerun rejects are replaced.
+    """
+    accepted = re.sub(r"[^A-Za-z0-9_]+", "-", title).strip("-")
+    return f"vobench-{accepted}"
 
 
 def _layout(trials: Sequence[TrialView]) -> rrb.Blueprint:
@@ -106,7 +113,11 @@ def _layout(trials: Sequence[TrialView]) -> rrb.Blueprint:
 
 
 def _replayed_frames(trials: Sequence[TrialView]) -> FrameRange | None:
-    """The numbers of the first and the last frame around the first failure of any trial, None if none failed."""
+    """The numbers of the first and the last frame to replay, None if no trial has a failure.
+
+    They are around the first failed frame of the first trial that has one. If no frame failed, they are around the
+    frame at which the first wrong trial goes wrong.
+    """
     for trial in trials:
         around_failure = first_failure(trial.statuses)
         if around_failure:
@@ -114,12 +125,13 @@ def _replayed_frames(trials: Sequence[TrialView]) -> FrameRange | None:
     first = trials[0]
     for trial in trials:
         if trial.wrong_at is not None:
-            return _numbered(_around(trial.wrong_at, len(first.statuses)), first.first)
+            around_error = _around(trial.wrong_at, len(first.statuses))
+            return _numbered(around_error, first.first)
     return None
 
 
 def first_failure(statuses: Sequence[str]) -> FrameRange | None:
-    """The frames around the first failed one, None if no frame failed."""
+    """The first and the last frame around the first failed frame, None if no frame failed."""
     for index, status in enumerate(statuses):
         if status in FAILED:
             return _around(index, len(statuses))
@@ -127,20 +139,25 @@ def first_failure(statuses: Sequence[str]) -> FrameRange | None:
 
 
 def _around(index: int, count: int) -> FrameRange:
-    """The first and the last of the frames around one of `count`."""
-    reach = FRAMES_AROUND_REPLAY
-    return max(0, index - reach), min(count - 1, index + reach)
+    """The first and the last frame around the frame `index`, of `count` frames."""
+    first = max(0, index - FRAMES_AROUND_REPLAY)
+    last = min(count - 1, index + FRAMES_AROUND_REPLAY)
+    return first, last
 
 
 def _numbered(frames: FrameRange, offset: int) -> FrameRange:
+    """The frames with their numbers in the sequence, given the number of the first frame that is shown."""
     first, last = frames
     return first + offset, last + offset
 
 
 def _log_pictures(stream: rr.RecordingStream, frames: Iterable[EncodedFrame], form: PictureForm) -> Stamps:
-    """Log both pictures of each frame, with one frame in memory at a time; the stamps of the frames."""
+    """Log both pictures of each frame, and return the stamps of the frames.
+
+    Only one frame is in memory at a time.
+    """
     stamps = []
-    quality = BEST_QUALITY  # falls where frames would be too large, and stays there
+    quality = BEST_QUALITY  # it is reduced when a frame would be too large, and not increased again
     with ThreadPoolExecutor(2) as threads:
         for frame in frames:
             encoded = {TRUTH_LEFT: frame.left}
@@ -211,7 +228,10 @@ def _log_trial(log: FrameStream, trial: TrialView, color: Color, unit: Unit) -> 
 
 
 def _log_estimate(log: FrameStream, trial: TrialView, entities: EstimatorEntities, color: Color) -> None:
-    """Log the estimated path, interrupted at frames without a pose, and the left camera, which vanishes there."""
+    """Log the estimated path and the left camera.
+
+    At frames without a pose, the path is interrupted, and the camera is not shown.
+    """
     frames, samples = log.match(trial.estimate.t_ns)
     gaps = np.flatnonzero(np.diff(frames) > 1) + 1
     strips = np.split(trial.estimate.positions_m[samples], gaps)
@@ -226,7 +246,7 @@ def _log_estimate(log: FrameStream, trial: TrialView, entities: EstimatorEntitie
 def _log_camera(
     log: FrameStream, entity: str, camera: Camera, path: Trajectory, *, length_m: float, color: Color
 ) -> None:
-    """Log a camera along a path, drawn as a pyramid of a length."""
+    """Log a camera along a path. It is drawn as a pyramid with the length `length_m`."""
     frames, samples = log.match(path.t_ns)
     count = len(frames)
     log.poses(entity, frames, path.T_world_frame[samples])
@@ -249,7 +269,7 @@ def rerun_matrix(camera: Camera) -> Array:
 
 
 def _unit(trials: Sequence[TrialView]) -> Unit:
-    """The unit in which the largest error has few digits."""
+    """The unit of the errors: mm, cm or m, depending on the largest error of all trials."""
     errors_m = np.concatenate([trial.error_m for trial in trials])
     largest_m = float(errors_m[np.isfinite(errors_m)].max(initial=0.0))
     if largest_m < 0.1:
@@ -272,7 +292,10 @@ def _log_curve(log: FrameStream, entity: str, values: Array, name: str, color: C
 
 
 def _log_error_lines(log: FrameStream, trial: TrialView, entities: EstimatorEntities) -> None:
-    """Log the error of each frame as a line from truth to estimate, none where there is no pose."""
+    """Log the error of each frame as a line from the true to the estimated position.
+
+    A frame without a pose has no line.
+    """
     truth_frames, truth_samples = log.match(trial.ground_truth.t_ns)
     estimate_frames, estimate_samples = log.match(trial.estimate.t_ns)
     frames, truth_rows, estimate_rows = np.intersect1d(truth_frames, estimate_frames, return_indices=True)
@@ -286,13 +309,16 @@ def _log_error_lines(log: FrameStream, trial: TrialView, entities: EstimatorEnti
 
 
 def _log_points(log: FrameStream, points: Mapping[int, Array], entities: EstimatorEntities, color: Color) -> None:
-    """Log the points of the scene as the estimator reconstructs it; those of a frame stay until the next ones."""
+    """Log the points of the scene that the estimator reconstructs.
+
+    The points of a frame are shown until those of a later frame replace them.
+    """
     if not points:
         return
     frames = sorted(points)
     points_m = [points[index] for index in frames]
     columns = rr.Points3D.columns(positions=np.concatenate(points_m))
-    counts = [len(each) for each in points_m]
+    counts = [len(frame_points_m) for frame_points_m in points_m]
     log.static(entities.points, rr.Points3D.from_fields(colors=color, radii=LINE_RADIUS))
     log.columns(entities.points, np.array(frames), columns.partition(counts))
 
@@ -305,7 +331,7 @@ def _log_numbers(log: FrameStream, origin: str, numbers: Mapping[str, Array]) ->
 
 
 def _log_statuses(log: FrameStream, statuses: Sequence[str], entities: EstimatorEntities) -> None:
-    """Log the status where it changes: Rerun draws it until the next one."""
+    """Log the status at the frames where it changes. Rerun shows it until the next change."""
     known = list(dict.fromkeys([*STATUS_COLORS, *statuses]))
     colors = [STATUS_COLORS.get(status, OTHER_STATUS_COLOR) for status in known]
     log.static(entities.status, rr.StateConfiguration(values=known, colors=colors))
@@ -315,7 +341,7 @@ def _log_statuses(log: FrameStream, statuses: Sequence[str], entities: Estimator
 
 
 def _changes(statuses: Sequence[str]) -> Iterator[int]:
-    """The frames whose status is not that of the frame before."""
+    """The frames whose status differs from that of the previous frame."""
     before = None
     for index, status in enumerate(statuses):
         if status != before:

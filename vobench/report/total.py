@@ -15,19 +15,32 @@ from vobench.report.cell import Cell
 from vobench.report.division import is_ranked
 from vobench.runner.folder import NOT_APPLICABLE
 
-CHOSEN_RATIO = 1.5  # of losses, for which a board says how many places decide it
+CHOSEN_RATIO = 1.5  # the ratio of losses for which a board reports how many places are needed to detect it
 
 
 @dataclass(frozen=True, slots=True)
 class Total:
-    """One estimator over the cases of a division that every ranked estimator has: its rank, score and cost.
+    """The rank, score and cost of one estimator over the cases of a division that every ranked estimator has.
 
-    `group` is the division's label. `score` is the lost-aware score, 1 minus the geometric mean of the losses.
-    `ate_percent` is a median over cases. `error_ratio` is the error relative to the first-ranked estimator's on cases
-    where both survive, with its confidence interval. `rank` is None for baselines and oracles, which are not ranked.
-    `ranks`, its 95 % interval, and `decided_above` are None if nothing is tested. `smallest_ratio` of losses to the
-    estimator above would have been decided, and `places_needed` would decide a ratio of 1.5. `is_efficient` states
-    that no ranked estimator with a better score used less CPU time.
+    `group` is the label of the division.
+    `estimator` is the name of the estimator.
+    `claims` are the claims of its manifest.
+    `rank` is its rank in the division, or None for baselines and oracles, which are not ranked.
+    `ranks` is the 95 % confidence interval of the rank, or None if nothing is tested.
+    `score` is the lost-aware score, which is 1 minus the geometric mean of the losses.
+    `error_ratio` is the error relative to that of the first-ranked estimator, on cases where neither estimator fails.
+    `error_interval` is the 95 % confidence interval of `error_ratio`.
+    `p_above` is the p-value of the test against the estimator above, corrected for the number of such tests.
+    `decided_above` is whether this test is significant, or None if nothing is tested.
+    `smallest_ratio` is the smallest ratio of losses to the estimator above that this test detects in 95 % of runs.
+    `places_needed` is the number of places that are needed to detect a ratio of losses of CHOSEN_RATIO.
+    `trials` is the number of trials.
+    `failed` is the number of trials that failed.
+    `cases`, `drives` and `places` are the numbers of cases, drives and places of the trials.
+    `ate_percent` is the median ATE over cases, in percent of the length of the path.
+    `cpu_ms` is the mean CPU time per frame over cases, in milliseconds.
+    `memory_mib` is the largest memory of any case, in MiB.
+    `is_efficient` is whether no ranked estimator with a better score used less CPU time.
     """
 
     group: str
@@ -54,43 +67,61 @@ class Total:
 
 
 def ranked_table(cells: Sequence[Cell]) -> tuple[list[str], ranking.TrialTable | None]:
-    """The ranked estimators of a division by name, and their trials on the cases that all of them have, if any."""
+    """The sorted names of the ranked estimators of a division, and the table of their trials.
+
+    The table covers the cases that all ranked estimators have. It is None if there is no such case.
+    """
     ranked = [cell for cell in _applicable(cells) if is_ranked(cell)]
     names = sorted({cell.estimator for cell in ranked})
-    by_case = _grouped(ranked, lambda cell: cell.case)
-    common = [case for case, members in by_case.items() if len(members) == len(names)]
-    if not common:
+    cells_by_case = _grouped(ranked, lambda cell: cell.case)
+    shared_cases = _shared_cases(cells_by_case, len(names))
+    if not shared_cases:
         return names, None
-    by_estimator = _grouped([cell for cell in ranked if cell.case in set(common)], lambda cell: cell.estimator)
-    design = _design([by_case[case][0] for case in common])
-    return names, _trial_table(by_estimator, names, common, design)
+    shared = set(shared_cases)
+    shared_cells = [cell for cell in ranked if cell.case in shared]
+    cells_by_estimator = _grouped(shared_cells, lambda cell: cell.estimator)
+    design = _design([cells_by_case[case][0] for case in shared_cases])
+    return names, _trial_table(cells_by_estimator, names, shared_cases, design)
 
 
 def rank_division(label: str, cells: Sequence[Cell], *, is_sequential: bool = False) -> tuple[list[Total], list[str]]:
     """The totals of a division, the best estimator first, and remarks on what they cover.
 
-    `is_sequential` states that the number of units depends on what they showed. Baselines and oracles follow without a
-    rank. Cases without a sensor that an estimator requires are excluded for that estimator. If no case has it, the
+    Baselines and oracles have no rank, and follow the ranked estimators. If no estimator of the division can be ranked,
+    all of its estimators are listed without a rank.
+
+    `is_sequential` is whether the number of units was chosen during the run, depending on the results so far.
+
+    Cases without a sensor that an estimator requires are excluded for that estimator. If no case has it, the
     estimator counts as failed.
     """
     applicable = _applicable(cells)
     ranked = [cell for cell in applicable if is_ranked(cell)]
     competitors = ranked or applicable
     names = sorted({cell.estimator for cell in competitors})
-    by_case = _grouped(competitors, lambda cell: cell.case)
-    common = [case for case, members in by_case.items() if len(members) == len(names)]
+    cells_by_case = _grouped(competitors, lambda cell: cell.case)
+    shared_cases = _shared_cases(cells_by_case, len(names))
     remarks = []
-    if len(common) < len(by_case):
-        remarks.append(_shared_cases_remark(competitors, shared=len(common), cases=len(by_case)))
-    if not common:
+    if len(shared_cases) < len(cells_by_case):
+        remarks.append(_shared_cases_remark(competitors, shared=len(shared_cases), cases=len(cells_by_case)))
+    if not shared_cases:
         return [], remarks
 
-    beside = _beside(applicable, common) if ranked else []
-    ranked_names = names if ranked else []
-    design = _design([by_case[case][0] for case in common])
-    unranked = beside if ranked else names
+    if ranked:
+        ranked_names = names
+        unranked_names = _unranked_with_all(applicable, shared_cases)
+    else:
+        ranked_names = []
+        unranked_names = names
+    design = _design([cells_by_case[case][0] for case in shared_cases])
     totals = _totals(
-        label, applicable, common, design, ranked=ranked_names, unranked=unranked, is_sequential=is_sequential
+        label,
+        applicable,
+        shared_cases,
+        design,
+        ranked=ranked_names,
+        unranked=unranked_names,
+        is_sequential=is_sequential,
     )
     if len(ranked_names) > 1:
         remarks += _untested_remark(design)
@@ -107,54 +138,72 @@ def _totals(
     unranked: Sequence[str],
     is_sequential: bool,
 ) -> list[Total]:
-    """The totals of the ranked estimators in their order, then those of the others by score."""
+    """The totals of the ranked estimators by rank, followed by those of the unranked estimators by score."""
     shared = set(cases)
-    by_estimator = _grouped([cell for cell in cells if cell.case in shared], lambda cell: cell.estimator)
+    shared_cells = [cell for cell in cells if cell.case in shared]
+    cells_by_estimator = _grouped(shared_cells, lambda cell: cell.estimator)
 
     def total_of(name: str, standing: ranking.Standing, *, has_rank: bool) -> Total:
-        return _total(label, by_estimator[name], standing, design, has_rank=has_rank)
+        return _total(label, cells_by_estimator[name], standing, design, has_rank=has_rank)
 
     totals = list[Total]()
     first: list[str] = []
     if ranked:
-        table = _trial_table(by_estimator, ranked, cases, design, is_sequential=is_sequential)
+        table = _trial_table(cells_by_estimator, ranked, cases, design, is_sequential=is_sequential)
         for standing in ranking.rank(table):
             totals.append(total_of(ranked[standing.index], standing, has_rank=True))
         first = [totals[0].estimator]
 
     others = list[Total]()
     for name in unranked:
-        table = _trial_table(by_estimator, [*first, name], cases, design, is_sequential=is_sequential)
+        table = _trial_table(cells_by_estimator, [*first, name], cases, design, is_sequential=is_sequential)
         standing = ranking.beside(table)
         others.append(total_of(name, standing, has_rank=False))
     return totals + sorted(others, key=lambda total: -total.score)
 
 
-def _beside(cells: Sequence[Cell], cases: Sequence[str]) -> list[str]:
-    """The unranked estimators that have all of the cases."""
-    cases_of = _grouped([cell for cell in cells if not is_ranked(cell)], lambda cell: cell.estimator)
+def _shared_cases(cells_by_case: Mapping[str, Sequence[Cell]], estimator_count: int) -> list[str]:
+    """The cases that have a cell of every estimator."""
+    return [case for case, cells in cells_by_case.items() if len(cells) == estimator_count]
+
+
+def _unranked_with_all(cells: Sequence[Cell], cases: Sequence[str]) -> list[str]:
+    """The names of the unranked estimators that have all of the cases."""
+    unranked_cells = [cell for cell in cells if not is_ranked(cell)]
+    cells_by_estimator = _grouped(unranked_cells, lambda cell: cell.estimator)
     names = []
-    for name, members in sorted(cases_of.items()):
+    for name, members in sorted(cells_by_estimator.items()):
         if {cell.case for cell in members} >= set(cases):
             names.append(name)
     return names
 
 
 def _design(cells: Sequence[Cell]) -> Design:
-    """Where the cases take place, by one cell of each; a case of an unknown place is a place of its own."""
+    """The place and the drive of each case, given one cell of each case.
+
+    A case whose place is unknown counts as a separate place.
+    """
     places = [cell.facts.place or f"case {cell.case}" for cell in cells]
     drives = [cell.facts.drive for cell in cells]
     return make_design(places, drives)
 
 
 def _applicable(cells: Sequence[Cell]) -> list[Cell]:
-    """The cells without those that lack a required sensor, unless that is so of all cells of their estimator."""
+    """The cells that count for the totals.
+
+    A cell whose case lacks a required sensor is excluded, unless all cells of its estimator are of this kind.
+    """
     able = {cell.estimator for cell in cells if cell.status != NOT_APPLICABLE}
-    return [cell for cell in cells if cell.estimator not in able or cell.status != NOT_APPLICABLE]
+    applicable = []
+    for cell in cells:
+        is_excluded = cell.status == NOT_APPLICABLE and cell.estimator in able
+        if not is_excluded:
+            applicable.append(cell)
+    return applicable
 
 
 def _grouped(cells: Sequence[Cell], key: Callable[[Cell], str]) -> dict[str, list[Cell]]:
-    """Cells by a key, in their order."""
+    """The cells grouped by a key. Groups and cells are in the order of the cells."""
     groups: dict[str, list[Cell]] = {}
     for cell in cells:
         groups.setdefault(key(cell), []).append(cell)
@@ -162,7 +211,7 @@ def _grouped(cells: Sequence[Cell], key: Callable[[Cell], str]) -> dict[str, lis
 
 
 def _shared_cases_remark(cells: Sequence[Cell], *, shared: int, cases: int) -> str:
-    """The remark that not every estimator has every case, with the estimator that has the fewest."""
+    """The remark that not every estimator has every case. It names the estimator that has the fewest cases."""
     cases_of = Counter(cell.estimator for cell in cells)
     fewest = min(cases_of, key=lambda name: (cases_of[name], name))
     if not shared:
@@ -171,7 +220,7 @@ def _shared_cases_remark(cells: Sequence[Cell], *, shared: int, cases: int) -> s
 
 
 def _untested_remark(design: Design) -> list[str]:
-    """The remark that there are too few drives or places for a test."""
+    """The remark that there are too few drives or places for a test, or no remark if there are enough."""
     if design.drives >= ranking.MIN_DRIVES and design.places >= ranking.MIN_PLACES:
         return []
     seen = f"{counted(design.drives, 'drive')} in {counted(design.places, 'place')}"
@@ -180,24 +229,25 @@ def _untested_remark(design: Design) -> list[str]:
 
 
 def _trial_table(
-    by_estimator: Mapping[str, Sequence[Cell]],
+    cells_by_estimator: Mapping[str, Sequence[Cell]],
     names: Sequence[str],
     cases: Sequence[str],
     design: Design,
     *,
     is_sequential: bool = False,
 ) -> ranking.TrialTable:
-    """The trials of some estimators on the cases."""
+    """The table of the trials of the named estimators on the cases."""
     row_of = {name: row for row, name in enumerate(names)}
     column_of = {case: column for column, case in enumerate(cases)}
-    cells = [cell for name in names for cell in by_estimator[name]]
+    cells = [cell for name in names for cell in cells_by_estimator[name]]
     repeats = max(cell.trials for cell in cells)
-    losses = np.full((len(names), len(cases), repeats), np.nan)
+    losses = np.full((len(names), len(cases), repeats), np.nan)  # NaN for a trial that does not exist
     errors = losses.copy()
     for cell in cells:
-        index = row_of[cell.estimator], column_of[cell.case]
-        losses[index][: cell.trials] = cell.losses
-        errors[index][: cell.trials] = cell.errors
+        row = row_of[cell.estimator]
+        column = column_of[cell.case]
+        losses[row, column, : cell.trials] = cell.losses
+        errors[row, column, : cell.trials] = cell.errors
     return ranking.TrialTable(losses, errors, design, is_sequential)
 
 
@@ -250,4 +300,5 @@ def _mark_efficient(totals: Sequence[Total]) -> list[Total]:
 
 
 def _cpu_ms(total: Total) -> float:
+    """The CPU time of an estimator per frame in milliseconds; infinite if it is unknown."""
     return inf if total.cpu_ms is None else total.cpu_ms

@@ -38,10 +38,16 @@ def save_recordings(
 ) -> list[TrialRecording]:
     """Write trials of a run as Rerun files, failures first.
 
-    Without `case` and `estimator` it is the gravest failure, or else the trial with the largest error. `compare` names
-    two estimators to be shown side by side, `worst` is the number of trials, each in a file of its own, and `window`
-    selects frames. Files are written next to the estimates, or to `save`. Raises InputError if a file cannot be written
-    there, and UnknownNameError.
+    If `case` and `estimator` are not given, the most severe failure is chosen. If no trial failed, the trial with the
+    largest error is chosen.
+
+    `compare` names two estimators that are shown side by side.
+    `worst` is the number of trials. Each of them is written to a separate file.
+    `window` selects frames.
+    `form` is the format of the pictures.
+    `save` is the file to write. If it is None, files are written next to the estimates.
+
+    Raises InputError if a file cannot be written, and UnknownNameError for an unknown case or estimator.
     """
     recordings = []
     for trials in _chosen(folder, case=case, estimator=estimator, compare=compare, worst=worst):
@@ -53,7 +59,7 @@ def save_recordings(
 
 
 def open_viewer(paths: Sequence[Path], *, web: bool = False) -> None:
-    """Open files in Rerun's viewer, or with `web` serve them to a browser on this machine until interrupted.
+    """Open files in Rerun's viewer. With `web`, serve them to a browser on this machine until interrupted instead.
 
     Raises MissingDependencyError if there is no display.
     """
@@ -73,7 +79,7 @@ def open_viewer(paths: Sequence[Path], *, web: bool = False) -> None:
 def _chosen(
     folder: RunFolder, *, case: str | None, estimator: str | None, compare: tuple[str, str] | None, worst: int
 ) -> list[list[TrialScore]]:
-    """The trials of each recording."""
+    """The trials that each recording shows."""
     scores = folder.scores()
     if compare:
         first_estimator, second_estimator = compare

@@ -14,14 +14,20 @@ from vobench.runner.estimate import read_outcome
 from vobench.runner.store import INPUTS, Store
 from vobench.runner.task import KINDS, Task, has_failed, missing
 
-COMPARED = 300  # the number of results of each kind, those used last, to which a task is compared
-MOST_CHANGES = 3  # a result with more changed inputs is not similar to a task
-VALUE_LETTERS = 24
+COMPARED = 300  # a task is compared to this many results of its kind, those that were used last
+MOST_CHANGES = 3  # a result that differs in more inputs is not similar to a task
+VALUE_LETTERS = 24  # the largest length of the text of a value
 
 
 @dataclass(frozen=True, slots=True)
-class ToDo:
-    """The tasks of one stage: how many must be performed and why, and the estimated seconds, if known."""
+class StageEstimate:
+    """The tasks of one stage, those of them that must be performed, and the estimated time.
+
+    `stage` is the name of the stage.
+    `tasks` is the number of tasks, including those whose results are in the store.
+    `reasons` maps each reason why tasks must be performed to the number of these tasks.
+    `seconds` is the estimated time of the tasks that must be performed, or None if it is unknown.
+    """
 
     stage: str
     tasks: int
@@ -29,29 +35,32 @@ class ToDo:
     seconds: float | None
 
     @property
-    def to_do(self) -> int:
+    def pending(self) -> int:
         """The number of tasks that must be performed."""
         return sum(self.reasons.values())
 
 
-def to_do(tasks: Sequence[Task], root: Path) -> list[ToDo]:
-    """The tasks that must be performed, by stage and in order."""
-    wanted = {task.key: task for task in missing(tasks, root)}
+def pending_tasks(tasks: Sequence[Task], root: Path) -> list[StageEstimate]:
+    """The work that remains for tasks, by stage, given the folder `root` of the store."""
+    pending = {task.key: task for task in missing(tasks, root)}
     store = Store(root)
-    stages = []
-    for stage, count in Counter(task.stage for task in tasks).items():
-        reasons = Counter(_reason(task, wanted, root) for task in wanted.values() if task.stage == stage)
-        taken_s = store.seconds(stage)
-        left_s = reasons.total() * median(taken_s) if taken_s else None
-        stages.append(ToDo(stage, count, dict(reasons), left_s))
-    return stages
+    task_counts = Counter(task.stage for task in tasks)
+    estimates = []
+    for stage, task_count in task_counts.items():
+        reasons = Counter(_reason(task, pending, root) for task in pending.values() if task.stage == stage)
+        earlier_s = store.seconds(stage)
+        remaining_s = None
+        if earlier_s:
+            remaining_s = reasons.total() * median(earlier_s)
+        estimates.append(StageEstimate(stage, task_count, dict(reasons), remaining_s))
+    return estimates
 
 
-def _reason(task: Task, wanted: Mapping[str, Task], root: Path) -> str:
-    """The reason why a task must be performed."""
+def _reason(task: Task, pending: Mapping[str, Task], root: Path) -> str:
+    """The reason why a task must be performed. `pending` are all tasks that must be performed, by key."""
     for key in task.needs:
-        if key in wanted:
-            return f"its {wanted[key].stage} is to be made"
+        if key in pending:
+            return f"the {pending[key].stage} that it requires must be computed first"
     folder = root / task.key
     if folder.is_dir():
         fault = Store(root).fault(task.key)
@@ -64,21 +73,26 @@ def _reason(task: Task, wanted: Mapping[str, Task], root: Path) -> str:
 
 
 def _changes(inputs: dict[str, str], kind: Path) -> str:
-    """The differences between inputs and those of the most similar recent result; "new" if none is similar."""
-    fewest: set[str] | None = None
-    nearest: dict[str, str] = {}
+    """The inputs that differ from those of the most similar recent result, or "new" if no result is similar.
+
+    `kind` is the folder of the results of this kind.
+    """
+    most_similar: dict[str, str] = {}
+    changed_names = set[str]()
+    smallest_count = MOST_CHANGES + 1
     for other in _stored(kind):
         all_names = inputs.keys() | other.keys()
         names = {name for name in all_names if inputs.get(name) != other.get(name)}
-        limit = MOST_CHANGES + 1 if fewest is None else len(fewest)
-        if len(names) < limit:
-            fewest = names
-            nearest = other
-    changes = [_change(name, nearest.get(name), inputs.get(name)) for name in sorted(fewest or ())]
+        if len(names) < smallest_count:
+            smallest_count = len(names)
+            changed_names = names
+            most_similar = other
+    changes = [_change(name, most_similar.get(name), inputs.get(name)) for name in sorted(changed_names)]
     return "; ".join(changes) or "new"
 
 
 def _change(name: str, before: str | None, now: str | None) -> str:
+    """The description of a changed input, with its values before and now. None stands for a missing input."""
     if name == "repeat":
         return "another repeat"
     if name == "code":
@@ -91,12 +105,14 @@ def _change(name: str, before: str | None, now: str | None) -> str:
 def _shortened(text: str | None) -> str:
     if not text:
         return "nothing"
-    return text if len(text) <= VALUE_LETTERS else f"{text[: VALUE_LETTERS - 1]}…"
+    if len(text) <= VALUE_LETTERS:
+        return text
+    return f"{text[: VALUE_LETTERS - 1]}…"
 
 
 @cache
 def _stored(kind: Path) -> list[dict[str, str]]:
-    """The inputs of the recent results of a kind."""
+    """The inputs of the recent results in a folder, with nested keys joined by dots."""
     stored = []
     with suppress(OSError):
         paths = sorted(kind.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
@@ -108,8 +124,10 @@ def _stored(kind: Path) -> list[dict[str, str]]:
 
 
 def _flat(value: Any, name: str = "") -> Iterator[tuple[str, str]]:
+    """The values of a nested dictionary as JSON, each with its keys joined by dots."""
     if isinstance(value, dict):
         for key, inner in value.items():
-            yield from _flat(inner, f"{name}.{key}" if name else key)
+            inner_name = f"{name}.{key}" if name else key
+            yield from _flat(inner, inner_name)
     else:
         yield name, json.dumps(value, ensure_ascii=False, sort_keys=True)

@@ -27,8 +27,8 @@ PACKAGE = Path(__file__).resolve().parents[1]
 PLUGIN = "vobench.plugin"
 # The digest of a module depends on the version of Python and on this file.
 READER = hashlib.sha256(sys.version.encode() + Path(__file__).read_bytes()).digest()
-READ_BYTES = 1 << 20
-NOT_DATA = {".py", ".pyc"}
+READ_BYTES = 1 << 20  # the number of bytes of a file that are read at a time
+NOT_DATA = {".py", ".pyc"}  # the suffixes of files that are not data files
 # Imports for type checkers only, on which no result depends.
 TYPES_ONLY = re.compile(rb"^if TYPE_CHECKING:\n(?:(?: .*)?\n)+", re.MULTILINE)
 
@@ -45,7 +45,8 @@ def canonical(inputs: Mapping[str, Any]) -> str:
 
 
 def digest(inputs: Mapping[str, Any]) -> str:
-    """The first 128 bits of the SHA-256 hash, in hex, of the inputs as JSON on one line, which is faster to write."""
+    """The first 128 bits of the SHA-256 hash of the inputs, in hex."""
+    # JSON on one line is faster to write than that of `canonical`.
     text = json.dumps(inputs, sort_keys=True, ensure_ascii=False, allow_nan=False)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
@@ -83,7 +84,7 @@ def _files(folder: Path) -> Iterator[Path]:
 
 
 def _leads_on(folder: Path, readable: Iterable[Path], seen: set[str]) -> bool:
-    """Whether a folder is searched for files. The target of a link is added to `seen`."""
+    """Whether a folder is searched for files. If it is a link, its target is added to `seen`."""
     if folder.name == "__pycache__":
         return False
     if not folder.is_symlink():
@@ -96,7 +97,7 @@ def _leads_on(folder: Path, readable: Iterable[Path], seen: set[str]) -> bool:
 
 
 def _is_readable(path: Path, readable: Iterable[Path]) -> bool:
-    """Whether a path is no link, or is one to a place in a readable folder."""
+    """Whether a path is not a link, or is a link to a place in a readable folder."""
     if not path.is_symlink():
         return True
     target = Path(os.path.realpath(path))
@@ -111,7 +112,8 @@ def versions(*libraries: str) -> dict[str, str]:
 @cache
 def library_versions(*names: str) -> dict[str, str]:
     """The versions of Python and of installed distributions that can change the bytes of a result."""
-    return {"python": platform.python_version(), **{name: _version(name) for name in names}}
+    versions_by_name = {name: _version(name) for name in names}
+    return {"python": platform.python_version(), **versions_by_name}
 
 
 def _version(name: str) -> str:
@@ -123,8 +125,9 @@ def _version(name: str) -> str:
 
 @cache
 def code_digest(*entries: str, package: Path = PACKAGE) -> str:
-    """A hash of modules and everything they import: their code without docstrings and comments, and their data files.
+    """A hash of modules and of everything that they import, directly or indirectly.
 
+    The hash covers the code without docstrings and comments, and the data files in the folders of the modules.
     A package in `entries` stands for all of its modules.
     """
     known = _modules(package)
@@ -162,10 +165,14 @@ def imported_by(folder: Path, *, package: Path = PACKAGE) -> list[str]:
 @cache
 def _homes(package: Path) -> dict[str, str]:
     """The module that defines each name of `vobench.plugin` and each retired name, such as `vobench.plugin.se3`."""
-    homes = {f"{PLUGIN}.{name}": home.partition(":")[0] for name, home in offered_names(package).items()}
+    homes = dict[str, str]()
+    for name, target in offered_names(package).items():
+        target_module, _, _ = target.partition(":")
+        homes[f"{PLUGIN}.{name}"] = target_module
     for module, moved in _table(package / "retired.py", "MOVED").items():
         for name, new_place in moved.items():
-            homes[f"{module}.{name}"] = homes.get(new_place) or new_place.rpartition(".")[0]
+            new_module, _, _ = new_place.rpartition(".")
+            homes[f"{module}.{name}"] = homes.get(new_place) or new_module
     return homes
 
 
@@ -246,6 +253,7 @@ def _module(source: bytes) -> Module:
 
 
 def _compiled(source: bytes) -> Module:
+    """The digest and imports of a source, from its compiled code."""
     # optimize=2 omits docstrings, and asserts, which do not change results.
     seen_at_runtime = TYPES_ONLY.sub(b"", source)
     bare = _bare(compile(seen_at_runtime, "", "exec", optimize=2, dont_inherit=True))
@@ -257,14 +265,15 @@ def _compiled(source: bytes) -> Module:
 
 def _bare(code: CodeType) -> CodeType:
     """The code without its file name and line numbers."""
-    consts = tuple(_bare(const) if isinstance(const, CodeType) else const for const in code.co_consts)
-    return code.replace(co_consts=consts, co_filename="", co_firstlineno=0, co_linetable=b"")
+    bare_consts = tuple(_bare(const) if isinstance(const, CodeType) else const for const in code.co_consts)
+    return code.replace(co_consts=bare_consts, co_filename="", co_firstlineno=0, co_linetable=b"")
 
 
 def _imports(code: CodeType) -> Iterator[str]:
-    """The dotted names in code, which are modules, and each name that can be imported from one of them."""
+    """The names in code that may be modules of vobench: the dotted names, and the names imported from one of them."""
     for name in code.co_names:
-        if (name == "vobench" or name.startswith("vobench.")) and name != PLUGIN:
+        is_in_vobench = name == "vobench" or name.startswith("vobench.")
+        if is_in_vobench and name != PLUGIN:
             yield name
             yield from (f"{name}.{part}" for part in code.co_names if "." not in part)
     for const in code.co_consts:
@@ -281,15 +290,16 @@ def _plugin_names(tree: ast.Module) -> set[str]:
     for node in ast.walk(tree):
         if isinstance(node, ast.Import | ast.ImportFrom):
             imported |= _imported_names(node)
-    is_whole = not imported.isdisjoint({PLUGIN, f"{PLUGIN}.*"})
-    names = imported | _all_names(tree) if is_whole else imported
-    return {name for name in names if name.startswith(f"{PLUGIN}.")}
+    imports_all = PLUGIN in imported or f"{PLUGIN}.*" in imported
+    if imports_all:
+        imported |= _all_names(tree)
+    return {name for name in imported if name.startswith(f"{PLUGIN}.")}
 
 
 def _imported_names(node: ast.Import | ast.ImportFrom) -> set[str]:
     """The full names that an import statement imports, such as `vobench.plugin.se3`."""
-    module = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
-    return {f"{module}{alias.name}" for alias in node.names}
+    prefix = f"{node.module}." if isinstance(node, ast.ImportFrom) else ""
+    return {f"{prefix}{alias.name}" for alias in node.names}
 
 
 def _all_names(tree: ast.Module) -> set[str]:

@@ -15,7 +15,7 @@ from vobench.trajectory.trajectory import Stamps
 
 if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
-    from vobench.runner.dry_run import ToDo
+    from vobench.runner.dry_run import StageEstimate
 
 IN_CACHE = "in the cache"
 TO_SIMULATE = "to simulate"
@@ -63,7 +63,7 @@ class PlanSummary:
 
     plan: Plan
     cases: tuple[CaseSummary, ...]
-    stages: "tuple[ToDo, ...] | None" = None
+    stages: "tuple[StageEstimate, ...] | None" = None
     doubts: tuple[str, ...] = ()
 
     @property
@@ -94,8 +94,8 @@ class PlanSummary:
         """For each stage: the number of tasks, how many must be performed and why, and the estimated seconds."""
         rows = []
         for stage in self.stages or ():
-            in_cache = stage.tasks - stage.to_do
-            rows.append({**asdict(stage), IN_CACHE: in_cache, "to do": stage.to_do})
+            in_cache = stage.tasks - stage.pending
+            rows.append({**asdict(stage), IN_CACHE: in_cache, "to do": stage.pending})
         return rows
 
     def as_dict(self) -> dict[str, Any]:
@@ -149,9 +149,9 @@ def summarize(planned: Plan, *, with_stages: bool = False) -> PlanSummary:
     if not with_stages:
         return PlanSummary(planned, cases, doubts=doubts)
 
-    from vobench.runner.dry_run import to_do
+    from vobench.runner.dry_run import pending_tasks
 
-    stages = to_do(plan(planned, checked.recordings), cache_folder())
+    stages = pending_tasks(plan(planned, checked.recordings), cache_folder())
     return PlanSummary(planned, cases, tuple(stages), doubts)
 
 

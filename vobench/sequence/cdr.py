@@ -17,20 +17,24 @@ LITTLE_ENDIAN = b"\x00\x01"
 
 
 def serialise(message: Any) -> bytes:
-    """A message as CDR bytes, in little-endian order."""
+    """A message as CDR bytes in little-endian order."""
     return bytes(TYPES.serialize_cdr(message, message.__msgtype__, little_endian=True))
 
 
 def with_stamp(template: bytes, t_ns: int) -> bytes:
-    """A copy of the serialised message `template` with another stamp. The message must begin with a header."""
+    """A copy of a serialised message with another stamp.
+
+    `template` is the message. It must begin with a header.
+    """
     stamp = STAMP.pack(*split_stamp(t_ns))
     return b"".join((template[:STAMP_START], stamp, template[STAMP_END:]))
 
 
 def with_picture(template: bytes, t_ns: int, encoded: bytes) -> bytes:
-    """A copy of the serialised CompressedImage `template` with another stamp, and with a picture.
+    """A copy of a serialised CompressedImage with another stamp and another picture.
 
-    The template must have an empty picture, which is the last field of the message.
+    `template` is the message. Its picture, which is the last field, must be empty.
+    `encoded` is the picture, encoded as PNG or in another format.
     """
     stamp = STAMP.pack(*split_stamp(t_ns))
     frame_and_format = template[STAMP_END : -LENGTH.size]
@@ -39,7 +43,13 @@ def with_picture(template: bytes, t_ns: int, encoded: bytes) -> bytes:
 
 
 class StampedPicture(NamedTuple):
-    """The content of a serialised CompressedImage."""
+    """The content of a serialised CompressedImage.
+
+    `t_ns` is the stamp in ns.
+    `codec` is the name of the format in which the picture is encoded, such as "png".
+    `colour` is the encoding of its pixels, a key of `CHANNELS`.
+    `encoded` is the encoded picture.
+    """
 
     t_ns: int
     codec: str
@@ -62,11 +72,12 @@ def parse_picture(data: memoryview) -> StampedPicture:
     if colour not in CHANNELS:
         raise ValueError(f"a picture has the unknown format {format_name!r}")
     start, end = _sequence_bounds(data, offset)
-    return StampedPicture(sec * NS_PER_S + nanosec, codec, colour, data[start:end])
+    t_ns = sec * NS_PER_S + nanosec
+    return StampedPicture(t_ns, codec, colour, data[start:end])
 
 
 def _read_string(data: memoryview, offset: int) -> tuple[str, int]:
-    """The string at an offset, and the offset after the zero byte that ends it."""
+    """The string at an offset, and the offset of the byte that follows the zero byte at its end."""
     start, end = _sequence_bounds(data, offset)
     text_end = max(start, end - 1)
     return bytes(data[start:text_end]).decode(), end
@@ -83,5 +94,7 @@ def _sequence_bounds(data: memoryview, offset: int) -> tuple[int, int]:
     start = length_offset + LENGTH.size
     end: int = start + length
     if end > len(data):
-        raise ValueError(f"a message of {len(data)} bytes states {length} more at {length_offset}")
+        raise ValueError(
+            f"the message has {len(data)} bytes, but the length field at offset {length_offset} announces {length} more"
+        )
     return start, end

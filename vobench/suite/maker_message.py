@@ -47,7 +47,7 @@ TEXTURES = (Picture, Procedural)
 PARTS = (MeshArrays, Thing, Material, Surroundings)
 CLASSES: dict[str, type] = {each.__name__: each for each in (*PARTS, *LIGHTS, *LEVELS, *TEXTURES)}
 DTYPES = ("float64", "float32", "int64", "int32", "uint8", "bool")
-# What reading bytes that do not describe a scene raises.
+# The exceptions that are raised when bytes are read that do not describe a scene.
 UNREADABLE = (
     ValueError,
     KeyError,
@@ -65,7 +65,10 @@ ALIGNMENT = 16  # arrays begin at multiples of this
 
 
 def checked(returned: Any) -> GeneratedPlace:
-    """What `make(seed)` returned: things, materials by name and, optionally, lights. Raises SuiteError."""
+    """The scene that `make(seed)` returned: things, materials by name and, optionally, lights.
+
+    Raises SuiteError if it is not valid.
+    """
     if not isinstance(returned, Sequence) or len(returned) not in (2, 3):
         raise SuiteError("should return things, materials by name and, optionally, lights")
     things, materials, *rest = returned
@@ -74,7 +77,7 @@ def checked(returned: Any) -> GeneratedPlace:
 
 
 def checked_place(returned: Any) -> GeneratedPlace:
-    """What `generate(seed, lighting)` returned. Raises SuiteError if it is not valid."""
+    """The scene that `generate(seed, lighting)` returned. Raises SuiteError if it is not valid."""
     if not isinstance(returned, GeneratedPlace):
         raise SuiteError(f"should return a GeneratedPlace, not {type(returned).__name__}")
     materials = returned.materials
@@ -93,15 +96,18 @@ def checked_place(returned: Any) -> GeneratedPlace:
 
 
 def _all_of(noun: str, objects: Any, classes: tuple[type, ...]) -> tuple[Any, ...]:
-    """The objects, which may come from a generator, as a tuple. Raises SuiteError if one is of another class."""
+    """The objects as a tuple. They may come from a generator.
+
+    Raises SuiteError if they are not iterable, or if one of them is of another class.
+    """
     try:
         listed = tuple(objects)
     except TypeError:
         raise SuiteError(f"should return a list of {noun}s, not {type(objects).__name__}") from None
-    strange = [each for each in listed if not isinstance(each, classes)]
-    if strange:
+    unexpected = [each for each in listed if not isinstance(each, classes)]
+    if unexpected:
         names = " or ".join(each.__name__ for each in classes)
-        raise SuiteError(f"returns a {noun} that is no {names}: {type(strange[0]).__name__}")
+        raise SuiteError(f"returns a {noun} that is no {names}: {type(unexpected[0]).__name__}")
     return listed
 
 
@@ -176,16 +182,18 @@ class _Writer:
             entry = self._fields(as_arrays(thing))
         elif CLASSES.get(kind.__name__) is kind and is_dataclass(thing):
             entry = self._fields(thing)
-        elif callable(getattr(thing, "pixels", None)):  # a texture of a class of the maker is sent as its picture
+        elif callable(getattr(thing, "pixels", None)):
+            # A texture whose class the maker defines itself is sent as its picture.
             kind = Picture
             entry = {"values": self.value(np.asarray(thing.pixels())), "tile_m": self.value(thing.tile_m)}
         else:
             known = ", ".join(CLASSES)
             raise SuiteError(f"returns something of class {kind.__name__}, which is none of {known}")
+        index = len(self.objects)
         self.objects.append({"class": kind.__name__, "fields": entry})
         self._alive.append(thing)
-        self._places[id(thing)] = len(self.objects) - 1
-        return self._places[id(thing)]
+        self._places[id(thing)] = index
+        return index
 
     def _fields(self, thing: Any) -> dict[str, Any]:
         return {field.name: self.value(getattr(thing, field.name)) for field in fields(thing)}
@@ -245,17 +253,18 @@ def decode(content: bytes) -> GeneratedPlace:
 
 
 def _object(entry: Any, earlier: Sequence[Any], arrays: memoryview) -> Any:
-    """The object that an entry describes. Objects in its fields must be among the earlier ones."""
+    """The object that an entry of the header describes. Its fields may refer to the objects in `earlier` only."""
     name = entry["class"]
     values = {key: _value(value, earlier, arrays) for key, value in entry["fields"].items()}
     fields_read = _reader(name).model_validate(values)
-    made = CLASSES[name](**{key: getattr(fields_read, key) for key in values})
-    if isinstance(made, Picture):
-        _require_picture(made)
-    if isinstance(made, MeshArrays):
-        _require_sound(made)
-        return as_mesh(made)
-    return made
+    arguments = {key: getattr(fields_read, key) for key in values}
+    instance = CLASSES[name](**arguments)
+    if isinstance(instance, Picture):
+        _require_picture(instance)
+    if isinstance(instance, MeshArrays):
+        _require_sound(instance)
+        return as_mesh(instance)
+    return instance
 
 
 def _require_class(value: Any, *, classes: tuple[type, ...]) -> Any:
@@ -282,7 +291,8 @@ class _Mesh:
     """Replaces trimesh.Trimesh in annotations, because this module does not import trimesh."""
 
 
-_OF_FIELDS: dict[Any, Any] = {
+# The annotations that replace those of fields which hold objects.
+FIELD_VALIDATORS: dict[Any, Any] = {
     _Mesh: Annotated[Any, AfterValidator(_require_mesh)],
     Level: _instance_of(*LEVELS),
     Texture | None: _instance_of(*TEXTURES, type(None)),
@@ -292,18 +302,23 @@ _OF_FIELDS: dict[Any, Any] = {
 
 @cache
 def _reader(name: str) -> type[BaseModel]:
-    """The pydantic model that checks the fields of a class of `CLASSES`. Of arrays, only the class is checked."""
+    """The pydantic model that checks the fields of a class in `CLASSES`.
+
+    For arrays, only the type is checked, not the dtype or the shape.
+    """
     known = CLASSES[name]
     hints = get_type_hints(known, localns={"Trimesh": _Mesh}, include_extras=True)
     required: dict[str, Any] = {}
     for field in fields(known):
         hint = hints[field.name]
-        required[field.name] = (_OF_FIELDS.get(hint, hint), ...)
+        annotation = FIELD_VALIDATORS.get(hint, hint)
+        required[field.name] = (annotation, ...)  # pydantic's notation for a field without a default
     config = ConfigDict(arbitrary_types_allowed=True, extra="forbid")
     return create_model(name, __config__=config, **required)
 
 
 def _value(value: Any, earlier: Sequence[Any], arrays: memoryview) -> Any:
+    """The value of a field from its JSON form. Lists become tuples."""
     if isinstance(value, list):
         return tuple(_value(each, earlier, arrays) for each in value)
     if not isinstance(value, dict):

@@ -1,4 +1,4 @@
-"""Lightings, which replace the power or the level of lights in a scene."""
+"""Lightings: replacements for the power or the level of the lights of a scene."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -9,17 +9,20 @@ from vobench.scene.light import Light, Sky, Sun, scaled
 from vobench.suite.scene_spec import LightOverride
 from vobench.suite.yaml_source import YamlFile
 
-Lighting = dict[str, LightOverride]  # by the name of the light
+Lighting = dict[str, LightOverride]  # the keys are the names of lights
 
 # The names of the lights of which a scene has at most one.
 SUN = "sun"
 SKY = "sky"
-# The prefixes of generated names, for things that have no name in the file.
+# The prefixes of the names that are generated for things without a name in the file.
 GENERATED_NAMES = ("box_", "board_", "window_", "wall_", "floor", "ceiling")
 
 
 def with_lighting(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, ...]:
-    """The lights under a lighting. Raises SuiteError for an unknown light, or a value that a light cannot have."""
+    """The lights of a scene under a lighting.
+
+    Raises SuiteError if the lighting names an unknown light, or gives a light a value that it cannot have.
+    """
     names = list(dict.fromkeys(light.name for light in lights))
     for name in lighting:
         if name not in names:
@@ -32,7 +35,10 @@ def with_lighting(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, .
 
 
 def _override_light(light: Light, override: LightOverride) -> Light:
-    """The light with another level. Another power is converted to a level, so that its light is computed only once."""
+    """The light with another level.
+
+    Another power is converted to a level, so that the light need not be baked again.
+    """
     if isinstance(light, Sun | Sky):
         _require_unset("power_lm", override, light)
         nominal = light.illuminance_lx
@@ -44,7 +50,8 @@ def _override_light(light: Light, override: LightOverride) -> Light:
     level = override.level.build() if override.level else light.level
     if target is None:
         return replace(light, level=level)
-    return replace(light, level=scaled(level, _factor(light, nominal, target)))
+    factor = _factor(light, nominal, target)
+    return replace(light, level=scaled(level, factor))
 
 
 def _require_unset(key: str, override: LightOverride, light: Light) -> None:
@@ -54,17 +61,25 @@ def _require_unset(key: str, override: LightOverride, light: Light) -> None:
 
 
 def _factor(light: Light, nominal: float, target: float) -> float:
-    """The factor from the strength of a light in the scene to another one. Raises SuiteError if there is none."""
+    """The ratio target / nominal of two strengths of a light.
+
+    `nominal` is the strength in the scene.
+    `target` is the strength in the lighting.
+
+    Raises SuiteError if the nominal strength is 0 and the target is not.
+    """
     if nominal == 0 and target > 0:
         raise SuiteError(
             f"lighting: '{light.name}' is 0 in the scene, so it cannot be set to {target:g}; increase it in the scene"
         )
-    return target / nominal if nominal else 0.0
+    if nominal == 0:
+        return 0.0
+    return target / nominal
 
 
 def require_possible(name: str, scene: YamlFile) -> None:
-    """Raise SuiteError if no light of a scene, which was read only in part, can have this name."""
-    written_names = [*_written_names(scene.parsed)]
+    """Raise SuiteError if no light of a scene can have this name. The scene was parsed, but not built."""
+    written_names = list(_written_names(scene.parsed))
     daylight_names = [light for light in (SUN, SKY) if light in scene.parsed]
     known_names = [*written_names, *daylight_names]
     thing_name = name.partition(".")[0]
@@ -73,7 +88,7 @@ def require_possible(name: str, scene: YamlFile) -> None:
 
 
 def _written_names(tree: Any) -> Iterator[str]:
-    """The value of every key `name` in a tree."""
+    """The value of every key `name` in a tree of dictionaries and lists."""
     values: Iterable[Any] = ()
     if isinstance(tree, dict):
         values = tree.values()

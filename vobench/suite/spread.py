@@ -21,14 +21,18 @@ MOST_UNITS = 10_000
 
 @settings()
 class Spread:
-    """A balanced design, in which scenarios do not run in all places but in some of them.
+    """A balanced design, in which each scenario runs in some of the places instead of all of them.
 
-    A unit is a combination of the variants of the axes `over`: by default a drive in a place. The design has `units`
-    of them, and each scenario runs in `each` of these, at all its severities. In a suite without scenarios, the
-    combinations of the other axes are spread instead. All estimators run in the same units.
+    A unit is one combination of the variants of the axes in `over`. By default it is a drive in a place.
 
-    `pairs` maps a scene to the trajectories that belong there, such as {street: [car], flat: [walk]}. Both are named as
-    in the suite, without seeds. Every trajectory belongs to the scenes that are not listed.
+    `over` names the axes whose variants are combined.
+    `units` is the number of units in the design.
+    `each` is the number of units in which each scenario runs, at all its severities.
+    `pairs` maps a scene to the trajectories that it is combined with, such as {street: [car], flat: [walk]}. Scenes and
+    trajectories are named as in the suite, without seeds. A scene that is not listed is combined with all trajectories.
+
+    In a suite without scenarios, the combinations of the other axes are spread instead. All estimators run in the same
+    units.
     """
 
     over: Annotated[tuple[UnitAxis, ...], MinLen(1)] = UNIT_AXES
@@ -51,8 +55,10 @@ class Unit:
 
     @property
     def place(self) -> str:
-        """The scene with its seed; the drive in a design that is not over scenes."""
-        return self.by_axis.get("scene", "") or self.by_axis["trajectory"]
+        """The scene with its seed. In a design that is not over scenes, it is the drive."""
+        if "scene" in self.by_axis:
+            return self.by_axis["scene"]
+        return self.by_axis["trajectory"]
 
     @property
     def kind(self) -> str:
@@ -62,21 +68,28 @@ class Unit:
     @property
     def name(self) -> str:
         """The variants in the order of the axes, as in the names of cases."""
-        return "-".join(self.by_axis[axis] for axis in UNIT_AXES if axis in self.by_axis)
+        variants = [self.by_axis[axis] for axis in UNIT_AXES if axis in self.by_axis]
+        return "-".join(variants)
 
 
 def units(spread: Spread, variants: Mapping[str, Collection[str]]) -> list[Unit]:
     """The units of a design over the variants of each axis.
 
-    The design is balanced: the numbers of units of two variants of an axis differ by at most 1. With `pairs`, this
-    holds for the scenes, and for the trajectories of scenes that have the same ones.
+    The design is balanced: the numbers of units of any two variants of an axis differ by at most 1. With `pairs`, this
+    is guaranteed for scenes, and for trajectories among the scenes that are paired with the same trajectories.
 
-    Raises SuiteError for more units than there are, and for pairs of unknown scenes or trajectories.
+    Raises SuiteError if the design has more units than there are combinations, or if `pairs` names an unknown scene or
+    trajectory.
     """
-    by_axis: dict[str, list[str]] = {axis: list(variants[axis]) for axis in UNIT_AXES if axis in spread.over}
-    combinations = _diagonals(by_axis, _paired(spread.pairs or {}, by_axis))
+    variants_by_axis: dict[str, list[str]] = {}
+    for axis in UNIT_AXES:
+        if axis in spread.over:
+            variants_by_axis[axis] = list(variants[axis])
+
+    paired_drives = _paired_drives(spread.pairs or {}, variants_by_axis)
+    combinations = _diagonals(variants_by_axis, paired_drives)
     if spread.units > len(combinations):
-        raise SuiteError(_too_few_sentence(spread, by_axis, len(combinations)))
+        raise SuiteError(_too_few_sentence(spread, variants_by_axis, len(combinations)))
     return [Unit(combination) for combination in combinations[: spread.units]]
 
 
@@ -90,75 +103,99 @@ def _too_few_sentence(spread: Spread, variants: Mapping[str, Collection[str]], a
     return f"{spread.units} units are more than the {available} {reason}"
 
 
-def _paired(pairs: Mapping[str, Collection[str]], variants: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
-    """The trajectories that belong to each scene with pairs, both with their seeds.
+def _paired_drives(pairs: Mapping[str, Collection[str]], variants: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """The trajectories that each scene in `pairs` is combined with. Scenes and trajectories have their seeds.
 
-    Raises SuiteError for pairs of unknown scenes or trajectories.
+    Raises SuiteError if `pairs` names an unknown scene or trajectory.
     """
-    allowed = dict[str, list[str]]()
-    for scene, names in pairs.items():
-        scenes = _of_entry(scene, "scene", variants)
-        drives = [drive for name in names for drive in _of_entry(name, "trajectory", variants)]
+    drives_of_scene = dict[str, list[str]]()
+    for scene_name, trajectory_names in pairs.items():
+        scenes = _variants_of_entry(scene_name, "scene", variants)
+        drives = list[str]()
+        for trajectory_name in trajectory_names:
+            drives += _variants_of_entry(trajectory_name, "trajectory", variants)
         if not drives:
-            raise SuiteError(f"spread.pairs.{scene} should name trajectories of the suite (got none)")
-        allowed.update(dict.fromkeys(scenes, drives))
-    return allowed
+            raise SuiteError(f"spread.pairs.{scene_name} should name trajectories of the suite (got none)")
+        for scene in scenes:
+            drives_of_scene[scene] = drives
+    return drives_of_scene
 
 
-def _of_entry(name: str, axis: str, variants: Mapping[str, Sequence[str]]) -> list[str]:
-    """The variants of an entry of the suite: those with its name, or with its name before a seed."""
+def _variants_of_entry(name: str, axis: str, variants: Mapping[str, Sequence[str]]) -> list[str]:
+    """The variants of an entry of the suite: those with its name alone, or with its name followed by a seed.
+
+    Raises SuiteError if the suite has no such entry.
+    """
     matching = [variant for variant in variants[axis] if variant == name or variant.startswith(f"{name}.")]
     if not matching:
         raise SuiteError(f"spread.pairs names the {axis} '{name}', which is not among {', '.join(variants[axis])}")
     return matching
 
 
-def _diagonals(variants: Mapping[str, Sequence[str]], allowed: Mapping[str, list[str]]) -> list[dict[str, str]]:
-    """All combinations of the variants, in an order in which any number of the first ones is balanced.
+def _diagonals(variants: Mapping[str, Sequence[str]], paired_drives: Mapping[str, list[str]]) -> list[dict[str, str]]:
+    """All combinations of the variants, ordered so that the first N of them are balanced for every N.
 
-    In a table of scenes and trajectories, they are the diagonals: first each scene with a trajectory, then each scene
-    with the next trajectory, and so on. `allowed` are the trajectories of some of the scenes; the others have all.
+    The order follows the diagonals of a table of scenes and trajectories. The first diagonal combines each scene with
+    one trajectory, the second one combines each scene with its next trajectory, and so on.
+
+    `paired_drives` has the trajectories of the scenes that are paired. All other scenes have all trajectories.
     """
     if len(variants) == 1:
         ((axis, names),) = variants.items()
         return [{axis: name} for name in names]
-    drives_of = {scene: tuple(allowed.get(scene, variants["trajectory"])) for scene in variants["scene"]}
-    starts = _first_drives(drives_of)
+
+    drives_of_scene = dict[str, tuple[str, ...]]()
+    for scene in variants["scene"]:
+        drives_of_scene[scene] = tuple(paired_drives.get(scene, variants["trajectory"]))
+    first_index = _first_drive_indices(drives_of_scene)
+    diagonal_count = max(len(drives) for drives in drives_of_scene.values())
+
     combinations = []
-    most_drives = max(len(drives) for drives in drives_of.values())
-    for diagonal, (scene, drives) in product(range(most_drives), drives_of.items()):
+    for diagonal, (scene, drives) in product(range(diagonal_count), drives_of_scene.items()):
         if diagonal < len(drives):
-            index = (starts[scene] + diagonal) % len(drives)
+            index = (first_index[scene] + diagonal) % len(drives)
             combinations.append({"scene": scene, "trajectory": drives[index]})
     return combinations
 
 
-def _first_drives(drives_of: Mapping[str, tuple[str, ...]]) -> dict[str, int]:
-    """The number of the trajectory with which each scene begins, different ones for scenes with the same ones."""
+def _first_drive_indices(drives_of_scene: Mapping[str, tuple[str, ...]]) -> dict[str, int]:
+    """The index of the trajectory that each scene is combined with first.
+
+    Scenes that have the same list of trajectories start at consecutive indices, so that they start differently. An
+    index may exceed the length of the list; it is to be taken modulo the length.
+    """
     scene_count = Counter[tuple[str, ...]]()
-    starts = dict[str, int]()
-    for scene, drives in drives_of.items():
-        starts[scene] = scene_count[drives]
+    first_index = dict[str, int]()
+    for scene, drives in drives_of_scene.items():
+        first_index[scene] = scene_count[drives]
         scene_count[drives] += 1
-    return starts
+    return first_index
 
 
 @dataclass(slots=True)
 class Dealer:
     """Assigns units to treatments, such as scenarios, one treatment after the other.
 
-    Each treatment gets `each` different units, one by one. The next one is that with the fewest runs so far, where a
-    unit in a kind of place that the treatment already has counts as if it had the runs of one more treatment. Ties are
-    decided by the treatment's own units in that kind of place and in that place, then by the runs of the place and of
-    the drive, and last by the seed.
+    Each treatment gets `each` different units. They are chosen one at a time: the next unit is the one with the fewest
+    runs so far. If the treatment already has a unit in the same kind of place, the runs of one treatment are added to
+    that number as a penalty. Ties are broken by the smallest of the following, in this order:
+
+    1. the number of units that the treatment already has in this kind of place,
+    2. the number of units that it already has in this place,
+    3. the number of runs so far in this place plus the number of runs so far of this drive,
+    4. the position in a random order, which depends on `seed`.
+
+    `units` are the units of the design.
+    `each` is the number of units that a treatment gets.
+    `seed` is the seed of the random order.
     """
 
     units: Sequence[Unit]
     each: int
     seed: int
     _rng: np.random.Generator = field(init=False)
-    _dealt: Counter[str] = field(init=False, default_factory=Counter)
-    _dealt_by_variant: Counter[tuple[str, str]] = field(init=False, default_factory=Counter)
+    _runs_by_unit: Counter[str] = field(init=False, default_factory=Counter)
+    _runs_by_variant: Counter[tuple[str, str]] = field(init=False, default_factory=Counter)
 
     def __post_init__(self) -> None:
         if self.each > len(self.units):
@@ -166,39 +203,43 @@ class Dealer:
         self._rng = np.random.default_rng([self.seed, SPREAD_STREAM])
 
     def deal(self, runs: int = 1) -> list[Unit]:
-        """The units of the next treatment, which has a number of runs in each of them."""
+        """The units of the next treatment. The treatment has `runs` runs in each of its units."""
         order = self._rng.permutation(len(self.units)).tolist()
         candidates = [self.units[index] for index in order]
         chosen = list[Unit]()
         chosen_by_kind = Counter[str]()
         chosen_by_place = Counter[str]()
 
-        def rank(unit: Unit) -> tuple[int, ...]:
-            """The candidate with the lowest rank is next."""
-            of_kind = chosen_by_kind[unit.kind]
-            runs_of_kind = runs if of_kind else 0
-            return self._dealt[unit.name] + runs_of_kind, of_kind, chosen_by_place[unit.place], self._load(unit)
+        def priority(unit: Unit) -> tuple[int, int, int, int]:
+            """The sort key of a candidate. The candidate with the smallest key is chosen next."""
+            chosen_of_kind = chosen_by_kind[unit.kind]
+            chosen_of_place = chosen_by_place[unit.place]
+            penalty = runs if chosen_of_kind else 0
+            penalised_runs = self._runs_by_unit[unit.name] + penalty
+            return penalised_runs, chosen_of_kind, chosen_of_place, self._runs_of_variants(unit)
 
         for _ in range(self.each):
-            unit = min(candidates, key=rank)
+            unit = min(candidates, key=priority)
             candidates.remove(unit)
             chosen.append(unit)
             chosen_by_kind[unit.kind] += 1
             chosen_by_place[unit.place] += 1
-            self._dealt[unit.name] += runs
+            self._runs_by_unit[unit.name] += runs
             for variant in unit.by_axis.items():
-                self._dealt_by_variant[variant] += runs
+                self._runs_by_variant[variant] += runs
         return sorted(chosen, key=self.units.index)
 
-    def _load(self, unit: Unit) -> int:
-        """The number of runs in the place of a unit so far, plus that of its drive."""
-        return sum(self._dealt_by_variant[variant] for variant in unit.by_axis.items())
+    def _runs_of_variants(self, unit: Unit) -> int:
+        """The number of runs so far in the place of a unit plus the number of runs so far of its drive."""
+        return sum(self._runs_by_variant[variant] for variant in unit.by_axis.items())
 
 
 def changes_for_units(suite: Mapping[str, Any], count: int) -> dict[str, str]:
-    """The changes of a suite, as plain YAML, that give its design a number of units.
+    """The changes of a suite after which its design has `count` units.
 
-    The numbers of seeds of its places are multiplied or, if the design is not over scenes, those of its drives.
+    `suite` is the content of the YAML file. The keys of the result are paths in it, such as "spread.units". The numbers
+    of seeds of scenes are multiplied so that there are enough places. If the design is not over scenes, the numbers of
+    seeds of trajectories are multiplied instead.
 
     Raises SuiteError if the suite has no design.
     """
@@ -206,24 +247,26 @@ def changes_for_units(suite: Mapping[str, Any], count: int) -> dict[str, str]:
     if not isinstance(spread, Mapping) or not isinstance(spread.get("units"), int):
         raise SuiteError("--units is for suites with `spread`, and this suite has none")
     over = spread.get("over") or UNIT_AXES
-    changes = {"spread.units": str(count)}
+    units_change = {"spread.units": str(count)}
     least_factor = ceil(count / spread["units"])
     trajectories = suite.get("trajectories") or {}
     if "scene" not in over:
-        return changes | _more_seeds("trajectories", trajectories, least_factor, count)
+        return units_change | _more_seeds("trajectories", trajectories, least_factor, count)
 
     scenes = dict(enumerate(suite.get("scenes") or ()))
     drive_count = 1
     if "trajectory" in over:
-        drive_count = max(sum(_seeds_or_one(entry) for entry in trajectories.values()), 1)
+        variant_counts = [_variant_count(entry) for entry in trajectories.values()]
+        drive_count = max(sum(variant_counts), 1)
     needed_places = ceil(count / drive_count)
-    return changes | _more_seeds("scenes", scenes, least_factor, needed_places)
+    return units_change | _more_seeds("scenes", scenes, least_factor, needed_places)
 
 
 def _more_seeds(key: str, entries: Mapping[Any, Any], least_factor: int, needed: int) -> dict[str, str]:
-    """The changes of entries of a suite that multiply their seeds by one factor.
+    """The changes that multiply the numbers of seeds of the entries at `key` by one factor.
 
-    The factor is at least `least_factor`, and so large that there are `needed` variants.
+    The factor is at least `least_factor`, and large enough for `needed` variants in total. Entries without seeds have
+    one variant each, and do not change.
     """
     seeds_of = {name: entry["seeds"] for name, entry in entries.items() if _has_seeds(entry)}
     if not seeds_of:
@@ -241,6 +284,6 @@ def _has_seeds(entry: Any) -> bool:
     return isinstance(entry, Mapping) and isinstance(entry.get("seeds"), int)
 
 
-def _seeds_or_one(entry: Any) -> int:
-    """The number of variants of an entry."""
+def _variant_count(entry: Any) -> int:
+    """The number of variants of an entry: its number of seeds, or 1 if it has none."""
     return entry["seeds"] if _has_seeds(entry) else 1

@@ -26,13 +26,22 @@ from vobench.trajectory.tum import format_tum
 
 Spatial = PoseSpline | Handheld | Rail | Quadrotor
 AnyTrajectory = Waypoints | Planar | Spatial | Wander | Replay
-KINDS = {get_args(hints(each)["kind"])[0]: each for each in get_args(AnyTrajectory)}
+
+
+def _kind(trajectory_class: type) -> str:
+    """The name of a kind of trajectory, which is the only value of the field `kind` of its class."""
+    kind: str = get_args(hints(trajectory_class)["kind"])[0]
+    return kind
+
+
+# The class of each kind of trajectory, by the name of the kind.
+KINDS = {_kind(trajectory_class): trajectory_class for trajectory_class in get_args(AnyTrajectory)}
 # The keys of wheeled trajectories that only some movers have.
 MOVER_SPECIFIC_KEYS = set[str]().union(*MOVER_KEYS.values())
 
 
 def known_keys(spec: Wheeled) -> set[str]:
-    """The keys that are allowed for a trajectory with its mover."""
+    """The keys that a wheeled trajectory may have. They depend on its mover."""
     common_keys = set(hints(type(spec))) - MOVER_SPECIFIC_KEYS
     return common_keys | set(spec.mover_keys[spec.mover])
 
@@ -69,7 +78,10 @@ TrajectorySpec = Annotated[
 
 
 def read_times(spec: Replay, folder: Path) -> Stamps | None:
-    """The stamps in the file `times` of a trajectory; None if it names no such file. Raises InputError."""
+    """The stamps in the file that the key `times` of a trajectory names, or None if it names no file.
+
+    Relative paths start at `folder`. Raises InputError if the file cannot be read.
+    """
     if not spec.times:
         return None
     path = folder / spec.times
@@ -77,9 +89,12 @@ def read_times(spec: Replay, folder: Path) -> Stamps | None:
 
 
 def read_replayed(spec: Replay, folder: Path, times: Stamps | None) -> str:
-    """The poses in the file of a trajectory as TUM text, in body axes. Relative paths start at `folder`.
+    """The poses in the file of a trajectory, as TUM text, in body axes.
 
-    Raises InputError.
+    `folder` is the folder at which relative paths start.
+    `times` are the stamps of poses that have none in the file.
+
+    Raises InputError if the file cannot be read, and VobenchError if stamps are missing or do not fit.
     """
     path = folder / spec.file
     parsed = parse_any(_read_text(path), name=str(path))
@@ -94,11 +109,16 @@ def read_replayed(spec: Replay, folder: Path, times: Stamps | None) -> str:
     T = move.apply(parsed.T) if move else parsed.T  # (N, 4, 4)
     # KITTI's matrices have six digits, so they are not exact rotations.
     rotations = se3.nearest_rotation(T[:, :3, :3])
-    return format_tum(Trajectory(t_ns, se3.transform(rotations, T[:, :3, 3])))
+    positions_m = T[:, :3, 3]
+    trajectory = Trajectory(t_ns, se3.transform(rotations, positions_m))
+    return format_tum(trajectory)
 
 
 def _stamps(spec: Replay, times: Stamps | None, parsed: ParsedTrajectory) -> Stamps:
-    """The stamps for poses without stamps, from a file or a constant rate. Raises VobenchError."""
+    """The stamps for poses that have none in their file. They come from another file, or from a constant rate.
+
+    Raises VobenchError if there is neither, or if the numbers of stamps and poses differ.
+    """
     if times is not None:
         t_ns = parsed.stamped_by(times)
         if t_ns is None:
