@@ -123,10 +123,12 @@ class Run:
     ) -> "Figure":
         """A figure of the run, of all or some estimators.
 
-        Without a `kind`, paths in top view and errors over time on one case, by default the first. The kinds are those
-        of `vobench plot`: path, axes, error, segments, cumulative, breakdown, cost, matrix and strip; without `case`
-        they show all cases, or the one that is most worth a look. `over` is what errors are drawn over, time or path,
-        and `metric` that of the matrix.
+        `kind` is one of those of `vobench plot`: path, axes, error, segments, cumulative, breakdown, cost, matrix or
+        strip. Without it, paths in top view and errors over time are drawn.
+        `case` is the case that is shown. Without it, figures of a `kind` show all cases, or the most informative one;
+        the figure without a `kind` shows the first case.
+        `over` is the axis that errors are drawn over: time or path.
+        `metric` is the metric of the matrix.
 
         Raises UnknownNameError for a name that the run does not have, and InputError if there is nothing to draw.
         """
@@ -136,7 +138,9 @@ class Run:
         names = () if estimators is None else listed(estimators)
         for name in names:
             self._require("estimator", name, self.estimators)
-        chosen = case if kind else case or self.cases[0]
+        chosen = case
+        if kind is None and case is None:
+            chosen = self.cases[0]
         if chosen is not None:
             self._require("case", chosen, self.cases)
         options = FigureOptions(width_inches=width_inches, over=over, metric=metric)

@@ -27,14 +27,14 @@ class AmbientLight:
 
     def __init__(self, baked: BakedScene) -> None:
         patches = baked.patches
-        # Counted from -1, the texels of no surfel.
+        # The texels of each surfel are counted; those without a surfel, which have -1, are left out.
         surfel_count = len(patches.area_m2)
         texel_count = np.bincount(patches.surfel_of + 1, minlength=surfel_count + 1)[1:]
         total_m2 = max(patches.area_m2.sum(), 1e-12)
         texel_share = patches.area_m2 / np.maximum(texel_count, 1) / np.pi / total_m2
         surfel_weights = texel_share[:, None] * patches.reflectance
-        with_none = np.append(surfel_weights, np.zeros((1, 3)), 0)  # the last one for the surfel -1
-        weights = with_none.astype(np.float32)
+        weights_or_zero = np.append(surfel_weights, [[0, 0, 0]], axis=0)  # row -1: texels without a surfel
+        weights = weights_or_zero.astype(np.float32)
         self._weights = weights[patches.surfel_of].reshape(*baked.direct.shape[1:], 3)
         self._light = self._weights
         self._mean_cd_m2 = np.zeros(3)
@@ -42,7 +42,7 @@ class AmbientLight:
     def cd_m2(self, light: Floats) -> Array:
         """The mean (3,) under a light map (H, W, 3). It is recomputed only for another array than in the last call."""
         if light is not self._light:
-            # No dot product, whose order of adding up depends on the number of threads.
+            # np.sum instead of a dot product, whose result depends on the number of threads.
             self._light = light
             self._mean_cd_m2 = np.sum(self._weights * light, axis=(0, 1), dtype=np.float64)
         return self._mean_cd_m2

@@ -77,12 +77,14 @@ def make_board(
     refuted: Collection[str] = (),
     until_ratio: float | None = None,
 ) -> Board:
-    """The board of trials; `answered` is by case and estimator, `facts` by case, and entries may be missing in both.
+    """The board of trials.
 
-    `remarks` are further ones, which come first. `refuted` are the estimators that state that they are deterministic,
-    but gave different answers to one sequence; their cells state that they are not deterministic. `until_ratio` is
-    given if units were drawn until each pair was decided or alike within this ratio: tests and intervals are then such
-    that hold whenever one stops.
+    `answered` are the statistics of frames by case and estimator, `facts` those of cases; entries may be missing.
+    `remarks` are shown before all others.
+    `refuted` are the estimators that claim to be deterministic, but gave different estimates for one sequence. Their
+    cells state that they are not deterministic.
+    `until_ratio` is the ratio of losses up to which two estimators count as equivalent in a sequential run. Tests and
+    intervals then remain valid whenever the run stops.
     """
     scores = list(scores)
     unmade = unavailable_cases(scores)

@@ -121,8 +121,9 @@ def _with_hidden_truth(suite: Plan, root: Path) -> Plan:
     """The plan, in which the runs below `root` and all recordings of the suite are hidden, as they contain truth."""
     hidden = [root.resolve()]
     for case in suite.recorded:
-        truth = case.source.truth
-        hidden += [Path(path).resolve() for path in (case.source.path, truth) if path]
+        for path in (case.source.path, case.source.truth):
+            if path:
+                hidden.append(Path(path).resolve())
     return replace(suite, hidden=(*suite.hidden, *hidden))
 
 

@@ -78,7 +78,7 @@ def encode(
 ) -> bytes:
     """A grey or RGB picture as PNG, or as JPEG of a quality.
 
-    Raises SequenceError where it has not the camera's size. PNG gets no compression level: OpenCV's default strategy
+    Raises SequenceError if the picture does not have the size of the camera. PNG gets no compression level: OpenCV's default strategy
     is both faster and smaller than any level.
     """
     height, width = (camera.height_px, camera.width_px) if camera else image.shape[:2]
@@ -120,7 +120,7 @@ def require_picture(
     *,
     colour: str = MONO,
 ) -> tuple[str, int, int]:
-    """Form, height and width by a picture's header.
+    """The format, height and width in the header of a picture.
 
     Raises SequenceError unless it has 8 bits, the channels of the colour, and the camera's size.
     """
