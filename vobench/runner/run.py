@@ -121,9 +121,8 @@ def _with_hidden_truth(suite: Plan, root: Path) -> Plan:
     """The plan, in which the runs below `root` and all recordings of the suite are hidden, as they contain truth."""
     hidden = [root.resolve()]
     for case in suite.recorded:
-        for path in (case.source.path, case.source.truth):
-            if path:
-                hidden.append(Path(path).resolve())
+        paths = (case.source.path, case.source.truth)
+        hidden.extend(Path(path).resolve() for path in paths if path)
     return replace(suite, hidden=(*suite.hidden, *hidden))
 
 

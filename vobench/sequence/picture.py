@@ -78,8 +78,8 @@ def encode(
 ) -> bytes:
     """A grey or RGB picture as PNG, or as JPEG of a quality.
 
-    Raises SequenceError if the picture does not have the size of the camera. PNG gets no compression level: OpenCV's default strategy
-    is both faster and smaller than any level.
+    Raises SequenceError if the picture does not have the size of the camera. PNG gets no compression level: OpenCV's
+    default strategy is both faster and smaller than any level.
     """
     height, width = (camera.height_px, camera.width_px) if camera else image.shape[:2]
     expected = _shape(height, width, colour)
