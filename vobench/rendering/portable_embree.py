@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vobench.errors import MissingDependencyError
 from vobench.portable import PORTABLE
+from vobench.rendering.dot_product import dot
 
 DEVICE_CONFIG = b"isa=sse4.2"  # the instruction set that Embree may use
 UNEXPECTED_BUILD = f"{PORTABLE} needs embreex 4.4 as its wheel for Linux is built; run without it"
@@ -88,23 +89,14 @@ def with_portable_places(
     # p, q and the determinant are named as in the paper.
     p = np.cross(direction, c - a)
     q = np.cross(origin - a, b - a)
-    determinant = _dot(b - a, p)
+    determinant = dot(b - a, p)
     recomputed = {
-        "u": _dot(origin - a, p) / determinant,
-        "v": _dot(direction, q) / determinant,
-        "tfar": _dot(c - a, q) / determinant,
+        "u": dot(origin - a, p) / determinant,
+        "v": dot(direction, q) / determinant,
+        "tfar": dot(c - a, q) / determinant,
     }
     portable_hits = dict(hits)
     for name, values in recomputed.items():
         portable_hits[name] = hits[name].copy()
         portable_hits[name][rays] = values
     return portable_hits
-
-
-def _dot(one: NDArray[Any], other: NDArray[Any]) -> NDArray[Any]:
-    """The dot products (R,) of vectors (R, 3).
-
-    The order of the sum is fixed here, because BLAS and einsum choose theirs by the processor.
-    """
-    products = one * other
-    return np.asarray(products[:, 0] + products[:, 1] + products[:, 2])
