@@ -14,7 +14,7 @@ from vobench.scene.material import Material
 from vobench.scene.scene import ceiling_light
 from vobench.scene.triangles import Thing, triangle_table
 
-MATERIALS = {"a": Material(), "mirror": Material("mirror", tint=0.8)}
+MATERIALS = {"a": Material(), "glass": Material("pane", eta=1.5), "mirror": Material("mirror", tint=0.8)}
 X, Y, Z = np.eye(3)
 FLOOR = rectangle(0 * Z, 2 * X, 2 * Y, "a", "floor")
 BULB = PointLight("bulb", np.array([0.3, -0.2, 1.5]), 4 * np.pi * 100)

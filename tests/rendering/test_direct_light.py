@@ -79,6 +79,24 @@ def test_the_sky_through_a_small_opening_leaves_no_stains() -> None:
     assert np.sqrt(np.mean(relative**2)) < 0.4
 
 
+def test_the_sky_through_a_pane_behind_slats_leaves_no_stains() -> None:
+    pane = rectangle(1.5 * X + Z, Y, Z, "glass", "pane")
+    slats = [
+        rectangle(1.3 * X + height * Z, 0.05 * Z, 2 * Y, "a", f"slat_{height:.2f}")
+        for height in np.arange(0.5, 1.6, 0.1)
+    ]
+    points, layout, visibility = open_floor(pane, *slats, spacing_m=0.025)
+    (emitter,) = (each for each in emitters(Sky("sky", 1000.0), visibility) if each.sky == "pane")
+    cells = np.zeros(len(points), np.int32)
+    rows = np.arange(len(points))
+    light_lx = direct_light(emitter, points, layout, cells, visibility, side=4, among=np.ones(len(points), bool))
+    many = cast_shadow_rays(emitter, points, rows, visibility, RayGrid(24, is_spread=True)).light
+    assert light_lx.mean() == pytest.approx(many.mean(), rel=0.05)
+    far_from_slats = points.points_m[:, 0] < 0.5
+    relative = (light_lx - many)[far_from_slats] / many[far_from_slats]
+    assert relative.std() < 0.11
+
+
 def test_a_panel_far_away_is_a_point_with_the_cosine_of_its_face() -> None:
     far = ceiling_light("far", np.array([0.0, 0, 30.0]), (0.4, 0.3), power_lm=5000)
     points_m, light_lx = lit_by(far)

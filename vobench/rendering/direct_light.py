@@ -25,6 +25,8 @@ FINER_STRIDES = (*STRIDES[1:], 1)
 STEEP = (0.08, 0.15)
 GENTLE = 0.2  # the visible share on a coarse grid is smoothed if it differs by less than this between neighbours
 
+PANE_BLURS = 4  # how often the light through a pane is blurred, so that the noise of its few rays leaves no stains
+
 # The open sky is so bright that the light of a small share of it is computed with more rays, and smoothed.
 FAINT_SHARE = 0.3  # the greatest share for which this is done
 FAINT_SIDES = 4  # how many times as many rays along each side of the grid of rays
@@ -90,7 +92,10 @@ class Receivers:
         light.set(rows, self._sampled(emitter, rows, side))
         not_interpolated = light.refine(self.lit, stride=1, tolerance=np.inf)
         light.set(not_interpolated, self._sampled(emitter, not_interpolated, side))
-        return self.layout.blurred(light.values)
+        values = light.values
+        for _ in range(PANE_BLURS):
+            values = self.layout.blurred(values)
+        return values
 
     def hard_light(self, emitter: Emitter, side: int) -> Floats:
         """The light (P,) of a narrow emitter, for which one shadow ray suffices except near the edges of shadows.
