@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 BED_LENGTH_M = 2.08
 MATTRESS_CENTER_M = 0.4  # the height of the centre of the mattress
 MIN_WIDTH_FOR_TWO_PILLOWS_M = 1.2  # narrower beds have one pillow
+PILLOW_X_M = 0.3  # the distance from the wall to the centre of a pillow
+PILLOW_HEIGHT_M = 0.585  # the height of the centre of a pillow
+PILLOW_LEAN_DEG = (-24, -14)  # the range of the pitch of a pillow
 BLANKET_COLOURS = ("#b4533a", "#d39a3c", "#6b4353", "#27445c", "#d8c3a0")
 BEDSIDE_DEPTH_M = 0.38
 WARDROBE_DEPTH_M = 0.58
@@ -81,9 +84,9 @@ def _pillows(rng: Rng, width_m: float, linen: Material) -> list[Part]:
     for index in range(count):
         places_from_middle = index - (count - 1) / 2
         y = places_from_middle * 0.5 * width_m
-        lean_deg = rng.uniform(-24, -14)
+        lean_deg = rng.uniform(*PILLOW_LEAN_DEG)
         yaw_deg = rng.normal(0, 4)
-        parts.append(put(pillow, linen, 0.3, y, 0.585, pitch=lean_deg, yaw=yaw_deg))
+        parts.append(put(pillow, linen, x=PILLOW_X_M, y=y, z=PILLOW_HEIGHT_M, pitch=lean_deg, yaw=yaw_deg))
     return parts
 
 
@@ -233,7 +236,7 @@ def _coat(rng: Rng) -> "Trimesh":
 
 
 def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> list[Part]:
-    """A narrow cupboard with two tilting fronts. It is 0.28 m deep and 0.85 m high."""
+    """A narrow cupboard with two tilting fronts. It is 0.26 m deep and 0.85 m high."""
     paint = coated(colour, roughness=0.35)
     depth_m = SHOE_CABINET_DEPTH_M
     body_m = (depth_m, width_m, 0.85)

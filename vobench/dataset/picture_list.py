@@ -186,16 +186,18 @@ def numbered(*folders: Path) -> list[tuple[Path, ...]]:
     Raises InputError if a number is missing or repeated, or if the cameras have different numbers.
     """
     cameras = [_pictures_by_number(folder) for folder in folders]
-    first_camera = cameras[0]
-    last_camera = cameras[-1]  # the same one if there is only one camera
-    left = tuple(first_camera.values())
-    right = tuple(last_camera.values())
+    if len(cameras) == 1:
+        return [tuple(cameras[0].values())]
+
+    left_by_number, right_by_number = cameras
+    left = tuple(left_by_number.values())
+    right = tuple(right_by_number.values())
     if len(left) != len(right):
         counts = f"{len(left)} left and {len(right)} right pictures"
-        raise InputError(f"{counts}; there should be as many of each: {folders[0]} and {folders[-1]}")
-    if min(first_camera) != min(last_camera):
+        raise InputError(f"{counts}; there should be as many of each: {folders[0]} and {folders[1]}")
+    if min(left_by_number) != min(right_by_number):
         raise InputError(f"the first left and right pictures should have the same number: {left[0]} and {right[0]}")
-    return [left] if len(folders) == 1 else [left, right]
+    return [left, right]
 
 
 def _pictures_by_number(folder: Path) -> dict[int, Path]:
@@ -258,15 +260,17 @@ def partners(
         raise InputError(f"no left and right picture have stamps within {within_ns} ns of each other in {name}")
 
     notes = []
-    left_alone = len(left_ns) - len(pairs)
-    right_alone = len(right_ns) - len(pairs)
-    if left_alone or right_alone:
-        notes.append(f"{left_alone} left and {right_alone} right pictures without a partner were dropped.")
-    differences_ns = np.abs(left_ns[pairs.gt] - right_ns[pairs.est])
+    left_indices = pairs.gt
+    right_indices = pairs.est
+    unpaired_left = len(left_ns) - len(pairs)
+    unpaired_right = len(right_ns) - len(pairs)
+    if unpaired_left or unpaired_right:
+        notes.append(f"{unpaired_left} left and {unpaired_right} right pictures without a partner were dropped.")
+    differences_ns = np.abs(left_ns[left_indices] - right_ns[right_indices])
     largest_ns = differences_ns.max()
     if largest_ns:
         notes.append(f"Stamps of a pair are up to {largest_ns} ns apart; the left picture's stamp was used for both.")
-    return Partners(pairs.gt, pairs.est, tuple(notes))
+    return Partners(left_indices, right_indices, tuple(notes))
 
 
 def picture_files(t_ns: Stamps, *cameras: Sequence[Path]) -> PictureStream:
