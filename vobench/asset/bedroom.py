@@ -148,7 +148,11 @@ def wardrobe(
     colour: str = "",
     tones: str = "oak",
 ) -> list[Part]:
-    """A wardrobe with doors, often with a box on top. It is painted if it has a colour, otherwise it is of wood."""
+    """A wardrobe with doors, and on some wardrobes a box on top.
+
+    `colour` is the colour of the paint; if it is empty, the wardrobe is made of wood.
+    `tones` are the tones of the wood.
+    """
     look = coated(colour, roughness=0.35) if colour else wood(tones)
     depth_m = WARDROBE_DEPTH_M
     body_m = (depth_m - 0.02, width_m, height_m - PLINTH_M)
@@ -165,7 +169,7 @@ def wardrobe(
     front_m = (0.02, door_m - 0.006, height_m - 0.11)
     handle = tube(mm("0 0 -90, 28 0 -90, 28 0 90, 0 0 90"), 0.006, sections=6)
     for index in range(door_count):
-        y = (index + 0.5) * door_m - width_m / 2
+        y = (index + 0.5) * door_m - width_m / 2  # the middle of the door
         parts.append(stood(front_m, look, depth_m - 0.008, y, 0.07, bevel=0.003, u=0.7 * index))
         # Doors open in pairs, so that the handles of both doors of a pair are next to each other.
         handle_side = 1 if index % 2 == 0 else -1
@@ -181,7 +185,7 @@ def wardrobe(
 
 
 def armchair(rng: Rng, colour: str = "#8a9a7b", tones: str = "oak") -> list[Part]:
-    """An armchair on wooden legs, often with a cushion. It is centred at the origin."""
+    """An armchair on wooden legs, in most cases with a cushion. It is centred at the origin."""
     cover = cloth(colour)
     seat = cushion((0.66, 0.6, 0.18), power=6, cells=4)
     back = cushion((0.16, 0.62, 0.62), power=5, cells=4)

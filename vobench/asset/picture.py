@@ -532,7 +532,7 @@ def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
 
 # Printed matter: a picture fills the texture coordinates from 0 to 1. A mesh can show a rectangular part of it.
 def _canvas(width: int, height: int, colour: str) -> tuple[Image.Image, Draw]:
-    """An image of a colour, in pixels, and an object that draws on it."""
+    """An image that is filled with a colour, and an object that draws on it."""
     image = Image.new("RGB", (width, height), colour)
     return image, ImageDraw.Draw(image)
 

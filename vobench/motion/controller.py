@@ -26,6 +26,19 @@ from vobench.motion.pioneer import (
 )
 from vobench.setting import OneOf, Positive, require
 
+BISECTIONS = 40  # the number of bisection steps in the search for the largest stable gain
+SMALLEST_GAIN_PER_S = 1e-6  # if the largest stable gain is smaller, no gain is recommended
+GROWTH_MARGIN = 1e-9  # the growth must be below 1 by this much
+# A component of the state (m, m/s, rad, rad/s) that exceeds this shows that the integration has diverged.
+MAX_STATE = 1e6
+# A longer leg or a higher rate is probably a typing error, and the drive would fill the memory.
+MAX_LEG_S = 3600.0
+MAX_RATE_HZ = 1e4
+LegTime = Annotated[float, Gt(0), Le(MAX_LEG_S)]
+MOST_FRAMES = 200_000  # the largest number of frames of a drive: nearly two hours at 30 Hz
+# The largest number of frames if every leg lasts as long as possible. Disturbances are drawn for all these frames.
+MOST_POSSIBLE_FRAMES = 20_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class ControllerSettings:
@@ -186,20 +199,6 @@ def _axis_growth(
     return float(np.abs(eigenvalues).max())
 
 
-BISECTIONS = 40  # the number of bisection steps in the search for the largest stable gain
-SMALLEST_GAIN_PER_S = 1e-6  # if the largest stable gain is smaller, no gain is recommended
-GROWTH_MARGIN = 1e-9  # the growth must be below 1 by this much
-# A component of the state (m, m/s, rad, rad/s) that exceeds this shows that the integration has diverged.
-MAX_STATE = 1e6
-# A longer leg or a higher rate is probably a typing error, and the drive would fill the memory.
-MAX_LEG_S = 3600.0
-MAX_RATE_HZ = 1e4
-LegTime = Annotated[float, Gt(0), Le(MAX_LEG_S)]
-MOST_FRAMES = 200_000  # the largest number of frames of a drive: nearly two hours at 30 Hz
-# The largest number of frames if every leg lasts as long as possible. Disturbances are drawn for all these frames.
-MOST_POSSIBLE_FRAMES = 20_000_000
-
-
 @dataclass(frozen=True, slots=True)
 class Vehicle:
     """A robot with its controller, and how its motion is integrated.
@@ -343,17 +342,25 @@ class Vehicle:
         def rates_at_changing_slip(extended_state: Array) -> Array:
             elapsed_share = float(extended_state[7])
             slip_now = slip.towards(next_slip or slip, elapsed_share)
-            rates = self.rates(extended_state[:7], reference, slip_now, period_start)
-            return np.array((*rates, self.rate_hz))
+            state_rates = self.rates(extended_state[:7], reference, slip_now, period_start)
+            return np.array((*state_rates, self.rate_hz))
 
+        rates: Callable[[Array], Array]
         is_constant = next_slip is None or next_slip == slip
-        states = over_period(
-            rates_at_constant_slip if is_constant else rates_at_changing_slip,
-            state if is_constant else np.append(state, 0.0),
+        if is_constant:
+            rates = rates_at_constant_slip
+            start = state
+        else:
+            rates = rates_at_changing_slip
+            start = np.append(state, 0.0)
+        extended_states = over_period(
+            rates,
+            start,
             period_s=1 / self.rate_hz,
             substeps=self.substeps,
             integrator=self.integrator,
-        )[:, :7]
+        )
+        states = extended_states[:, :7]
         is_bounded = np.abs(states).max() < MAX_STATE  # False for NaN
         if not is_bounded:
             raise MotionError(f"the motion diverged with {self.integrator}; use rk4, more sub-steps or a lower gain")
