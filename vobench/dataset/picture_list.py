@@ -104,7 +104,8 @@ def listed_pictures(
     """The existing pictures of one or two cameras, and notes on what was dropped.
 
     Each of `lists` is the file with the list of a camera, and the folder to which its file names are relative.
-    `separator` and `unit` are those of `read_list`.
+    `separator` is the separator of the two columns of a list; None for white space.
+    `unit` is the unit of the stamps.
     `within_ns` is the largest difference between the stamps of a pair.
     Raises InputError if a list is not valid, if there is no pair, or if all files are missing.
     """
@@ -126,7 +127,7 @@ def _drop_missing(cameras: list[PictureList]) -> tuple[list[PictureList], Notes]
     """
     camera_paths = [camera.paths for camera in cameras]
     shots = list(zip(*camera_paths, strict=True))  # the paths of the one or two pictures that belong together
-    exists = np.array([_all_exist(paths) for paths in shots])
+    exists = np.array([_all_exist(paths) for paths in shots])  # (N,), for each shot
     if exists.all():
         return cameras, ()
 
@@ -156,7 +157,9 @@ def _missing_note(
 ) -> str:
     """A sentence with the number of dropped pictures, and where in the recording they are.
 
-    `exists` (N,) is whether the files exist, `t_ns` (N,) are the stamps, and `noun` is "pairs" or "pictures".
+    `exists` (N,) is whether the files of each picture or pair exist.
+    `t_ns` (N,) are the stamps.
+    `noun` is "pairs" or "pictures".
     """
     indices = np.flatnonzero(exists)
     dropped = len(exists) - len(indices)
@@ -249,9 +252,11 @@ def partners(
     within_ns: int,
     name: str,
 ) -> Partners:
-    """The pairs of pictures whose stamps differ by at most `within_ns`.
+    """The pairs of left and right pictures with nearly equal stamps.
 
-    `left_ns` and `right_ns` are the stamps of the pictures of both cameras.
+    `left_ns` are the stamps of the left pictures.
+    `right_ns` are the stamps of the right pictures.
+    `within_ns` is the largest difference between the stamps of a pair.
     `name` is the name of the recording, for messages.
     Raises InputError if there are no pairs.
     """
@@ -276,7 +281,8 @@ def partners(
 def picture_files(t_ns: Stamps, *cameras: Sequence[Path]) -> PictureStream:
     """A stream of the pictures of one or two cameras. A file is read only when the stream reaches it.
 
-    `t_ns` (N,) are the stamps, and each of `cameras` are the paths of the N pictures of a camera.
+    `t_ns` (N,) are the stamps.
+    `cameras` are the paths of the N pictures of each camera.
     Raises InputError if the first pictures cannot be read.
     """
 

@@ -40,7 +40,7 @@ class Run:
     """A finished run of a suite, by its folder: tables, plots and recordings of its trials."""
 
     def __init__(self, path: Path | str) -> None:
-        """The run at a path; the folder of a suite stands for its latest run. Raises InputError if it is no run."""
+        """The run in a folder, or the latest run in the folder of a suite. Raises InputError if there is no run."""
         self._folder = open_run(Path(path))
         self._scores = self._folder.scores()
 
@@ -367,11 +367,18 @@ def read_board(path: Path | str) -> "pd.DataFrame":
 
 
 def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | None = None) -> "pd.DataFrame":
-    """What got better or worse from one run to another: one row per estimator, then one per case and estimator.
+    """The changes of scores from one run to another: one row per estimator, then one per case and estimator.
 
-    A ratio of losses above `at_most` counts as worse. A run is a `Run`, its folder or a bundle. All trials are scored
-    again from their estimates and ground truths; a UserWarning names those whose stored score differs. Raises
-    InputError if the two runs have nothing in common, or have different cases with the same name.
+    All trials are scored again from their estimates and ground truths. A UserWarning names those whose stored score
+    differs.
+
+    Args:
+        old: The earlier run: a `Run`, its folder or a bundle.
+        new: The later run.
+        at_most: The largest ratio of losses that does not count as worse.
+
+    Raises:
+        InputError: The two runs have nothing in common, or have different cases with the same name.
     """
     import pandas as pd
 
@@ -385,7 +392,10 @@ def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | No
 
 
 def bundle(run: Run | Path | str, out: Path | str) -> Path:
-    """Pack a run into a zip file that others can rescore and merge. Raises InputError if `out` is not a .zip."""
+    """Pack a run into a zip file that others can rescore and merge, and return its path.
+
+    Raises InputError if `out` does not end in .zip.
+    """
     from vobench.runner import bundle as packing
 
     path = Path(out)
@@ -462,7 +472,7 @@ def _estimator_name(given: str | type | Path) -> str:
 
 
 def _as_yaml(value: Any) -> str:
-    """A value as the option --set takes it."""
+    """A value as text in the syntax of the option --set."""
     import json
 
     if isinstance(value, str):
@@ -479,6 +489,7 @@ def run_path(given: Run | Path | str) -> Path:
 
 
 def _change_row(change: "ScoreChange") -> dict[str, Any]:
+    """The row of a change in the table of `compare`."""
     low, high = change.interval or (None, None)
     return {
         "case": change.case or "all",
@@ -494,6 +505,7 @@ def _change_row(change: "ScoreChange") -> dict[str, Any]:
 
 
 def _matrix_rows(board: "Board") -> list[list[str]]:
+    """The rows of the table of cases and estimators, with the default metric."""
     from vobench.report import board_table
 
     matrix = board_table.matrix(board, board_table.DEFAULT_METRIC)
@@ -501,6 +513,7 @@ def _matrix_rows(board: "Board") -> list[list[str]]:
 
 
 def _html_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str) -> str:
+    """A table as HTML, with its title above it."""
     import pandas as pd
 
     table = pd.DataFrame([list(row) for row in rows], columns=list(headings))
