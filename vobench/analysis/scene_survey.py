@@ -26,8 +26,12 @@ MAX_FACES_OF_RECTANGLE = 2
 class SceneSurvey:
     """The contents of a scene at its start, and the defects of its meshes.
 
+    `thing_count` is the number of things.
+    `face_count` is the number of triangles.
+    `material_count` is the number of materials.
     `textures_mb` is the size of all textures in memory, in megabytes.
-    `low_m` and `high_m` are opposite corners of the bounding box.
+    `low_m` is the corner of the bounding box with the smallest coordinates.
+    `high_m` is the corner of the bounding box with the largest coordinates.
     `light_names` are the names of all lights.
     `open_edge_count` is the number of edges that belong to only one face; those of rectangles are not counted.
     `duplicate_face_count` is the number of faces with the same corners as an earlier face.

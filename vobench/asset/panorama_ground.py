@@ -72,8 +72,9 @@ def _crest(canvas: PanoramaCanvas, rise: float) -> Floats:
     wave = np.arange(1, WAVES + 1)
     phase = 2 * np.pi * canvas.rng.random(WAVES)
     amplitude = wave**WAVE_EXPONENT * canvas.rng.standard_normal(WAVES)
-    profile = np.cos(wave * canvas.azimuth[:, None] + phase) @ amplitude
-    profile = (profile - profile.min()) / np.ptp(profile)
+    angle_rad = wave * canvas.azimuth[:, None] + phase  # (COLUMNS, WAVES)
+    wave_sum = np.cos(angle_rad) @ amplitude
+    profile = (wave_sum - wave_sum.min()) / np.ptp(wave_sum)  # from 0 to 1
 
     roughness = noise(canvas.rng, 512, 20, 256, slope=0.8)[0]
     closed_roughness = [*roughness, roughness[0]]

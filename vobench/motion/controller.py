@@ -85,8 +85,10 @@ def references(
 ) -> Pair[float]:
     """The references u_ref in m/s and omega_ref in rad/s, equations (20) and (21).
 
-    `error_x_m` and `error_y_m` are the position of the target minus the position of h.
+    `error_x_m` is the x of the target minus the x of h.
+    `error_y_m` is the y of the target minus the y of h.
     `psi` is the heading in rad.
+    `settings` has the gains and limits of the controller.
     `path_mps` is the velocity (x, y) of a moving target. It is added to the velocity of (20).
 
     If a reference exceeds its limit, both are divided by the same factor. This preserves the direction in which h
@@ -256,8 +258,10 @@ class Vehicle:
         target_m: Array,
         path_mps: Pair[float] = (0.0, 0.0),
     ) -> Pair[float]:
-        """The references u_ref in m/s and omega_ref in rad/s that drive h to a target (2,).
+        """The references u_ref in m/s and omega_ref in rad/s that drive h to a target.
 
+        `state` (7,) is the state of the vehicle.
+        `target_m` (2,) is the position of the target.
         `path_mps` is the velocity (x, y) of a moving target.
         """
         x, y, psi = state[:3].tolist()
@@ -276,9 +280,11 @@ class Vehicle:
     ) -> Pair[Number]:
         """The accelerations u' in m/s^2 and omega' in rad/s^2: those of (18), limited, plus the disturbance delta.
 
+        `u` is the speed in m/s.
+        `omega` is the angular velocity in rad/s.
         `reference` are u_ref and omega_ref.
         `period_start` are u and omega at the start of the control period.
-        `delta` are delta_u and delta_omega.
+        `delta` are delta_u in m/s^2 and delta_omega in rad/s^2.
         """
         u_ref, omega_ref = reference
         if self.theta is None:
