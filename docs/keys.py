@@ -9,7 +9,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from vobench.cli.schema import FILES
+from vobench.cli.schema import SETTINGS_CLASSES
 from vobench.setting import unit_of
 from vobench.suite.yaml_file import json_schema
 
@@ -22,7 +22,7 @@ BOUNDS = {"exclusiveMinimum": ">", "minimum": "≥", "exclusiveMaximum": "<", "m
 def sections() -> dict[str, dict[str, Any]]:
     """The schema of every class of settings that YAML files hold, by its name."""
     found = dict[str, dict[str, Any]]()
-    for kind in FILES.values():
+    for kind in SETTINGS_CLASSES.values():
         for part in _parts(json_schema(kind)):
             if "properties" in part and len(part["properties"]) > len(
                 found.get(part["title"], {}).get("properties", ())

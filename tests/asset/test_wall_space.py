@@ -24,4 +24,4 @@ def test_walls_of_two_rooms_are_apart() -> None:
 
 
 def test_a_region_is_centred_at_its_coordinate() -> None:
-    assert region_around(3.0, 1.0, 0.2, 0.8) == WallRegion(2.5, 3.5, 0.2, 0.8)
+    assert region_around(3.0, width_m=1.0, bottom_m=0.2, top_m=0.8) == WallRegion(2.5, 3.5, 0.2, 0.8)

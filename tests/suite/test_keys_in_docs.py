@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from vobench.cli.schema import FILES
+from vobench.cli.schema import SETTINGS_CLASSES
 from vobench.setting import unit_of
 from vobench.suite.yaml_file import json_schema
 
@@ -29,9 +29,9 @@ def test_a_table_that_has_fallen_behind_is_found():
         assert old in keys["refreshed"](text.replace(old, new))
 
 
-@pytest.mark.parametrize("kind", FILES)
+@pytest.mark.parametrize("kind", SETTINGS_CLASSES)
 def test_a_schema_allows_no_other_keys_and_says_every_unit(kind):
-    whole = json_schema(FILES[kind])
+    whole = json_schema(SETTINGS_CLASSES[kind])
     for section in [whole, *whole["$defs"].values()] if "$defs" in whole else [whole]:
         assert section["additionalProperties"] is False
         assert {key: part.get("unit", "") for key, part in section["properties"].items()} == {

@@ -27,7 +27,13 @@ from vobench.suite.white import white_of
 
 @dataclass(frozen=True, slots=True)
 class SceneReport:
-    """The survey of a scene, with its file, the scene that was built from it, and notes about its models."""
+    """The survey of a scene.
+
+    `spec` is the scene's file.
+    `scene` is the scene that was built from it.
+    `survey` has the contents of the scene and the defects of its meshes.
+    `notes` are notes for the user on what was changed or doubtful when the models were read.
+    """
 
     spec: SceneFile
     scene: Scene
@@ -39,12 +45,13 @@ class SceneReport:
         survey = self.survey
         corners_m = zip(survey.low_m, survey.high_m, strict=True)
         size = " x ".join(f"{high_m - low_m:.2f}" for low_m, high_m in corners_m)
+        defects = f"open edges: {survey.open_edge_count:,}; faces on a face: {survey.duplicate_face_count:,}"
         contents = f"{survey.thing_count} things, {survey.face_count:,} faces, {survey.material_count} materials"
         lines = [
             f"{self.spec.place_name}: {contents}",
             f"size: {size} m",
             f"textures: {survey.textures_mb:.0f} MB",
-            f"open edges: {survey.open_edge_count:,}; faces on a face: {survey.duplicate_face_count:,}",
+            defects,
             f"backs seen: {survey.back_facing_share:.1%}",
             f"free circle: {self._free_circle()}",
         ]
@@ -80,13 +87,16 @@ class SceneReport:
         }
 
     def white_cd_m2(self) -> float | None:
-        """The white that cameras are exposed for; None if the scene does not state it and its light is not computed."""
+        """The luminance of the white that cameras are exposed for, in cd/m².
+
+        It is None if the scene does not specify it and its light has not been computed.
+        """
         if self.spec.white_cd_m2 is None and self._light() is None:
             return None
         return white_of(self.spec, self._light())
 
     def doubts(self) -> list[str]:
-        """What is doubtful in the exposure of cameras on the free path, if the light is in the cache."""
+        """Warnings about the exposure of cameras on the free path; empty if the light is not in the cache."""
         light = self._light()
         return exposure_doubts(self.spec, light) if light else []
 
@@ -114,8 +124,8 @@ def strength(light: Light) -> str:
 def survey_scene(scene: str, *, seed: int | None = None, lighting: str = DRAWN) -> SceneReport:
     """Survey a scene, given its name or the path of its file or model. Its light is not computed.
 
-    With a seed, it is the place that the scene's generator creates, under a lighting.
-
+    `seed` is the seed of the place that the scene's generator creates; None for a scene that is not generated.
+    `lighting` is the lighting of a generated place.
     Raises UnknownNameError if there is no such scene, and SuiteError or ModelError if its files are invalid.
     """
     spec = read_place(scene, seed=seed, lighting=lighting)

@@ -17,7 +17,7 @@ from vobench.suite.viewpoint import is_place
 
 EYE_HEIGHT_M = 1.2  # the height of the viewer above the floor, about that of a robot's mast
 DIRECTIONS = 4096  # the number of random directions in which a survey looks for the backs of faces
-SEED = 0  # of these directions, so that a survey is repeatable
+DIRECTION_SEED = 0  # the seed of the random directions, fixed so that a survey is repeatable
 # An object with at most this many faces counts as a rectangle, which has open edges. Others should be closed surfaces.
 MAX_FACES_OF_RECTANGLE = 2
 
@@ -26,8 +26,12 @@ MAX_FACES_OF_RECTANGLE = 2
 class SceneSurvey:
     """The contents of a scene at its start, and the defects of its meshes.
 
+    `thing_count` is the number of things.
+    `face_count` is the number of triangles.
+    `material_count` is the number of materials.
     `textures_mb` is the size of all textures in memory, in megabytes.
-    `low_m` and `high_m` are opposite corners of the bounding box.
+    `low_m` is the corner of the bounding box with the smallest coordinates.
+    `high_m` is the corner of the bounding box with the largest coordinates.
     `light_names` are the names of all lights.
     `open_edge_count` is the number of edges that belong to only one face; those of rectangles are not counted.
     `duplicate_face_count` is the number of faces with the same corners as an earlier face.
@@ -95,6 +99,7 @@ def _textures(scene: Scene) -> set[Texture]:
 
 
 def _rounded(point_m: ArrayLike) -> tuple[float, float, float]:
+    """A point (3,), rounded to millimetres."""
     x_m, y_m, z_m = (round(float(coordinate), 3) for coordinate in np.asarray(point_m))
     return (x_m, y_m, z_m)
 
@@ -125,9 +130,12 @@ def _duplicate_face_count(point_ids: NDArray[np.intp]) -> int:
 
 def _back_facing_share(faces: Triangles, caster: RayCaster, eye_m: ArrayLike) -> float:
     """The share of directions from a viewpoint (3,) in which the nearest face shows its back."""
-    directions = unit(np.random.default_rng(SEED).standard_normal((DIRECTIONS, 3)))
-    hits = caster.hits(np.tile(eye_m, (DIRECTIONS, 1)), directions)
+    rng = np.random.default_rng(DIRECTION_SEED)
+    directions = unit(rng.standard_normal((DIRECTIONS, 3)))
+    origins_m = np.tile(eye_m, (DIRECTIONS, 1))
+    hits = caster.hits(origins_m, directions)
     is_hit = hits.face >= 0
     normals = faces.plane[hits.face[is_hit]]  # (K, 3), of the hit faces
-    is_back = np.einsum("ij,ij->i", normals, directions[is_hit]) > 0
+    cosines = np.einsum("ij,ij->i", normals, directions[is_hit])
+    is_back = cosines > 0
     return float(np.count_nonzero(is_back) / DIRECTIONS)

@@ -16,6 +16,9 @@ if TYPE_CHECKING:
 BED_LENGTH_M = 2.08
 MATTRESS_CENTER_M = 0.4  # the height of the centre of the mattress
 MIN_WIDTH_FOR_TWO_PILLOWS_M = 1.2  # narrower beds have one pillow
+PILLOW_X_M = 0.3  # the distance from the wall to the centre of a pillow
+PILLOW_HEIGHT_M = 0.585  # the height of the centre of a pillow
+PILLOW_LEAN_DEG = (-24, -14)  # the range of the pitch of a pillow
 BLANKET_COLOURS = ("#b4533a", "#d39a3c", "#6b4353", "#27445c", "#d8c3a0")
 BEDSIDE_DEPTH_M = 0.38
 WARDROBE_DEPTH_M = 0.58
@@ -81,9 +84,9 @@ def _pillows(rng: Rng, width_m: float, linen: Material) -> list[Part]:
     for index in range(count):
         places_from_middle = index - (count - 1) / 2
         y = places_from_middle * 0.5 * width_m
-        lean_deg = rng.uniform(-24, -14)
+        lean_deg = rng.uniform(*PILLOW_LEAN_DEG)
         yaw_deg = rng.normal(0, 4)
-        parts.append(put(pillow, linen, 0.3, y, 0.585, pitch=lean_deg, yaw=yaw_deg))
+        parts.append(put(pillow, linen, x=PILLOW_X_M, y=y, z=PILLOW_HEIGHT_M, pitch=lean_deg, yaw=yaw_deg))
     return parts
 
 
@@ -145,7 +148,11 @@ def wardrobe(
     colour: str = "",
     tones: str = "oak",
 ) -> list[Part]:
-    """A wardrobe with doors, often with a box on top. It is painted if it has a colour, otherwise it is of wood."""
+    """A wardrobe with doors, and on some wardrobes a box on top.
+
+    `colour` is the colour of the paint; if it is empty, the wardrobe is made of wood.
+    `tones` are the tones of the wood.
+    """
     look = coated(colour, roughness=0.35) if colour else wood(tones)
     depth_m = WARDROBE_DEPTH_M
     body_m = (depth_m - 0.02, width_m, height_m - PLINTH_M)
@@ -162,7 +169,7 @@ def wardrobe(
     front_m = (0.02, door_m - 0.006, height_m - 0.11)
     handle = tube(mm("0 0 -90, 28 0 -90, 28 0 90, 0 0 90"), 0.006, sections=6)
     for index in range(door_count):
-        y = (index + 0.5) * door_m - width_m / 2
+        y = (index + 0.5) * door_m - width_m / 2  # the middle of the door
         parts.append(stood(front_m, look, depth_m - 0.008, y, 0.07, bevel=0.003, u=0.7 * index))
         # Doors open in pairs, so that the handles of both doors of a pair are next to each other.
         handle_side = 1 if index % 2 == 0 else -1
@@ -178,7 +185,7 @@ def wardrobe(
 
 
 def armchair(rng: Rng, colour: str = "#8a9a7b", tones: str = "oak") -> list[Part]:
-    """An armchair on wooden legs, often with a cushion. It is centred at the origin."""
+    """An armchair on wooden legs, in most cases with a cushion. It is centred at the origin."""
     cover = cloth(colour)
     seat = cushion((0.66, 0.6, 0.18), power=6, cells=4)
     back = cushion((0.16, 0.62, 0.62), power=5, cells=4)
@@ -233,7 +240,7 @@ def _coat(rng: Rng) -> "Trimesh":
 
 
 def shoe_cabinet(rng: Rng, width_m: float = 0.9, colour: str = "#dcdbd6") -> list[Part]:
-    """A narrow cupboard with two tilting fronts. It is 0.28 m deep and 0.85 m high."""
+    """A narrow cupboard with two tilting fronts. It is 0.26 m deep and 0.85 m high."""
     paint = coated(colour, roughness=0.35)
     depth_m = SHOE_CABINET_DEPTH_M
     body_m = (depth_m, width_m, 0.85)

@@ -110,7 +110,7 @@ def _fits(layout: RoomLayout, place: _RowPlace) -> bool:
     """Whether a row can stand at a place: its ends, the wall and the floor are free."""
     height_m = WORKTOP_HEIGHT_M if place.windows_m else ROW_HEIGHT_M
     spot = place.spot
-    region = region_around(spot.along_m, place.length_m, 0.0, height_m)
+    region = region_around(spot.along_m, width_m=place.length_m, bottom_m=0.0, top_m=height_m)
     footprint = spot.footprint(kitchen.ROW_DEPTH_M, place.length_m)
     front = spot.footprint(FRONT_M, place.length_m, kitchen.ROW_DEPTH_M)
     is_wall_free = layout.walls.is_free(spot.side, region)
@@ -131,7 +131,7 @@ def _add_row(layout: RoomLayout, style: Style, place: _RowPlace) -> None:
         window=place.window_y_m,
     )
     footprint = spot.footprint(kitchen.ROW_DEPTH_M + WORKTOP_EDGE_M, place.length_m)
-    region = region_around(spot.along_m, place.length_m, 0.0, ROW_HEIGHT_M)
+    region = region_around(spot.along_m, width_m=place.length_m, bottom_m=0.0, top_m=ROW_HEIGHT_M)
     layout.floor.occupy(footprint, ROW_HEIGHT_M)
     layout.walls.occupy(spot.side, region)
 

@@ -196,17 +196,17 @@ def cut_out(tint: str, texture: Texture) -> Material:
     return replace(matt(tint, texture), cutout=0.5)
 
 
-def tufts(rng: Rng, feet_m: Array, height_m: tuple[float, float], material: Material) -> Part:
+def tufts(rng: Rng, feet_m: Array, height_range_m: tuple[float, float], material: Material) -> Part:
     """Plants as pairs of crossed cards, which show a picture of grass or flowers.
 
     `feet_m` (N, 3) are the positions of the plants on the ground.
-    `height_m` is the range from which their heights are drawn.
+    `height_range_m` are the smallest and the largest height.
     `material` is the material with the picture; see `cut_out`.
     """
     sizes_m = []
     poses = []
     for x, y, z in feet_m.tolist():
-        card_height_m = float(rng.uniform(*height_m))
+        card_height_m = float(rng.uniform(*height_range_m))
         first_deg = float(rng.uniform(0, 90))
         for yaw_deg in (first_deg, first_deg + 90):
             sizes_m.append((1.5 * card_height_m, card_height_m))

@@ -16,7 +16,11 @@ WAVE_EXPONENT = -1.3  # the amplitude of wave n is proportional to n to this pow
 LOWEST_CREST = 0.35  # the lowest point of the crest relative to the highest
 TREE_TANGENT = 0.0012  # the standard deviation of the noise, as the tangent of an elevation
 WOODS_CONTRAST = 0.35  # the standard deviation of the logarithm of the luminance
+# Tiles of noise for each radian of azimuth and for each unit of the tangent of the elevation.
+WOODS_TILES_PER_RAD = 0.9
+WOODS_TILES_PER_TANGENT = 6
 HILL_LIGHT = 0.6  # illuminance relative to level ground: slopes face the viewer, and woods cast shadows
+HILL_BOTTOM_TANGENT = -0.01  # the tangent of the elevation of the lowest row that is computed
 HILL_FOOT_TANGENT = -0.002  # hills are painted only above this tangent of the elevation
 
 
@@ -50,13 +54,13 @@ def paint_hills(canvas: PanoramaCanvas, *, rise: float, distance_m: float, albed
     `albedo` is their mean albedo.
     """
     crest = _crest(canvas, rise)
-    rows = canvas.rows(-0.01, float(crest.max()))
+    rows = canvas.rows(HILL_BOTTOM_TANGENT, float(crest.max()))
     tangent = canvas.tangent[rows, None]
     rows_below_crest = (crest - tangent) / canvas.tangent_step[rows, None]
     coverage = np.clip(rows_below_crest + 0.5, 0, 1)  # the share of each pixel that is below the crest
     coverage *= tangent > HILL_FOOT_TANGENT
 
-    woods = canvas.grain(canvas.azimuth[None, :] * 0.9, tangent * 6)
+    woods = canvas.grain(canvas.azimuth[None, :] * WOODS_TILES_PER_RAD, tangent * WOODS_TILES_PER_TANGENT)
     tone = np.exp(WOODS_CONTRAST * woods)[..., None]
     light_lx = HILL_LIGHT * canvas.daylight.level_lx
     colour = reflected_cd_m2(albedo, light_lx) * tone
@@ -68,12 +72,14 @@ def _crest(canvas: PanoramaCanvas, rise: float) -> Floats:
     wave = np.arange(1, WAVES + 1)
     phase = 2 * np.pi * canvas.rng.random(WAVES)
     amplitude = wave**WAVE_EXPONENT * canvas.rng.standard_normal(WAVES)
-    profile = np.cos(wave * canvas.azimuth[:, None] + phase) @ amplitude
-    profile = (profile - profile.min()) / np.ptp(profile)
+    angle_rad = wave * canvas.azimuth[:, None] + phase  # (COLUMNS, WAVES)
+    wave_sum = np.cos(angle_rad) @ amplitude
+    profile = (wave_sum - wave_sum.min()) / np.ptp(wave_sum)  # from 0 to 1
 
     roughness = noise(canvas.rng, 512, 20, 256, slope=0.8)[0]
     closed_roughness = [*roughness, roughness[0]]
     sample_azimuth = np.linspace(-np.pi, np.pi, len(closed_roughness))
     trees = np.interp(canvas.azimuth, sample_azimuth, closed_roughness)
-    hills = rise * (LOWEST_CREST + 0.65 * profile)
+    relative_height = LOWEST_CREST + (1 - LOWEST_CREST) * profile
+    hills = rise * relative_height
     return np.asarray(hills + TREE_TANGENT * trees)

@@ -532,7 +532,7 @@ def _stone_chips(rng: Rng, px: int, tile_m: float) -> tuple[Bytes, Bytes]:
 
 # Printed matter: a picture fills the texture coordinates from 0 to 1. A mesh can show a rectangular part of it.
 def _canvas(width: int, height: int, colour: str) -> tuple[Image.Image, Draw]:
-    """An image of a colour, in pixels, and an object that draws on it."""
+    """An image that is filled with a colour, and an object that draws on it."""
     image = Image.new("RGB", (width, height), colour)
     return image, ImageDraw.Draw(image)
 
@@ -561,7 +561,7 @@ def _words(rng: Rng, count: int) -> str:
     return " ".join(rng.choice(WORDS.split(), count))
 
 
-def _on(colour: str) -> str:
+def _text_colour_on(colour: str) -> str:
     """The colour of text on a background: light on a dark background, and dark on a light one."""
     is_dark = sum(rgb(colour)) < 380
     return PAPER if is_dark else INK
@@ -652,7 +652,7 @@ def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
     draw.rectangle([x, y, x + 479, y + 679], fill=paper)
     draw.rectangle([x, y, x + 479, y + 90], fill=band)
     title = _words(rng, 3).title()
-    _text(draw, (x + 24, y + 36), title, 29, _on(band))
+    _text(draw, (x + 24, y + 36), title, 29, _text_colour_on(band))
     for left in range(24, 456, split):
         _column(draw, rng, (x + left, y + 112, x + left + split - 20, y + 650), 10)
 
@@ -741,7 +741,7 @@ def _series(rng: Rng) -> list[Image.Image]:
     for start, length in bands:
         end = start + length
         draw.rectangle([start * height, 0, end * height, width], fill=accent)
-    title_ink = _on(accent if title_band > 0 else colour)
+    title_ink = _text_colour_on(accent if title_band > 0 else colour)
     title_size = min(0.6 * width, 0.075 * height, 1.25 * height / len(title))
     _text(draw, (0.15 * height, 0.5 * width), title, title_size, title_ink, anchor="lm")
 
@@ -750,7 +750,7 @@ def _series(rng: Rng) -> list[Image.Image]:
     for volume in range(1, volumes + 1):
         spine = image.copy()
         foot = author if volumes == 1 else str(volume)
-        _text(ImageDraw.Draw(spine), (0.97 * height, 0.5 * width), foot, size, _on(colour), anchor="rm")
+        _text(ImageDraw.Draw(spine), (0.97 * height, 0.5 * width), foot, size, _text_colour_on(colour), anchor="rm")
         spines_of_series.append(spine)
     return spines_of_series
 
@@ -762,7 +762,7 @@ def screen(seed: int = 0) -> Picture:
     is_dark = rng.random() < 0.7
     background = "#1f252b" if is_dark else "#f2f1ec"
     panel = "#12161a" if is_dark else "#d9dcdc"
-    ink = _on(background)
+    ink = _text_colour_on(background)
 
     image, draw = _canvas(1280, 720, background)
     draw.rectangle([0, 0, 1280, 26], fill=panel)
@@ -837,13 +837,22 @@ def _circles(draw: Draw, rng: Rng, w: int, h: int) -> None:
         is_half = rng.random() < 0.4
         draw.rectangle([x, y, x + side, y + side], fill=background)
 
-        # A quarter is part of a circle twice as wide, about a corner of the square.
-        diameter = side if is_half else 2 * side
-        left = x if is_half else x - side * (quarter in (0, 3))
-        top = y if is_half else y - side * (quarter in (0, 1))
+        if is_half:
+            left = x
+            top = y
+            diameter = side
+            sector_deg = 180
+        else:
+            # The circle is twice as wide as the square, and its centre is at a corner of the square.
+            centre_x = x if quarter in (0, 3) else x + side
+            centre_y = y if quarter in (0, 1) else y + side
+            left = centre_x - side
+            top = centre_y - side
+            diameter = 2 * side
+            sector_deg = 90
+        box = [left, top, left + diameter, top + diameter]
         start_deg = 90 * quarter
-        end_deg = start_deg + 90 + 90 * is_half
-        draw.pieslice([left, top, left + diameter, top + diameter], start_deg, end_deg, fill=foreground)
+        draw.pieslice(box, start_deg, start_deg + sector_deg, fill=foreground)
 
         near = 0.38 * side
         far = 0.62 * side
@@ -929,7 +938,7 @@ def carton(seed: int = 0, tile_m: float = 0.5) -> Picture:
 @painted
 def sign(text: str, colour: str = PAPER) -> Picture:
     """A sign (480 × 240 px) with a word inside a border."""
-    ink = _on(colour)
+    ink = _text_colour_on(colour)
     image, draw = _canvas(480, 240, colour)
     draw.rectangle([8, 8, 471, 231], outline=ink, width=5)
     _text(draw, (240, 120), text, 90, ink, anchor="mm")

@@ -177,7 +177,7 @@ class RoomLayout:
                 spot = self.spot(side, along)
                 footprint = spot.footprint(depth_m, width_m, wall_gap_m)
                 front = spot.footprint(front_m, width_m, wall_gap_m + depth_m)
-                region = region_around(along, width_m, 0.0, height_m)
+                region = region_around(along, width_m=width_m, bottom_m=0.0, top_m=height_m)
                 if self.walls.is_free(side, region) and self.floor.fits([footprint], [front] if front_m else []):
                     yield spot
 

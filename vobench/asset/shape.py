@@ -87,7 +87,9 @@ def block_arrays(
     bevel = min(bevel_m, MAX_BEVEL * half_m.min())
     if bevel > 0:
         cube = _bevelled_cube()
-        vertices_m = cube.signs * (half_m - bevel * (1 - cube.sides))
+        # A vertex touches its own side of the box, and is one bevel inside the box on the other two axes.
+        inset_m = bevel * (1 - cube.sides)
+        vertices_m = cube.signs * (half_m - inset_m)
     else:
         cube = _cube()
         vertices_m = cube.signs * half_m

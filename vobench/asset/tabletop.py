@@ -9,18 +9,22 @@ from vobench.asset.picture import one_of
 from vobench.asset.room_layout import PieceMaker, RoomLayout
 from vobench.asset.spot import Spot
 
-TABLE_HEIGHT_M = 0.74  # of desks and dining tables, as in furniture.desk and household.table
-BOOK_SEEDS = 6  # pictures of book spines, few enough to be shared by the shelves of many places
-CARTON_SEEDS = 4  # pictures of cartons
-TURNED_KINDS = ("books", "papers")  # whose long side is along the surface
-YAW_NOISE_DEG = 9.0  # standard deviation of the direction of things
+TABLE_HEIGHT_M = 0.74  # the height of desks and dining tables, as in furniture.desk and household.table
+BOOK_SEEDS = 6  # the number of pictures of book spines; few, so that the shelves of many places share them
+CARTON_SEEDS = 4  # the number of pictures of cartons
+# The kinds that are rotated by 90 degrees, so that their long side is along the surface.
+ROTATED_KINDS = ("books", "papers")
+YAW_NOISE_DEG = 9.0  # the standard deviation of the yaw of items
 
 
 @dataclass(frozen=True, slots=True)
 class TabletopItem:
     """A kind of thing that lies on surfaces.
 
-    `make(rng, **options)` returns its parts. `half_width_m` is half of the width that is kept for it.
+    `kind` is the name that its pieces get.
+    `make` is a function such that `make(rng, **options)` returns its parts.
+    `half_width_m` is half of the width that is reserved for it.
+    `options` are the keyword arguments of `make`.
     """
 
     kind: str
@@ -32,7 +36,7 @@ class TabletopItem:
 def tabletop_items(layout: RoomLayout) -> dict[str, TabletopItem]:
     """The things that may lie on a surface, by name.
 
-    All of them are drawn in the same order, whichever are used.
+    All of them are drawn in the same order, no matter which are used, so that the random numbers do not depend on it.
     """
     rng = layout.rng
     books = {"count": int(rng.integers(2, 6)), "seed": layout.seed % BOOK_SEEDS}
@@ -76,7 +80,7 @@ def add_tabletop_items(
     Args:
         layout: the room.
         support: the name of the piece whose surface it is.
-        spot: the frame in which the surface is; its middle is at y = 0.
+        spot: the frame of the surface, whose middle is at y = 0.
         names: keys of `tabletop_items`.
         x_m: the x of the row.
         width_m: the width of the surface.
@@ -88,9 +92,10 @@ def add_tabletop_items(
     occupied_m = 0.0
     for index in rng.permutation(len(names)).tolist():
         item = available[names[index]]
-        if occupied_m + 2 * item.half_width_m <= width_m:
+        item_width_m = 2 * item.half_width_m
+        if occupied_m + item_width_m <= width_m:
             items.append(item)
-            occupied_m += 2 * item.half_width_m
+            occupied_m += item_width_m
     if not items:
         return
 
@@ -98,8 +103,10 @@ def add_tabletop_items(
     y_m = -width_m / 2
     for item in items:
         y_m += item.half_width_m + mean_gap_m * float(rng.uniform(0.5, 1.5))
-        y_m = min(y_m, width_m / 2 - item.half_width_m)
-        turn_deg = 90.0 if item.kind in TURNED_KINDS else 0.0
-        yaw_deg = spot.yaw_deg + turn_deg + float(rng.normal(0, YAW_NOISE_DEG))
-        layout.add(item.kind, item.make, spot.point(x_m, y_m), z_m, yaw_deg=yaw_deg, support=support, **item.options)
+        last_y_m = width_m / 2 - item.half_width_m
+        y_m = min(y_m, last_y_m)
+        rotation_deg = 90.0 if item.kind in ROTATED_KINDS else 0.0
+        yaw_deg = spot.yaw_deg + rotation_deg + float(rng.normal(0, YAW_NOISE_DEG))
+        position_m = spot.point(x_m, y_m)
+        layout.add(item.kind, item.make, position_m, z_m, yaw_deg=yaw_deg, support=support, **item.options)
         y_m += item.half_width_m

@@ -126,7 +126,7 @@ def _corner(layout: RoomLayout, spot: Spot, *, board_m: float, sofa_m: float) ->
     table_x_m = front_m - TABLE_TO_SOFA_M - TABLE_DEPTH_M / 2 if view_m > TABLE_VIEW_M else None
     sofa_spot = layout.spot(OPPOSITE[spot.side], spot.along_m)
     corner = _TelevisionCorner(spot, sofa_spot, is_at_wall, board_m, sofa_m, back_m, table_x_m)
-    behind_sofa = region_around(sofa_spot.along_m, sofa_m, 0.0, SOFA_WALL_HEIGHT_M)
+    behind_sofa = region_around(sofa_spot.along_m, width_m=sofa_m, bottom_m=0.0, top_m=SOFA_WALL_HEIGHT_M)
     if is_at_wall and not layout.walls.is_free(sofa_spot.side, behind_sofa):
         return None
     footprints = [footprint for footprint, _ in corner.occupied()]
@@ -153,9 +153,9 @@ def _furnish_corner(layout: RoomLayout, style: Style, corner: _TelevisionCorner)
     for footprint, height_m in corner.occupied():
         layout.floor.occupy(footprint, height_m)
     if corner.is_at_wall:
-        behind_sofa = region_around(corner.sofa_spot.along_m, corner.sofa_m, 0.0, SOFA_COVERED_M)
+        behind_sofa = region_around(corner.sofa_spot.along_m, width_m=corner.sofa_m, bottom_m=0.0, top_m=SOFA_COVERED_M)
         layout.walls.occupy(corner.sofa_spot.side, behind_sofa)
-    behind_television = region_around(spot.along_m, corner.board_m, 0.0, TELEVISION_TOP_M)
+    behind_television = region_around(spot.along_m, width_m=corner.board_m, bottom_m=0.0, top_m=TELEVISION_TOP_M)
     layout.walls.occupy(spot.side, behind_television)
 
 

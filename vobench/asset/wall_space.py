@@ -21,9 +21,11 @@ class WallRegion:
         return not (is_apart or is_above)
 
 
-def region_around(along_m: float, width_m: float, bottom_m: float, top_m: float) -> WallRegion:
-    """The region of a width whose middle is at a coordinate along the wall."""
-    return WallRegion(along_m - width_m / 2, along_m + width_m / 2, bottom_m, top_m)
+def region_around(along_m: float, *, width_m: float, bottom_m: float, top_m: float) -> WallRegion:
+    """The region whose middle is at `along_m`, a coordinate along the wall."""
+    start_m = along_m - width_m / 2
+    end_m = along_m + width_m / 2
+    return WallRegion(start_m, end_m, bottom_m, top_m)
 
 
 @dataclass(frozen=True, slots=True)

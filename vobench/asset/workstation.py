@@ -148,7 +148,7 @@ def add_wall_workstation(layout: RoomLayout, style: Style, top: Material) -> Non
     back = Spot(*spot.point(GAP_M), spot.yaw_deg, spot.side)
     add_workstation(layout, style, back, width_m - DESK_GAP_M, top)
     layout.floor.occupy(spot.footprint(depth_m, width_m, GAP_M), CHAIR_HEIGHT_M)
-    layout.walls.occupy(spot.side, region_around(spot.along_m, width_m, 0.0, DISPLAY_TOP_M))
+    layout.walls.occupy(spot.side, region_around(spot.along_m, width_m=width_m, bottom_m=0.0, top_m=DISPLAY_TOP_M))
 
 
 # --- Blocks of desks ---

@@ -56,7 +56,9 @@ class CommandGroup(TyperGroup):
 
     def get_command(self, _: Any, cmd_name: str) -> Any:
         """The command with the given name; None if there is none."""
-        target = COMMANDS.get(cmd_name) or _installed_commands().get(cmd_name)
+        target = COMMANDS.get(cmd_name)
+        if target is None:  # installed distributions are only searched if vobench has no command with this name
+            target = _installed_commands().get(cmd_name)
         if target is None:
             return None
         module_name, _, function_name = target.partition(":")

@@ -13,7 +13,7 @@ from vobench.runner.convert_trajectory import TrajectoryEdit, convert_trajectori
 from vobench.runner.trajectory_pair import TrajectorySource
 from vobench.trajectory.nanoseconds import NS_PER_S
 
-MOST_S = 9e9  # the largest time in seconds that fits into a stamp of 64 bits in nanoseconds
+MAX_TIME_S = 9e9  # a stamp is a 64-bit integer in nanoseconds, which can store up to 9.2e9 s
 
 
 @option_group
@@ -37,19 +37,21 @@ class EditOptions:
     """Options that edit a trajectory before it is written: time offset, time range and downsampling."""
 
     t_offset: Annotated[
-        float, typer.Option(min=-MOST_S, max=MOST_S, help="The time in seconds to add to all stamps.")
+        float, typer.Option(min=-MAX_TIME_S, max=MAX_TIME_S, help="The time in seconds to add to all stamps.")
     ] = 0.0
     t_start: Annotated[
-        float | None, typer.Option(min=-MOST_S, max=MOST_S, help="Remove the poses before this stamp, in seconds.")
+        float | None,
+        typer.Option(min=-MAX_TIME_S, max=MAX_TIME_S, help="Remove the poses before this stamp, in seconds."),
     ] = None
     t_end: Annotated[
-        float | None, typer.Option(min=-MOST_S, max=MOST_S, help="Remove the poses after this stamp, in seconds.")
+        float | None,
+        typer.Option(min=-MAX_TIME_S, max=MAX_TIME_S, help="Remove the poses after this stamp, in seconds."),
     ] = None
     downsample: Annotated[int | None, typer.Option(min=2, help="Keep at most this many poses, evenly spaced.")] = None
 
     @property
     def edit(self) -> TrajectoryEdit:
-        """The same options as an edit, with times in nanoseconds."""
+        """The edit that these options specify, with times in nanoseconds."""
         return TrajectoryEdit(
             offset_ns=round(self.t_offset * NS_PER_S),
             first_ns=_nanoseconds(self.t_start),
@@ -59,7 +61,7 @@ class EditOptions:
 
 
 def _nanoseconds(time_s: float | None) -> int | None:
-    """A time in nanoseconds; None if there is none."""
+    """A time in nanoseconds; None if no time is given."""
     return None if time_s is None else round(time_s * NS_PER_S)
 
 

@@ -67,7 +67,7 @@ def export_command(
 
 
 def _print_result(notes: Iterable[str], sentence: str) -> None:
-    """Print the notes as a list, and a sentence about the result after them."""
+    """Print the notes as a list, followed by a sentence about the result."""
     for note in notes:
         print(f"- {note}")
     print(sentence)

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, cast
 
 import typer
 
@@ -10,18 +10,18 @@ from vobench.cli import terminal
 from vobench.cli.option import Json, option_group, with_option_groups
 from vobench.cli.trajectory_option import TrajectoryOptions
 from vobench.errors import InputError, require_known
-from vobench.report.figure_style import ABSCISSAS, COLUMN_INCHES, ENDINGS, PAGE_INCHES, save_figure
+from vobench.report.figure_style import ABSCISSAS, COLUMN_INCHES, ENDINGS, PAGE_INCHES, Abscissa, save_figure
 
 if TYPE_CHECKING:
     from vobench.report.figure_kind import FigureOptions, FileFigures, RunFigures
 
-WIDTHS = {"column": COLUMN_INCHES, "page": PAGE_INCHES}
-LARGEST_INCHES = 40.0
+WIDTHS_INCHES = {"column": COLUMN_INCHES, "page": PAGE_INCHES}
+MAX_WIDTH_INCHES = 40.0
 
 
 @option_group
 class FigureSelection:
-    """Which figures are drawn, and of what."""
+    """Options that select the kinds of figures, and the cases and estimators that they show."""
 
     kind: Annotated[
         list[str] | None,
@@ -44,7 +44,7 @@ class FigureSelection:
 
 @option_group
 class FigureForm:
-    """How figures are drawn."""
+    """Options that specify the axes, the metric and the width of figures."""
 
     over: Annotated[str, typer.Option(help="What errors are drawn over: time or path.")] = "time"
     metric: Annotated[str, typer.Option(help="The metric of the matrix, as of `vobench report`.")] = "ate"
@@ -58,30 +58,32 @@ class FigureForm:
 
     @property
     def width_inches(self) -> float | None:
-        """The width of all figures; None for that of each kind. Raises InputError."""
+        """The width of all figures; None for the default width of each kind. Raises InputError if it is invalid."""
         return None if self.width is None else _width_inches(self.width)
 
     def options(self) -> "FigureOptions":
-        """The options of figures. Raises UnknownNameError for an unknown word, and InputError for a wrong width."""
+        """The options of figures.
+
+        Raises UnknownNameError for an unknown axis or metric, and InputError for an invalid width.
+        """
         from vobench.report.board_metric import METRICS
         from vobench.report.figure_kind import FigureOptions
 
-        require_known("abscissa", self.over, ABSCISSAS)
+        over = cast("Abscissa", require_known("abscissa", self.over, ABSCISSAS))
         require_known("metric", self.metric, METRICS)
-        over = ABSCISSAS[ABSCISSAS.index(self.over)]
         return FigureOptions(width_inches=self.width_inches, over=over, metric=self.metric)
 
 
 def _width_inches(text: str) -> float:
-    """The width that an option names. Raises InputError."""
-    if text in WIDTHS:
-        return WIDTHS[text]
+    """The width in inches, from the text of the option. Raises InputError if it is invalid."""
+    if text in WIDTHS_INCHES:
+        return WIDTHS_INCHES[text]
     try:
         width_inches = float(text)
     except ValueError:
         width_inches = 0.0
-    if not 1.0 <= width_inches <= LARGEST_INCHES:
-        raise InputError(f"--width should be column, page, or 1 to {LARGEST_INCHES:g} inches, got {text!r}")
+    if not 1.0 <= width_inches <= MAX_WIDTH_INCHES:
+        raise InputError(f"--width should be column, page, or 1 to {MAX_WIDTH_INCHES:g} inches, got {text!r}")
     return width_inches
 
 
@@ -143,7 +145,10 @@ def _file_figures(
     trajectories: TrajectoryOptions,
     options: "FigureOptions",
 ) -> "FileFigures":
-    """The figures of files: one of ground truth, and others of estimates. Raises InputError."""
+    """The figures of files: the first file is the ground truth, and the others are estimates.
+
+    Raises InputError if options for runs were given, or if a file cannot be read.
+    """
     from vobench.report.figure_kind import FileFigures
     from vobench.report.scored_case import scored_files
     from vobench.runner.score_settings import settings_like

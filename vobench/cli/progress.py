@@ -19,28 +19,29 @@ class Bars:
 
         self._console = Console(stderr=True, markup=False)
 
-    def track(self, items: Iterable[Item], what: str, *, total: int) -> Iterator[Item]:
+    def track(self, items: Iterable[Item], description: str, *, total: int) -> Iterator[Item]:
         """Iterate over items, and count them on a bar that disappears at the end."""
         from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
         columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-        with self._progress(f"{what}: {total} frames", *columns) as progress:
-            yield from progress.track(items, total=total, description=what)
+        with self._progress(f"{description}: {total} frames", *columns) as progress:
+            yield from progress.track(items, total=total, description=description)
 
     @contextmanager
-    def step(self, what: str) -> Iterator[Callable[[float], object]]:
+    def step(self, description: str) -> Iterator[Callable[[float], object]]:
         """A spinner around work of unknown length. It yields a function that shows the finished share."""
         from rich.progress import SpinnerColumn, TaskProgressColumn, TextColumn
 
-        with self._progress(what, SpinnerColumn(), TextColumn(what), TaskProgressColumn()) as progress:
-            task = progress.add_task(what, total=None)
+        with self._progress(description, SpinnerColumn(), TextColumn(description), TaskProgressColumn()) as progress:
+            task = progress.add_task(description, total=None)
             yield lambda share: progress.update(task, total=1.0, completed=share)
 
     def say(self, sentence: str) -> None:
-        """Print a separate line."""
+        """Print a sentence as a separate line on standard error."""
         print(f"vobench: {sentence}", file=sys.stderr, flush=True)
 
     def _progress(self, line: str, *columns: "ProgressColumn") -> "Progress":
+        """A progress bar with the given columns. If standard error is not a terminal, only `line` is printed."""
         from rich.progress import Progress
 
         is_terminal = self._console.is_terminal

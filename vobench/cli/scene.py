@@ -48,16 +48,14 @@ def scene_command(
 
     With --seeds, draw a contact sheet of the places that its generator creates.
     """
-    del trust  # the callback of the option has done its work
+    del trust  # the callback of --trust has already recorded the consent
     require_known("lighting", lighting, (*LIGHTINGS, DRAWN))
     if out:
         require_png(out)
     if seeds is not None:
-        if out is None:
-            raise InputError("--seeds draws a sheet; add --out sheet.png")
-        first_seed = 1 if seed is None else seed
-        save_place_sheet(scene, out, seeds=seeds, first_seed=first_seed, lighting=lighting, progress=Bars())
+        _draw_places(scene, out, seeds=seeds, seed=seed, lighting=lighting)
         return
+
     if seed is None and lighting != DRAWN:
         raise InputError("--lighting is for the places of a generator; add --seed")
     report = survey_scene(scene, seed=seed, lighting=lighting)
@@ -68,3 +66,17 @@ def scene_command(
         return
     for line in [*report.lines(), *report.notes, *report.doubts()]:
         print(line)
+
+
+def _draw_places(scene: str, out: Path | None, *, seeds: int, seed: int | None, lighting: str) -> None:
+    """Draw a contact sheet of generated places to a PNG file.
+
+    `seeds` is the number of places.
+    `seed` is the seed of the first place; 1 if it is None.
+    `lighting` is the lighting of all places.
+    Raises InputError if there is no `out`.
+    """
+    if out is None:
+        raise InputError("--seeds draws a sheet; add --out sheet.png")
+    first_seed = 1 if seed is None else seed
+    save_place_sheet(scene, out, seeds=seeds, first_seed=first_seed, lighting=lighting, progress=Bars())

@@ -12,7 +12,7 @@ from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite_spec import Suite
 from vobench.suite.yaml_file import json_schema
 
-FILES = {"suite": Suite, "scenario": ScenarioFile, "scene": SceneFile, "estimator": Manifest}
+SETTINGS_CLASSES = {"suite": Suite, "scenario": ScenarioFile, "scene": SceneFile, "estimator": Manifest}
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
@@ -27,5 +27,6 @@ def schema_command(
 ) -> None:
     """Print the JSON Schema of a suite's, scenario's, scene's or estimator's YAML, for editors and other programs."""
     del json  # the output is always JSON
-    settings = FILES[require_known("schema", kind, FILES)]
-    terminal.print_json({"$schema": DIALECT, **json_schema(settings)})
+    require_known("schema", kind, SETTINGS_CLASSES)
+    settings_class = SETTINGS_CLASSES[kind]
+    terminal.print_json({"$schema": DIALECT, **json_schema(settings_class)})

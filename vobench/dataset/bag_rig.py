@@ -84,17 +84,18 @@ class Info:
     rectified: bool
 
     def matrix(self, name: str, *shape: int) -> Array:
-        """The matrix k, r or p with a shape. It is 0 for an uncalibrated camera.
+        """The matrix with the name k, r or p, as an array of the given shape. It is 0 for an uncalibrated camera.
 
         Raises InputError if the matrix does not have this shape or is not finite.
         """
         values = np.asarray(self._field(name), float)
-        has_shape = values.size == np.prod(shape)
-        if not has_shape or not np.isfinite(values).all():
+        has_expected_size = values.size == np.prod(shape)
+        if not has_expected_size or not np.isfinite(values).all():
             raise InputError(f"{self.topic}: {name.upper()} should be finite numbers, but is {values.tolist()}")
         return values.reshape(shape)
 
     def _field(self, name: str) -> Any:
+        """The field with a name in lower case (ROS 2), or otherwise in upper case (ROS 1)."""
         if hasattr(self.message, name):
             return getattr(self.message, name)
         return getattr(self.message, name.upper())
@@ -154,7 +155,11 @@ def stereo_transform_from_projection(left: Info, right: Info) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class FramedInfo:
-    """A CameraInfo message, and the name of the camera's frame in /tf_static."""
+    """A CameraInfo message with the frame of its camera.
+
+    `info` is the message.
+    `frame` is the name of the camera's frame in /tf_static.
+    """
 
     info: Info
     frame: str
@@ -180,9 +185,14 @@ def info_rig(
     right = cameras[1]
     # /tf_static contains the frames of the cameras, not those of rectified pictures.
     is_rectified = left.info.rectified or right.info.rectified
-    T_left_right = None if is_rectified else find_transform(transforms, left.frame, right.frame)
+    # A frame that both cameras share contains no information about the baseline.
+    has_shared_frame = left.frame == right.frame
+    T_left_right = None
+    if not is_rectified and not has_shared_frame:
+        T_left_right = find_transform(transforms, left.frame, right.frame)
+
     notes: tuple[str, ...] = ()
-    if T_left_right is None or left.frame == right.frame:
+    if T_left_right is None:
         T_left_right = stereo_transform_from_projection(left.info, right.info)
         topics = f"{left.info.topic} and {right.info.topic}"
         notes = (f"The position of the right camera was derived from R and P of {topics}.",)

@@ -60,7 +60,12 @@ class Writing:
 class Layout:
     """A layout of recordings: how it is recognised, read and written.
 
-    `heeds` names the ReadOptions that it uses.
+    `name` is the name of the layout, as in `vobench import --form`.
+    `known_by` describes how a user recognises the layout, for messages.
+    `sniff` returns whether a folder or file has this layout.
+    `read` reads a recording with the given options.
+    `heeds` are the names of the ReadOptions that `read` uses.
+    `writing` is how recordings are written; None if the layout can only be read.
     `truth` is a regular expression for its files and folders with ground truth, as `folder/name`. The sandbox hides
     them from estimators.
     """

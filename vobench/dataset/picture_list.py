@@ -104,7 +104,8 @@ def listed_pictures(
     """The existing pictures of one or two cameras, and notes on what was dropped.
 
     Each of `lists` is the file with the list of a camera, and the folder to which its file names are relative.
-    `separator` and `unit` are those of `read_list`.
+    `separator` is the separator of the two columns of a list; None for white space.
+    `unit` is the unit of the stamps.
     `within_ns` is the largest difference between the stamps of a pair.
     Raises InputError if a list is not valid, if there is no pair, or if all files are missing.
     """
@@ -126,7 +127,7 @@ def _drop_missing(cameras: list[PictureList]) -> tuple[list[PictureList], Notes]
     """
     camera_paths = [camera.paths for camera in cameras]
     shots = list(zip(*camera_paths, strict=True))  # the paths of the one or two pictures that belong together
-    exists = np.array([_all_exist(paths) for paths in shots])
+    exists = np.array([_all_exist(paths) for paths in shots])  # (N,), for each shot
     if exists.all():
         return cameras, ()
 
@@ -156,7 +157,9 @@ def _missing_note(
 ) -> str:
     """A sentence with the number of dropped pictures, and where in the recording they are.
 
-    `exists` (N,) is whether the files exist, `t_ns` (N,) are the stamps, and `noun` is "pairs" or "pictures".
+    `exists` (N,) is whether the files of each picture or pair exist.
+    `t_ns` (N,) are the stamps.
+    `noun` is "pairs" or "pictures".
     """
     indices = np.flatnonzero(exists)
     dropped = len(exists) - len(indices)
@@ -186,16 +189,18 @@ def numbered(*folders: Path) -> list[tuple[Path, ...]]:
     Raises InputError if a number is missing or repeated, or if the cameras have different numbers.
     """
     cameras = [_pictures_by_number(folder) for folder in folders]
-    first_camera = cameras[0]
-    last_camera = cameras[-1]  # the same one if there is only one camera
-    left = tuple(first_camera.values())
-    right = tuple(last_camera.values())
+    if len(cameras) == 1:
+        return [tuple(cameras[0].values())]
+
+    left_by_number, right_by_number = cameras
+    left = tuple(left_by_number.values())
+    right = tuple(right_by_number.values())
     if len(left) != len(right):
         counts = f"{len(left)} left and {len(right)} right pictures"
-        raise InputError(f"{counts}; there should be as many of each: {folders[0]} and {folders[-1]}")
-    if min(first_camera) != min(last_camera):
+        raise InputError(f"{counts}; there should be as many of each: {folders[0]} and {folders[1]}")
+    if min(left_by_number) != min(right_by_number):
         raise InputError(f"the first left and right pictures should have the same number: {left[0]} and {right[0]}")
-    return [left] if len(folders) == 1 else [left, right]
+    return [left, right]
 
 
 def _pictures_by_number(folder: Path) -> dict[int, Path]:
@@ -247,9 +252,11 @@ def partners(
     within_ns: int,
     name: str,
 ) -> Partners:
-    """The pairs of pictures whose stamps differ by at most `within_ns`.
+    """The pairs of left and right pictures with nearly equal stamps.
 
-    `left_ns` and `right_ns` are the stamps of the pictures of both cameras.
+    `left_ns` are the stamps of the left pictures.
+    `right_ns` are the stamps of the right pictures.
+    `within_ns` is the largest difference between the stamps of a pair.
     `name` is the name of the recording, for messages.
     Raises InputError if there are no pairs.
     """
@@ -258,21 +265,24 @@ def partners(
         raise InputError(f"no left and right picture have stamps within {within_ns} ns of each other in {name}")
 
     notes = []
-    left_alone = len(left_ns) - len(pairs)
-    right_alone = len(right_ns) - len(pairs)
-    if left_alone or right_alone:
-        notes.append(f"{left_alone} left and {right_alone} right pictures without a partner were dropped.")
-    differences_ns = np.abs(left_ns[pairs.gt] - right_ns[pairs.est])
+    left_indices = pairs.gt
+    right_indices = pairs.est
+    unpaired_left = len(left_ns) - len(pairs)
+    unpaired_right = len(right_ns) - len(pairs)
+    if unpaired_left or unpaired_right:
+        notes.append(f"{unpaired_left} left and {unpaired_right} right pictures without a partner were dropped.")
+    differences_ns = np.abs(left_ns[left_indices] - right_ns[right_indices])
     largest_ns = differences_ns.max()
     if largest_ns:
         notes.append(f"Stamps of a pair are up to {largest_ns} ns apart; the left picture's stamp was used for both.")
-    return Partners(pairs.gt, pairs.est, tuple(notes))
+    return Partners(left_indices, right_indices, tuple(notes))
 
 
 def picture_files(t_ns: Stamps, *cameras: Sequence[Path]) -> PictureStream:
     """A stream of the pictures of one or two cameras. A file is read only when the stream reaches it.
 
-    `t_ns` (N,) are the stamps, and each of `cameras` are the paths of the N pictures of a camera.
+    `t_ns` (N,) are the stamps.
+    `cameras` are the paths of the N pictures of each camera.
     Raises InputError if the first pictures cannot be read.
     """
 

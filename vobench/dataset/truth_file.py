@@ -61,10 +61,13 @@ def truth_file(
     whose: str,
     turn: Array | None = None,
 ) -> tuple[Trajectory | None, Notes]:
-    """The truth in the file that the options name, or otherwise in the first existing file of `beside`, and notes.
+    """The ground truth in the file that the options name, or otherwise in the first existing file of `beside`.
 
-    `turn` (4, 4) is the change of axes that is applied to the world and to the body. `whose` says what the poses are;
-    it is the end of the note that names the file.
+    Returns the trajectory, None if there is no file, and notes about it for the user.
+
+    `frames_ns` (N,) are the stamps of the pictures, for files without stamps.
+    `whose` describes the body of the poses. It is the end of the note that names the file.
+    `turn` (4, 4) is the change of axes that is applied to the world and to the body; None for no change.
     """
     path = options.truth
     if path is None:

@@ -33,7 +33,8 @@ SlotKind = Literal["frames", "time"]
 class Coverage:
     """How much of a recording an estimate covers, and where it has gaps.
 
-    A gap lasts from the last pose before it, or the start of the ground truth, to the first pose after it, or the end.
+    A gap begins at the last pose before it and ends at the first pose after it. If there is no such pose, it begins or
+    ends with the ground truth.
     Every track after the first one is a relocalisation.
 
     `ratio` is the share of slots with an estimated pose.
@@ -107,6 +108,7 @@ def coverage(gt_t_ns: Stamps, estimated_frames: Index, *, rule: CoverageOf = "fr
     """The coverage of a ground truth with stamps (N,), N > 0.
 
     `estimated_frames` (K,) are the indices of the true poses for which the estimate has a pose.
+    `rule` defines the slots; see `slots`.
     """
     frames = np.unique(estimated_frames)
     gt_slots = slots(gt_t_ns, rule)
@@ -159,20 +161,22 @@ def _intervals(gt_t_ns: Stamps, frames: Index, gt_slots: Slots) -> _Intervals:
     frame_count = len(gt_t_ns)
     border_frames = np.concatenate([[-1], frames, [frame_count]])
     border_slots = np.concatenate([[-1], gt_slots.of_frame[frames], [gt_slots.count]])
-    border_ns = gt_t_ns[np.clip(border_frames, 0, frame_count - 1)]
+    nearest_frames = np.clip(border_frames, 0, frame_count - 1)
+    border_ns = gt_t_ns[nearest_frames]
+    slot_steps = np.diff(border_slots)
     return _Intervals(
         begin_frame=border_frames[:-1],
         end_frame=border_frames[1:],
         begin_ns=border_ns[:-1],
         end_ns=border_ns[1:],
-        lost_slots=np.maximum(np.diff(border_slots) - 1, 0),  # two poses can be in one slot
+        lost_slots=np.maximum(slot_steps - 1, 0),  # two poses can be in one slot
     )
 
 
 class _Gap(NamedTuple):
-    """A gap.
+    """A gap in an estimate.
 
-    `frames` is the number of true poses in it.
+    `frames` is the number of true poses in the gap.
     `duration_ns` is its duration.
     """
 

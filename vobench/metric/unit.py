@@ -59,13 +59,13 @@ def make_design(places: Sequence[Hashable], drives: Sequence[Hashable]) -> Desig
     drive_of_case = list[int]()
     place_of_drive = list[int]()
     for place, drive in zip(places, drives, strict=True):
-        unit = (place, drive)
+        place_and_drive = (place, drive)
         if place not in place_indices:
             place_indices[place] = len(place_indices)
-        if unit not in drive_indices:
-            drive_indices[unit] = len(drive_indices)
+        if place_and_drive not in drive_indices:
+            drive_indices[place_and_drive] = len(drive_indices)
             place_of_drive.append(place_indices[place])
-        drive_of_case.append(drive_indices[unit])
+        drive_of_case.append(drive_indices[place_and_drive])
     return Design(np.array(drive_of_case, np.intp), np.array(place_of_drive, np.intp))
 
 

@@ -26,6 +26,19 @@ from vobench.motion.pioneer import (
 )
 from vobench.setting import OneOf, Positive, require
 
+BISECTIONS = 40  # the number of bisection steps in the search for the largest stable gain
+SMALLEST_GAIN_PER_S = 1e-6  # if the largest stable gain is smaller, no gain is recommended
+GROWTH_MARGIN = 1e-9  # the growth must be below 1 by this much
+# A component of the state (m, m/s, rad, rad/s) that exceeds this shows that the integration has diverged.
+MAX_STATE = 1e6
+# A longer leg or a higher rate is probably a typing error, and the drive would fill the memory.
+MAX_LEG_S = 3600.0
+MAX_RATE_HZ = 1e4
+LegTime = Annotated[float, Gt(0), Le(MAX_LEG_S)]
+MOST_FRAMES = 200_000  # the largest number of frames of a drive: nearly two hours at 30 Hz
+# The largest number of frames if every leg lasts as long as possible. Disturbances are drawn for all these frames.
+MOST_POSSIBLE_FRAMES = 20_000_000
+
 
 @dataclass(frozen=True, slots=True)
 class ControllerSettings:
@@ -72,8 +85,10 @@ def references(
 ) -> Pair[float]:
     """The references u_ref in m/s and omega_ref in rad/s, equations (20) and (21).
 
-    `error_x_m` and `error_y_m` are the position of the target minus the position of h.
+    `error_x_m` is the x of the target minus the x of h.
+    `error_y_m` is the y of the target minus the y of h.
     `psi` is the heading in rad.
+    `settings` has the gains and limits of the controller.
     `path_mps` is the velocity (x, y) of a moving target. It is added to the velocity of (20).
 
     If a reference exceeds its limit, both are divided by the same factor. This preserves the direction in which h
@@ -186,20 +201,6 @@ def _axis_growth(
     return float(np.abs(eigenvalues).max())
 
 
-BISECTIONS = 40  # the number of bisection steps in the search for the largest stable gain
-SMALLEST_GAIN_PER_S = 1e-6  # if the largest stable gain is smaller, no gain is recommended
-GROWTH_MARGIN = 1e-9  # the growth must be below 1 by this much
-# A component of the state (m, m/s, rad, rad/s) that exceeds this shows that the integration has diverged.
-MAX_STATE = 1e6
-# A longer leg or a higher rate is probably a typing error, and the drive would fill the memory.
-MAX_LEG_S = 3600.0
-MAX_RATE_HZ = 1e4
-LegTime = Annotated[float, Gt(0), Le(MAX_LEG_S)]
-MOST_FRAMES = 200_000  # the largest number of frames of a drive: nearly two hours at 30 Hz
-# The largest number of frames if every leg lasts as long as possible. Disturbances are drawn for all these frames.
-MOST_POSSIBLE_FRAMES = 20_000_000
-
-
 @dataclass(frozen=True, slots=True)
 class Vehicle:
     """A robot with its controller, and how its motion is integrated.
@@ -257,8 +258,10 @@ class Vehicle:
         target_m: Array,
         path_mps: Pair[float] = (0.0, 0.0),
     ) -> Pair[float]:
-        """The references u_ref in m/s and omega_ref in rad/s that drive h to a target (2,).
+        """The references u_ref in m/s and omega_ref in rad/s that drive h to a target.
 
+        `state` (7,) is the state of the vehicle.
+        `target_m` (2,) is the position of the target.
         `path_mps` is the velocity (x, y) of a moving target.
         """
         x, y, psi = state[:3].tolist()
@@ -277,9 +280,11 @@ class Vehicle:
     ) -> Pair[Number]:
         """The accelerations u' in m/s^2 and omega' in rad/s^2: those of (18), limited, plus the disturbance delta.
 
+        `u` is the speed in m/s.
+        `omega` is the angular velocity in rad/s.
         `reference` are u_ref and omega_ref.
         `period_start` are u and omega at the start of the control period.
-        `delta` are delta_u and delta_omega.
+        `delta` are delta_u in m/s^2 and delta_omega in rad/s^2.
         """
         u_ref, omega_ref = reference
         if self.theta is None:
@@ -343,17 +348,25 @@ class Vehicle:
         def rates_at_changing_slip(extended_state: Array) -> Array:
             elapsed_share = float(extended_state[7])
             slip_now = slip.towards(next_slip or slip, elapsed_share)
-            rates = self.rates(extended_state[:7], reference, slip_now, period_start)
-            return np.array((*rates, self.rate_hz))
+            state_rates = self.rates(extended_state[:7], reference, slip_now, period_start)
+            return np.array((*state_rates, self.rate_hz))
 
+        rates: Callable[[Array], Array]
         is_constant = next_slip is None or next_slip == slip
-        states = over_period(
-            rates_at_constant_slip if is_constant else rates_at_changing_slip,
-            state if is_constant else np.append(state, 0.0),
+        if is_constant:
+            rates = rates_at_constant_slip
+            start = state
+        else:
+            rates = rates_at_changing_slip
+            start = np.append(state, 0.0)
+        extended_states = over_period(
+            rates,
+            start,
             period_s=1 / self.rate_hz,
             substeps=self.substeps,
             integrator=self.integrator,
-        )[:, :7]
+        )
+        states = extended_states[:, :7]
         is_bounded = np.abs(states).max() < MAX_STATE  # False for NaN
         if not is_bounded:
             raise MotionError(f"the motion diverged with {self.integrator}; use rk4, more sub-steps or a lower gain")

@@ -40,7 +40,7 @@ class Run:
     """A finished run of a suite, by its folder: tables, plots and recordings of its trials."""
 
     def __init__(self, path: Path | str) -> None:
-        """The run at a path; the folder of a suite stands for its latest run. Raises InputError if it is no run."""
+        """The run in a folder, or the latest run in the folder of a suite. Raises InputError if there is no run."""
         self._folder = open_run(Path(path))
         self._scores = self._folder.scores()
 
@@ -81,10 +81,11 @@ class Run:
 
     @cached_property
     def pairs(self) -> "pd.DataFrame":
-        """What is known of each pair of estimators, one row each, in a run with `until="decided"`.
+        """One row per pair of estimators: the comparison of their losses, in a run with `until="decided"`.
 
-        `ratio` is the second's loss relative to the first's, with the ends `low` and `high` of its interval. Raises
-        InputError for another run.
+        `ratio` is the loss of the second estimator relative to that of the first.
+        `low` and `high` are the ends of its confidence interval.
+        Raises InputError if the run was not made with `until="decided"`.
         """
         import pandas as pd
 
@@ -123,14 +124,19 @@ class Run:
     ) -> "Figure":
         """A figure of the run, of all or some estimators.
 
-        `kind` is one of those of `vobench plot`: path, axes, error, segments, cumulative, breakdown, cost, matrix or
-        strip. Without it, paths in top view and errors over time are drawn.
-        `case` is the case that is shown. Without it, figures of a `kind` show all cases, or the most informative one;
-        the figure without a `kind` shows the first case.
-        `over` is the axis that errors are drawn over: time or path.
-        `metric` is the metric of the matrix.
+        Args:
+            case: The case that is shown. Without it, figures of a `kind` show all cases, or the most informative one;
+                the figure without a `kind` shows the first case.
+            kind: One of those of `vobench plot`: path, axes, error, segments, cumulative, breakdown, cost, matrix or
+                strip. Without it, paths in top view and errors over time are drawn.
+            estimators: Names of the estimators that are shown; all by default.
+            over: The axis over which errors are drawn: time or path.
+            metric: The metric of the matrix.
+            width_inches: The width of the figure; by default that of its kind.
 
-        Raises UnknownNameError for a name that the run does not have, and InputError if there is nothing to draw.
+        Raises:
+            UnknownNameError: The run has no case or estimator with that name.
+            InputError: There is nothing to draw.
         """
         from vobench.report.figure_kind import FigureOptions, RunFigures
         from vobench.report.trial_plot import plot_case
@@ -138,13 +144,13 @@ class Run:
         names = () if estimators is None else listed(estimators)
         for name in names:
             self._require("estimator", name, self.estimators)
-        chosen = case
-        if kind is None and case is None:
-            chosen = self.cases[0]
-        if chosen is not None:
-            self._require("case", chosen, self.cases)
+        if case is None and kind is None:
+            case = self.cases[0]
+        if case is not None:
+            self._require("case", case, self.cases)
+        cases = [] if case is None else [case]
         options = FigureOptions(width_inches=width_inches, over=over, metric=metric)
-        figures = RunFigures(self._folder, cases=() if chosen is None else [chosen], estimators=names, options=options)
+        figures = RunFigures(self._folder, cases=cases, estimators=names, options=options)
         return figures.draw(kind) if kind else plot_case(figures.case())
 
     def view(
@@ -158,10 +164,17 @@ class Run:
         """Write one trial as a Rerun recording, open it in the viewer, and return the path of the recording.
 
         If `case` and `estimator` are not given, the most severe failure is chosen. If no trial failed, the trial with
-        the largest error is chosen. With `save`, the recording is written there, and no viewer is opened. With `web`,
-        it is served to a browser on this machine until interrupted.
+        the largest error is chosen.
 
-        Raises MissingDependencyError if there is no display, and UnknownNameError for an unknown case or estimator.
+        Args:
+            case: The case of the trial.
+            estimator: The estimator of the trial.
+            save: The path to which the recording is written; no viewer is opened.
+            web: Whether to serve the recording to a browser on this machine until interrupted.
+
+        Raises:
+            MissingDependencyError: There is no display.
+            UnknownNameError: The run has no case or estimator with that name.
         """
         from vobench.report.viewer import open_viewer, save_recordings
 
@@ -287,7 +300,8 @@ def run(
         fresh: Whether to recompute everything instead of using the cache.
         quiet: Whether to hide the progress.
         until: With "decided", fresh places are drawn until each pair of estimators is decided, or alike within the
-            ratio; `Run.pairs` has what is known of each. Interrupted, the same call resumes from the cache.
+            ratio; `Run.pairs` has the result for each pair. After an interruption, the same call resumes from the
+            cache.
         ratio: With `until`, the ratio of losses that is of interest.
         budget: With `until`, the time after which no more places are drawn, as in "40min".
 
@@ -300,8 +314,8 @@ def run(
 
     _check_until(until, ratio, budget)
 
-    def planned_draw(number: int | None) -> Plan:
-        planned = plan(suite, estimators=estimators, only=only, changes=changes, draw=number)
+    def plan_of_draw(draw: int | None) -> Plan:
+        planned = plan(suite, estimators=estimators, only=only, changes=changes, draw=draw)
         return planned if frames is None else cut(planned, frames)
 
     def run_in(planned: Plan, parent: Path, finish: "Finish") -> "RunFolder":
@@ -309,21 +323,21 @@ def run(
         return run_plan(planned, out=parent, finish=finish, display=display, jobs=jobs, is_fresh=fresh)
 
     if until is None:
-        return Run(run_in(planned_draw(None), Path(out), page.write_reports).path)
+        return Run(run_in(plan_of_draw(None), Path(out), page.write_reports).path)
 
     from vobench.report.until_decided import parse_duration_s
     from vobench.report.until_decided_run import run_draws
 
     budget_s = inf if budget is None else parse_duration_s(budget)
-    tell = _silent if quiet else print
-    ended = run_draws(planned_draw, run_in, out=Path(out), ratio=ratio, budget_s=budget_s, tell=tell)
+    show_message = _ignore_message if quiet else print
+    decided = run_draws(plan_of_draw, run_in, out=Path(out), ratio=ratio, budget_s=budget_s, tell=show_message)
     if not quiet:
-        print(ended.cost)
-    return Run(ended.folder.path)
+        print(decided.cost)
+    return Run(decided.folder.path)
 
 
 def _check_until(until: str | None, ratio: float, budget: str | None) -> None:
-    """Raise InputError for options of `until` that are wrong."""
+    """Raise InputError if the options of `until` are invalid or do not fit together."""
     if until not in (None, "decided"):
         raise InputError(f"until should be 'decided' or None, got {until!r}")
     if until is None and budget is not None:
@@ -332,8 +346,8 @@ def _check_until(until: str | None, ratio: float, budget: str | None) -> None:
         raise InputError(f"ratio should be above 1, got {ratio:g}")
 
 
-def _silent(sentence: str) -> None:
-    del sentence
+def _ignore_message(message: str) -> None:
+    del message
 
 
 def read_run(path: Path | str) -> Run:
@@ -353,11 +367,18 @@ def read_board(path: Path | str) -> "pd.DataFrame":
 
 
 def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | None = None) -> "pd.DataFrame":
-    """What got better or worse from one run to another: one row per estimator, then one per case and estimator.
+    """The changes of scores from one run to another: one row per estimator, then one per case and estimator.
 
-    A ratio of losses above `at_most` counts as worse. A run is a `Run`, its folder or a bundle. All trials are scored
-    again from their estimates and ground truths; a UserWarning names those whose stored score differs. Raises
-    InputError if the two runs have nothing in common, or have different cases with the same name.
+    All trials are scored again from their estimates and ground truths. A UserWarning names those whose stored score
+    differs.
+
+    Args:
+        old: The earlier run: a `Run`, its folder or a bundle.
+        new: The later run.
+        at_most: The largest ratio of losses that does not count as worse.
+
+    Raises:
+        InputError: The two runs have nothing in common, or have different cases with the same name.
     """
     import pandas as pd
 
@@ -371,7 +392,10 @@ def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | No
 
 
 def bundle(run: Run | Path | str, out: Path | str) -> Path:
-    """Pack a run into a zip file that others can rescore and merge. Raises InputError if `out` is not a .zip."""
+    """Pack a run into a zip file that others can rescore and merge, and return its path.
+
+    Raises InputError if `out` does not end in .zip.
+    """
     from vobench.runner import bundle as packing
 
     path = Path(out)
@@ -388,16 +412,18 @@ def plan(
     changes: Mapping[str, Any] | None = None,
     draw: int | None = None,
 ) -> Plan:
-    """The plan of a suite, as `run` takes it. `draw` counts those of `run` with `until` from 0.
+    """The plan of a suite. The arguments `suite`, `estimators`, `only` and `changes` are those of `run`.
 
-    Raises SuiteError and UnknownNameError; for a draw also if the suite has no places that can be drawn.
+    `draw` is the index of a draw of places, from 0, as in `run` with `until`; None for the places of the suite.
+    Raises SuiteError if the suite is invalid, or if it has no places that can be drawn for a `draw`.
+    Raises UnknownNameError if no suite, case or estimator has a given name.
     """
     names = tuple(_estimator_name(each) for each in listed(estimators))
-    stated = {key: _as_yaml(value) for key, value in (changes or {}).items()}
+    changed_values = {key: _as_yaml(value) for key, value in (changes or {}).items()}
     if draw is None:
-        planned = read_plan(str(suite), only_estimators=names, changes=stated)
+        planned = read_plan(str(suite), only_estimators=names, changes=changed_values)
     else:
-        planned = Draws(str(suite), stated, names).plan(draw)
+        planned = Draws(str(suite), changed_values, names).plan(draw)
     return _only(planned, listed(only))
 
 
@@ -446,7 +472,7 @@ def _estimator_name(given: str | type | Path) -> str:
 
 
 def _as_yaml(value: Any) -> str:
-    """A value as the option --set takes it."""
+    """A value as text in the syntax of the option --set."""
     import json
 
     if isinstance(value, str):
@@ -463,6 +489,7 @@ def run_path(given: Run | Path | str) -> Path:
 
 
 def _change_row(change: "ScoreChange") -> dict[str, Any]:
+    """The row of a change in the table of `compare`."""
     low, high = change.interval or (None, None)
     return {
         "case": change.case or "all",
@@ -478,6 +505,7 @@ def _change_row(change: "ScoreChange") -> dict[str, Any]:
 
 
 def _matrix_rows(board: "Board") -> list[list[str]]:
+    """The rows of the table of cases and estimators, with the default metric."""
     from vobench.report import board_table
 
     matrix = board_table.matrix(board, board_table.DEFAULT_METRIC)
@@ -485,6 +513,7 @@ def _matrix_rows(board: "Board") -> list[list[str]]:
 
 
 def _html_table(headings: Sequence[str], rows: Iterable[Sequence[str]], title: str) -> str:
+    """A table as HTML, with its title above it."""
     import pandas as pd
 
     table = pd.DataFrame([list(row) for row in rows], columns=list(headings))

@@ -14,7 +14,9 @@ from vobench.trajectory.trajectory import Stamps
 class RowStrip:
     """A strip of adjacent rows that are exposed at the same time.
 
-    The exposure is divided into M sub-frames. Sub-frame m lasts from start_ns[m] to end_ns[m]; both arrays are (M,).
+    `rows` are the rows of the strip.
+    `start_ns` (M,) is the start of each sub-frame of the exposure.
+    `end_ns` (M,) is the end of each sub-frame.
     """
 
     rows: slice
@@ -23,7 +25,7 @@ class RowStrip:
 
     @property
     def mid_ns(self) -> Stamps:
-        """The middle of each sub-frame (M,), at which it is rendered."""
+        """The time (M,) at the middle of each sub-frame, for which it is rendered."""
         durations_ns = self.end_ns - self.start_ns
         return self.start_ns + durations_ns // 2
 
@@ -42,8 +44,11 @@ def row_strips(
     `height` is the number of rows.
     `readout_s` is the number of rows times the delay between adjacent rows; it is 0 for a global shutter.
     `t_ns` is the mid-exposure time of the middle row.
+    `exposure_s` is the exposure time of each row.
     `strip_count` is the number of strips. For a global shutter there is always one strip.
-    Each strip is exposed when its middle row is exposed. For its outermost rows, that time is wrong by
+    `sub_frames` is the number of sub-frames into which the exposure is divided.
+
+    All rows of a strip are exposed at the time of its middle row, so the time of its outermost rows is wrong by up to
     readout_s / (2 · strip_count).
     Raises InputError if the exposure has fewer nanoseconds than sub-frames, if the picture has fewer rows than strips,
     or if a number is below 1.
@@ -58,7 +63,9 @@ def row_strips(
 
     border_offsets_ns = _sub_frame_borders_ns(exposure_ns, sub_frames)
     strips = []
-    for rows in _strip_rows(height, strip_count if readout_ns else 1):
+    is_global_shutter = readout_ns == 0
+    strip_rows = _strip_rows(height, 1 if is_global_shutter else strip_count)
+    for rows in strip_rows:
         mid_ns = t_ns + _delay_ns(rows, height, readout_ns)
         start_ns = mid_ns - exposure_ns // 2
         borders_ns = start_ns + border_offsets_ns
@@ -67,14 +74,22 @@ def row_strips(
 
 
 def row_stamps(height: int, *, readout_s: float, t_ns: int) -> Stamps:
-    """The mid-exposure time of each row (height,). `t_ns` is the mid-exposure time of the middle row."""
+    """The mid-exposure time (height,) of each row.
+
+    `height` is the number of rows.
+    `readout_s` is the number of rows times the delay between adjacent rows.
+    `t_ns` is the mid-exposure time of the middle row.
+    """
     readout_ns = round(readout_s * NS_PER_S)
-    stamps = [t_ns + _delay_ns(slice(row, row + 1), height, readout_ns) for row in range(height)]
+    stamps = []
+    for row in range(height):
+        delay_ns = _delay_ns(slice(row, row + 1), height, readout_ns)
+        stamps.append(t_ns + delay_ns)
     return np.array(stamps, np.int64)
 
 
 def _strip_rows(height: int, strip_count: int) -> list[slice]:
-    """The rows of each strip. Strips differ by at most one row."""
+    """The rows of each strip. The numbers of rows of two strips differ by at most 1."""
     borders = [height * index // strip_count for index in range(strip_count + 1)]
     return [slice(first, end) for first, end in pairwise(borders)]
 
@@ -86,7 +101,7 @@ def _sub_frame_borders_ns(exposure_ns: int, sub_frames: int) -> Stamps:
 
 
 def _delay_ns(rows: slice, height: int, readout_ns: int) -> int:
-    """The delay of the middle of some rows relative to the middle of the picture.
+    """The delay of the middle of adjacent rows relative to the middle of the picture.
 
     It is negative in the upper half of the picture. Half a nanosecond is rounded away from 0, so two rows at the same
     distance above and below the middle have exactly opposite delays.

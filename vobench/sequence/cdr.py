@@ -25,6 +25,7 @@ def with_stamp(template: bytes, t_ns: int) -> bytes:
     """A copy of a serialised message with another stamp.
 
     `template` is the message. It must begin with a header.
+    `t_ns` is the new stamp.
     """
     stamp = STAMP.pack(*split_stamp(t_ns))
     return b"".join((template[:STAMP_START], stamp, template[STAMP_END:]))
@@ -34,6 +35,7 @@ def with_picture(template: bytes, t_ns: int, encoded: bytes) -> bytes:
     """A copy of a serialised CompressedImage with another stamp and another picture.
 
     `template` is the message. Its picture, which is the last field, must be empty.
+    `t_ns` is the new stamp.
     `encoded` is the picture, encoded as PNG or in another format.
     """
     stamp = STAMP.pack(*split_stamp(t_ns))
@@ -66,8 +68,8 @@ def parse_picture(data: memoryview) -> StampedPicture:
     format_name, offset = _read_string(data, offset)
 
     # The format is "png", or for instance "rgb8; png compressed bgr8".
-    stated_colour, _, codec_and_more = format_name.rpartition("; ")
-    colour = stated_colour or MONO
+    named_colour, _, codec_and_more = format_name.rpartition("; ")
+    colour = named_colour or MONO
     codec, _, _ = codec_and_more.partition(" ")
     if colour not in CHANNELS:
         raise ValueError(f"a picture has the unknown format {format_name!r}")
@@ -89,7 +91,8 @@ def _sequence_bounds(data: memoryview, offset: int) -> tuple[int, int]:
     Its length is stored before it, at the first multiple of four that is not less than `offset`.
     Raises ValueError if the data ends before the sequence.
     """
-    length_offset = offset + -offset % LENGTH.size
+    padding = -offset % LENGTH.size
+    length_offset = offset + padding
     (length,) = LENGTH.unpack_from(data, length_offset)
     start = length_offset + LENGTH.size
     end: int = start + length
