@@ -37,8 +37,8 @@ def test_estimators_are_ordered_by_the_geometric_mean_of_their_losses(loss):
     means = np.exp(np.log(loss).mean((1, 2)))
     assert [each.loss for each in found] == pytest.approx(sorted(means))
     assert sorted(each.index for each in found) == [0, 1, 2, 3]
-    assert all(above.place <= below.place for above, below in pairwise(found))
-    assert {each.places for each in found} == {None}  # three places are too few for a test
+    assert all(above.rank <= below.rank for above, below in pairwise(found))
+    assert {each.rank_interval for each in found} == {None}  # three places are too few for a test
 
 
 @given(st.floats(0, 1), st.floats(0, 1))
@@ -93,7 +93,7 @@ def test_repeats_in_one_place_decide_nothing_however_many():
     loss = losses_of(np.random.default_rng(0), [1, 50], cases=1, repeats=100)
     second = ranked(loss)[1]
     assert (second.decided_above, second.p_above, second.error_interval) == (None, None, None)
-    assert second.places is None
+    assert second.rank_interval is None
 
 
 @pytest.mark.parametrize(
@@ -122,7 +122,7 @@ def test_a_large_difference_is_decided_and_its_ratio_is_in_its_interval():
     low, high = second.error_interval
     assert second.decided_above
     assert low < 2 < high
-    assert second.places == (2, 2)
+    assert second.rank_interval == (2, 2)
     assert 1 < second.smallest_ratio < 2
 
 
@@ -149,7 +149,7 @@ def test_error_ratios_are_over_cases_where_both_survive():
 
 def test_an_undecided_neighbour_is_among_the_possible_places_of_both():
     found = ranked(losses_of(np.random.default_rng(0), [1, 1.01, 9], place_std=0.3))
-    assert [each.places for each in found] == [(1, 2), (1, 2), (3, 3)]
+    assert [each.rank_interval for each in found] == [(1, 2), (1, 2), (3, 3)]
 
 
 @given(st.permutations(range(4)))
@@ -162,14 +162,14 @@ def test_names_do_not_matter(order):
 def test_equal_ones_share_a_place():
     loss = np.full((3, 4, 1), 0.1)
     loss[2] = 0.2
-    assert [each.place for each in ranked(loss)] == [1, 1, 3]
+    assert [each.rank for each in ranked(loss)] == [1, 1, 3]
 
 
 def test_cases_that_stand_still_have_no_loss_and_change_none():
     loss = losses_of(np.random.default_rng(6), [1, 2])
     still = np.concatenate([loss, np.full((2, 3, 4), np.nan)], axis=1)
     assert [each.loss for each in ranked(still)] == pytest.approx([each.loss for each in ranked(loss)])
-    assert [each.place for each in ranked(np.full((2, 3, 4), np.nan))] == [1, 1]
+    assert [each.rank for each in ranked(np.full((2, 3, 4), np.nan))] == [1, 1]
 
 
 def test_unequal_numbers_of_repeats_weigh_cases_alike():
@@ -190,7 +190,7 @@ def test_an_estimator_beside_the_ranking_has_its_loss_and_its_ratio():
 
 def test_alone_an_estimator_is_first_and_tested_against_nobody():
     (only,) = ranked(losses_of(np.random.default_rng(8), [1]))
-    assert (only.place, only.places, only.p_above, only.smallest_ratio, only.places_needed(1.5)) == (
+    assert (only.rank, only.rank_interval, only.p_above, only.smallest_ratio, only.places_needed(1.5)) == (
         1,
         (1, 1),
         None,

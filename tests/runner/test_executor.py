@@ -76,7 +76,7 @@ ALL = [LIGHT, *PICTURES, *ESTIMATES, *SCORES]
 
 def test_tasks_come_after_what_they_need_and_two_at_a_time(tmp_path):
     executor, heard = Recorder(2), list[TaskEvent]()
-    assert perform_all(ALL, tmp_path, executor, heard=heard.append) == {}
+    assert perform_all(ALL, tmp_path, executor, on_event=heard.append) == {}
     ended = list[str]()
     for event in heard:
         if event.what == "started":
@@ -173,11 +173,11 @@ def test_ten_thousand_tasks_are_handed_out_in_little_time(tmp_path):
     assert os.times().user - began < 20
 
 
-def run(bench, tmp_path: Path, executor: Executor, *changes, heard=lambda _: None, **options) -> RunFolder:
+def run(bench, tmp_path: Path, executor: Executor, *changes, on_event=lambda _: None, **options) -> RunFolder:
     try:
         return run_suite(
             bench.plan(*changes), {}, root=tmp_path / "runs", store=tmp_path / "store", executor=executor,
-            finish=page.write_reports, heard=heard, **options,
+            finish=page.write_reports, on_event=on_event, **options,
         )  # fmt: skip
     finally:
         executor.close()
@@ -263,7 +263,7 @@ def test_what_a_fault_of_a_library_ended_is_made_once_more(bench, tmp_path, monk
         return future
 
     monkeypatch.setattr(executor, "submit", once)
-    folder = run(bench, tmp_path, executor, heard=heard.append)
+    folder = run(bench, tmp_path, executor, on_event=heard.append)
     assert [score.reason for score in folder.scores() if score.status != "ok"] == []
     told = {event.task.key: event.told for event in heard if event.what == "told"}
     assert hit

@@ -320,7 +320,7 @@ def test_a_suite_of_stock_pyrender_runs_to_a_board(bench):
 def test_a_trial_has_the_status_of_the_task_that_failed_and_is_crashed_if_that_has_none(failure, status):
     task = Task("score", None, {"case": "down"}, ("sequence/1", "estimate/1"))
     outcome = TaskOutcome(failure, "it is full", stack="main")
-    gathering = SimpleNamespace(_unmade={}, _failures={task.key: outcome})
+    gathering = SimpleNamespace(_failed_cases={}, _failures={task.key: outcome})
     made = _Gathering._failure(gathering, task)
     assert (made.status, made.reason, made.stack) == (status, "it is full", "main")
-    assert _Gathering._failure(SimpleNamespace(_unmade={}, _failures={}), task) is None
+    assert _Gathering._failure(SimpleNamespace(_failed_cases={}, _failures={}), task) is None

@@ -28,18 +28,22 @@ DIGITS = 12  # decimals at which means count as equal
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """The rank of one estimator and its uncertainty; what too few places cannot show is None.
+    """The rank of one estimator and its uncertainty. Values for which there are too few places are None.
 
-    `place` counts from 1, and `places` is its 95 % interval. `loss` is the geometric mean of the loss. `error_ratio` is
-    the error relative to the first's, on cases where both survive, with its confidence interval `error_interval`.
-    `above` is the difference of log losses to the estimator ranked above, `p_above` its p-value after correction for
-    the number of such tests, and `level` that of each test before it. `above` is None, too, if units were drawn until
-    decided.
+    `index` is the row of the estimator in the table of trials.
+    `rank` is its rank, which counts from 1.
+    `rank_interval` is the 95 % confidence interval of the rank.
+    `loss` is the geometric mean of the loss.
+    `error_ratio` is the error relative to that of the first-ranked estimator, on cases where neither fails.
+    `error_interval` is the confidence interval of `error_ratio`.
+    `above` is the difference of log losses to the estimator ranked above. It is also None in a sequential run.
+    `p_above` is the p-value of the test against the estimator above, corrected for the number of such tests.
+    `level` is the significance level of one such test without correction: DECIDED divided by the number of tests.
     """
 
     index: int
-    place: int
-    places: tuple[int, int] | None
+    rank: int
+    rank_interval: tuple[int, int] | None
     loss: float
     error_ratio: float | None
     error_interval: tuple[float, float] | None
@@ -140,18 +144,18 @@ def rank(trials: TrialTable) -> list[Standing]:
     differences = [log_losses[below] - log_losses[above] for above, below in pairwise(order)]  # (P,) each
     neighbours = [paired_difference(of_pair) for of_pair in differences]
     p_values = holm([trials.p(of_pair) for of_pair in differences])
-    intervals = _place_intervals(trials, order, p_values) if trials.is_tested else None
+    intervals = _rank_intervals(trials, order, p_values) if trials.is_tested else None
     error_ratios = _error_ratios(trials, order)
 
     standings = list[Standing]()
-    places = _shared_places(means[order])
-    for position, (estimator, place) in enumerate(zip(order, places, strict=True)):
+    ranks = _shared_ranks(means[order])
+    for position, (estimator, rank_of_estimator) in enumerate(zip(order, ranks, strict=True)):
         has_test = trials.is_tested and position > 0
         error_ratio, error_interval = error_ratios[position]
         standing = Standing(
             index=estimator,
-            place=place,
-            places=intervals[position] if intervals else None,
+            rank=rank_of_estimator,
+            rank_interval=intervals[position] if intervals else None,
             loss=float(np.exp(means[estimator])),
             error_ratio=error_ratio,
             error_interval=error_interval,
@@ -176,8 +180,8 @@ def beside(trials: TrialTable) -> Standing:
     error_ratio, error_interval = _error_ratios(trials, [0, last])[1]
     return Standing(
         index=last,
-        place=last + 1,
-        places=None,
+        rank=last + 1,
+        rank_interval=None,
         loss=float(np.exp(log_loss)),
         error_ratio=error_ratio,
         error_interval=error_interval,
@@ -187,11 +191,11 @@ def beside(trials: TrialTable) -> Standing:
     )
 
 
-def _place_intervals(trials: TrialTable, order: Sequence[int], neighbour_p: Sequence[float]) -> list[tuple[int, int]]:
-    """The first and the last place of each ranked estimator, by how many others are significantly better and worse.
+def _rank_intervals(trials: TrialTable, order: Sequence[int], neighbour_p: Sequence[float]) -> list[tuple[int, int]]:
+    """The first and the last rank of each ranked estimator, by how many others are significantly better and worse.
 
     All pairs are tested, with Holm's correction at 5 %, so that all intervals of a board hold together in 95 of 100.
-    Neighbours whose order is not decided, by their corrected p-values (E - 1,), may share their places besides.
+    Neighbours whose order is not decided, by their corrected p-values (E - 1,), may share their ranks besides.
     Source: Mogstad, Romano, Shaikh and Wilhelm, Inference for ranks, 2024.
     """
     above, below = np.triu_indices(len(order), k=1)  # (pairs,)
@@ -227,10 +231,10 @@ def _error_ratios(trials: TrialTable, order: Sequence[int]) -> list[tuple[float 
     return ratios
 
 
-def _shared_places(means: Array) -> list[int]:
-    """Places from 1 of estimators in order, with mean losses (E,); equal ones share the first of their places."""
-    places = list[int]()
+def _shared_ranks(means: Array) -> list[int]:
+    """The ranks of estimators, from 1, given their mean losses (E,) in order. Equal losses share the first rank."""
+    ranks = list[int]()
     for position, mean in enumerate(means.tolist()):
         is_tied = position > 0 and mean == means[position - 1]
-        places.append(places[-1] if is_tied else position + 1)
-    return places
+        ranks.append(ranks[-1] if is_tied else position + 1)
+    return ranks

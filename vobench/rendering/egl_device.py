@@ -21,7 +21,7 @@ class EglDevice:
     """A device that EGL can render with.
 
     `index` is its position in EGL's list of devices.
-    `name` is the name of its renderer and of its device file, as far as EGL reports them.
+    `name` consists of the names of its renderer and its device file, as far as EGL reports them.
     `is_software` is whether it renders on the CPU.
     `handle` is EGL's handle of the device, or None for the default display.
     """
@@ -36,36 +36,37 @@ class EglDevice:
         return f"{self.index}: {self.name} ({kind})"
 
 
-def ordered(found: Sequence[EglDevice], wanted: str) -> list[EglDevice]:
+def ordered(available: Sequence[EglDevice], wanted: str) -> list[EglDevice]:
     """The devices to try, in order. The environment variable VOBENCH_EGL_DEVICE restricts them.
 
-    `found` are the devices that EGL lists.
-    `wanted` is the value of the variable: "cpu", "gpu", the index of a device, or "" for all devices. If it is "", CPU
-    renderers come before GPUs, because Mesa's CPU renderer draws the same bytes on every machine. Some pixels of a
-    picture from a GPU differ from them by one grey value.
+    `available` are the devices that EGL lists.
+    `wanted` is the value of the variable: "cpu", "gpu", the index of a device, or "" for all devices.
+
+    If `wanted` is "", CPU renderers come first, because the CPU renderer of Mesa draws the same bytes on every machine.
+    Pictures from GPUs differ from them in some pixels by one grey value.
 
     Raises MissingDependencyError if EGL lists no such device.
     """
     match wanted.strip().lower():
         case "":
-            return sorted(found, key=lambda device: not device.is_software)
+            return sorted(available, key=lambda device: not device.is_software)
         case "cpu":
-            chosen = [device for device in found if device.is_software]
+            selected = [device for device in available if device.is_software]
         case "gpu":
-            chosen = [device for device in found if not device.is_software]
+            selected = [device for device in available if not device.is_software]
         case index:
-            chosen = [device for device in found if str(device.index) == index]
-    if not chosen:
+            selected = [device for device in available if str(device.index) == index]
+    if not selected:
         raise MissingDependencyError(
             f"{DEVICE_VARIABLE} should be cpu, gpu or the number of a device, got {wanted!r}; "
-            f"EGL lists {listed(found)}; run: unset {DEVICE_VARIABLE}"
+            f"EGL lists {listed(available)}; run: unset {DEVICE_VARIABLE}"
         )
-    return chosen
+    return selected
 
 
-def listed(found: Iterable[EglDevice]) -> str:
+def listed(available: Iterable[EglDevice]) -> str:
     """The devices in one line of text, or "none" if there are none."""
-    return ", ".join(map(str, found)) or "none"
+    return ", ".join(map(str, available)) or "none"
 
 
 def devices() -> list[EglDevice]:

@@ -15,8 +15,8 @@ from vobench.rendering.static_scene import static_scene
 from vobench.scene.light import Light, Steady, Sun
 from vobench.trajectory.nanoseconds import NS_PER_S
 
-SUN_TURN_RAD = 1e-4  # steps in which a moving sun turns: less than a fiftieth of the diameter of its disc
-CACHED = 16  # light maps: enough for the strips of a stereo pair
+SUN_TURN_RAD = 1e-4  # the angle of a step of a moving sun, less than a fiftieth of the diameter of its disc
+CACHED = 16  # the number of cached light maps, which is enough for the strips of a stereo pair
 
 
 class AmbientLight:
@@ -102,7 +102,10 @@ class Illumination:
         return _cached(self._maps, (levels, suns_ns), lambda: self._map(levels, suns_ns))
 
     def lights_at(self, start_ns: int, end_ns: int) -> tuple[Floats, tuple[float, ...]]:
-        """The colours of the lights times their levels (L, 3), and the instant of each sun that moves, 0 of others."""
+        """The state of the L lights from start_ns to end_ns.
+
+        Returns the colours (L, 3) times the levels, and the instant in ns of each moving sun. It is 0 for other lights.
+        """
         levels, suns_ns = self._now(start_ns, end_ns)
         colours = np.array([light.colour for light in self._lights], np.float32).reshape(-1, 3)
         return colours * np.array(levels, np.float32)[:, None], suns_ns
@@ -112,7 +115,7 @@ class Illumination:
         start_ns: int,
         end_ns: int,
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """The level of each light, and the instant of its sun if it is one that moves, otherwise 0."""
+        """The level of each light, and the instant in ns of each moving sun. It is 0 for other lights."""
         middle_ns = (start_ns + end_ns) / 2
         levels = tuple(light.level.mean(start_ns, end_ns) for light in self._lights)
         suns_ns = tuple(_stepped_ns(light, middle_ns) for light in self._lights)
@@ -123,6 +126,7 @@ class Illumination:
         levels: tuple[float, ...],
         suns_ns: tuple[float, ...],
     ) -> Floats:
+        """The light map (H, W, 3) for the levels and the instants in ns of `_now`."""
         total = self._steady.copy()
         if self._varying:
             total += self._sum({index: levels[index] for index in self._varying})
@@ -131,7 +135,7 @@ class Illumination:
         return total
 
     def _sum(self, levels: dict[int, float]) -> Floats:
-        """The light map (H, W, 3) of lights, given by their indices, at levels."""
+        """The light map (H, W, 3) of some lights. `levels` has the level of each of them by its index."""
         baked = self._baked
         total = np.zeros((*baked.direct.shape[1:], 3), np.float32)
         indirect = np.zeros(baked.bounced.shape[1:], np.float32)
@@ -145,7 +149,10 @@ class Illumination:
         return total
 
     def _sun(self, index: int, t_ns: float) -> Floats:
-        """The light map of a moving sun at an instant: direct light by rays, indirect light between baked instants."""
+        """The light map (H, W, 3) of a moving sun at an instant.
+
+        Direct light is computed by casting rays. Indirect light is interpolated between baked instants.
+        """
 
         def compute() -> Floats:
             baked = self._baked
@@ -161,17 +168,21 @@ class Illumination:
 
 
 def _stepped_ns(light: Light, t_ns: float) -> float:
-    """The instant of the last step of SUN_TURN_RAD of a moving sun, so that few of them are computed; otherwise 0."""
+    """The instant in ns, rounded so that a moving sun turns in steps of SUN_TURN_RAD. It is 0 for other lights.
+
+    A light map is computed for each step only.
+    """
     if not isinstance(light, Sun) or not light.moves:
         return 0.0
     times_ns = NS_PER_S * np.array(light.times_s)
     travel_rad = travelled_rad(light)
-    stepped_rad = SUN_TURN_RAD * np.rint(np.interp(t_ns, times_ns, travel_rad) / SUN_TURN_RAD)
+    turned_rad = np.interp(t_ns, times_ns, travel_rad)
+    stepped_rad = SUN_TURN_RAD * np.rint(turned_rad / SUN_TURN_RAD)
     return float(np.interp(stepped_rad, travel_rad, times_ns))
 
 
 def _between(track: SunTrack, t_ns: float) -> Floats:
-    """The indirect light (S, 3) of surfels at an instant, interpolated linearly between the baked ones."""
+    """The indirect light (S, 3) of surfels at an instant, interpolated linearly between baked instants."""
     last = len(track.times_ns) - 1
     after = int(np.clip(np.searchsorted(track.times_ns, t_ns), 1, last))
     start_ns = track.times_ns[after - 1]

@@ -38,9 +38,10 @@ def travelled_rad(sun: Sun) -> Array:
     """An upper bound (K,) in rad on the angle that a sun has travelled from its first time to each of its K times."""
     azimuth_rad = np.deg2rad(sun.azimuth_deg)
     elevation_rad = np.deg2rad(sun.elevation_deg)
-    height_rad = np.abs(elevation_rad)
-    lower_rad = np.minimum(height_rad[1:], height_rad[:-1])
-    # The change of azimuth, along the wider of the two circles of equal elevation.
-    across_rad = np.diff(azimuth_rad) * np.cos(lower_rad)
-    steps_rad = np.hypot(across_rad, np.diff(elevation_rad))
+    from_horizon_rad = np.abs(elevation_rad)
+    lower_rad = np.minimum(from_horizon_rad[1:], from_horizon_rad[:-1])
+    # An upper bound on the horizontal angle: for a given change of azimuth, it is largest at the lower elevation.
+    horizontal_rad = np.diff(azimuth_rad) * np.cos(lower_rad)
+    vertical_rad = np.diff(elevation_rad)
+    steps_rad = np.hypot(horizontal_rad, vertical_rad)
     return np.concatenate([[0.0], np.cumsum(steps_rad)])

@@ -33,8 +33,13 @@ def light_key(index: int) -> str:
 def nominal_strength(light: Light) -> Array:
     """The strength (3,) of a light at level 1 in red, green and blue.
 
-    Its unit depends on the kind of light: cd/m² for area lights, cd for point and spot lights, lx for the sun. For the
-    sky it is 1, because the picture of the sky contains the luminance.
+    Quantity and unit depend on the class of the light:
+
+    AreaLight: the luminance in cd/m².
+    PointLight: the luminous intensity in cd.
+    SpotLight: the luminous intensity in cd along the axis.
+    Sun: the illuminance in lx.
+    Sky: 1, without a unit, because the picture of the sky contains the luminance.
     """
     match light:
         case AreaLight():

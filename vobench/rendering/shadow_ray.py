@@ -77,8 +77,9 @@ def first_sides(
 ) -> NDArray[np.int64]:
     """The side (P,) of the first grid of rays from each of the points (P, 3) to an emitter.
 
-    It grows with the angular width of the emitter, and is 1 if the shadows of the emitter are hard. `side` is the side
-    from which the others are derived, as fractions of it.
+    The result grows with the angular width of the emitter. It is 1 if the shadows of the emitter are hard.
+
+    `side` is the nominal side. The results are fractions or multiples of it.
     """
     width_rad = chunked(lambda part: emitter.width_rad(points_m[part]), len(points_m))
     half = max(side // 2, 1)
@@ -105,7 +106,8 @@ def cast_shadow_rays(  # noqa: PLR0917
 ) -> ArrivedLight:
     """Cast a grid of shadow rays from each of the points at rows (N,) to an emitter.
 
-    If a pattern is given, the rays of neighbouring texels are stratified together.
+    `grid` is the grid of the rays of one point.
+    `pattern` stratifies the rays of neighbouring texels together. If it is None, the dither of each texel is used.
     """
 
     def cast(part: slice) -> Floats:
@@ -131,28 +133,30 @@ def _cast(
     total_unshadowed_lx = np.zeros(count, np.float32)
     clear_count = np.zeros(count, np.float32)
     ray_count = np.zeros(count, np.float32)
-    # Buffers for the rays of one cell, of which only the lit ones are cast.
-    rows = np.empty(count, np.int32)
-    origins_m = np.empty((count, 3), np.float32)
-    segments_m = np.empty((count, 3), np.float32)
+    # Buffers for the shadow rays of one cell. `lit_rays` writes the rays of the texels that the cell would light.
+    row_buffer = np.empty(count, np.int32)
+    origin_buffer_m = np.empty((count, 3), np.float32)
+    segment_buffer_m = np.empty((count, 3), np.float32)
     aim = emitter.towards(texels)
     for cell in range(grid.side**2):
         vectors_m, light = _light_of_cell(aim, texels, cell, grid.side)
-        lit_count = lit_rays(texels.points_m, vectors_m, light, rows, origins_m, segments_m)
-        lit = slice(lit_count)
+        lit_count = lit_rays(texels.points_m, vectors_m, light, row_buffer, origin_buffer_m, segment_buffer_m)
+        rows = row_buffer[:lit_count]
+        origins_m = origin_buffer_m[:lit_count]
+        segments_m = segment_buffer_m[:lit_count]
         if grid.is_spread:
             spread_over_texels(
                 texels.dither,
                 texels.step_u_m,
                 texels.step_v_m,
                 cell,
-                rows[lit],
-                origins_m[lit],
-                segments_m[lit],
+                rows,
+                origins_m,
+                segments_m,
             )
-        transmittance = emitter.transmittance(occluder, origins_m[lit], segments_m[lit])
+        transmittance = emitter.transmittance(occluder, origins_m, segments_m)
         add_arrived(
-            rows[lit],
+            rows,
             transmittance.astype(np.float32),
             light,
             total_lx,

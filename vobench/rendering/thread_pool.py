@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vobench import stop
 
 T = TypeVar("T")
-CHUNK = 1 << 14  # points at once: their arrays fit the processor's cache
+CHUNK = 1 << 14  # the number of points of a slice, whose arrays fit into the processor's cache
 
 
 def in_chunks(
@@ -21,7 +21,13 @@ def in_chunks(
     chunk: int = CHUNK,
     done: Callable[[float], object] | None = None,
 ) -> list[T]:
-    """The results of `work` for each slice of `count` things, in order; `done` is called with shares of the work."""
+    """The results of `work` for consecutive slices of range(count), in order.
+
+    `work` is called with each slice, possibly in another thread.
+    `chunk` is the length of a slice.
+    `done` is called after each slice with the share of the slices that are finished. If there is only one slice, it is
+    not called.
+    """
     slices = [slice(start, min(start + chunk, count)) for start in range(0, count, chunk)]
 
     def checked(part: slice) -> T:
@@ -40,5 +46,9 @@ def in_chunks(
 
 
 def chunked(work: Callable[[slice], NDArray[Any]], count: int) -> NDArray[Any]:
-    """The results of `work` for slices of `count` things, one after the other (count, ...)."""
-    return np.concatenate(in_chunks(work, count) or [work(slice(0, 0))])
+    """The results of `work` for consecutive slices of range(count), concatenated to an array (count, ...)."""
+    results = in_chunks(work, count)
+    if not results:
+        # The result for an empty slice has the right shape and type.
+        results = [work(slice(0, 0))]
+    return np.concatenate(results)

@@ -16,7 +16,8 @@ def _csv(board: Board, _: str) -> str:
     return as_csv(board)
 
 
-# By name: the text of a board whose matrix shows a metric. JSON and CSV hold all metrics.
+# The function of each format, which returns a board as text. Its second argument is the name of a metric: Markdown and
+# LaTeX show the matrix of this metric. JSON and CSV contain all metrics.
 FORMATS: dict[str, Callable[[Board, str], str]] = {
     "md": markdown,
     "json": _json,

@@ -15,10 +15,10 @@ from vobench.report.total import CHOSEN_RATIO, Total
 NO_VALUE = "–"
 DEFAULT_METRIC = "ate"
 SIGNIFICANT_DIGITS = 3
-MOST_DECIMALS = 5
-LEAST_SCORE_DECIMALS = 3
-MOST_SCORE_DECIMALS = 7
-LEAST_MAGNITUDE = 1e-9  # smaller numbers have the exponent of this one, because log10(0) is undefined
+MAX_DECIMALS = 5
+MIN_SCORE_DECIMALS = 3
+MAX_SCORE_DECIMALS = 7
+MIN_MAGNITUDE = 1e-9  # smaller numbers have the exponent of this one, because log10(0) is undefined
 LEGEND = (
     "* best in its case; ~ not significantly worse than the best in this case (tested only with four or more trials "
     "per cell). Cells with several trials show their median and range. ATE: RMSE of position after SE(3) alignment, or "
@@ -108,7 +108,7 @@ def number(value: float | None) -> str:
     if value == 0:
         return "0"
     wanted_decimals = SIGNIFICANT_DIGITS - 1 - _exponent(value)
-    decimals = min(max(wanted_decimals, 0), MOST_DECIMALS)
+    decimals = min(max(wanted_decimals, 0), MAX_DECIMALS)
     return f"{value:.{decimals}f}"
 
 
@@ -136,13 +136,13 @@ def total_score(total: Total) -> str:
     """The score of an estimator, with enough decimals for two significant digits of its loss."""
     loss = 1 - total.score
     wanted_decimals = 1 - _exponent(loss)
-    decimals = min(max(wanted_decimals, LEAST_SCORE_DECIMALS), MOST_SCORE_DECIMALS)
+    decimals = min(max(wanted_decimals, MIN_SCORE_DECIMALS), MAX_SCORE_DECIMALS)
     return f"{total.score:.{decimals}f}"
 
 
 def _exponent(value: float) -> int:
     """The decimal exponent of a number, such as -2 for 0.05."""
-    magnitude = max(abs(value), LEAST_MAGNITUDE)
+    magnitude = max(abs(value), MIN_MAGNITUDE)
     return floor(log10(magnitude))
 
 

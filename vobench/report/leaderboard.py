@@ -23,10 +23,16 @@ from vobench.runner.folder import (
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """The table of cells with the totals and curves derived from it; `remarks` state what the numbers do not show.
+    """The table of cells, with the totals and curves that are derived from it.
 
-    `visible` states what the estimators could access. `unmade` are the cases that could not be simulated or imported:
-    they have no cells and count for no estimator. `environment` is where the numbers come from, as far as it is known.
+    `title` is the title of the board.
+    `cells` are the cells, each of one case and one estimator.
+    `totals` are the totals of the estimators by division, the best estimator first.
+    `curves` are the breakdown curves.
+    `remarks` are sentences about what the numbers do not show.
+    `unmade` are the cases that could not be simulated or imported. They have no cells and count for no estimator.
+    `environment` describes the machine and the versions that the numbers come from, or is None if they are unknown.
+    `visible` is a sentence about what the estimators could access.
     """
 
     title: str
@@ -68,32 +74,38 @@ class Board:
 
 def make_board(
     scores: Iterable[TrialScore],
-    answered: StatisticsByCell,
+    frame_statistics: StatisticsByCell,
     facts: Mapping[str, CaseFacts] | None = None,
     *,
     title: str = "",
     environment: Environment | None = None,
     remarks: Sequence[str] = (),
-    refuted: Collection[str] = (),
+    not_deterministic: Collection[str] = (),
     until_ratio: float | None = None,
 ) -> Board:
     """The board of trials.
 
-    `answered` are the statistics of frames by case and estimator, `facts` those of cases; entries may be missing.
+    `scores` are the scores of the trials.
+    `frame_statistics` are the statistics of frames by case and estimator. Entries may be missing.
+    `facts` are the facts of cases by name. Entries may be missing.
+    `title` is the title of the board.
+    `environment` describes the machine and the versions that the numbers come from, or is None if they are unknown.
     `remarks` are shown before all others.
-    `refuted` are the estimators that claim to be deterministic, but gave different estimates for one sequence. Their
-    cells state that they are not deterministic.
+    `not_deterministic` are the estimators that claim to be deterministic, but gave different estimates for one
+    sequence. Their cells state that they are not deterministic.
     `until_ratio` is the ratio of losses up to which two estimators count as equivalent in a sequential run. Tests and
     intervals then remain valid whenever the run stops.
     """
     scores = list(scores)
-    unmade = unavailable_cases(scores)
+    unavailable = unavailable_cases(scores)
     trials = list(with_sequence(scores))
-    cells = [_corrected(cell, refuted) for cell in make_cells(trials, answered, facts or {})]
+    claimed_cells = make_cells(trials, frame_statistics, facts or {})
+    cells = [_corrected(cell, not_deterministic) for cell in claimed_cells]
+    case_names = {score.case for score in scores}
     all_remarks = [
         *remarks,
         *truth_copy_remarks(trials),
-        *_unmade_remark(unmade, cases=len({score.case for score in scores})),
+        *_unavailable_remark(unavailable, cases=len(case_names)),
     ]
 
     totals, division_remarks = _rank(cells, is_sequential=until_ratio is not None)
@@ -106,59 +118,81 @@ def make_board(
         totals=tuple(totals),
         curves=tuple(breakdown_curves(cells)),
         remarks=tuple(all_remarks),
-        unmade=unmade,
+        unmade=unavailable,
         environment=environment,
         visible=visible_to(trials),
     )
 
 
 def _rank(cells: Sequence[Cell], *, is_sequential: bool) -> tuple[list[Total], list[str]]:
-    """The totals of every division, and the remarks on them; a remark that holds for all of them is made once."""
-    cells_of = divisions(cells)
+    """The totals of all divisions, and the remarks on them.
+
+    A remark is listed once. It ends with the labels of its divisions, unless it is about all of them.
+    """
+    cells_by_division = divisions(cells)
     totals = list[Total]()
-    labels_of: dict[str, list[str]] = {}
-    for division, division_cells in cells_of.items():
-        label = division.label(list(cells_of))
+    labels_by_remark = dict[str, list[str]]()
+    for division, division_cells in cells_by_division.items():
+        label = division.label(list(cells_by_division))
         division_totals, remarks = rank_division(label, division_cells, is_sequential=is_sequential)
         totals += division_totals
         for remark in remarks:
-            labels_of.setdefault(remark, []).append(label)
+            labels_by_remark.setdefault(remark, []).append(label)
 
     sentences = []
-    for remark, labels in labels_of.items():
-        is_general = len(labels) == len(cells_of)
-        sentences.append(remark if is_general else f"{remark} ({'; '.join(labels)})")
+    for remark, labels in labels_by_remark.items():
+        is_general = len(labels) == len(cells_by_division)
+        if is_general:
+            sentences.append(remark)
+        else:
+            sentences.append(f"{remark} ({'; '.join(labels)})")
     return totals, sentences
 
 
-def _corrected(cell: Cell, refuted: Collection[str]) -> Cell:
-    """The cell, which states that its estimator is not deterministic if it is one of those refuted."""
-    if cell.estimator not in refuted:
+def _corrected(cell: Cell, not_deterministic: Collection[str]) -> Cell:
+    """The cell. It states that its estimator is not deterministic if this is one of `not_deterministic`."""
+    if cell.estimator not in not_deterministic:
         return cell
     return replace(cell, claims=(*cell.claims, NOT_DETERMINISTIC))
 
 
-def make_cells(trials: Iterable[TrialScore], answered: StatisticsByCell, facts: Mapping[str, CaseFacts]) -> list[Cell]:
-    """One cell for each case and estimator, in order of their names. A truth copy is one in all of its cells."""
+def make_cells(
+    trials: Iterable[TrialScore],
+    frame_statistics: StatisticsByCell,
+    facts: Mapping[str, CaseFacts],
+) -> list[Cell]:
+    """One cell for each case and estimator, in the order of their names.
+
+    An estimator that copies the truth is marked as a truth copy in all of its cells.
+
+    `frame_statistics` are the statistics of frames by case and estimator. Entries may be missing.
+    `facts` are the facts of cases by name. Entries may be missing.
+    """
     marked_trials = with_truth_copies(list(trials))
     cells = []
     for (case, estimator), members in trials_by_cell(marked_trials, facts).items():
-        statistics = answered.get((case, estimator), EstimatorStatistics())
-        cells.append(make_cell(members, statistics, facts.get(case, facts.get(members[0].case, CaseFacts()))))
+        statistics = frame_statistics.get((case, estimator), EstimatorStatistics())
+        facts_of_first_trial = facts.get(members[0].case, CaseFacts())
+        case_facts = facts.get(case, facts_of_first_trial)
+        cells.append(make_cell(members, statistics, case_facts))
     return cells
 
 
-def _unmade_remark(unmade: Sequence[UnavailableCases], *, cases: int) -> list[str]:
-    """One sentence on the cases that could not be simulated or imported, with each cause once."""
-    if not unmade:
+def _unavailable_remark(unavailable: Sequence[UnavailableCases], *, cases: int) -> list[str]:
+    """The sentence about the cases that could not be simulated or imported, or no sentence if there are none."""
+    if not unavailable:
         return []
-    count = sum(len(group.cases) for group in unmade)
-    causes = "; ".join(f"{group.names}: {group.cause}" for group in unmade)
+    count = sum(len(group.cases) for group in unavailable)
+    causes = "; ".join(f"{group.names}: {group.cause}" for group in unavailable)
     return [f"{count} of {cases} cases could not be simulated or imported and count for no estimator: {causes}"]
 
 
 def _until_remarks(cells: Sequence[Cell], ratio: float | None) -> list[str]:
-    """How units were drawn and what that means for tests, and one sentence for each pair; nothing for other runs."""
+    """The sentences about a sequential run: how units were drawn, and the result of each pair of estimators.
+
+    `ratio` is the ratio of losses up to which two estimators count as equivalent, or None if the run is not sequential.
+    There are no sentences then.
+    """
     if ratio is None:
         return []
     pairs = named_pairs(cells, ratio=ratio)
@@ -168,6 +202,6 @@ def _until_remarks(cells: Sequence[Cell], ratio: float | None) -> list[str]:
 
 
 def _truth_noise_remarks(cells: Iterable[Cell]) -> list[str]:
-    """One sentence for each noise of the ground truth that scores are computed with."""
+    """One sentence for each kind of noise that was added to the ground truth before scoring."""
     noises = {cell.facts.truth_noise for cell in cells if cell.facts.truth_noise}
     return sorted(f"The ground truth used for scoring is perturbed by {noise}" for noise in noises)

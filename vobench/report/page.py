@@ -63,7 +63,7 @@ def _board(folder: RunFolder, scores: list[TrialScore], answered: StatisticsByCe
             *design_remarks(facts.values(), base_seed=_base_seed(folder)),
             *determinism_remarks(repeated),
         ],
-        refuted=[answers.estimator for answers in repeated if not answers.are_equal],
+        not_deterministic=[answers.estimator for answers in repeated if not answers.are_equal],
         until_ratio=recorded_ratio(folder),
     )
 

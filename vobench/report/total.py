@@ -36,7 +36,9 @@ class Total:
     `places_needed` is the number of places that are needed to detect a ratio of losses of CHOSEN_RATIO.
     `trials` is the number of trials.
     `failed` is the number of trials that failed.
-    `cases`, `drives` and `places` are the numbers of cases, drives and places of the trials.
+    `cases` is the number of cases of the trials.
+    `drives` is the number of drives of the trials.
+    `places` is the number of places of the trials.
     `ate_percent` is the median ATE over cases, in percent of the length of the path.
     `cpu_ms` is the mean CPU time per frame over cases, in milliseconds.
     `memory_mib` is the largest memory of any case, in MiB.
@@ -147,16 +149,16 @@ def _totals(
         return _total(label, cells_by_estimator[name], standing, design, has_rank=has_rank)
 
     totals = list[Total]()
-    first: list[str] = []
+    first_ranked: list[str] = []  # the name of the first-ranked estimator, if any estimator is ranked
     if ranked:
         table = _trial_table(cells_by_estimator, ranked, cases, design, is_sequential=is_sequential)
         for standing in ranking.rank(table):
             totals.append(total_of(ranked[standing.index], standing, has_rank=True))
-        first = [totals[0].estimator]
+        first_ranked = [totals[0].estimator]
 
     others = list[Total]()
     for name in unranked:
-        table = _trial_table(cells_by_estimator, [*first, name], cases, design, is_sequential=is_sequential)
+        table = _trial_table(cells_by_estimator, [*first_ranked, name], cases, design, is_sequential=is_sequential)
         standing = ranking.beside(table)
         others.append(total_of(name, standing, has_rank=False))
     return totals + sorted(others, key=lambda total: -total.score)
@@ -193,10 +195,10 @@ def _applicable(cells: Sequence[Cell]) -> list[Cell]:
 
     A cell whose case lacks a required sensor is excluded, unless all cells of its estimator are of this kind.
     """
-    able = {cell.estimator for cell in cells if cell.status != NOT_APPLICABLE}
+    applicable_estimators = {cell.estimator for cell in cells if cell.status != NOT_APPLICABLE}
     applicable = []
     for cell in cells:
-        is_excluded = cell.status == NOT_APPLICABLE and cell.estimator in able
+        is_excluded = cell.status == NOT_APPLICABLE and cell.estimator in applicable_estimators
         if not is_excluded:
             applicable.append(cell)
     return applicable
@@ -212,20 +214,22 @@ def _grouped(cells: Sequence[Cell], key: Callable[[Cell], str]) -> dict[str, lis
 
 def _shared_cases_remark(cells: Sequence[Cell], *, shared: int, cases: int) -> str:
     """The remark that not every estimator has every case. It names the estimator that has the fewest cases."""
-    cases_of = Counter(cell.estimator for cell in cells)
-    fewest = min(cases_of, key=lambda name: (cases_of[name], name))
+    case_counts = Counter(cell.estimator for cell in cells)
+    fewest = min(case_counts, key=lambda name: (case_counts[name], name))
     if not shared:
-        return f"No estimator is ranked because no case is shared by all estimators ({fewest} has {cases_of[fewest]})"
-    return f"Totals cover the {shared} of {cases} cases that all estimators share ({fewest} has {cases_of[fewest]})"
+        return (
+            f"No estimator is ranked because no case is shared by all estimators ({fewest} has {case_counts[fewest]})"
+        )
+    return f"Totals cover the {shared} of {cases} cases that all estimators share ({fewest} has {case_counts[fewest]})"
 
 
 def _untested_remark(design: Design) -> list[str]:
     """The remark that there are too few drives or places for a test, or no remark if there are enough."""
     if design.drives >= ranking.MIN_DRIVES and design.places >= ranking.MIN_PLACES:
         return []
-    seen = f"{counted(design.drives, 'drive')} in {counted(design.places, 'place')}"
+    available = f"{counted(design.drives, 'drive')} in {counted(design.places, 'place')}"
     required = f"{ranking.MIN_DRIVES} drives in {ranking.MIN_PLACES} places"
-    return [f"Nothing is tested: {seen}, and a test requires {required}; ranks hold for these cases only"]
+    return [f"Nothing is tested: {available}, and a test requires {required}; ranks hold for these cases only"]
 
 
 def _trial_table(
@@ -260,8 +264,8 @@ def _total(label: str, cells: Sequence[Cell], standing: ranking.Standing, design
         group=label,
         estimator=cells[0].estimator,
         claims=cells[0].claims,
-        rank=standing.place if has_rank else None,
-        ranks=standing.places,
+        rank=standing.rank if has_rank else None,
+        ranks=standing.rank_interval,
         score=1.0 - standing.loss,
         error_ratio=standing.error_ratio,
         error_interval=standing.error_interval,
@@ -290,11 +294,11 @@ def _mark_efficient(totals: Sequence[Total]) -> list[Total]:
     """The same totals, marked as efficient if no ranked estimator with a better score used less CPU time."""
     ranked = [total for total in totals if total.rank is not None]
     best_first = sorted(ranked, key=lambda total: (-total.score, _cpu_ms(total)))
-    least_ms = inf
+    lowest_ms = inf
     efficient = set[str]()
     for total in best_first:
-        if _cpu_ms(total) < least_ms:
-            least_ms = _cpu_ms(total)
+        if _cpu_ms(total) < lowest_ms:
+            lowest_ms = _cpu_ms(total)
             efficient.add(total.estimator)
     return [replace(total, is_efficient=total.estimator in efficient) for total in totals]
 

@@ -14,9 +14,9 @@ from vobench.runner.estimate import read_outcome
 from vobench.runner.store import INPUTS, Store
 from vobench.runner.task import KINDS, Task, has_failed, missing
 
-COMPARED = 300  # a task is compared to this many results of its kind, those that were used last
-MOST_CHANGES = 3  # a result that differs in more inputs is not similar to a task
-VALUE_LETTERS = 24  # the largest length of the text of a value
+MAX_COMPARED = 300  # the number of results that a task is compared to: those of its kind that were used last
+MAX_CHANGES = 3  # a result that differs in more inputs is not similar to a task
+MAX_VALUE_LENGTH = 24  # the largest number of characters of a value
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,19 +68,22 @@ def _reason(task: Task, pending: Mapping[str, Task], root: Path) -> str:
             return f"damaged: {fault}"
         if has_failed(task, folder):
             return f"failed before: {read_outcome(folder).reason}"
-    inputs = json.loads(json.dumps(task.inputs))
-    return _changes(dict(_flat(inputs)), root / KINDS[task.stage])
+    # Stored inputs have passed through JSON, which turns tuples into lists. The inputs of the task do so as well.
+    as_stored = json.loads(json.dumps(task.inputs))
+    values_by_name = dict(_flat(as_stored))
+    return _changes(values_by_name, root / KINDS[task.stage])
 
 
-def _changes(inputs: dict[str, str], kind: Path) -> str:
+def _changes(inputs: dict[str, str], kind_folder: Path) -> str:
     """The inputs that differ from those of the most similar recent result, or "new" if no result is similar.
 
-    `kind` is the folder of the results of this kind.
+    `inputs` are the inputs of the task, as text, by name.
+    `kind_folder` is the folder of the results of the same kind.
     """
     most_similar: dict[str, str] = {}
     changed_names = set[str]()
-    smallest_count = MOST_CHANGES + 1
-    for other in _stored(kind):
+    smallest_count = MAX_CHANGES + 1
+    for other in _stored(kind_folder):
         all_names = inputs.keys() | other.keys()
         names = {name for name in all_names if inputs.get(name) != other.get(name)}
         if len(names) < smallest_count:
@@ -105,18 +108,18 @@ def _change(name: str, before: str | None, now: str | None) -> str:
 def _shortened(text: str | None) -> str:
     if not text:
         return "nothing"
-    if len(text) <= VALUE_LETTERS:
+    if len(text) <= MAX_VALUE_LENGTH:
         return text
-    return f"{text[: VALUE_LETTERS - 1]}…"
+    return f"{text[: MAX_VALUE_LENGTH - 1]}…"
 
 
 @cache
-def _stored(kind: Path) -> list[dict[str, str]]:
+def _stored(kind_folder: Path) -> list[dict[str, str]]:
     """The inputs of the recent results in a folder, with nested keys joined by dots."""
     stored = []
     with suppress(OSError):
-        paths = sorted(kind.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
-        for path in paths[:COMPARED]:
+        paths = sorted(kind_folder.iterdir(), key=lambda path: path.stat().st_mtime, reverse=True)
+        for path in paths[:MAX_COMPARED]:
             with suppress(OSError, ValueError):
                 inputs = json.loads((path / INPUTS).read_text(encoding="utf-8"))
                 stored.append(dict(_flat(inputs)))

@@ -566,14 +566,14 @@ def perform_all(
     executor: Executor,
     *,
     shares_time: bool = False,
-    heard: Callable[[TaskEvent], object] = lambda _: None,
+    on_event: Callable[[TaskEvent], object] = lambda _: None,
 ) -> dict[str, TaskOutcome]:
     """Perform tasks, each after those that it needs, and return all failures by key.
 
-    An estimator is timed, so no other task runs beside it unless `shares_time`. `heard` is called with events.
+    An estimator is timed, so no other task runs beside it unless `shares_time`. `on_event` is called with events.
     Raises InputError if the disk is full, MissingDependencyError if a library is missing, and Stopped.
     """
-    schedule = _Schedule(_Queue.of(tasks), store, executor, shares_time=shares_time, heard=heard)
+    schedule = _Schedule(_Queue.of(tasks), store, executor, shares_time=shares_time, on_event=on_event)
     try:
         while not schedule.is_finished:
             stop.check()
@@ -595,14 +595,14 @@ class _Schedule:
         executor: Executor,
         *,
         shares_time: bool,
-        heard: Callable[[TaskEvent], object],
+        on_event: Callable[[TaskEvent], object],
     ) -> None:
         self.failures: dict[str, TaskOutcome] = {}
         self._queue = queue
         self._store = store
         self._executor = executor
         self._shares_time = shares_time
-        self._heard = heard
+        self._on_event = on_event
         self._cores = len(os.sched_getaffinity(0))
         self._running: dict[Future[TaskOutcome], tuple[Task, int]] = {}
         self._last_inputs = [""] * executor.slots
@@ -633,7 +633,7 @@ class _Schedule:
     def _begin(self, task: Task, slot: int) -> None:
         self._last_inputs[slot] = _main_input(task)
         threads = self._threads(task)
-        self._heard(TaskEvent("started", task, slot))
+        self._on_event(TaskEvent("started", task, slot))
 
         def tell(sentence: str) -> None:
             self._messages.put(TaskEvent("told", task, slot, told=sentence))
@@ -653,7 +653,7 @@ class _Schedule:
         """Wait briefly for tasks to end, and process their messages and outcomes."""
         ended = wait(self._running, timeout=LOOK_S, return_when=FIRST_COMPLETED).done
         while not self._messages.empty():
-            self._heard(self._messages.get())
+            self._on_event(self._messages.get())
         for future in ended:
             task, slot = self._running.pop(future)
             self._end(task, slot, future.result())
@@ -664,7 +664,7 @@ class _Schedule:
         if done.lacks:
             raise InputError(done.reason)
         what: Literal["failed", "done"] = "failed" if done.failure else "done"
-        self._heard(TaskEvent(what, task, slot, done.wall_s, done.reason))
+        self._on_event(TaskEvent(what, task, slot, done.wall_s, done.reason))
         if not done.failure:
             self._queue.release(task.key)
             return

@@ -28,7 +28,7 @@ PLUGIN = "vobench.plugin"
 # The digest of a module depends on the version of Python and on this file.
 READER = hashlib.sha256(sys.version.encode() + Path(__file__).read_bytes()).digest()
 READ_BYTES = 1 << 20  # the number of bytes of a file that are read at a time
-NOT_DATA = {".py", ".pyc"}  # the suffixes of files that are not data files
+CODE_SUFFIXES = {".py", ".pyc"}  # files with other suffixes are data files
 # Imports for type checkers only, on which no result depends.
 TYPES_ONLY = re.compile(rb"^if TYPE_CHECKING:\n(?:(?: .*)?\n)+", re.MULTILINE)
 
@@ -71,19 +71,20 @@ def _content_digest(path: Path) -> bytes:
 def _files(folder: Path) -> Iterator[Path]:
     """The files below a folder, except compiled Python.
 
-    A link is followed only to a place that estimators may read, and only one of the links to a folder is followed.
+    A link is followed only if estimators may read its target. Of several links to one folder, only one is followed.
     """
     readable = [folder.resolve(), *folders_readable_by_all()]
     seen = set[str]()  # the targets of links to folders
-    for place, folders, names in os.walk(folder, followlinks=True):
-        folders[:] = [name for name in sorted(folders) if _leads_on(Path(place, name), readable, seen)]
+    for parent, folders, names in os.walk(folder, followlinks=True):
+        # os.walk enters only the folders that remain in this list.
+        folders[:] = [name for name in sorted(folders) if _is_searched(Path(parent, name), readable, seen)]
         for name in names:
-            path = Path(place, name)
+            path = Path(parent, name)
             if _is_readable(path, readable) and path.is_file():
                 yield path
 
 
-def _leads_on(folder: Path, readable: Iterable[Path], seen: set[str]) -> bool:
+def _is_searched(folder: Path, readable: Iterable[Path], seen: set[str]) -> bool:
     """Whether a folder is searched for files. If it is a link, its target is added to `seen`."""
     if folder.name == "__pycache__":
         return False
@@ -97,7 +98,7 @@ def _leads_on(folder: Path, readable: Iterable[Path], seen: set[str]) -> bool:
 
 
 def _is_readable(path: Path, readable: Iterable[Path]) -> bool:
-    """Whether a path is not a link, or is a link to a place in a readable folder."""
+    """Whether a path is not a link, or is a link into a readable folder."""
     if not path.is_symlink():
         return True
     target = Path(os.path.realpath(path))
@@ -128,22 +129,28 @@ def code_digest(*entries: str, package: Path = PACKAGE) -> str:
     """A hash of modules and of everything that they import, directly or indirectly.
 
     The hash covers the code without docstrings and comments, and the data files in the folders of the modules.
-    A package in `entries` stands for all of its modules.
+
+    `entries` are the names of modules and packages. A package stands for all of its modules.
+    `package` is the folder of vobench.
     """
     known = _modules(package)
-    rooms = tuple(f"{entry}." for entry in entries)
-    entered = [name for name in known if f"{name}.".startswith(rooms)]
-    modules = closure(entered, package=package)
+    requested = [name for name in known if _is_in(name, entries)]
+    modules = closure(requested, package=package)
     state = hashlib.sha256()
     for name, module in sorted(modules.items()):
         state.update(f"{name}\0{module.digest}".encode())
     folders = {known[name].parent for name in modules} - {package}
     for folder in sorted(folders):
-        data_files = [path for path in _files(folder) if path.suffix not in NOT_DATA]
+        data_files = [path for path in _files(folder) if path.suffix not in CODE_SUFFIXES]
         for path in sorted(data_files):
             content = hashlib.sha256(path.read_bytes()).hexdigest()
             state.update(f"{path.relative_to(package)}\0{content}".encode())
     return state.hexdigest()[:32]
+
+
+def _is_in(name: str, entries: Iterable[str]) -> bool:
+    """Whether a module is one of the entries, or is inside a package that is one of them."""
+    return any(name == entry or name.startswith(f"{entry}.") for entry in entries)
 
 
 def imported_by(folder: Path, *, package: Path = PACKAGE) -> list[str]:
@@ -220,8 +227,8 @@ def closure(entries: Iterable[str], *, package: Path = PACKAGE) -> dict[str, Mod
         if name in known and name not in modules:
             module = _module(known[name].read_bytes())
             modules[name] = module
-            room = name.rpartition(".")[0]
-            waiting += [*module.imports, room]
+            parent_package, _, _ = name.rpartition(".")
+            waiting += [*module.imports, parent_package]
     return modules
 
 
@@ -240,23 +247,24 @@ def _modules(package: Path) -> dict[str, Path]:
 @cache
 def _module(source: bytes) -> Module:
     """The digest and imports of a source. The result is cached in a file for all processes."""
-    known = cache_folder() / "modules" / hashlib.sha256(READER + source).hexdigest()
+    cached = cache_folder() / "modules" / hashlib.sha256(READER + source).hexdigest()
     with suppress(OSError, ValueError):
-        return MODULE.validate_json(known.read_bytes(), strict=True)
+        return MODULE.validate_json(cached.read_bytes(), strict=True)
     module = _compiled(source)
     with suppress(OSError):
-        known.parent.mkdir(parents=True, exist_ok=True)
-        part = known.with_suffix(f".{os.getpid()}")
-        part.write_bytes(MODULE.dump_json(module))
-        part.replace(known)
+        cached.parent.mkdir(parents=True, exist_ok=True)
+        temporary = cached.with_suffix(f".{os.getpid()}")
+        temporary.write_bytes(MODULE.dump_json(module))
+        temporary.replace(cached)
     return module
 
 
 def _compiled(source: bytes) -> Module:
     """The digest and imports of a source, from its compiled code."""
     # optimize=2 omits docstrings, and asserts, which do not change results.
-    seen_at_runtime = TYPES_ONLY.sub(b"", source)
-    bare = _bare(compile(seen_at_runtime, "", "exec", optimize=2, dont_inherit=True))
+    runtime_source = TYPES_ONLY.sub(b"", source)
+    code = compile(runtime_source, "", "exec", optimize=2, dont_inherit=True)
+    bare = _bare(code)
     # Version 2 of marshal has no references, which would depend on other objects in the process.
     digest = hashlib.sha256(marshal.dumps(bare, 2)).hexdigest()
     imports = {*_imports(bare), *_plugin_names(ast.parse(source))}

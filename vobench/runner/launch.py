@@ -85,7 +85,7 @@ def run_plan(
             finish=finish,
             executor=executor,
             begin=begin,
-            heard=display.hear,
+            on_event=display.hear,
             tell=display.say,
             shares_time=shares_time,
             is_fresh=is_fresh,
@@ -137,7 +137,7 @@ def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | N
         if to_make:
             kept.require_writable()
         display.begin(to_make, typical_seconds(store))
-        failures = perform_all(to_make, store, executor, heard=display.hear)
+        failures = perform_all(to_make, store, executor, on_event=display.hear)
     for task in tasks:
         if task.key in failures:
             raise InputError(f"{task.stage} {task.name} failed: {failures[task.key].reason}")

@@ -6,7 +6,7 @@ from vobench.errors import InputError, UnknownNameError, unknown_name_sentence
 from vobench.metric.comparison import MetricDefinition
 from vobench.metric.definitions import DEFINITIONS
 
-GROUP = "vobench.metrics"  # the group of entry points, each of which is a MetricDefinition
+GROUP = "vobench.metrics"  # the group of entry points that are MetricDefinitions
 
 
 def all_metrics() -> tuple[MetricDefinition, ...]:
@@ -34,10 +34,13 @@ def find_metric(name: str) -> MetricDefinition:
 
     Raises UnknownNameError with the nearest name if there is none.
     """
-    stem = name.partition("[")[0]
-    without_statistic = stem.rpartition(".")[0]
+    # ate.trans.rmse[align=se3] is the statistic rmse of the metric ate.trans with settings.
+    identity, _, _ = name.partition("[")
+    without_statistic, _, _ = identity.rpartition(".")
     known = all_metrics()
     for definition in known:
-        if definition.id == name.lower() or definition.identity in (stem, without_statistic):
+        has_id = definition.id == name.lower()
+        has_identity = definition.identity in (identity, without_statistic)
+        if has_id or has_identity:
             return definition
     raise UnknownNameError(unknown_name_sentence("metric", name, [definition.id for definition in known]))

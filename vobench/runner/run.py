@@ -47,9 +47,9 @@ if TYPE_CHECKING:
     from vobench.dataset.recording import Recording
 
 Finish = Callable[[RunFolder, list[TrialScore]], None]
-OF_ESTIMATE = (ESTIMATE, TRACKS, LOG, TIMES)
-OF_SCORE = (SCORE, FRAMES)
-OPTIONAL = (COVARIANCE, REVISED)
+ESTIMATE_FILES = (ESTIMATE, TRACKS, LOG, TIMES)
+SCORE_FILES = (SCORE, FRAMES)
+OPTIONAL_FILES = (COVARIANCE, REVISED)  # files that only some estimates have
 # The remedies for sequences that could not be created. A refusal contains its own remedy.
 REMEDIES: dict[str, str] = {
     "crashed": " (`vobench doctor` checks what this machine lacks)",
@@ -72,22 +72,30 @@ def run_suite(
     is_fresh: bool = False,
     begin: Callable[[Sequence[Task]], object] = lambda _: None,
     require_all: bool = False,
-    heard: Callable[[TaskEvent], object] = lambda _: None,
+    on_event: Callable[[TaskEvent], object] = lambda _: None,
     tell: Tell = lambda _: None,
 ) -> RunFolder:
     """Run all cases, estimators and repeats. Results in the store are reused.
 
-    `finish` adds reports to the folder before it gets its final name below `root`.
-    `is_fresh` ignores results in the store.
-    `begin` is called with the tasks that will be performed.
-    `executor`, `shares_time` (which the suite can also set) and `heard` are those of `perform_all`.
-    `tell` is called with sentences about the store, for example about a damaged result, and about folders that the
-    sandbox does not open.
     A trial that fails has a row with the reason. A case that could not be simulated or imported is in `unmade()` of the
     folder. Its trials have the status `no_sequence`, and count for no estimator.
 
-    Raises NoSequenceError, and creates no folder, if no case could be simulated or imported; with `require_all`, if any
-    could not. Raises MissingDependencyError if a library is missing, and InputError if the disk is full.
+    `recordings` are the recordings of the recorded cases.
+    `root` is the folder in which the folder of the run is created.
+    `store` is the folder of the store.
+    `finish` adds reports to the folder before it gets its final name below `root`.
+    `executor` performs the tasks.
+    `shares_time` is whether other tasks may run beside an estimator. The suite can also set it.
+    `is_fresh` is whether results in the store are ignored.
+    `begin` is called with the tasks that will be performed.
+    `require_all` is whether one case that could not be simulated or imported is enough for a NoSequenceError.
+    `on_event` is called with each event of a task.
+    `tell` is called with sentences about the store, for example about a damaged result, and about folders that the
+    sandbox does not open.
+
+    Raises NoSequenceError if no case could be simulated or imported. No folder is created then.
+    Raises MissingDependencyError if a library is missing.
+    Raises InputError if the disk is full.
     """
     require_held()
     if unopened := note_on_unopened():
@@ -99,13 +107,13 @@ def run_suite(
         if is_fresh:
             results.require_writable()
             results.forget(task.key for task in tasks)
-        to_make = missing(tasks, store)
-        if to_make:
+        pending = missing(tasks, store)
+        if pending:
             results.require_writable()
-            results.set_aside_damaged((task.key for task in to_make), tell)
+            results.set_aside_damaged((task.key for task in pending), tell)
         shares_time = shares_time or suite.suite.share_time
-        begin(to_make)
-        failures = perform_all(to_make, store, executor, shares_time=shares_time, heard=heard)
+        begin(pending)
+        failures = perform_all(pending, store, executor, shares_time=shares_time, on_event=on_event)
         gathering = _Gathering(suite, store, scores, failures)
         gathering.require_sequences(require_all=require_all)
 
@@ -121,8 +129,10 @@ def _with_hidden_truth(suite: Plan, root: Path) -> Plan:
     """The plan, in which the runs below `root` and all recordings of the suite are hidden, as they contain truth."""
     hidden = [root.resolve()]
     for case in suite.recorded:
-        paths = (case.source.path, case.source.truth)
-        hidden.extend(Path(path).resolve() for path in paths if path)
+        if case.source.path:
+            hidden.append(Path(case.source.path).resolve())
+        if case.source.truth:
+            hidden.append(Path(case.source.truth).resolve())
     return replace(suite, hidden=(*suite.hidden, *hidden))
 
 
@@ -134,14 +144,14 @@ class _Gathering:
         self._scores = scores
         self._failures = failures
         self._cases = {case.name: case for case in suite.cases}
-        self._unmade = _unmade(scores, failures)
+        self._failed_cases = _failed_cases(scores, failures)
         estimators = [_estimator_facts(entry) for entry in suite.estimator_entries]
         self.identity = {"suite": plain(suite.suite), "estimators": estimators}
 
     def require_sequences(self, *, require_all: bool) -> None:
-        """Raise NoSequenceError if no case could be made; with `require_all`, if any could not."""
+        """Raise NoSequenceError if no case has a sequence. With `require_all`, one missing sequence is enough."""
         cases = {task.inputs["case"] for task in self._scores}
-        _require_sequences(self._unmade, cases, require_all=require_all)
+        _require_sequences(self._failed_cases, cases, require_all=require_all)
 
     def write(self, folder: RunFolder, *, timed: str) -> list[TrialScore]:
         """Write the files of the run, its cases and its trials, and return the scores of the trials."""
@@ -153,13 +163,13 @@ class _Gathering:
 
     def _failure(self, task: Task) -> "_Failure | None":
         """The failure of a trial without a score; None if it has one."""
-        unmade = self._unmade.get(task.inputs["case"])
-        if unmade:
-            return unmade
-        done = self._failures.get(task.key)
-        if done is None:
+        failed_case = self._failed_cases.get(task.inputs["case"])
+        if failed_case:
+            return failed_case
+        outcome = self._failures.get(task.key)
+        if outcome is None:
             return None
-        return _Failure(done.failure or "crashed", done.reason, done.stack)
+        return _Failure(outcome.failure or "crashed", outcome.reason, outcome.stack)
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,29 +181,32 @@ class _Failure:
     stack: str = ""
 
 
-def _unmade(scores: Iterable[Task], failures: Mapping[str, TaskOutcome]) -> dict[str, _Failure]:
+def _failed_cases(scores: Iterable[Task], failures: Mapping[str, TaskOutcome]) -> dict[str, _Failure]:
     """The failures of cases without a sequence, by name."""
-    unmade = dict[str, _Failure]()
+    failed_cases = dict[str, _Failure]()
     for task in scores:
         sequence, _ = task.needs
         if sequence in failures:
-            done = failures[sequence]
-            remedy = REMEDIES.get(done.failure or "crashed", "")
-            unmade[task.inputs["case"]] = _Failure(NO_SEQUENCE, f"{done.reason}{remedy}", done.stack)
-    return unmade
+            outcome = failures[sequence]
+            remedy = REMEDIES.get(outcome.failure or "crashed", "")
+            reason = f"{outcome.reason}{remedy}"
+            failed_cases[task.inputs["case"]] = _Failure(NO_SEQUENCE, reason, outcome.stack)
+    return failed_cases
 
 
-def _require_sequences(unmade: Mapping[str, _Failure], cases: Collection[str], *, require_all: bool) -> None:
-    """Raise NoSequenceError if no case could be made; with `require_all`, if any could not."""
-    nothing_made = bool(unmade) and len(unmade) == len(cases)
-    if not (nothing_made or (require_all and unmade)):
+def _require_sequences(failed_cases: Mapping[str, _Failure], cases: Collection[str], *, require_all: bool) -> None:
+    """Raise NoSequenceError if no case has a sequence. With `require_all`, one missing sequence is enough."""
+    if not failed_cases:
         return
-    by_cause = dict[str, list[str]]()
-    for case, failure in unmade.items():
-        by_cause.setdefault(failure.reason, []).append(case)
-    causes = [f"{UnavailableCases(cause, tuple(names)).names}: {cause}" for cause, names in by_cause.items()]
-    count = "no case" if nothing_made else f"{len(unmade)} of {len(cases)} cases"
-    negation = "" if nothing_made else " not"
+    all_failed = len(failed_cases) == len(cases)
+    if not all_failed and not require_all:
+        return
+    cases_by_cause = dict[str, list[str]]()
+    for case, failure in failed_cases.items():
+        cases_by_cause.setdefault(failure.reason, []).append(case)
+    causes = [f"{UnavailableCases(cause, tuple(names)).names}: {cause}" for cause, names in cases_by_cause.items()]
+    count = "no case" if all_failed else f"{len(failed_cases)} of {len(cases)} cases"
+    negation = "" if all_failed else " not"
     raise NoSequenceError(
         f"{count} could{negation} be simulated or imported, so nothing was scored: {'; '.join(causes)}"
     )
@@ -204,7 +217,9 @@ def _gather(
 ) -> TrialScore:
     """Copy the files of a trial from the store, and before the first trial of a case, those of the case."""
     stop.check()
-    sequence, estimate = (store / key for key in task.needs)
+    sequence_key, estimate_key = task.needs
+    sequence = store / sequence_key
+    estimate = store / estimate_key
     case = task.inputs["case"]
     if not folder.case(case).is_dir():
         _gather_case(cases[case], sequence, folder.case(case))
@@ -213,9 +228,9 @@ def _gather(
     score = read_score(store / task.key / SCORE)
     target = folder.estimate(score.case, score.estimator, score.repeat)
     target.mkdir(parents=True)
-    optional = [name for name in OPTIONAL if (estimate / name).is_file()]
-    copy_files(estimate, [*OF_ESTIMATE, *optional], target)
-    copy_files(store / task.key, OF_SCORE, target)
+    optional_files = [name for name in OPTIONAL_FILES if (estimate / name).is_file()]
+    copy_files(estimate, [*ESTIMATE_FILES, *optional_files], target)
+    copy_files(store / task.key, SCORE_FILES, target)
     return score
 
 
@@ -249,17 +264,19 @@ def _write_failed(task: Task, failure: _Failure, folder: RunFolder) -> TrialScor
 
 
 def _gather_case(case: AnyCase, sequence: Path, target: Path) -> None:
+    """Write the files of a case to the folder `target`, with a link to the folder `sequence` if it exists."""
     target.mkdir(parents=True)
-    is_made = sequence.is_dir()
+    has_sequence = sequence.is_dir()
     settings = plain(case)
-    if is_made and isinstance(case, RecordedCase):
+    if has_sequence and isinstance(case, RecordedCase):
         settings["import"] = read_import_notes(sequence)  # what the import assumed, converted or dropped
     write_json(target / CASE, settings)
-    if not is_made:
+    if not has_sequence:
         return
     copy_files(sequence, [GROUND_TRUTH], target)
-    exact = (target / GROUND_TRUTH).read_text(encoding="utf-8")
-    (target / GROUND_TRUTH).write_text(scored_truth(exact, case), encoding="utf-8")
+    ground_truth = target / GROUND_TRUTH
+    exact = ground_truth.read_text(encoding="utf-8")
+    ground_truth.write_text(scored_truth(exact, case), encoding="utf-8")
     (target / SEQUENCE).symlink_to(sequence.resolve())
 
 

@@ -132,9 +132,13 @@ def joined(meshes: Sequence["Trimesh"]) -> "Trimesh":
 
 
 def flat_shaded(vertices_m: ArrayLike, faces: ArrayLike, uv: ArrayLike) -> "Trimesh":
-    """A mesh with flat shading, that is, sharp edges: each face has three vertices that no other face shares.
+    """A mesh with flat shading. No two of its faces share a vertex, so its edges are sharp.
 
-    `vertices_m` (V, 3), `faces` (F, 3) and `uv` (V, 2) describe the mesh with shared vertices.
+    The arguments describe the mesh with shared vertices.
+
+    `vertices_m` (V, 3) are the positions of the vertices.
+    `faces` (F, 3) are the indices of the vertices of each face.
+    `uv` (V, 2) are the texture coordinates of the vertices.
     """
     shared_faces = np.asarray(faces, np.int64)
     corners_m = np.asarray(vertices_m, float)[shared_faces]  # (F, 3, 3)

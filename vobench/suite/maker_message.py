@@ -60,8 +60,8 @@ UNREADABLE = (
 )
 OBJECT = "object"
 ARRAY = "array"
-LENGTH = struct.Struct("<Q")  # the length of the header
-ALIGNMENT = 16  # arrays begin at multiples of this
+LENGTH = struct.Struct("<Q")  # the length of the header in bytes
+ALIGNMENT = 16  # the offset of each array is a multiple of this number of bytes
 
 
 def checked(returned: Any) -> GeneratedPlace:
@@ -127,11 +127,11 @@ def _require_drawable(thing: Thing, material: Material) -> None:
 
 def _require_sound(mesh: MeshArrays) -> None:
     """Raise SuiteError if the arrays of a mesh do not fit together, or if a number is not finite."""
-    vertices = len(mesh.vertices_m)
+    vertex_count = len(mesh.vertices_m)
     shapes: dict[str, tuple[NDArray[Any], tuple[int, int]]] = {
-        "vertices": (mesh.vertices_m, (vertices, 3)),
-        "texture coordinates": (mesh.uv, (vertices, 2)),
-        "normals": (mesh.normals, (vertices, 3)),
+        "vertices": (mesh.vertices_m, (vertex_count, 3)),
+        "texture coordinates": (mesh.uv, (vertex_count, 2)),
+        "normals": (mesh.normals, (vertex_count, 3)),
         "faces": (mesh.faces, (len(mesh.faces), 3)),
     }
     for name, (array, shape) in shapes.items():
@@ -141,9 +141,9 @@ def _require_sound(mesh: MeshArrays) -> None:
             raise SuiteError(f"{name} have a number that is not finite")
     if not len(mesh.faces):
         return
-    first_vertex = mesh.faces.min()
-    last_vertex = mesh.faces.max()
-    if first_vertex < 0 or last_vertex >= vertices:
+    lowest_index = mesh.faces.min()
+    highest_index = mesh.faces.max()
+    if lowest_index < 0 or highest_index >= vertex_count:
         raise SuiteError("faces name a vertex that is not there")
 
 
@@ -157,7 +157,7 @@ class _Writer:
         self.objects: list[dict[str, Any]] = []
         self.arrays: list[bytes] = []
         self._offset = 0
-        self._places: dict[int, int] = {}
+        self._indices: dict[int, int] = {}
         self._alive: list[Any] = []  # keeps the objects, so that their ids are not used again
 
     def value(self, value: Any) -> Any:
@@ -170,32 +170,40 @@ class _Writer:
             return [self.value(each) for each in value]
         if value is None or isinstance(value, str | int | float | bool):
             return value
-        return {OBJECT: self.place(value)}
+        return {OBJECT: self.index_of(value)}
 
-    def place(self, thing: Any) -> int:
+    def index_of(self, thing: Any) -> int:
         """The index of an object in the list. A new object is added."""
-        if id(thing) in self._places:
-            return self._places[id(thing)]
-        kind: type = type(thing)
-        if is_mesh(thing):
-            kind = MeshArrays
-            entry = self._fields(as_arrays(thing))
-        elif CLASSES.get(kind.__name__) is kind and is_dataclass(thing):
-            entry = self._fields(thing)
-        elif callable(getattr(thing, "pixels", None)):
-            # A texture whose class the maker defines itself is sent as its picture.
-            kind = Picture
-            entry = {"values": self.value(np.asarray(thing.pixels())), "tile_m": self.value(thing.tile_m)}
-        else:
-            known = ", ".join(CLASSES)
-            raise SuiteError(f"returns something of class {kind.__name__}, which is none of {known}")
+        if id(thing) in self._indices:
+            return self._indices[id(thing)]
+        class_name, encoded_fields = self._encoded(thing)
         index = len(self.objects)
-        self.objects.append({"class": kind.__name__, "fields": entry})
+        self.objects.append({"class": class_name, "fields": encoded_fields})
         self._alive.append(thing)
-        self._places[id(thing)] = index
+        self._indices[id(thing)] = index
         return index
 
+    def _encoded(self, thing: Any) -> tuple[str, dict[str, Any]]:
+        """The name of the class that an object is encoded as, and its fields in JSON form.
+
+        Raises SuiteError for an object of a class that is not supported.
+        """
+        if is_mesh(thing):
+            return MeshArrays.__name__, self._fields(as_arrays(thing))
+        thing_class: type = type(thing)
+        is_supported = CLASSES.get(thing_class.__name__) is thing_class
+        if is_supported and is_dataclass(thing):
+            return thing_class.__name__, self._fields(thing)
+        if callable(getattr(thing, "pixels", None)):
+            # A texture whose class the maker defines itself is sent as its picture.
+            values = self.value(np.asarray(thing.pixels()))
+            tile_m = self.value(thing.tile_m)
+            return Picture.__name__, {"values": values, "tile_m": tile_m}
+        known = ", ".join(CLASSES)
+        raise SuiteError(f"returns something of class {thing_class.__name__}, which is none of {known}")
+
     def _fields(self, thing: Any) -> dict[str, Any]:
+        """The fields of a dataclass in JSON form, by name."""
         return {field.name: self.value(getattr(thing, field.name)) for field in fields(thing)}
 
     def _array(self, array: Any) -> dict[str, Any]:
@@ -215,14 +223,16 @@ def encode(scene: GeneratedPlace) -> bytes:
     """The scene of a maker as bytes. Raises SuiteError if it contains an object of a class not in `CLASSES`."""
     writer = _Writer()
     header = {
-        "things": [writer.place(thing) for thing in scene.things],
-        "materials": {str(name): writer.place(material) for name, material in scene.materials.items()},
-        "lights": [writer.place(light) for light in scene.lights],
+        "things": [writer.index_of(thing) for thing in scene.things],
+        "materials": {str(name): writer.index_of(material) for name, material in scene.materials.items()},
+        "lights": [writer.index_of(light) for light in scene.lights],
         "objects": writer.objects,
     }
     text = json.dumps(header).encode("utf-8")
-    text += b" " * (-(LENGTH.size + len(text)) % ALIGNMENT)
-    return b"".join([LENGTH.pack(len(text)), text, *writer.arrays])
+    unaligned_length = LENGTH.size + len(text)
+    padding = b" " * (-unaligned_length % ALIGNMENT)
+    padded_text = text + padding
+    return b"".join([LENGTH.pack(len(padded_text)), padded_text, *writer.arrays])
 
 
 # Reading
@@ -232,19 +242,19 @@ def decode(content: bytes) -> GeneratedPlace:
     """The scene of a maker from bytes that are not trusted. Raises SuiteError if they are not valid."""
     try:
         (length,) = LENGTH.unpack_from(content)
-        first = LENGTH.size + length
-        header = json.loads(content[LENGTH.size : first])
-        arrays = memoryview(content)[first:]
+        header_end = LENGTH.size + length
+        header = json.loads(content[LENGTH.size : header_end])
+        arrays = memoryview(content)[header_end:]
         objects: list[Any] = []
         for entry in header["objects"]:
             objects.append(_object(entry, objects, arrays))
-        materials = {name: objects[place] for name, place in header["materials"].items()}
-        things = [objects[place] for place in header["things"]]
-        lights = [objects[place] for place in header["lights"]]
+        materials = {name: objects[index] for name, index in header["materials"].items()}
+        things = [objects[index] for index in header["things"]]
+        lights = [objects[index] for index in header["lights"]]
     except ValidationError as error:
         mistake = error.errors()[0]
-        place = ".".join(map(str, mistake["loc"]))
-        raise SuiteError(f"returns a {error.title} with a wrong {place}: {mistake['msg']}") from None
+        field_path = ".".join(map(str, mistake["loc"]))
+        raise SuiteError(f"returns a {error.title} with a wrong {field_path}: {mistake['msg']}") from None
     except VobenchError:
         raise
     except UNREADABLE as error:

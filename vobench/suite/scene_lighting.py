@@ -82,8 +82,11 @@ def require_possible(name: str, scene: YamlFile) -> None:
     written_names = list(_written_names(scene.parsed))
     daylight_names = [light for light in (SUN, SKY) if light in scene.parsed]
     known_names = [*written_names, *daylight_names]
-    thing_name = name.partition(".")[0]
-    if thing_name not in known_names and not name.startswith(GENERATED_NAMES):
+    # A lamp of a thing has the name thing.lamp, and the scene contains only the name of the thing.
+    thing_name, _, _ = name.partition(".")
+    is_known = thing_name in known_names
+    has_generated_name = name.startswith(GENERATED_NAMES)
+    if not is_known and not has_generated_name:
         raise SuiteError(f"lighting: {unknown_name_sentence('light', name, known_names)}")
 
 

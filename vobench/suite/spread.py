@@ -176,14 +176,15 @@ def _first_drive_indices(drives_of_scene: Mapping[str, tuple[str, ...]]) -> dict
 class Dealer:
     """Assigns units to treatments, such as scenarios, one treatment after the other.
 
-    Each treatment gets `each` different units. They are chosen one at a time: the next unit is the one with the fewest
-    runs so far. If the treatment already has a unit in the same kind of place, the runs of one treatment are added to
-    that number as a penalty. Ties are broken by the smallest of the following, in this order:
+    Each treatment gets `each` different units. They are chosen one at a time. Candidates are compared by the following
+    numbers in this order, and the candidate with the smallest numbers is chosen:
 
-    1. the number of units that the treatment already has in this kind of place,
-    2. the number of units that it already has in this place,
-    3. the number of runs so far in this place plus the number of runs so far of this drive,
-    4. the position in a random order, which depends on `seed`.
+    1. the number of runs of the unit so far, plus the runs of the treatment in one unit if the treatment already has a
+       unit in this kind of place,
+    2. the number of units that the treatment already has in this kind of place,
+    3. the number of units that the treatment already has in this place,
+    4. the number of runs so far in this place plus the number of runs so far of this drive,
+    5. the position in a random order, which depends on `seed`.
 
     `units` are the units of the design.
     `each` is the number of units that a treatment gets.
@@ -211,7 +212,7 @@ class Dealer:
         chosen_by_place = Counter[str]()
 
         def priority(unit: Unit) -> tuple[int, int, int, int]:
-            """The sort key of a candidate. The candidate with the smallest key is chosen next."""
+            """The first four numbers of a candidate. Candidates are in random order, so `min` breaks ties at random."""
             chosen_of_kind = chosen_by_kind[unit.kind]
             chosen_of_place = chosen_by_place[unit.place]
             penalty = runs if chosen_of_kind else 0

@@ -20,12 +20,13 @@ MIN_SAMPLES = 20  # the smallest number of samples of the speed in the overlap
 MAX_SAMPLES = 2_000_000  # the largest number of samples of a recording
 WINDOW_STEPS = 5  # a speed is measured over this many steps, to average the noise of single poses
 
-# The refinement around an offset: each round divides the search range by REFINEMENT. The last one resolves 1/500 step.
+# The refinement around an offset. Each round divides the search range by REFINEMENT. The last round has a resolution of
+# about 1/500 of a step.
 ROUNDS = 3
-TRIES = 17  # offsets per round
+TRIES = 17  # the number of offsets that each round tries
 REFINEMENT = 8
-MAX_INSTANTS = 800  # the approximate number of instants at which speeds are compared
-MIN_INSTANTS = 8
+MAX_INSTANTS = 800  # the approximate largest number of instants at which speeds are compared
+MIN_INSTANTS = 8  # the smallest number of these instants
 
 STRETCHES = 8  # the number of parts of a trajectory whose offsets are estimated separately
 SAME_CLOCK_NS = 1_000_000  # both trajectories have one clock if their stamps differ by a constant up to this error
@@ -41,7 +42,7 @@ class TimeOffset:
     """The time offset of an estimate.
 
     `offset_ns` is the time to add to the stamps of the estimate.
-    `correlation` is the correlation of both motions after that, from -1 to 1.
+    `correlation` is the correlation of both motions after this correction, from -1 to 1.
     """
 
     offset_ns: int
@@ -51,17 +52,21 @@ class TimeOffset:
 def estimate_offset(gt: Trajectory, est: Trajectory) -> TimeOffset:
     """The time offset for which the motions correlate best.
 
-    All offsets are tried for which at least half of the shorter recording overlaps, with angular speeds and with
-    speeds; the better of the two results is refined.
+    All offsets are tried for which at least half of the shorter recording overlaps. Angular speeds and speeds are
+    correlated separately, and the better of the two results is refined.
+
     Raises AlignmentError if a recording is too short, or if the trajectories have no correlated motion.
+
     Source: Furgale et al. (2013).
     """
     step_ns = int(_step_ns(gt, est))
     _require_samples(gt, est, step_ns)
     window_ns = WINDOW_STEPS * step_ns
-    gt_speeds = speeds(gt, _grid_ns(gt, step_ns, window_ns), window_ns)
-    est_speeds = speeds(est, _grid_ns(est, step_ns, window_ns), window_ns)
-    start_ns = int(gt.t_ns[0] - est.t_ns[0])
+    gt_grid_ns = _grid_ns(gt, step_ns, window_ns)
+    est_grid_ns = _grid_ns(est, step_ns, window_ns)
+    gt_speeds = speeds(gt, gt_grid_ns, window_ns)
+    est_speeds = speeds(est, est_grid_ns, window_ns)
+    start_ns = int(gt.t_ns[0] - est.t_ns[0])  # the offset for which both trajectories start together
     candidates = []
     for gt_speed, est_speed in zip(gt_speeds, est_speeds, strict=True):
         correlations = _correlations(gt_speed, est_speed)
@@ -82,16 +87,18 @@ def estimate_offset(gt: Trajectory, est: Trajectory) -> TimeOffset:
 
 
 def _grid_ns(trajectory: Trajectory, step_ns: int, window_ns: int) -> Stamps:
-    """The starts (N,) of all windows that fit into a trajectory, one step apart."""
+    """The starts (N,) in ns of all windows that fit into a trajectory, one step apart."""
     first = trajectory.t_ns[0]
     last = trajectory.t_ns[-1] - window_ns
     return np.arange(first, last, step_ns, dtype=np.int64)
 
 
 def motion_correlation(gt: Trajectory, est: Trajectory, offset_ns: int) -> float | None:
-    """The correlation of both motions, from -1 to 1, if an offset is added to the stamps of the estimate.
+    """The correlation of both motions, from -1 to 1.
 
-    It is None if the trajectories hardly overlap, or if no speed changes.
+    `offset_ns` is added to the stamps of the estimate first.
+
+    Returns None if the trajectories hardly overlap, or if no speed changes.
     """
     step_ns = int(_step_ns(gt, est))
     correlations = _mean_correlations(gt, est, np.array([offset_ns]), WINDOW_STEPS * step_ns)
@@ -99,10 +106,12 @@ def motion_correlation(gt: Trajectory, est: Trajectory, offset_ns: int) -> float
 
 
 def offsets_in_stretches(gt: Trajectory, est: Trajectory, *, within_ns: int) -> Array:
-    """The time offset (N,) of each part of the estimate, which is divided into STRETCHES parts with as many poses each.
+    """The time offsets (N,) in ns of the parts of the estimate.
 
-    `within_ns` is the largest offset that is tried; at least one step is tried.
-    An offset is 0 if its part does not determine it. A part with less than two poses is omitted.
+    The estimate is divided into STRETCHES parts with the same number of poses. A part with fewer than two poses is
+    omitted. If a part does not determine an offset, its offset is 0.
+
+    `within_ns` is the largest offset that is tried. Offsets of up to one step are always tried.
     """
     step_ns = _step_ns(gt, est)
     reach_ns = max(step_ns, within_ns)
@@ -115,11 +124,13 @@ def offsets_in_stretches(gt: Trajectory, est: Trajectory, *, within_ns: int) -> 
 
 
 def _step_ns(gt: Trajectory, est: Trajectory) -> float:
-    """The median time between the poses of a trajectory; the longer one of both trajectories."""
+    """The median time in ns between successive poses. Of the two trajectories, the longer median counts."""
     for trajectory in (gt, est):
         if len(trajectory) < 2:
             raise AlignmentError(f"a time offset needs two poses or more, got {len(trajectory)}")
-    return max(float(np.median(np.diff(trajectory.t_ns))) for trajectory in (gt, est))
+    gt_step_ns = float(np.median(np.diff(gt.t_ns)))
+    est_step_ns = float(np.median(np.diff(est.t_ns)))
+    return max(gt_step_ns, est_step_ns)
 
 
 def _require_samples(gt: Trajectory, est: Trajectory, step_ns: int) -> None:
@@ -137,13 +148,16 @@ def _require_samples(gt: Trajectory, est: Trajectory, step_ns: int) -> None:
 def speeds(trajectory: Trajectory, t_ns: Stamps, window_ns: int) -> tuple[Array, Array]:
     """The angles (N,) in rad and the distances (N,) in m by which a body moves in windows of time.
 
-    `t_ns` (N,) are the starts of the windows, and `window_ns` is their duration.
+    `t_ns` (N,) are the starts of the windows.
+    `window_ns` is the duration of a window.
     """
-    T_begin = poses_at(trajectory, t_ns)
-    T_end = poses_at(trajectory, t_ns + window_ns)
-    R_begin_end = se3.transposed(T_begin[:, :3, :3]) @ T_end[:, :3, :3]
-    moved_m = T_end[:, :3, 3] - T_begin[:, :3, 3]
-    return se3.rotation_angle(R_begin_end), np.linalg.norm(moved_m, axis=1)
+    T_world_begin = poses_at(trajectory, t_ns)
+    T_world_end = poses_at(trajectory, t_ns + window_ns)
+    R_begin_end = se3.transposed(T_world_begin[:, :3, :3]) @ T_world_end[:, :3, :3]
+    angles_rad = se3.rotation_angle(R_begin_end)
+    displacements_m = T_world_end[:, :3, 3] - T_world_begin[:, :3, 3]
+    distances_m = np.linalg.norm(displacements_m, axis=1)
+    return angles_rad, distances_m
 
 
 def _correlations(a: Array, b: Array) -> Array:
@@ -153,7 +167,7 @@ def _correlations(a: Array, b: Array) -> Array:
     """
     ones_a = np.ones(len(a))
     ones_b = np.ones(len(b))
-    n = np.round(_sliding_products(ones_a, ones_b))
+    n = np.round(_sliding_products(ones_a, ones_b))  # the number of samples in the overlap, for each lag
     a = _standardised(a)
     b = _standardised(b)
     sum_a = _sliding_products(a, ones_b)
@@ -169,8 +183,8 @@ def _correlations(a: Array, b: Array) -> Array:
     has_overlap = n >= max(MIN_OVERLAP * shortest, MIN_SAMPLES)
     has_variance = variances > MIN_VARIANCE_PRODUCT * n**4
     is_determined = has_overlap & has_variance
-    spread = np.sqrt(np.where(is_determined, variances, 1.0))
-    correlation = covariance / spread
+    std_product = np.sqrt(np.where(is_determined, variances, 1.0))
+    correlation = covariance / std_product
     return np.asarray(np.where(is_determined, correlation, -1.0))
 
 
@@ -184,7 +198,7 @@ def _standardised(signal: Array) -> Array:
 def _sliding_products(a: Array, b: Array) -> Array:
     """The sum over k of a[k + lag] b[k] for all lags from 1 - len(b), by the fast Fourier transform."""
     n = len(a) + len(b) - 1
-    size = 1 << (n - 1).bit_length()
+    size = 1 << (n - 1).bit_length()  # the next power of two
     spectrum = np.fft.rfft(a, size) * np.fft.rfft(b[::-1], size)
     products: Array = np.fft.irfft(spectrum, size)[:n]
     return products
@@ -200,7 +214,8 @@ def _refined(
 ) -> int:
     """The offset near a coarse one for which the motions correlate best.
 
-    `reach_ns` is the largest difference from the coarse offset that is tried; it is one step by default.
+    `reach_ns` is the largest difference from the coarse offset that is tried. The default is one step.
+
     Returns the coarse offset if the motions do not determine a better one.
     """
     best_ns = coarse_ns
@@ -226,6 +241,7 @@ def _mean_correlations(
     """The mean of the correlations of angular speeds and of speeds, for each of the offsets (N,).
 
     All offsets are compared at the same instants of the estimate.
+
     Returns None if the trajectories hardly overlap, or if no speed changes.
     """
     first = max(int(gt.t_ns[0]) - int(offsets_ns.min()), int(est.t_ns[0]))
@@ -279,7 +295,7 @@ def _snapped_to_stamps(
 ) -> int:
     """The offset, corrected so that stamps become equal if both trajectories have poses at the same instants.
 
-    If they have not, the stamps come from different clocks, and the offset is rounded to ROUNDED_DIGITS.
+    Otherwise, the stamps come from different clocks, and the offset is rounded to ROUNDED_DIGITS.
     """
     shifted_ns = est.t_ns + offset_ns
     is_inside = (shifted_ns >= gt.t_ns[0]) & (shifted_ns <= gt.t_ns[-1])
