@@ -32,14 +32,14 @@ def faces_of(cube: PrefilteredCubeMap, level: int) -> np.ndarray:
 
 def test_the_first_level_is_the_pictures() -> None:
     pictures = np.random.default_rng(0).random((6, SIZE_PX, SIZE_PX, 3)).astype(np.float32)
-    cube = PrefilteredCubeMap([list(pictures)] * len(ROUGHNESS), FACES, ROUGHNESS)
+    cube = PrefilteredCubeMap([list(pictures)], [0] * len(ROUGHNESS), FACES, ROUGHNESS)
     np.testing.assert_array_equal(faces_of(cube, 0), pictures)
 
 
 def test_uniform_surroundings_stay_as_they_are_at_every_roughness() -> None:
     colour = np.array([0.5, 1.0, 2.0], np.float32)
     pictures = np.broadcast_to(colour, (6, SIZE_PX, SIZE_PX, 3))
-    cube = PrefilteredCubeMap([list(pictures)] * len(ROUGHNESS), FACES, ROUGHNESS)
+    cube = PrefilteredCubeMap([list(pictures)], [0] * len(ROUGHNESS), FACES, ROUGHNESS)
     for level in range(len(ROUGHNESS)):
         np.testing.assert_allclose(faces_of(cube, level), np.broadcast_to(colour, faces_of(cube, level).shape), 1e-5)
 
@@ -47,7 +47,7 @@ def test_uniform_surroundings_stay_as_they_are_at_every_roughness() -> None:
 def test_a_bright_side_stays_where_it_is_and_is_blurred_more_by_more_roughness() -> None:
     pictures = np.zeros((6, SIZE_PX, SIZE_PX, 3), np.float32)
     pictures[2] = 1.0
-    cube = PrefilteredCubeMap([list(pictures)] * len(ROUGHNESS), FACES, ROUGHNESS)
+    cube = PrefilteredCubeMap([list(pictures)], [0] * len(ROUGHNESS), FACES, ROUGHNESS)
     contrasts = []
     for level in range(len(ROUGHNESS)):
         means = faces_of(cube, level).mean((1, 2, 3))
@@ -59,5 +59,5 @@ def test_a_bright_side_stays_where_it_is_and_is_blurred_more_by_more_roughness()
 
 def test_the_state_is_restored() -> None:
     pictures = np.ones((6, SIZE_PX, SIZE_PX, 3), np.float32)
-    PrefilteredCubeMap([list(pictures)] * len(ROUGHNESS), FACES, ROUGHNESS)
+    PrefilteredCubeMap([list(pictures)], [0] * len(ROUGHNESS), FACES, ROUGHNESS)
     assert all(GL.glIsEnabled(capability) for capability in CAPABILITIES)

@@ -15,7 +15,7 @@ CAPABILITIES = (GL.GL_SCISSOR_TEST, GL.GL_DEPTH_TEST, GL.GL_CULL_FACE)
 
 
 class PrefilteredCubeMap:
-    """A cube map of L levels. Level k has the six pictures (N, N, 3) at pictures[k], convolved with its GGX lobe.
+    """A cube map of L levels. Level k has six pictures (N, N, 3), pictures[shown[k]], convolved with its GGX lobe.
 
     The order of the pictures is that of OpenGL, +x first. axes (6, 3, 3) has the right, down and ahead axes of each as
     rows. roughness (L,) is 0 for the first level, which shows the pictures themselves.
@@ -24,12 +24,13 @@ class PrefilteredCubeMap:
     def __init__(
         self,
         pictures: Sequence[Sequence[Radiance]],
+        shown: Sequence[int],
         axes: Array,
         roughness: Sequence[float],
     ) -> None:
         size_px = len(pictures[0][0])
-        self.id = _cube_map(pictures[0])
-        unfiltered = [_cube_map(of_level) for of_level in pictures]
+        self.id = _cube_map(pictures[shown[0]])
+        unfiltered = [_cube_map(six) for six in pictures]
         program = ShaderProgram("fullscreen", "probe")
         framebuffer = GL.glGenFramebuffers(1)
         GL.glBindVertexArray(GL.glGenVertexArrays(1))
@@ -38,7 +39,7 @@ class PrefilteredCubeMap:
             GL.glDisable(capability)
 
         for level in range(1, len(roughness)):
-            bind(GL.GL_TEXTURE0, unfiltered[level], GL.GL_TEXTURE_CUBE_MAP)
+            bind(GL.GL_TEXTURE0, unfiltered[shown[level]], GL.GL_TEXTURE_CUBE_MAP)
             level_px = size_px >> level
             GL.glViewport(0, 0, level_px, level_px)
             for face in range(len(axes)):

@@ -41,7 +41,6 @@ class FrameRenderer:
         self._ambient = AmbientLight(baked)
         self._movers = baked.scene.movers
         self._lights = baked.scene.lights
-        self._lamp_parts = lamp_parts(self._lights)
         self._fog = baked.scene.fog
         light_map = self._illumination.at(0, 0)
         is_shaded = bool(self._movers and self._lights)
@@ -51,6 +50,7 @@ class FrameRenderer:
         self._draw = BatchDraw(drawn, self._light.id, panoramas)
         self._target = cache(partial(render_target, in_colour=self._draw.mirrors_in_colour))
         self._warp = cache(warp)
+        self._lamp_parts = lamp_parts(self._lights) if self._draw.needs_probe else ()
         if self._draw.needs_probe:
             self._draw.use_probe(self._room_probe(baked, baked.faces))
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from vobench.geometry.se3 import Array
 from vobench.geometry.triangle import areas_m2
-from vobench.geometry.vector import unit
+from vobench.rendering.lamp import Lamp, lamp_of
 from vobench.rendering.uniform_block import GLINT_ROWS, MOST_GLINTS
 from vobench.scene.light import AreaLight, Light, PointLight, SpotLight, Sun
 from vobench.scene.mesh import face_corners
@@ -19,26 +19,28 @@ EVERYWHERE_RAD = 10.0  # more than any angle to an axis
 NO_AXIS = (0.0, 0.0, 0.0, 1.0)
 COSINE = -1.0  # stands in the place of the fading of a spot for a flat light, whose intensity has a cosine
 BULB = (0.0, 0.0, 0.0, 0.0)
-FLAT = 0.9  # the share of the area of faces that their sum as vectors has if they are flat
 
 
 @dataclass(frozen=True, slots=True)
 class LampPart:
     """A connected part of an area light.
 
-    light: the index of the light. middle_m (3,). axis (3,): the normal of a flat part, 0 of one that shines all around.
-    intensity_m2: the greatest intensity in cd that a luminance of 1 cd/m² gives.
+    `light` is the index of the light, and `luminance_cd_m2` its luminance at level 1.
+    `lamp` has the middle of the part and its normal.
+    `is_flat` is whether it shines only before its plane.
+    `shown_m2` is the area that it shows: before its plane, or on average from all sides.
     """
 
     light: int
-    middle_m: Array
-    axis: Array
-    intensity_m2: float
+    luminance_cd_m2: float
+    lamp: Lamp
+    is_flat: bool
+    shown_m2: float
 
     @property
     def radius_m(self) -> float:
-        """The radius of a disc that has its greatest intensity."""
-        return float(np.sqrt(self.intensity_m2 / np.pi))
+        """The radius of a disc of the area that it shows."""
+        return float(np.sqrt(self.shown_m2 / np.pi))
 
 
 def lamp_parts(lights: Sequence[Light]) -> tuple[LampPart, ...]:
@@ -60,16 +62,12 @@ def _parts_of(index: int, light: AreaLight) -> list[LampPart]:
     parts = []
     for mesh in welded.split(only_watertight=False):
         corners_m = face_corners(mesh)
-        areas = areas_m2(corners_m)
-        middle_m = np.average(corners_m.mean(1), axis=0, weights=areas)
-        edges_m = corners_m[:, 1:] - corners_m[:, :1]
-        area_vector_m2 = np.cross(edges_m[:, 0], edges_m[:, 1]).sum(0) / 2
-        flat_area_m2 = float(np.linalg.norm(area_vector_m2))
-        is_flat = flat_area_m2 > FLAT * areas.sum()
+        lamp = lamp_of(corners_m)
+        is_flat = lamp.min_cosine == 0
+        area_m2 = float(areas_m2(corners_m).sum())
         # A convex body shows a quarter of its area to all sides.
-        intensity_m2 = flat_area_m2 if is_flat else float(areas.sum()) / 4
-        axis = unit(area_vector_m2) if is_flat else np.zeros(3)
-        parts.append(LampPart(index, middle_m, axis, intensity_m2))
+        shown_m2 = area_m2 if is_flat else area_m2 / 4
+        parts.append(LampPart(index, light.luminance_cd_m2, lamp, is_flat, shown_m2))
     return parts
 
 
@@ -104,11 +102,11 @@ def _illuminance(glint: Array, eye_m: Array) -> float:
 
 def _area_glint(part: LampPart, light: Light, start_ns: int, end_ns: int) -> Array:
     """The rows (4, 4) of a part of an area light in `glints`."""
-    assert isinstance(light, AreaLight)
-    luminance_cd_m2 = light.luminance_cd_m2 * light.level.mean(start_ns, end_ns) * np.array(light.colour)
-    place = [*part.middle_m, 1]
-    power = [*part.intensity_m2 * luminance_cd_m2, EVERYWHERE_RAD]
-    axis = [*part.axis, COSINE] if part.axis.any() else NO_AXIS
+    luminance_cd_m2 = part.luminance_cd_m2 * light.level.mean(start_ns, end_ns) * np.array(light.colour)
+    assert part.lamp.center_m is not None
+    place = [*part.lamp.center_m, 1]
+    power = [*part.shown_m2 * luminance_cd_m2, EVERYWHERE_RAD]
+    axis = [*part.lamp.axis, COSINE] if part.is_flat else NO_AXIS
     return np.array([place, power, axis, [part.radius_m, 1, 0, 0]])
 
 

@@ -68,6 +68,8 @@ def room_probe(
     """
     centre_m = _free_place(corners_m)
     lamps = TriangleCaster(corners_m, lamp_faces, robust=True)
+    rays = CAMERA.rays(pixel_grid(CAMERA)).reshape(-1, 3)
+    along_axis = rays / rays[:, 2:]
     pictures = []
     pictures_without_lamps = []
     wall_distances_m = []
@@ -76,14 +78,17 @@ def room_probe(
         picture, reversed_depth = draw(CAMERA, se3.transform(R_world_camera, centre_m))
         farthest_m = float(((corners_m - centre_m) @ ahead).max())
         distance_m = np.where(reversed_depth > 0, NEAR_M / np.maximum(reversed_depth, 1e-9), farthest_m)
-        is_lamp = _shows_lamp(lamps, centre_m, R_world_camera, distance_m)
         pictures.append(picture[:, ::-1])
-        pictures_without_lamps.append(np.where(is_lamp[..., None], 0, picture)[:, ::-1])
+        if len(lamp_faces):
+            is_lamp = _shows_lamp(lamps, centre_m, along_axis @ R_world_camera.T, distance_m)
+            pictures_without_lamps.append(np.where(is_lamp[..., None], 0, picture)[:, ::-1])
         wall_distances_m.append(np.quantile(distance_m, WALL))
     roughness = [roughness_of(level) for level in range(LEVELS)]
-    by_level = [pictures] * ROUGH_LEVEL + [pictures_without_lamps] * (LEVELS - ROUGH_LEVEL)
+    # Without lamps that have glints, all levels show the same pictures.
+    distinct = [pictures, pictures_without_lamps] if len(lamp_faces) else [pictures]
+    shown = [0] * ROUGH_LEVEL + [len(distinct) - 1] * (LEVELS - ROUGH_LEVEL)
     return Probe(
-        texture=PrefilteredCubeMap(by_level, FACES, roughness),
+        texture=PrefilteredCubeMap(distinct, shown, FACES, roughness),
         centre_m=centre_m,
         low_m=centre_m - wall_distances_m[1::2],
         high_m=centre_m + wall_distances_m[::2],
@@ -92,12 +97,14 @@ def room_probe(
     )
 
 
-def _shows_lamp(lamps: TriangleCaster, centre_m: Array, R_world_camera: Array, distance_m: Array) -> Mask:
-    """Which pixels (H, W) show a lamp or are beside one that does, given the distance (H, W) along the axis."""
-    rays = CAMERA.rays(pixel_grid(CAMERA)).reshape(-1, 3)
-    along_axis = rays / rays[:, 2:]
-    origins_m = np.broadcast_to(centre_m, rays.shape)
-    lamp_m = lamps.hits(origins_m, along_axis @ R_world_camera.T, FAR_M).distance.reshape(distance_m.shape)
+def _shows_lamp(lamps: TriangleCaster, centre_m: Array, along_axis: Array, distance_m: Array) -> Mask:
+    """Which pixels (H, W) show a lamp or are beside one that does.
+
+    `along_axis` (H·W, 3) are the directions of pixels in the world, with a component of 1 along the axis of the camera.
+    `distance_m` (H, W) is how far along the axis is what they show.
+    """
+    origins_m = np.broadcast_to(centre_m, along_axis.shape)
+    lamp_m = lamps.hits(origins_m, along_axis, FAR_M).distance.reshape(distance_m.shape)
     is_lamp = lamp_m < distance_m * (1 + SAME_DEPTH)
     return cv2.dilate(is_lamp.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
 

@@ -66,6 +66,7 @@ def _visible_facets(to_eye: Array, roughness: float) -> Array:
     first, second = (grid.ravel() for grid in np.meshgrid(middles, middles))
     stretched = to_eye * [roughness, roughness, 1]
     stretched /= np.linalg.norm(stretched)
+    # The second of the tangents leads upwards, since below the horizon no facet is seen.
     is_upright = np.hypot(stretched[0], stretched[1]) < 1e-9
     across = np.array([1.0, 0, 0]) if is_upright else np.array([-stretched[1], stretched[0], 0])
     across /= np.linalg.norm(across)
