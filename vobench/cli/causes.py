@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 # A condition is listed for a trial or a segment if it multiplies the error by more than this.
 LEAST_FACTOR = 1.1
 MOST_FACTORS = 3
-CAUSE_HEADINGS = ("condition", "factor", "95 % interval", "is")
+CAUSE_HEADINGS = ("condition", "factor", "95 % interval", "verdict")
 TRIAL_HEADINGS = ("case", "repeat", "status", "diverges at frame", "contributing conditions")
 SEGMENT_HEADINGS = ("case", "repeat", "frames", "error per path", "with")
 

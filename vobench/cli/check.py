@@ -28,7 +28,7 @@ def print_summary(summary: PlanSummary, *, as_json: bool) -> None:
     _print_cases(summary, console)
     _print_estimators(summary, console)
     found_rows = [list(row.values()) for row in summary.found()]
-    console.print(terminal.table("found", ["kind", "name", "origin", "path"], found_rows))
+    console.print(terminal.table("files", ["kind", "name", "origin", "path"], found_rows))
     for case in summary.cases:
         for note in case.notes or ():
             console.print(f"{case.case}: {note}")

@@ -12,7 +12,7 @@ from vobench.cli.option import Json, RerunOptions, with_option_groups
 from vobench.cli.plan_runner import plan_runner
 from vobench.cli.progress import Bars
 
-CHANGE_HEADINGS = ("without", "instead", "error", "less", "95 % interval", "survived", "is")
+CHANGE_HEADINGS = ("without", "instead", "error", "less", "95 % interval", "survived", "verdict")
 
 TrialPath = Annotated[
     Path,

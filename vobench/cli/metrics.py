@@ -31,7 +31,7 @@ def metrics_command(
     for definition in metrics:
         option = "--full" if definition.full else ""
         rows.append([definition.id, definition.unit, definition.headline, definition.title, option])
-    terminal.console().print(terminal.table("", ["metric", "unit", "headline", "is", "with"], rows))
+    terminal.console().print(terminal.table("", ["metric", "unit", "headline", "description", "option"], rows))
 
 
 def _print_definition(definition: dict[str, Any], *, as_json: bool) -> None:

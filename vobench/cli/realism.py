@@ -55,7 +55,7 @@ def _print(report: RealismReport) -> None:
     band_count = f"{realism.inside} of {len(realism.values)} statistics in their bands"
     title = f"{report.path}: {band_count}, measured on {realism.pictures} images"
     reference = "against" if report.against else "real ones"
-    headings = ["statistic", "value", "unit", reference, "is", "changed by"]
+    headings = ["statistic", "value", "unit", reference, "verdict", "changed by"]
     rows = [_row(row) for row in report.rows()]
     console.print(terminal.table(title, headings, rows))
     for sentence in side_effects(row["knob"] for row in report.rows()):

@@ -74,7 +74,7 @@ def _print(report: TwinReport, out: Path) -> None:
     console.print(f"Kendall's tau between both rankings: {facts['tau']:.2f} (95 % CI {low:.2f} … {high:.2f})")
 
     rows = [_statistic_row(row) for row in facts["statistics"]]
-    console.print(terminal.table("statistics", ["statistic", REAL, TWIN, "unit", "is"], rows))
+    console.print(terminal.table("statistics", ["statistic", REAL, TWIN, "unit", "verdict"], rows))
     for name, (real, twin) in facts["also"].items():
         console.print(f"{name}: {real:.3g} in the recording, {twin:.3g} in its twin")
 
