@@ -82,8 +82,8 @@ def test_a_verb_and_a_metric_from_outside_are_there_once_they_are_installed(vobe
     assert "ate_height" not in vobench("score", GT, EST).out
 
 
-def test_every_command_is_in_the_readmes_table_and_the_table_has_no_other():
-    assert sorted(re.findall(r"^\| `vobench (\w+)", README, re.MULTILINE)) == sorted(COMMANDS)
+def test_every_command_is_in_the_readmes_list_and_the_list_has_no_other():
+    assert sorted(re.findall(r"^- `vobench (\w+)", README, re.MULTILINE)) == sorted(COMMANDS)
 
 
 JSON = [

@@ -42,7 +42,7 @@ def test_the_example_of_the_page_runs_as_it_stands(case, capsys):
 def test_every_name_of_the_package_is_on_the_page_and_there():
     page = PAGE.read_text(encoding="utf-8")
     for name in set(vobench.__all__) - {"__version__"}:
-        assert re.search(rf"\| .*`{name}\b", page), name
+        assert re.search(rf"^- .*`{name}\b", page, re.MULTILINE), name
         assert getattr(vobench, name) is not None
         assert name in dir(vobench)
 
