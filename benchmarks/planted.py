@@ -147,9 +147,9 @@ def explain_all(world: World, out: Path, chosen: Sequence[Sequence[str]], repeat
         began = time.process_time()
         found = explain_trial(trial, run_plan=plan_runner(out), repeats=repeats).explanation
         ranked = [*found.singles[:3], *found.pairs[:2]]
-        told = ", ".join(f"{'+'.join(c.removed)} {c.mended:.0%} [{c.low:.0%}, {c.high:.0%}]" for c in ranked)
+        told = ", ".join(f"{'+'.join(c.removed)} {c.reduction:.0%} [{c.low:.0%}, {c.high:.0%}]" for c in ranked)
         right += (is_right := wanted == set(found.named).union(*found.alternatives))
-        everything = "none" if found.everything is None else f"{found.everything.mended:.0%}"
+        everything = "none" if found.everything is None else f"{found.everything.reduction:.0%}"
         print(
             f"{'+'.join(planted):20} {estimator:12} {score.status:8} {found.loss:6.1%} "
             f"{'right' if is_right else 'WRONG'}: {found.relation}: {' and '.join(found.named)}; {told}; "

@@ -224,13 +224,15 @@ def test_of_two_nuisances_variants_are_named_by_what_is_removed() -> None:
 
 
 def test_suspects_are_the_three_that_cost_most_as_the_only_one_removed_or_left() -> None:
-    everything = change("all", mended=0.8, loss=0.1)  # 0.5 before, so 0.4 to gain
-    singles = [change(name, mended=mended) for name, mended in zip("abcde", (0.4, 0.08, 0.0, 0.0, 0.24), strict=True)]
+    everything = change("all", reduction=0.8, loss=0.1)  # 0.5 before, so 0.4 to gain
+    singles = [
+        change(name, reduction=reduction) for name, reduction in zip("abcde", (0.4, 0.08, 0.0, 0.0, 0.24), strict=True)
+    ]
     alone = {"a": 0.1, "b": 0.1, "c": 0.26, "d": 0.18, "e": 0.1}
     # As the only one removed: a 0.5, b 0.1, e 0.3; as the only one left: c 0.4, d 0.2.
     assert _suspects(singles, alone, everything) == {"a", "c", "e"}
     assert _suspects(singles, {**alone, "d": 0.24}, everything) == {"a", "c", "d"}
-    nothing_left = change("all", mended=1.0, loss=0.0)
+    nothing_left = change("all", reduction=1.0, loss=0.0)
     assert _suspects(singles, {**dict.fromkeys("abcde", 0.0), "d": 0.45, "b": 0.3}, nothing_left) == {"a", "d", "b"}
 
 
@@ -249,15 +251,15 @@ def test_the_same_errors_before_and_after_are_surely_no_change() -> None:
     rng = np.random.default_rng(0)
     before = outcomes(*rng.lognormal(-3, 1, (6, 24)))
     found = changed(before, before)
-    assert (found.mended, found.low, found.high) == pytest.approx((0, 0, 0))
+    assert (found.reduction, found.low, found.high) == pytest.approx((0, 0, 0))
     assert not found.is_sure
     half = outcomes(*(outcome.loss / 2 for outcome in before))
     found = changed(before, half)
-    assert (found.mended, found.low, found.high) == pytest.approx((0.5, 0.5, 0.5))
+    assert (found.reduction, found.low, found.high) == pytest.approx((0.5, 0.5, 0.5))
     assert found.loss == pytest.approx(np.mean([outcome.loss for outcome in half]))
     assert found.is_sure
     worse = changed(half, before)
-    assert (worse.mended, worse.low, worse.high) == pytest.approx((-1, -1, -1))
+    assert (worse.reduction, worse.low, worse.high) == pytest.approx((-1, -1, -1))
     assert worse.is_harmful
 
 
@@ -265,12 +267,12 @@ def test_survivors_and_repeats_are_counted() -> None:
     after = [replace(outcome, survived=nth < 2) for nth, outcome in enumerate(outcomes([0.1], [0.2], [0.3]))]
     found = changed(outcomes([0.5], [0.5], [0.5]), after)
     assert (found.survived, found.repeats) == (2, 3)
-    assert found.mended == pytest.approx(0.6)
+    assert found.reduction == pytest.approx(0.6)
 
 
 def test_errors_of_nothing_are_no_division_by_zero() -> None:
     nothing = outcomes(np.zeros(24), np.zeros(24))
-    assert changed(nothing, nothing).mended == 1
+    assert changed(nothing, nothing).reduction == 1
     assert np.isfinite(changed(nothing, outcomes([0.1], [0.2])).low)
 
 
@@ -280,7 +282,7 @@ def test_where_nothing_is_random_the_interval_is_over_blocks_of_segments() -> No
     after = 0.15 + 0.05 * np.repeat(rng.standard_normal(8), 3)
     found = changed(outcomes(*[before] * 6), outcomes(*[after] * 6))
     assert 0.01 < found.high - found.low < 0.4
-    assert found.low < found.mended < found.high
+    assert found.low < found.reduction < found.high
     assert found.is_sure
     same = changed(outcomes(*[before] * 6), outcomes(*[before[::-1]] * 6))
     assert same.low < 0 < same.high

@@ -122,29 +122,29 @@ def test_the_time_of_a_stage_follows_from_the_trials_before(monkeypatch) -> None
 # --- Rows and verdicts, without a run ---
 
 
-def change(*removed: str, mended: float, is_sure: bool = True, high: float = 1.0) -> Change:
-    low = mended - 0.1 if is_sure else mended - 0.5
+def change(*removed: str, reduction: float, is_sure: bool = True, high: float = 1.0) -> Change:
+    low = reduction - 0.1 if is_sure else reduction - 0.5
     return Change(
         removed,
         loss=0.1,
-        mended=mended,
+        reduction=reduction,
         low=low,
         high=high,
         survived=2,
         repeats=6,
-        p_less=0.01 if is_sure and mended > 0 else 0.5,
-        p_more=0.01 if is_sure and mended < 0 else 0.5,
+        p_less=0.01 if is_sure and reduction > 0 else 0.5,
+        p_more=0.01 if is_sure and reduction < 0 else 0.5,
         is_confirmed=is_sure,
     )
 
 
-EVERYTHING = change("blur", "noise", "gloss", mended=0.9)
-BLUR = change("blur", mended=0.8)
-NOISE = change("noise", mended=0.2)
-GLOSS = change("gloss", mended=-0.2)
-FLARE = change("flare", mended=0.05, is_sure=False, high=0.1)
-JPEG = change("JPEG", mended=0.1, is_sure=False, high=0.6)
-PAIR = change("blur", "noise", mended=0.3, is_sure=False)
+EVERYTHING = change("blur", "noise", "gloss", reduction=0.9)
+BLUR = change("blur", reduction=0.8)
+NOISE = change("noise", reduction=0.2)
+GLOSS = change("gloss", reduction=-0.2)
+FLARE = change("flare", reduction=0.05, is_sure=False, high=0.1)
+JPEG = change("JPEG", reduction=0.1, is_sure=False, high=0.6)
+PAIR = change("blur", "noise", reduction=0.3, is_sure=False)
 ALL_SINGLES = (BLUR, NOISE, JPEG, FLARE, GLOSS)
 
 
@@ -161,18 +161,18 @@ def test_each_variant_has_its_verdict_and_everything_comes_last() -> None:
     assert [row["removed"] for row in rows][5:] == [PAIR.removed, EVERYTHING.removed]
     assert rows[0]["instead"] == "a short exposure and a sharp lens"
     assert rows[5]["instead"] == ""
-    assert (rows[0]["mended"], rows[0]["survived"], rows[0]["repeats"]) == (0.8, 2, 6)
+    assert (rows[0]["reduction"], rows[0]["survived"], rows[0]["repeats"]) == (0.8, 2, 6)
 
 
 def test_what_seems_to_help_but_was_not_confirmed_is_neither_named_nor_a_difference() -> None:
-    seeming = replace(change("flare", mended=0.4), is_confirmed=False)
+    seeming = replace(change("flare", reduction=0.4), is_confirmed=False)
     found = explained(singles=(BLUR, seeming))
     assert [row["verdict"] for row in found.rows()][:2] == ["fixes it", "unconfirmed"]
     assert found.explanation.contributing == ()
 
 
 def test_a_single_nuisance_is_listed_once() -> None:
-    single = change("blur", mended=0.8)
+    single = change("blur", reduction=0.8)
     assert [row["removed"] for row in explained(single, (single,)).rows()] == [("blur",), PAIR.removed]
 
 
@@ -186,14 +186,14 @@ def test_one_cause_is_said_with_its_remedy_what_else_helps_and_what_harms() -> N
 
 
 def test_alternatives_and_pairs_are_said_as_such() -> None:
-    either = explained(singles=(BLUR, change("noise", mended=0.7)))
+    either = explained(singles=(BLUR, change("noise", reduction=0.7)))
     assert either.sentences[0] == (
         "Cause of the failure: blur together with noise (70% less). Either change suffices: the error drops by 80% "
         "(95 % CI 70% to 100%)."
     )
     assert [row["verdict"] for row in either.rows()][:2] == ["fixes it", "fixes it"]
-    singles = (change("blur", mended=0.2, is_sure=False), NOISE)
-    together = explained(singles=singles, pairs=(change("blur", "noise", mended=0.85),))
+    singles = (change("blur", reduction=0.2, is_sure=False), NOISE)
+    together = explained(singles=singles, pairs=(change("blur", "noise", reduction=0.85),))
     assert together.sentences == (
         "Causes of the failure: blur and noise, each by itself. Only both together fix it: the error drops by 85% "
         "(95 % CI 75% to 100%).",
@@ -202,7 +202,7 @@ def test_alternatives_and_pairs_are_said_as_such() -> None:
 
 
 def test_where_nothing_is_named_it_is_said_what_was_ruled_out_and_what_is_open() -> None:
-    nothing = change("blur", "flare", mended=0.02, is_sure=False, high=0.2)
+    nothing = change("blur", "flare", reduction=0.02, is_sure=False, high=0.2)
     assert explained(nothing, (JPEG, FLARE), ()).sentences == (
         "None of these explains the failure: the cause is the estimator, its path or the scene.",
         "With all nuisances removed, the error drops by 2% (95 % CI -48% to 20%).",

@@ -26,13 +26,13 @@ def exit_code(**options):
 def test_advice_is_printed_and_is_no_failure(clauses, capsys):
     clauses.append(Clause("imports", Verdict.ADVICE, "a remedy"))
     assert exit_code() == 0
-    assert capsys.readouterr().out == "advice    imports: a remedy\n"
+    assert capsys.readouterr().out == "advice     imports: a remedy\n"
 
 
 def test_a_broken_clause_is_in_capitals_and_fails(clauses, capsys):
     clauses += [Clause("first", Verdict.ADVICE, "a remedy"), Clause("second", Verdict.BROKEN, "no pose")]
     assert exit_code() == 1
-    assert "BROKEN    second: no pose" in capsys.readouterr().out
+    assert "BROKEN     second: no pose" in capsys.readouterr().out
 
 
 def test_json_has_all_clauses_and_the_verdict(clauses, capsys):

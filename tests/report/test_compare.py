@@ -12,10 +12,10 @@ from vobench.report.compare import (
     BETTER,
     FAILS,
     GONE,
-    MENDED,
     NEW,
     NOT_MADE,
     OTHER_MACHINE,
+    RECOVERED,
     SAME,
     UNDECIDED,
     WORSE,
@@ -151,7 +151,7 @@ def test_many_trials_decide_a_cell(trials):
 
 def test_what_fails_now_and_what_no_longer_does(scored):
     well, ill = make_board([scored("a")], {}), make_board([scored("a", "crashed", ate_m=None)], {})
-    assert [verdicts(*pair)[1][0].verdict for pair in ((well, ill), (ill, well))] == [FAILS, MENDED]
+    assert [verdicts(*pair)[1][0].verdict for pair in ((well, ill), (ill, well))] == [FAILS, RECOVERED]
 
 
 def test_cells_of_one_run_alone_are_named(scored):
@@ -247,8 +247,8 @@ def test_trials_that_are_all_alike_have_no_interval(scored):
 def test_a_deterministic_cell_that_fails_more_often_fails_now_and_one_that_fails_less_is_mended(scored):
     partly = ([0.01, 0.01], ["ok", "lost"])
     assert cell_change(scored, ([0.01, 0.02],), partly).verdict == FAILS
-    assert cell_change(scored, ([0.01, 0.02], ["lost", "lost"]), partly).verdict == MENDED
-    assert cell_change(scored, ([0.01, 0.01], ["lost", "lost"]), ([0.01, 0.01],)).verdict == MENDED
+    assert cell_change(scored, ([0.01, 0.02], ["lost", "lost"]), partly).verdict == RECOVERED
+    assert cell_change(scored, ([0.01, 0.01], ["lost", "lost"]), ([0.01, 0.01],)).verdict == RECOVERED
 
 
 def test_a_limit_is_exceeded_by_more_than_itself_only(scored):

@@ -258,23 +258,23 @@ def _changes(outcomes: Outcomes, *, is_confirmed: bool) -> dict[Removal, Change]
 
 def _needs_pairs(singles: Mapping[Removal, Change], everything: Change, removable: Removal) -> bool:
     """Whether removing all nuisances seems to help, but no single one explains it."""
-    if len(removable) < 3 or everything.mended < PROMISING:
+    if len(removable) < 3 or everything.reduction < PROMISING:
         return False
-    best = max(singles[(name,)].mended for name in removable)
-    return best < SUFFICIENT_SHARE * everything.mended
+    best = max(singles[(name,)].reduction for name in removable)
+    return best < SUFFICIENT_SHARE * everything.reduction
 
 
 def _selected(findings: _Findings) -> list[Removal]:
     """What is run again with other seeds: the promising changes, and the one that seems to harm most."""
     ranked = _ranked(findings.singles.values())
-    selected = [change.removed for change in ranked[:SUSPECTS] if change.mended >= PROMISING]
+    selected = [change.removed for change in ranked[:SUSPECTS] if change.reduction >= PROMISING]
     if findings.pairs:
         best = _ranked(findings.pairs.values())[0]
-        if best.mended >= PROMISING:
+        if best.reduction >= PROMISING:
             first, second = best.removed
             selected += [best.removed, (first,), (second,)]
     worst = ranked[-1]
-    if worst.mended <= -PROMISING:
+    if worst.reduction <= -PROMISING:
         selected.append(worst.removed)
     return selected
 
@@ -289,16 +289,16 @@ def _suspects(
     Costs are relative to that of all nuisances together.
     """
     # If removing all changes nothing, or leaves no error, the costs are not relative to anything.
-    total_reduction = everything.mended if everything.mended != 0 else 1.0
+    total_reduction = everything.reduction if everything.reduction != 0 else 1.0
     total_cost = 1.0
-    if everything.mended < 1:
-        loss_before = everything.loss / (1 - everything.mended)
+    if everything.reduction < 1:
+        loss_before = everything.loss / (1 - everything.reduction)
         total_cost = loss_before - everything.loss
 
     costs = {}
     for change in singles:
         name = change.removed[0]
-        cost_if_removed = change.mended / total_reduction
+        cost_if_removed = change.reduction / total_reduction
         cost_if_left = (alone[name] - everything.loss) / max(total_cost, MIN_COST)
         costs[name] = max(cost_if_removed, cost_if_left)
     largest_first = sorted(costs, key=costs.__getitem__, reverse=True)
@@ -310,7 +310,7 @@ def _ranked(changes: Iterable[Change]) -> tuple[Change, ...]:
 
 
 def _improvement(change: Change) -> float:
-    return change.mended
+    return change.reduction
 
 
 def _differ(outcomes: Sequence[Outcome]) -> bool:
@@ -353,7 +353,7 @@ def _change(
     return Change(
         removed,
         loss=_mean_loss(changed),
-        mended=pairs.reduction,
+        reduction=pairs.reduction,
         low=low,
         high=high,
         survived=survived,

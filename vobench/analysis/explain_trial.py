@@ -52,7 +52,7 @@ class TrialExplanation:
             sentences.append(f"It also depends on {parts}.")
         for change in explanation.harmful:
             instead = _nuisance(change.removed[0]).instead
-            sentences.append(f"{_upper(instead)} would make it worse: the error grows by {-change.mended:.0%}.")
+            sentences.append(f"{_upper(instead)} would make it worse: the error grows by {-change.reduction:.0%}.")
         if not explanation.named:
             sentences += _ruled_out_sentences(explanation)
         return tuple(sentences)
@@ -62,7 +62,7 @@ class TrialExplanation:
 
         What seems to differ by the seeds of the screening, but was not run with others, is "unconfirmed".
         """
-        if change.is_sure and change.mended >= MATERIAL:
+        if change.is_sure and change.reduction >= MATERIAL:
             return "fixes it" if self._fixes(change) else "helps"
         if change.is_harmful:
             return "harms"
@@ -80,8 +80,8 @@ class TrialExplanation:
     def rows(self) -> list[dict[str, Any]]:
         """One row per variant of the case: single nuisances removed, then pairs, then all of them.
 
-        `loss` is the error without them; `mended`, `low` and `high` are the share of the error that went, with its
-        95 % interval; `survived` of `repeats` trials ended well.
+        `loss` is the error without them; `reduction` is the share by which the error decreased, and `low` and `high`
+        are its 95 % interval; `survived` of `repeats` trials ended well.
         """
         explanation = self.explanation
         changes = [*explanation.singles, *explanation.pairs]
@@ -137,7 +137,7 @@ def _ruled_out_sentences(explanation: Explanation) -> list[str]:
     if explanation.everything is not None:
         everything = explanation.everything
         interval = f"95 % CI {everything.low:.0%} to {everything.high:.0%}"
-        sentences.append(f"With all nuisances removed, the error drops by {everything.mended:.0%} ({interval}).")
+        sentences.append(f"With all nuisances removed, the error drops by {everything.reduction:.0%} ({interval}).")
     if explanation.ruled_out:
         parts = ", ".join(f"{change.removed[0]} (at most {change.high:.0%})" for change in explanation.ruled_out)
         sentences.append(f"Ruled out, by the share of the error that they can cost: {parts}.")
@@ -149,12 +149,12 @@ def _ruled_out_sentences(explanation: Explanation) -> list[str]:
 
 
 def _with_reduction(change: Change) -> str:
-    return f"{change.removed[0]} ({change.mended:.0%} less)"
+    return f"{change.removed[0]} ({change.reduction:.0%} less)"
 
 
 def _reduction(change: Change) -> str:
     """By how much a change reduces the error."""
-    return f"the error drops by {change.mended:.0%} (95 % CI {change.low:.0%} to {change.high:.0%})"
+    return f"the error drops by {change.reduction:.0%} (95 % CI {change.low:.0%} to {change.high:.0%})"
 
 
 def _upper(sentence: str) -> str:

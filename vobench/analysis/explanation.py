@@ -27,7 +27,7 @@ class Change:
 
     removed: Removal
     loss: float
-    mended: float
+    reduction: float
     low: float
     high: float
     survived: int
@@ -44,7 +44,7 @@ class Change:
     @property
     def is_harmful(self) -> bool:
         """Whether the error is significantly larger without them."""
-        return self.is_confirmed and self.p_more <= SURE_P and self.mended <= -MATERIAL
+        return self.is_confirmed and self.p_more <= SURE_P and self.reduction <= -MATERIAL
 
     @property
     def is_ruled_out(self) -> bool:
@@ -106,7 +106,7 @@ class Explanation:
         helping = []
         for change in self.singles:
             is_named = change.removed in named or bool(in_pair & set(change.removed))
-            if change.is_sure and change.mended >= MATERIAL and not is_named:
+            if change.is_sure and change.reduction >= MATERIAL and not is_named:
                 helping.append(change)
         return tuple(helping)
 
@@ -126,7 +126,7 @@ class Explanation:
         """The best sufficient single change, or else the best one that surely halves the error."""
         if self.sufficient:
             return self.sufficient[0]
-        halving = [change for change in self.singles if change.is_sure and change.mended >= HALF]
+        halving = [change for change in self.singles if change.is_sure and change.reduction >= HALF]
         return halving[0] if halving else None
 
     @property
@@ -135,11 +135,11 @@ class Explanation:
         if not self.pairs or self.sufficient:
             return None
         pair = self.pairs[0]
-        best_mended = 0.0
+        best_reduction = 0.0
         for change in self.singles:
             if set(change.removed) < set(pair.removed):
-                best_mended = max(best_mended, change.mended)
-        gains = pair.mended >= best_mended + MIN_GAIN_OF_PAIR
+                best_reduction = max(best_reduction, change.reduction)
+        gains = pair.reduction >= best_reduction + MIN_GAIN_OF_PAIR
         return pair if gains and _explains(pair, self.everything) else None
 
 
@@ -147,11 +147,11 @@ def is_sufficient(change: Change, everything: Change | None) -> bool:
     """Whether a change achieves most of what removing all nuisances does or, if that does not help, half."""
     if not change.is_sure:
         return False
-    if everything is not None and everything.is_sure and everything.mended > 0:
-        return change.mended >= max(SUFFICIENT_SHARE * everything.mended, MATERIAL)
-    return change.mended >= HALF
+    if everything is not None and everything.is_sure and everything.reduction > 0:
+        return change.reduction >= max(SUFFICIENT_SHARE * everything.reduction, MATERIAL)
+    return change.reduction >= HALF
 
 
 def _explains(pair: Change, everything: Change | None) -> bool:
     """Whether a pair explains a failure: like a single change, or by half of the error."""
-    return is_sufficient(pair, everything) or (pair.is_sure and pair.mended >= HALF)
+    return is_sufficient(pair, everything) or (pair.is_sure and pair.reduction >= HALF)

@@ -76,7 +76,7 @@ def _change_row(row: dict[str, Any], everything: tuple[str, ...]) -> list[str]:
         "all of these" if is_everything else " and ".join(row["removed"]),
         row["instead"],
         f"{row['loss']:.1%}",
-        f"{row['mended']:.0%}",
+        f"{row['reduction']:.0%}",
         f"{row['low']:.0%} to {row['high']:.0%}",
         f"{row['survived']} of {row['repeats']}",
         row["verdict"],

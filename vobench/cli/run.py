@@ -82,7 +82,7 @@ class Changes:
     ] = None
     fresh_units: Annotated[
         bool,
-        typer.Option("--fresh-units", help="Draw places and drives that nobody has seen; the board names their seed."),
+        typer.Option("--fresh-units", help="Draw places and drives from unused seeds; the board names the seed."),
     ] = False
 
     def values(self, suite: str) -> dict[str, str]:

@@ -11,7 +11,7 @@ from vobench.cli.option import Json
 if TYPE_CHECKING:
     from vobench.report.contract import Clause
 
-VERDICT_WIDTH = 9  # columns
+VERDICT_WIDTH = 10  # columns
 
 
 def try_command(
@@ -21,7 +21,7 @@ def try_command(
     *,
     json: Json = False,
 ) -> None:
-    """Check within seconds whether an estimator fulfils the contract; exit code 1 if it does not."""
+    """Test within seconds whether an estimator satisfies the contract; exit code 1 if it does not."""
     from vobench.report.contract import Verdict, contract
     from vobench.suite import catalog
 

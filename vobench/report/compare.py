@@ -28,7 +28,7 @@ BETTER = "better"
 WORSE = "worse"
 UNDECIDED = "not decided"
 FAILS = "fails now"
-MENDED = "mended"
+RECOVERED = "no longer fails"
 NEW = "new"
 GONE = "gone"
 NOT_MADE = "no sequence"  # the case could not be simulated or imported in one of the runs
@@ -263,7 +263,7 @@ class _Judge:
         if old_share < new_share:
             return FAILS
         if old_share > new_share:
-            return MENDED
+            return RECOVERED
         return self._of_ratio(ratio)
 
     def _of_random_cell(self, pair: CellPair, p: float, ratio: float | None) -> str:

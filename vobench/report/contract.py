@@ -34,7 +34,7 @@ class Verdict(StrEnum):
 
     KEPT = "kept"
     BROKEN = "broken"
-    NOT_TOLD = "not told"  # it could not be tested
+    NOT_TESTED = "not tested"  # it could not be tested
     POOR = "poor"  # within the contract, but a poor result
     ADVICE = "advice"  # nothing wrong today
 
@@ -103,10 +103,10 @@ class _Attempt:
         """Whether other pictures from FIRST_CHANGED on leave the poses before them unchanged."""
         manifest = self._estimator_entry.manifest
         if manifest.command:
-            return Clause("causality", Verdict.NOT_TOLD, "it reads all frames at once: nothing to compare")
+            return Clause("causality", Verdict.NOT_TESTED, "it reads all frames at once: nothing to compare")
         if not (manifest.causal and manifest.deterministic):
             seen = "it is not declared causal and deterministic: nothing to compare"
-            return Clause("causality", Verdict.NOT_TOLD, seen)
+            return Clause("causality", Verdict.NOT_TESTED, seen)
         is_same = np.array_equal(_poses_before_change(drive), _poses_before_change(self._run("other end")))
         seen = "poses do not depend on later frames" if is_same else "poses depend on later frames"
         return Clause("causality", _kept_if(is_same), seen)
@@ -133,7 +133,7 @@ class _Attempt:
         except EstimatorFailure as failure:
             yield Clause("frames unchanged, restart", Verdict.BROKEN, f"{failure.kind}: {failure.reason}")
             return
-        yield Clause("frames unchanged", Verdict.KEPT, "no picture and no reading was written to")
+        yield Clause("frames unchanged", Verdict.KEPT, "no image and no reading was changed")
         is_same = tracks[0] == tracks[1]
         seen = f"a second start() gives {'the same' if is_same else 'other'} poses"
         yield Clause("restart", _kept_if(is_same or not estimator_entry.manifest.deterministic), seen)
