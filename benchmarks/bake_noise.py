@@ -69,6 +69,7 @@ def report(name: str, rays: int, camera: Pinhole) -> None:
     many = replace(
         default,
         seed=1,
+        light_rays=rays * default.light_rays,
         indirect_rays=rays * default.indirect_rays,
         light_noise=default.light_noise / np.sqrt(rays),
     )

@@ -98,8 +98,8 @@ def examine(path: Path, out: Path | None, *, is_coarse: bool) -> Result:
     is_daylit = any(isinstance(light, Sun | Sky) for light in report.scene.lights)
     return Result(
         path.name,
-        kind="place" if report.found.is_place else "object",
-        faces=report.found.faces,
+        kind="place" if report.survey.is_place else "object",
+        faces=report.survey.face_count,
         lights=f"{len(report.scene.lights)}{', daylight' if is_daylit else ''}",
         white_cd_m2=white_cd_m2,
         shares=exposed_shares(luminance_cd_m2, white_cd_m2),
@@ -120,7 +120,7 @@ def _write_sheet(
     pictures: list[NDArray[np.float32]],
     white_cd_m2: float,
 ) -> None:
-    overview = sheet(report.scene, report.found, renderer, white_cd_m2, report.lines())
+    overview = sheet(report.scene, report.survey, renderer, white_cd_m2, report.lines())
     step = len(pictures) // SHOWN
     shown = [srgb(picture / (SATURATED * white_cd_m2)) for picture in pictures[::step][:SHOWN]]
     strip = np.hstack(shown)

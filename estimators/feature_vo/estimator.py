@@ -12,12 +12,15 @@ from vobench.plugin import (
     Array,
     Frame,
     Image,
+    Mask,
     PoseFit,
     Result,
     Rig,
     Status,
     Tracks,
     VobenchError,
+    comparable,
+    lucas_kanade,
     parameters,
     pose_from_points,
     se3,
@@ -27,6 +30,7 @@ from vobench.plugin import (
 Descriptors = NDArray[Any]
 Indices = NDArray[np.intp]
 DETECTORS = ("orb", "sift")
+MOST_REFINED_PX = 3.0  # a match that Lucas-Kanade moves farther is of another point
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +44,28 @@ class Settings:
     min_flow_px: float
     keep_below_px: float
     ransac_px: float
+    window_px: int
+
+
+@dataclass(frozen=True, slots=True)
+class Matches:
+    """Points of the last view that this view shows, too.
+
+    `last_px` and `now_px` are their left pixels (N, 2). `last_disparity_px` and `now_disparity_px` are their
+    disparities (N,); the current one is NaN if the right picture has no match.
+    """
+
+    last_px: Array
+    now_px: Array
+    last_disparity_px: Array
+    now_disparity_px: Array
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """Features of a stereo pair: left pixels (N, 2), descriptors (N, D), and disparities (N,) in px, NaN for none."""
+    """A left picture and its features: pixels (N, 2), descriptors (N, D), and disparities (N,) in px, NaN for none."""
 
+    left: Image
     uv_px: Array
     descriptors: Descriptors
     disparity_px: Array
@@ -71,6 +91,8 @@ class FeatureVo:
         else:
             self._detector = cv2.SIFT.create(s.features)
             self._matcher = cv2.BFMatcher(cv2.NORM_L2, crossCheck=True)
+        # The positions of SIFT have fractions; those of ORB are whole pixels of a level of its pyramid.
+        self._is_refining = name == "orb" and s.window_px > 0
         self._last: View | None = None
         # Poses in the view's axes.
         self._T_odom_last = np.eye(4)
@@ -97,15 +119,13 @@ class FeatureVo:
             self._T_odom_now = self._T_odom_last
             return Result(self._pair.T_left(self._T_odom_now), Status.STATIONARY, "no_flow")
 
-        has_depth = np.isfinite(last.disparity_px[of_last])
-        of_last = of_last[has_depth]
-        of_view = of_view[has_depth]
-        fit = self._fit(last, view, of_last, of_view)
+        matches = self._refined(last, view, of_last, of_view)
+        fit = self._fit(matches)
         if fit is None:
             self._last = view
             self._T_odom_last = self._T_odom_now
-            return Result(None, Status.LOST, "no_model", stats={"tracks": len(of_view)})
-        tracks = Tracks(last.uv_px[of_last], view.uv_px[of_view], fit.inlier)
+            return Result(None, Status.LOST, "no_model", stats={"tracks": len(matches.now_px)})
+        tracks = Tracks(matches.last_px, matches.now_px, fit.inlier)
         return self._step(view, fit, flow_px, tracks)
 
     def _look(self, left: Image, right: Image) -> View:
@@ -113,17 +133,17 @@ class FeatureVo:
         uv_left_px, descriptors_left = self._features(left)
         uv_right_px, descriptors_right = self._features(right)
         of_left, of_right = self._matched(descriptors_left, descriptors_right)
-        in_left_view = self._pair.left.in_view(uv_left_px[of_left])
-        in_right_view = self._pair.right.in_view(uv_right_px[of_right])
-        columns_px, rows_px = (in_left_view - in_right_view).T
+        left_px = uv_left_px[of_left]
+        right_px, is_refined = self._subpixel(left, right, left_px, uv_right_px[of_right])
+        columns_px, rows_px = (self._pair.left.in_view(left_px) - self._pair.right.in_view(right_px)).T
         with np.errstate(invalid="ignore"):
             is_same_row = np.abs(rows_px) < self._settings.row_px
             is_ahead = columns_px > self._settings.row_px
-        is_match = is_same_row & is_ahead
+        is_match = is_refined & is_same_row & is_ahead
 
         disparity_px = np.full(len(uv_left_px), np.nan)
         disparity_px[of_left[is_match]] = columns_px[is_match]
-        return View(uv_left_px, descriptors_left, disparity_px)
+        return View(left, uv_left_px, descriptors_left, disparity_px)
 
     def _features(self, image: Image) -> tuple[Array, Descriptors]:
         keypoints, descriptors = self._detector.detectAndCompute(image, None)
@@ -141,15 +161,48 @@ class FeatureVo:
         of_candidates = np.array([match.trainIdx for match in matches], np.intp)
         return of_queries, of_candidates
 
-    def _fit(self, last: View, view: View, of_last: Indices, of_view: Indices) -> PoseFit | None:
+    def _refined(self, last: View, view: View, of_last: Indices, of_view: Indices) -> Matches:
+        """Matches whose points have a depth in the last view, with sub-pixel positions in this one."""
+        has_depth = np.isfinite(last.disparity_px[of_last])
+        of_last = of_last[has_depth]
+        of_view = of_view[has_depth]
+        last_px = last.uv_px[of_last]
+        now_px, is_refined = self._subpixel(last.left, view.left, last_px, view.uv_px[of_view])
+        return Matches(
+            last_px=last_px[is_refined],
+            now_px=now_px[is_refined],
+            last_disparity_px=last.disparity_px[of_last[is_refined]],
+            now_disparity_px=view.disparity_px[of_view[is_refined]],
+        )
+
+    def _subpixel(self, image: Image, other: Image, points_px: Array, matched_px: Array) -> tuple[Array, Mask]:
+        """The sub-pixel positions (N, 2) of matches of points (N, 2), and which matches (N,) Lucas-Kanade confirms.
+
+        In a street, steps that are fitted to positions as ORB detects them have several times the error.
+        """
+        if not self._is_refining or not len(points_px):
+            return matched_px, np.ones(len(points_px), bool)
+        image, other = comparable(image, other)
+        refined_px, is_found = lucas_kanade(
+            image,
+            other,
+            points_px.astype(np.float32),
+            matched_px.astype(np.float32),
+            window_px=self._settings.window_px,
+            levels=0,
+        )
+        moved_px = np.linalg.norm(refined_px - matched_px, axis=1)
+        return refined_px.astype(float), is_found & (moved_px < MOST_REFINED_PX)
+
+    def _fit(self, matches: Matches) -> PoseFit | None:
         """The motion that brings the last view's points to this view's features; None if there is none."""
-        if len(of_view) < self._settings.min_points:
+        if len(matches.now_px) < self._settings.min_points:
             return None
         return pose_from_points(
-            self._pair.points(last.uv_px[of_last], last.disparity_px[of_last]),
-            self._pair.left.in_view(view.uv_px[of_view]),
+            self._pair.points(matches.last_px, matches.last_disparity_px),
+            self._pair.left.in_view(matches.now_px),
             self._pair.K,
-            disparity_px=view.disparity_px[of_view],
+            disparity_px=matches.now_disparity_px,
             baseline_m=self._pair.baseline_m,
             ransac_px=self._settings.ransac_px,
         )

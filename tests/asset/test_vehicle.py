@@ -6,6 +6,7 @@ import pytest
 from vobench.asset.furniture import Part
 from vobench.asset.vehicle import GLASS, RUBBER, SHAPES, parked_car
 from vobench.geometry.se3 import Array
+from vobench.geometry.triangle import face_normals
 
 
 def vertices_m(parts: list[Part]) -> Array:
@@ -33,6 +34,28 @@ def test_windows_face_outwards(shape: str) -> None:
     normals = np.cross(b - a, c - a)
     from_inside = (a + b + c) / 3 - [-0.2, 0.0, SHAPES[shape].waist_m - 0.4]
     assert (np.einsum("fk,fk->f", normals, from_inside) > 0).all()
+
+
+@pytest.mark.parametrize("shape", sorted(SHAPES))
+def test_the_shading_normals_of_a_car_are_on_the_visible_side_of_its_faces(shape: str) -> None:
+    for part in parked_car(np.random.default_rng(1), shape):
+        mesh = part.arrays
+        shading_normals = mesh.normals[mesh.faces].mean(axis=1)
+        cosines = np.einsum("fk,fk->f", shading_normals, face_normals(mesh.corners_m))
+        assert (cosines > 0).all()
+
+
+@pytest.mark.parametrize("shape", sorted(SHAPES))
+def test_both_ends_of_the_body_are_visible_from_outside(shape: str) -> None:
+    body = parked_car(np.random.default_rng(1), shape)[0].arrays
+    normals = face_normals(body.corners_m)
+    middles_x_m = body.corners_m[..., 0].mean(axis=1)
+    is_end = np.abs(normals[:, 0]) > 0.9999
+    is_front = middles_x_m > 0
+    assert (is_end & is_front).any()
+    assert (is_end & ~is_front).any()
+    assert (normals[is_end & is_front, 0] > 0).all()
+    assert (normals[is_end & ~is_front, 0] < 0).all()
 
 
 def test_cars_of_other_seeds_have_other_plates_and_colours() -> None:

@@ -58,8 +58,8 @@ def positions(results):
         ("stereo_pnp", "down", 0.002),
         ("stereo_pnp", "ahead", 0.002),
         ("planar_floor", "down", 0.001),
-        ("feature_vo", "down", 0.05),  # ORB finds whole pixels of each level
-        ("feature_vo", "ahead", 0.05),
+        ("feature_vo", "down", 0.01),
+        ("feature_vo", "ahead", 0.01),
     ],
 )
 def test_its_end_is_off_by_a_small_share_of_the_path(bed, filmed, estimator, way, most):
@@ -68,13 +68,41 @@ def test_its_end_is_off_by_a_small_share_of_the_path(bed, filmed, estimator, way
         results = as_left(results, RIGS[way])
     accuracy = ends(bed, results, way)
     assert accuracy.end_fraction < most
-    assert accuracy.end_rad < np.deg2rad(1.0 if estimator == "feature_vo" else 0.3)
+    assert accuracy.end_rad < np.deg2rad(0.3)
     assert {result.status for result in results[1:]} == {Status.OK}
 
 
-def test_sift_is_nearer_to_the_truth_than_orb(bed, filmed):
+def step_errors_m(results, T_world_left):
+    """How far each step (N - 1,) is from that of the truth."""
+    poses = np.stack([result.T_odom_frame for result in results])
+    steps, true_steps = (se3.inverse(T[:-1]) @ T[1:] for T in (poses, T_world_left))
+    return np.linalg.norm((se3.inverse(true_steps) @ steps)[:, :3, 3], axis=1)
+
+
+def test_positions_of_orb_are_refined_to_sub_pixels(bed, filmed):
+    """Its steps have less than half the error of plain frame-to-frame matching of detected positions."""
+    frames = filmed("ahead")[:7]
+    truth = bed.drive(*LEGS["ahead"])[:7] @ AHEAD.T_body_left
+    refined = bed.estimated("feature_vo", AHEAD, frames)
+    detected = bed.estimated("feature_vo", AHEAD, frames, window_px=0, keep_below_px=0.0)
+    refined_errors_m = step_errors_m(refined, truth)
+    detected_errors_m = step_errors_m(detected, truth)
+    assert np.sqrt(np.mean(refined_errors_m**2)) < 0.5 * np.sqrt(np.mean(detected_errors_m**2))
+
+
+def test_positions_of_sift_are_used_as_detected(bed, filmed):
+    """They are more accurate than Lucas-Kanade with a small window."""
+    frames = filmed("ahead")[:4]
+    default = bed.estimated("feature_vo", AHEAD, frames, detector="sift")
+    detected = bed.estimated("feature_vo", AHEAD, frames, detector="sift", window_px=0)
+    assert positions(default).tobytes() == positions(detected).tobytes()
+
+
+def test_detected_positions_of_sift_are_nearer_to_the_truth_than_those_of_orb(bed, filmed):
     truth = bed.drive(*LEGS["ahead"])[:6] @ AHEAD.T_body_left
-    orb, sift = (bed.estimated("feature_vo", AHEAD, filmed("ahead")[:6], detector=name) for name in ("orb", "sift"))
+    orb, sift = (
+        bed.estimated("feature_vo", AHEAD, filmed("ahead")[:6], detector=name, window_px=0) for name in ("orb", "sift")
+    )
     assert bed.accuracy(sift, truth).end_m < bed.accuracy(orb, truth).end_m
 
 

@@ -1,7 +1,6 @@
 """Checks of generated sites: nothing overlaps or floats, a body gets through, something shines."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from itertools import combinations
 
 import numpy as np
 import scipy
@@ -37,15 +36,31 @@ def face_count(site: Site) -> int:
 
 def _overlaps(site: Site, footprints: Mapping[str, Footprint]) -> Iterator[str]:
     """Pieces that enter one another or a wall."""
-    for (one, first), (other, second) in combinations(footprints.items(), 2):
+    names = list(footprints)
+    for one, other in _close_pairs(list(footprints.values())):
+        first = footprints[names[one]]
+        second = footprints[names[other]]
         depth_m = first.overlap_depth_m(second, OVERLAP_M)
         if depth_m:
-            yield f"{one} and {other} overlap by {depth_m:.2f} m"
+            yield f"{names[one]} and {names[other]} overlap by {depth_m:.2f} m"
     for name, standing in footprints.items():
         for wall in site.walls:
             depth_m = overlap_m(standing.corners_m, wall)
             if depth_m > OVERLAP_M:
                 yield f"{name} reaches {depth_m:.2f} m into a wall"
+
+
+def _close_pairs(footprints: Sequence[Footprint]) -> list[tuple[int, int]]:
+    """The pairs of footprints whose bounding rectangles overlap, each pair once."""
+    if not footprints:
+        return []
+    low_m = np.array([standing.corners_m.min(axis=0) for standing in footprints])
+    high_m = np.array([standing.corners_m.max(axis=0) for standing in footprints])
+    begins_before = low_m[:, None] < high_m[None]
+    ends_after = high_m[:, None] > low_m[None]
+    is_close = (begins_before & ends_after).all(axis=2)
+    ones, others = np.nonzero(np.triu(is_close, k=1))
+    return list(zip(ones.tolist(), others.tolist(), strict=True))
 
 
 def _loose(site: Site, footprints: Mapping[str, Footprint]) -> Iterator[str]:

@@ -170,9 +170,12 @@ def _end(ring_m: Array, side: float) -> MeshArrays:
     vertices_m = np.concatenate([ring_m, center_m[None]])
     first = np.arange(count)
     second = (first + 1) % count
-    faces = np.column_stack([first, second, np.full(count, count)])
+    middle = np.full(count, count)
+    # Cross sections run clockwise as seen from the front, see `_sections`.
+    order = [second, first, middle] if side > 0 else [first, second, middle]
+    faces = np.column_stack(order)
     normals = np.tile([side, 0.0, 0.0], (count + 1, 1))
-    return _facing(MeshArrays(vertices_m, faces, vertices_m[:, 1:], normals), (side, 0, 0))
+    return MeshArrays(vertices_m, faces, vertices_m[:, 1:], normals)
 
 
 # --- Windows and roof ---

@@ -23,12 +23,14 @@ FINER_STRIDES = (*STRIDES[1:], 1)
 # The visible share is interpolated on the grids of FINER_STRIDES if it differs by less than this between neighbours.
 # The error of an interpolated value beside the edge of a penumbra is less than half of this.
 STEEP = (0.08, 0.15)
-GENTLE = 0.2  # the visible share on a coarse grid is smoothed if it differs by less than this between neighbours
+GENTLE = 0.2  # the visible share is smoothed if, once smoothed, it differs by less than this between neighbours
+STEEP_SIDES = 2  # how many times as many rays along each side of the grid of rays where it differs by more
 
 PANE_BLURS = 4  # how often the light through a pane is blurred, so that the noise of its few rays leaves no stains
 
 # The open sky is so bright that the light of a small share of it is computed with more rays, and smoothed.
 FAINT_SHARE = 0.3  # the greatest share for which this is done
+DIM_SHARE = 0.1  # the greatest mean share of a place for which this is done; where it is greater, light is bright
 FAINT_SIDES = 4  # how many times as many rays along each side of the grid of rays
 FAINT_STEPS = 8  # the distance of points that may have missed the sky from one that saw it, in coarsest steps
 # The greatest shares, and how many times such shares are smoothed: the smaller a share is, the fewer rays see the sky.
@@ -151,7 +153,7 @@ class Receivers:
         share.set(rows, first_share)
         partly_hidden = rows[(low < 1) & (high > 0)]
         self._compute_share(share, emitter, partly_hidden, RayGrid(side, is_spread=True), coarsest)
-        if emitter.sky == "open":
+        if emitter.sky == "open" and share.values[rows].mean() < DIM_SHARE:
             self._compute_faint_share(share, emitter, rows, FAINT_SIDES * side)
 
         finer_grid = RayGrid(max(3 * side // 4, 1), is_spread=True)
@@ -168,7 +170,7 @@ class Receivers:
         """
         coarsest = STRIDES[0]
         _, high = share.extremes(rows, steps=coarsest)
-        saw_sky_nearby = TexelField(share.layout, share.values.copy(), share.state)
+        saw_sky_nearby = share.copy()
         for _ in range(FAINT_STEPS):
             saw_sky_nearby.smooth(rows, steps=coarsest)
         is_faint = (saw_sky_nearby.values[rows] > 0) & (high < FAINT_SHARE)
@@ -181,16 +183,25 @@ class Receivers:
                 share.smooth(fainter, steps=coarsest)
 
     def _compute_share(self, share: TexelField, emitter: Emitter, rows: Rows, grid: RayGrid, stride: int) -> None:
-        """Set the visible share of an emitter's light at the rows (N,), smoothed where it is partly hidden.
+        """Set the visible share of an emitter's light at the rows (N,), without the noise of its rays.
 
-        On the coarse grids it is smoothed only where it changes slowly.
+        In and beside a penumbra it is smoothed where it changes slowly. Where it does not, more rays are cast on the
+        finest grid, because smoothing would blur the shadow.
         """
-        values, clear_share = self._shares(emitter, rows, grid, stride)
+        values, _ = self._shares(emitter, rows, grid, stride)
         share.set(rows, values)
         low, high = share.extremes(rows, steps=stride)
-        is_partial = (clear_share > 0) & (clear_share < 1)
-        is_gentle = (high - low < GENTLE) | (stride == 1)
-        share.smooth(rows[is_partial & is_gentle], steps=stride)
+        near_penumbra = rows[(low < 1) & (high > 0)]
+        smoothed = share.copy()
+        smoothed.smooth(near_penumbra, steps=stride)
+        low, high = smoothed.extremes(near_penumbra, steps=stride)
+        is_gentle = high - low < GENTLE
+        share.smooth(near_penumbra[is_gentle], steps=stride)
+        if stride == 1:
+            steep = near_penumbra[~is_gentle]
+            many_rays = RayGrid(STEEP_SIDES * grid.side, is_spread=True)
+            values, _ = self._shares(emitter, steep, many_rays, stride)
+            share.set(steep, values)
 
     def _shares_by_sides(self, emitter: Emitter, rows: Rows, side: int, stride: int) -> tuple[Floats, Floats]:
         """As `_shares`, with a number of rays that depends on the apparent size of the emitter."""

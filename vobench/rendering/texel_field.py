@@ -31,6 +31,10 @@ class TexelField:
         """A field of `count` points at which nothing is known."""
         return cls(layout, np.zeros(count, np.float32), np.full(count, UNKNOWN, np.uint8))
 
+    def copy(self) -> "TexelField":
+        """A field with the same values, which can be changed without changing this one."""
+        return TexelField(self.layout, self.values.copy(), self.state.copy())
+
     def set(self, rows: Rows, values: Floats) -> None:
         """Set the values (N,) of the points at rows (N,), which are known from now on."""
         self.values[rows] = values
