@@ -9,7 +9,7 @@ import pytest
 from tests.analysis.changes import change
 from vobench.analysis.explain import Effort, _change, _suspects, effort, explain, folder_name
 from vobench.analysis.explanation import Change, Explanation
-from vobench.analysis.nuisance import Nuisance
+from vobench.analysis.nuisance import Nuisance, without
 from vobench.analysis.segment_loss import Outcome
 from vobench.suite.case import Case
 
@@ -309,4 +309,4 @@ def test_each_variant_removes_what_its_name_says_from_the_case_itself(hard: Case
             assert case.camera.motion_blur == is_blurred
         return {name: [Outcome("ok", True, np.full(24, 0.5))] for name in cases}
 
-    explain(hard, nuisances()[2:4], measure, seeds=SEEDS)
+    explain(hard, nuisances()[2:4], measure, seeds=SEEDS, remove=without)

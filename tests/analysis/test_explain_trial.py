@@ -26,7 +26,10 @@ def test_noise_is_named_and_mends_the_trial(noisy_run: NoisyRun) -> None:
     first = found.rows()[0]
     assert (first["removed"], first["verdict"]) == (("noise",), "fixes it")
     assert first["survived"] == first["repeats"] == 6  # those that confirm it
-    assert found.sentences[0].startswith("Cause of the failure: noise. With a chip without noise, the error drops by")
+    first_sentence = (
+        r"blind loses track at 0\.\d s because the images are noisy\. With a chip without noise, the error drops"
+    )
+    assert re.match(first_sentence, found.sentences[0])
     assert found.as_dict()["named"] == ("noise",)
 
     frame = found.to_frame()
@@ -149,9 +152,14 @@ ALL_SINGLES = (BLUR, NOISE, JPEG, FLARE, GLOSS)
 
 
 def explained(
-    everything: Change = EVERYTHING, singles: tuple[Change, ...] = ALL_SINGLES, pairs: tuple[Change, ...] = (PAIR,)
+    everything: Change = EVERYTHING,
+    singles: tuple[Change, ...] = ALL_SINGLES,
+    pairs: tuple[Change, ...] = (PAIR,),
+    status: str = "lost",
+    diverges_at_s: float | None = 3.24,
 ) -> TrialExplanation:
-    return TrialExplanation("walk", "mine", Explanation(0.5, "lost", True, everything, singles, {}, pairs, 40))
+    explanation = Explanation(0.5, status, True, everything, singles, {}, pairs, 40)
+    return TrialExplanation("walk", "mine", explanation, diverges_at_s)
 
 
 def test_each_variant_has_its_verdict_and_everything_comes_last() -> None:
@@ -178,8 +186,8 @@ def test_a_single_nuisance_is_listed_once() -> None:
 
 def test_one_cause_is_said_with_its_remedy_what_else_helps_and_what_harms() -> None:
     assert explained().sentences == (
-        "Cause of the failure: blur. With a short exposure and a sharp lens, the error drops by 80% "
-        "(95 % CI 70% to 100%).",
+        "mine loses track at 3.2 s because the images are blurred. With a short exposure and a sharp lens, the error "
+        "drops by 80% (95 % CI 70% to 100%) and 2 of 6 runs end well: expose shorter and focus the lens.",
         "It also depends on noise (20% less).",
         "Diffuse surfaces would make it worse: the error grows by 20%.",
     )
@@ -188,15 +196,17 @@ def test_one_cause_is_said_with_its_remedy_what_else_helps_and_what_harms() -> N
 def test_alternatives_and_pairs_are_said_as_such() -> None:
     either = explained(singles=(BLUR, change("noise", reduction=0.7)))
     assert either.sentences[0] == (
-        "Cause of the failure: blur together with noise (70% less). Either change suffices: the error drops by 80% "
-        "(95 % CI 70% to 100%)."
+        "mine loses track at 3.2 s because the images are blurred while the images are noisy. Either change suffices "
+        "(blur (80% less), noise (70% less)): expose shorter and focus the lens; or add light, expose longer with less "
+        "gain, or smooth the images."
     )
     assert [row["verdict"] for row in either.rows()][:2] == ["fixes it", "fixes it"]
     singles = (change("blur", reduction=0.2, is_sure=False), NOISE)
     together = explained(singles=singles, pairs=(change("blur", "noise", reduction=0.85),))
     assert together.sentences == (
-        "Causes of the failure: blur and noise, each by itself. Only both together fix it: the error drops by 85% "
-        "(95 % CI 75% to 100%).",
+        "mine loses track at 3.2 s because the images are blurred and the images are noisy, each by itself. Without "
+        "both, the error drops by 85% (95 % CI 75% to 100%) and 2 of 6 runs end well: expose shorter and focus the "
+        "lens, and add light, expose longer with less gain, or smooth the images.",
     )
     assert together.rows()[2]["verdict"] == "fixes it"
 
@@ -204,11 +214,26 @@ def test_alternatives_and_pairs_are_said_as_such() -> None:
 def test_where_nothing_is_named_it_is_said_what_was_ruled_out_and_what_is_open() -> None:
     nothing = change("blur", "flare", reduction=0.02, is_sure=False, high=0.2)
     assert explained(nothing, (JPEG, FLARE), ()).sentences == (
-        "None of these explains the failure: the cause is the estimator, its path or the scene.",
+        "mine loses track at 3.2 s and none of these explains it: the cause is the estimator, its path or the scene.",
         "With all nuisances removed, the error drops by 2% (95 % CI -48% to 20%).",
         "Ruled out, by the share of the error that they can cost: flare (at most 10%).",
         "Not decided with so few repeats: JPEG (up to 60%).",
     )
+
+
+@pytest.mark.parametrize(
+    ("status", "diverges_at_s", "symptom"),
+    [
+        ("ok", 3.24, "mine has an error of 50.0% of the path, first divergence at 3.2 s,"),
+        ("partial", None, "mine has an error of 50.0% of the path,"),
+        ("diverged", 0.5, "mine diverges at 0.5 s"),
+        ("crashed", None, "mine crashes"),
+    ],
+)
+def test_the_symptom_states_what_fails_and_when(status: str, diverges_at_s: float | None, symptom: str) -> None:
+    found = explained(status=status, diverges_at_s=diverges_at_s)
+    assert found.symptom == symptom
+    assert found.sentences[0].startswith(f"{symptom} because the images are blurred. With")
 
 
 def test_the_dictionary_has_what_is_concluded() -> None:

@@ -3,11 +3,12 @@
 from dataclasses import replace
 from itertools import pairwise
 
+import cv2
 import numpy as np
 import pytest
 
 from tests.analysis.test_image_noise import as_grey, boards
-from vobench.analysis.image_statistics import gradients, picture_statistics, spectrum
+from vobench.analysis.image_statistics import gradients, picture_statistics, spectrum, track_statistics
 from vobench.analysis.realism import (
     STATISTICS,
     WINDOW,
@@ -303,3 +304,114 @@ def test_advice_on_gain_holds_where_the_light_is_reduced_as_much_and_not_otherwi
     brighter = figures(level=1.0, gain_db=gain_db)
     assert brighter["burnt"] > figures(level=1.0)["burnt"]
     assert brighter["grey_mean"] > 1.2 * figures(level=1.0)["grey_mean"]
+
+
+def statistics(image: np.ndarray) -> dict[str, float]:
+    """The statistics of one image."""
+    return {**picture_statistics(as_grey(image)), "spectrum_slope": spectrum([as_grey(image)])[0]}
+
+
+LEFT_HALF = (slice(None), slice(None, 160))
+
+
+def fine_texture() -> np.ndarray:
+    """A pattern of small squares around 0, of an image."""
+    squares = np.random.default_rng(5).uniform(-40, 40, (60, 80))
+    return np.kron(squares, np.ones((4, 4)))
+
+
+def test_advice_on_sun_and_soft_light_holds() -> None:
+    before = statistics(boards())
+    sun = boards()
+    sun[LEFT_HALF] *= 0.25  # in the shadow
+    sun[:, 160:] *= 1.15
+    softer = 128 + 0.6 * (boards() - 128)
+    for name in ("gradient_p99", "grey_sd"):
+        assert "sun" in advice(name)[0]
+        assert "softer light" in advice(name)[1]
+        assert statistics(softer)[name] < before[name], name
+    assert statistics(sun)["grey_sd"] > before["grey_sd"]
+    assert statistics(1.15 * (boards() - 128) + 128)["gradient_p99"] > before["gradient_p99"]
+
+
+def test_advice_on_the_contrast_of_materials_holds() -> None:
+    assert "darker and brighter materials" in advice("grey_sd")[0]
+    stronger = 128 + 1.3 * (boards() - 128)
+    assert statistics(stronger)["grey_sd"] > statistics(boards())["grey_sd"]
+
+
+def test_advice_on_plain_and_textured_surfaces_holds() -> None:
+    textured = boards() + fine_texture()
+    half_plain = textured.copy()
+    half_plain[LEFT_HALF] = 128
+    assert advice("gradient_kurtosis")[0] == "plain surfaces beside detailed ones"
+    assert advice("gradient_kurtosis")[1].startswith("texture on more surfaces")
+    assert advice("corner_unevenness") == ("plain walls or sky beside texture", "texture on plain surfaces")
+    for name in ("gradient_kurtosis", "corner_unevenness"):
+        assert statistics(half_plain)[name] > statistics(textured)[name], name
+
+
+def test_advice_on_fine_texture_and_large_shapes_holds() -> None:
+    before = statistics(boards())
+    assert advice("spectrum_slope")[0].startswith("fine texture")
+    assert advice("spectrum_slope")[1].startswith("large shapes and shadows")
+    assert statistics(boards() + fine_texture())["spectrum_slope"] > before["spectrum_slope"]
+    squares = np.random.default_rng(6).uniform(-60, 60, (6, 8))
+    shapes = cv2.GaussianBlur(np.kron(squares, np.ones((40, 40))), (0, 0), 8)
+    assert statistics(boards() + shapes)["spectrum_slope"] < before["spectrum_slope"]
+
+
+def test_advice_on_sky_and_windows_holds() -> None:
+    window = boards()
+    window[:60] = 255
+    assert "sky or windows" in advice("burnt")[0]
+    assert statistics(window)["burnt"] > statistics(boards())["burnt"]
+
+
+def views(step_px: int, *, has_movers: bool = False) -> list[np.ndarray]:
+    """Successive images of a camera that passes a wall, with a step between them; and of boards that move in front."""
+    texture = np.tile(boards(size=(240, 700)), (1, 2))
+    images = []
+    for index in range(WINDOW):
+        image = texture[:, index * step_px : index * step_px + 320].copy()
+        for mover in range(6) if has_movers else ():
+            column = (40 * mover + 37 * index) % 300
+            image[30 * mover : 30 * mover + 30, column : column + 60] = 90 + 20 * mover
+        images.append(as_grey(image))
+    return images
+
+
+def test_advice_on_the_size_of_steps_holds() -> None:
+    small = track_statistics(views(4))
+    large = track_statistics(views(24))
+    for name in ("tracks_home", "track_life"):
+        assert advice(name)[0] == "smaller steps: more rate_hz, less speed"
+        assert advice(name)[1].startswith("larger steps: less rate_hz, more speed")
+    assert small.consistent_share > large.consistent_share
+    assert small.alive_share.sum() > large.alive_share.sum()
+
+
+def test_advice_on_movers_holds() -> None:
+    assert advice("track_life")[1].endswith("movers")
+    still = track_statistics(views(4))
+    crossed = track_statistics(views(4, has_movers=True))
+    assert crossed.alive_share.sum() < still.alive_share.sum()
+
+
+def row_error_px(*, roll_px: float = 0.0, pitch_px: float = 0.0) -> float:
+    """The row error of a pair whose right image is lower by `pitch_px`, and by `roll_px` more at its left border."""
+    left = boards()
+    tilt = -2 * roll_px / 320
+    matrix = np.array([[1.0, 0.0, -6.0], [tilt, 1.0, pitch_px - tilt * 160]])
+    right = cv2.warpAffine(left, matrix, (320, 240), borderMode=cv2.BORDER_REFLECT)
+    frames = [FrameSample(as_grey(left), as_grey(right)) for _ in range(2)]
+    return measure([frames], RIG).values["row_error_px"]
+
+
+def test_advice_on_calibration_errors_holds_for_roll_and_not_for_pitch() -> None:
+    more, less = advice("row_error_px")
+    assert more.startswith("more calibration_error (right_roll_deg;")
+    assert less.startswith("less calibration_error (right_roll_deg;")
+    right = row_error_px()
+    assert row_error_px(roll_px=1.0) > right + 0.2
+    assert row_error_px(pitch_px=1.0) == pytest.approx(right, abs=0.1)

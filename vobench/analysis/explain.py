@@ -6,16 +6,16 @@ Variants are screened with some seeds, and what is selected is confirmed with ot
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
 from vobench.analysis.explanation import SUFFICIENT_SHARE, Change, Explanation, Removal
-from vobench.analysis.nuisance import Nuisance, without
+from vobench.analysis.nuisance import Nuisance
 from vobench.analysis.paired_change import compare_pairs
 from vobench.analysis.segment_bootstrap import block_interval
 from vobench.analysis.segment_loss import Outcome
 from vobench.geometry.se3 import Array
-from vobench.suite.case import Case
 
 PROMISING = 0.2  # the reduction from which a variant is confirmed with other seeds
 SUSPECTS = 3  # nuisances that are removed in pairs, and single changes that are confirmed
@@ -27,9 +27,22 @@ MIN_COST = 1e-9  # of all nuisances together, by which the cost of one is divide
 
 AS_IT_IS: Removal = ()  # nothing is removed
 
+
+class Repeatable(Protocol):
+    """What is explained, such as a case: a dataclass whose repeats differ in their seed."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    @property
+    def seed(self) -> int:
+        """The seed of the first repeat."""
+
+
+C = TypeVar("C", bound=Repeatable)
+
 # Runs cases by their names, and returns the outcomes of each.
-Measure = Callable[[Mapping[str, Case]], Mapping[str, Sequence[Outcome]]]
-Remove = Callable[[Case, Removal], Case]  # the case without some nuisances
+Measure = Callable[[Mapping[str, C]], Mapping[str, Sequence[Outcome]]]
+Remove = Callable[[C, Removal], C]  # the case without some nuisances
 Outcomes = dict[Removal, list[Outcome]]  # of repeats, by the removed nuisances
 
 
@@ -76,12 +89,12 @@ def effort(repeats: int, *, is_deterministic: bool) -> Effort:
 
 
 def explain(
-    case: Case,
+    case: C,
     nuisances: Sequence[Nuisance],
-    measure: Measure,
+    measure: Measure[C],
     *,
     seeds: Effort,
-    remove: Remove = without,
+    remove: Remove[C],
 ) -> Explanation:
     """Run a case without each nuisance and without all, and run what seems to explain the failure with other seeds.
 
@@ -128,7 +141,7 @@ class _Findings:
     trials: int
 
 
-def _screen(variants: "_Variants", names: Sequence[str], seeds: Effort) -> _Findings:
+def _screen(variants: "_Variants[C]", names: Sequence[str], seeds: Effort) -> _Findings:
     """Run the case as it is, without each nuisance and without all; then without pairs if no single one explains it."""
     removable = variants.removable
     singly = [(name,) for name in names]
@@ -153,7 +166,7 @@ def _screen(variants: "_Variants", names: Sequence[str], seeds: Effort) -> _Find
     return _screen_pairs(variants, findings, everything, seeds)
 
 
-def _screen_pairs(variants: "_Variants", findings: _Findings, everything: Change, seeds: Effort) -> _Findings:
+def _screen_pairs(variants: "_Variants[C]", findings: _Findings, everything: Change, seeds: Effort) -> _Findings:
     """Run the case with each nuisance alone, and without the pairs of those that cost most."""
     removable = variants.removable
     only_left = variants.run(variants.with_only_one_left(), seeds.screening_seeds)
@@ -169,7 +182,7 @@ def _screen_pairs(variants: "_Variants", findings: _Findings, everything: Change
     )
 
 
-def _confirm(variants: "_Variants", findings: _Findings, selected: Sequence[Removal], seeds: Effort) -> _Findings:
+def _confirm(variants: "_Variants[C]", findings: _Findings, selected: Sequence[Removal], seeds: Effort) -> _Findings:
     """Run selected variants with new seeds. Their changes replace those of the screening, as does the baseline."""
     outcomes = variants.run([AS_IT_IS, *variants.all_removed, *selected], seeds.confirming_seeds)
     confirmed = _changes(outcomes, is_confirmed=True)
@@ -184,13 +197,13 @@ def _confirm(variants: "_Variants", findings: _Findings, selected: Sequence[Remo
 
 
 @dataclass(frozen=True, slots=True)
-class _Variants:
+class _Variants(Generic[C]):
     """Runs variants of a case from which some of its nuisances are removed."""
 
-    case: Case
+    case: C
     removable: Removal
-    measure: Measure
-    remove: Remove
+    measure: Measure[C]
+    remove: Remove[C]
 
     @property
     def all_removed(self) -> list[Removal]:

@@ -7,11 +7,12 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from vobench.analysis.cause_text import CAUSE_TEXTS
 from vobench.analysis.explain import Effort, effort, explain
 from vobench.analysis.explanation import MATERIAL, Change, Explanation, is_sufficient
-from vobench.analysis.nuisance import NUISANCES, Nuisance, nuisances_of
+from vobench.analysis.nuisance import NUISANCES, Nuisance, nuisances_of, without
 from vobench.analysis.segment_loss import Outcome
-from vobench.analysis.trial_data import read_conditions, read_outcome
+from vobench.analysis.trial_data import read_conditions, read_error_series, read_outcome, read_paths
 from vobench.errors import InputError
 from vobench.runner.data_frame import data_frame
 from vobench.runner.finished_trial import FinishedTrial, read_finished_trial, run_variants
@@ -20,22 +21,37 @@ from vobench.runner.frames import read_frames
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.store import SILENT, Progress
 from vobench.suite.case import Case
+from vobench.trajectory.nanoseconds import NS_PER_S
 
 if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
 
 MS_PER_S = 1e3
+# What an estimator does whose trial ended with a status. For others, the error is stated.
+SYMPTOMS = {
+    "lost": "loses track",
+    "diverged": "diverges",
+    "crashed": "crashes",
+    "timeout": "takes too long",
+    "out_of_memory": "takes too much memory",
+    "invalid_output": "returns an invalid answer",
+}
 SECONDS_TO_SAY = 5.0  # a stage that took less needs no forecast
 
 
 @dataclass(frozen=True, slots=True)
 class TrialExplanation:
-    """Why an estimator fails on a case."""
+    """Why an estimator fails on a case.
+
+    `diverges_at_s` is the time from the start of the case to the first frame whose error is far above the others' or
+    that has no pose; None if there is none.
+    """
 
     case: str
     estimator: str
     explanation: Explanation
+    diverges_at_s: float | None = None
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -44,9 +60,9 @@ class TrialExplanation:
 
     @property
     def sentences(self) -> tuple[str, ...]:
-        """What causes the failure, what harms, and what was ruled out, in sentences."""
+        """What fails, why and what to do about it; then what else matters, what harms, and what was ruled out."""
         explanation = self.explanation
-        sentences = [_cause_sentence(explanation)]
+        sentences = [_cause_sentence(self.symptom, explanation)]
         if explanation.contributing:
             parts = ", ".join(_with_reduction(change) for change in explanation.contributing)
             sentences.append(f"It also depends on {parts}.")
@@ -56,6 +72,16 @@ class TrialExplanation:
         if not explanation.named:
             sentences += _ruled_out_sentences(explanation)
         return tuple(sentences)
+
+    @property
+    def symptom(self) -> str:
+        """What fails and when, such as "mine loses track at 3.2 s"."""
+        explanation = self.explanation
+        since = "" if self.diverges_at_s is None else f" at {self.diverges_at_s:.1f} s"
+        if explanation.status in SYMPTOMS:
+            return f"{self.estimator} {SYMPTOMS[explanation.status]}{since}"
+        first = since and f", first divergence{since}"
+        return f"{self.estimator} has an error of {explanation.loss:.1%} of the path{first},"
 
     def verdict(self, change: Change) -> str:
         """The effect of a change: "fixes it", "helps", "harms", "no difference", "unconfirmed" or "undecided".
@@ -115,20 +141,33 @@ class TrialExplanation:
         return data_frame({**row, "removed": " and ".join(row["removed"])} for row in self.rows())
 
 
-def _cause_sentence(explanation: Explanation) -> str:
-    """What causes the failure, in one sentence."""
-    names = " and ".join(explanation.named)
+def _cause_sentence(symptom: str, explanation: Explanation) -> str:
+    """What fails, the cause, what removes it, and what to do, in one sentence."""
     changes = {change.removed: change for change in (*explanation.singles, *explanation.pairs)}
     if explanation.relation == "none":
-        return "None of these explains the failure: the cause is the estimator, its path or the scene."
+        return f"{symptom} and none of these explains it: the cause is the estimator, its path or the scene."
+
     cause = changes[explanation.named]
     if explanation.relation == "together":
-        return f"Causes of the failure: {names}, each by itself. Only both together fix it: {_reduction(cause)}."
+        reasons = " and ".join(_because(name) for name in explanation.named)
+        remedies = ", and ".join(_advice(name) for name in explanation.named)
+        return f"{symptom} because {reasons}, each by itself. Without both, {_reduction(cause)}: {remedies}."
     if explanation.relation == "either":
-        others = ", ".join(_with_reduction(changes[removed]) for removed in explanation.alternatives)
-        return f"Cause of the failure: {names} together with {others}. Either change suffices: {_reduction(cause)}."
-    remedy = _nuisance(explanation.named[0]).instead
-    return f"Cause of the failure: {names}. With {remedy}, {_reduction(cause)}."
+        names = [explanation.named[0], *(removed[0] for removed in explanation.alternatives)]
+        reasons = " while ".join(_because(name) for name in names)
+        reductions = ", ".join(_with_reduction(changes[(name,)]) for name in names)
+        remedies = "; or ".join(_advice(name) for name in names)
+        return f"{symptom} because {reasons}. Either change suffices ({reductions}): {remedies}."
+    (name,) = explanation.named
+    return f"{symptom} because {_because(name)}. With {_nuisance(name).instead}, {_reduction(cause)}: {_advice(name)}."
+
+
+def _because(name: str) -> str:
+    return CAUSE_TEXTS[name].because
+
+
+def _advice(name: str) -> str:
+    return CAUSE_TEXTS[name].advice
 
 
 def _ruled_out_sentences(explanation: Explanation) -> list[str]:
@@ -153,8 +192,9 @@ def _with_reduction(change: Change) -> str:
 
 
 def _reduction(change: Change) -> str:
-    """By how much a change reduces the error."""
-    return f"the error drops by {change.reduction:.0%} (95 % CI {change.low:.0%} to {change.high:.0%})"
+    """By how much a change reduces the error, and how many runs end well with it."""
+    interval = f"95 % CI {change.low:.0%} to {change.high:.0%}"
+    return f"the error drops by {change.reduction:.0%} ({interval}) and {change.survived} of {change.repeats} runs end well"
 
 
 def _upper(sentence: str) -> str:
@@ -197,8 +237,27 @@ def explain_trial(
             _require_answers(finished.score, scores)
             return {score.case: [read_outcome(folder, score)] for score in scores}
 
-    explanation = explain(finished.case, nuisances, measure, seeds=seeds)
-    return TrialExplanation(finished.score.case, finished.score.estimator, explanation)
+    explanation = explain(finished.case, nuisances, measure, seeds=seeds, remove=without)
+    return TrialExplanation(
+        finished.score.case,
+        finished.score.estimator,
+        explanation,
+        diverges_at_s=_divergence_s(finished),
+    )
+
+
+def _divergence_s(trial: FinishedTrial) -> float | None:
+    """The time from the start of a trial to the first frame with a large error or without a pose.
+
+    None if there is no such frame, or if the estimator did not answer to the end.
+    """
+    if trial.score.status not in FINISHED_TRIAL:
+        return None
+    first_frame = read_error_series(trial.folder, trial.score, {}).first_divergence
+    if first_frame is None:
+        return None
+    t_ns = read_paths(trial.folder, trial.score).gt.t_ns
+    return float(t_ns[first_frame] - t_ns[0]) / NS_PER_S
 
 
 def _require_answers(explained: TrialScore, scores: Sequence[TrialScore]) -> None:

@@ -54,7 +54,7 @@ class Statistic:
         return settings[self.verdict(value)]
 
 
-ERRORS = "calibration_error (right_roll_deg, right_pitch_deg)"
+ERRORS = "calibration_error (right_roll_deg; a pitch shifts all rows alike)"
 MORE_NOISE = "more gain_db with less exposure_gain"
 # What else the settings of the advice move, besides the statistic that they are advised for.
 SIDE_EFFECTS = {
