@@ -194,7 +194,8 @@ def _with_reduction(change: Change) -> str:
 def _reduction(change: Change) -> str:
     """By how much a change reduces the error, and how many runs end well with it."""
     interval = f"95 % CI {change.low:.0%} to {change.high:.0%}"
-    return f"the error drops by {change.reduction:.0%} ({interval}) and {change.survived} of {change.repeats} runs end well"
+    ending_well = f"{change.survived} of {change.repeats} runs end well"
+    return f"the error drops by {change.reduction:.0%} ({interval}) and {ending_well}"
 
 
 def _upper(sentence: str) -> str:
