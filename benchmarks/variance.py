@@ -42,8 +42,8 @@ def _factors(rows: list[dict[str, str]]) -> list[Factor]:
         Factor("estimator", estimators),
         Factor("scenario", treatments),
         Factor(PLACES, places),
-        Factor("drive", list(zip(places, drives, strict=True)), within=PLACES),
-        Factor("estimator x place", list(zip(estimators, places, strict=True))),
+        Factor("drive", list(zip(places, drives, strict=True)), within=(PLACES,)),
+        Factor("estimator x place", list(zip(estimators, places, strict=True)), within=("estimator", PLACES)),
     ]
 
 

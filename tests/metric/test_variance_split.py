@@ -19,7 +19,7 @@ def factors(trials=TRIALS):
         Factor("estimator", [trial[0] for trial in trials]),
         Factor("scenario", [trial[1] for trial in trials]),
         Factor("place", [trial[2] for trial in trials]),
-        Factor("drive", [trial[2:] for trial in trials], within="place"),
+        Factor("drive", [trial[2:] for trial in trials], within=("place",)),
     ]
 
 
@@ -63,6 +63,17 @@ def test_drives_are_not_taken_for_places():
     assert np.median([share["place"] for share in shares]) < 0.15
     assert np.mean([share["place"] for share in shares]) < 0.3
     assert np.mean([share["drive"] for share in shares]) > 0.6
+
+
+def test_an_interaction_does_not_take_the_effects_of_its_factors():
+    rng = np.random.default_rng(4)
+    values = drawn(rng, estimator=1.0, place=0.5, rest=0.1)
+    interaction = Factor("estimator x place", [trial[:1] + trial[2:3] for trial in TRIALS], ("estimator", "place"))
+    alone = variance_split(values, factors())
+    shares = variance_split(values, [*factors(), interaction])
+    for name, share in alone.items():
+        assert shares[name] == pytest.approx(share, abs=0.01)
+    assert shares["estimator x place"] < 0.01
 
 
 def test_shares_do_not_depend_on_unit_offset_and_order_of_trials():

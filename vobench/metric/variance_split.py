@@ -20,12 +20,13 @@ REST = "rest"
 class Factor:
     """A factor: the level of each of N values, as hashable labels.
 
-    `within` is the name of the factor in whose levels these are nested, as drives are in places.
+    `within` are the names of the factors in whose levels these are nested: drives are within places, and the
+    interaction of estimator and place is within both.
     """
 
     name: str
     levels: Sequence[Hashable]
-    within: str = ""
+    within: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +58,7 @@ def variance_split(values: Array, factors: Sequence[Factor]) -> dict[str, float]
 
 def _variance(values: Array, factor: Factor, factors: Sequence[Factor], noise: float) -> float:
     """The variance that a factor alone explains. A negative estimate counts as 0, so that few levels are overrated."""
-    nested = [other for other in factors if other.within == factor.name]
+    nested = [other for other in factors if factor.name in other.within]
     others = [other for other in factors if other is not factor and other not in nested]
     squares, freedom = _gain(values, others, [*others, factor])
     if not freedom:
