@@ -1,5 +1,7 @@
 """The contact sheet of a generator: a picture for each seed, in order, in the light of the place."""
 
+import weakref
+
 import cv2
 import numpy as np
 import pytest
@@ -49,6 +51,23 @@ def test_each_seed_has_a_picture_of_its_own_and_the_same_seed_the_same(cell, tmp
     assert np.array_equal(again, fifth)
     assert np.mean(np.abs(fourth - fifth).max(-1) > 8) > 0.1
     assert fourth.std() > 10
+
+
+def test_a_place_of_a_sheet_is_gone_before_the_next_one_is_built(cell, tmp_path, monkeypatch):
+    meshes = []
+    alive_before = []
+    build_once = place_sheet.build_once
+
+    def observed(place, lighting):
+        alive_before.append(sum(mesh() is not None for mesh in meshes))
+        built = build_once(place, lighting)
+        meshes.extend(weakref.ref(thing.mesh) for thing in built.things)
+        return built
+
+    monkeypatch.setattr(place_sheet, "build_once", observed)
+    save_place_sheet(cell, tmp_path / "three.png", seeds=3, lighting="day")
+    assert alive_before == [0, 0, 0]
+    assert len(meshes) >= 3
 
 
 def test_a_scene_without_a_generator_and_an_unknown_one_are_refused(tmp_path):

@@ -1,5 +1,8 @@
 """Holes in faces: where a texture's opacity is below the cut-out, interpolated and repeated."""
 
+import gc
+import weakref
+
 import numpy as np
 
 from vobench.rendering.cutout import CutOuts, is_opaque
@@ -36,6 +39,16 @@ def test_opacity_is_linear_between_pixels() -> None:
     # Opacity falls to three quarters a quarter of a pixel before the edge.
     places = np.array([[edge - 0.26 / 16, 0.5], [edge - 0.24 / 16, 0.5]])
     assert is_opaque(strict, places).tolist() == [True, False]
+
+
+def test_the_pixels_of_a_material_are_freed_with_it() -> None:
+    pixels = PIXELS.copy()
+    leaf = Material(texture=Picture(pixels, 0.5), cutout=0.5)
+    freed = weakref.ref(pixels)
+    assert is_opaque(leaf, np.array([[0.25, 0.3]])).all()
+    del pixels, leaf
+    gc.collect()
+    assert freed() is None
 
 
 def test_holes_are_found_on_faces_of_that_material_alone() -> None:

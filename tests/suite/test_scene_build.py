@@ -15,7 +15,7 @@ from vobench.scene.fog import Fog
 from vobench.scene.light import AreaLight, PointLight
 from vobench.scene.material import LUMINANCE, linear
 from vobench.scene.scene import Scene
-from vobench.suite.scene_build import build
+from vobench.suite.scene_build import build, build_once
 from vobench.suite.scene_file import read_scene, scene_content
 
 YAML = """name: yard
@@ -75,6 +75,18 @@ def yard(tmp_path: Path):
 
 def vertices(scene: Scene, name: str) -> np.ndarray:
     return np.concatenate([thing.mesh.vertices for thing in scene.things if thing.name == name])
+
+
+def test_a_scene_that_is_built_once_is_equal_and_not_kept(tmp_path: Path) -> None:
+    path = tmp_path / "yard.yaml"
+    path.write_text(YAML, encoding="utf-8")
+    spec = read_scene(path)
+    once = build_once(spec, {})
+    kept = build(spec, {})
+    assert build(spec, {}).things is kept.things
+    assert build_once(spec, {}).things[0] is not once.things[0]
+    assert np.array_equal(once.things[0].mesh.vertices, kept.things[0].mesh.vertices)
+    assert [light.name for light in once.lights] == [light.name for light in kept.lights]
 
 
 def test_the_names_that_a_yaml_may_say_are_those_that_there_are() -> None:

@@ -1,5 +1,6 @@
 """Draws the contact sheet of a generator: one picture for each seed, in light that is computed coarsely."""
 
+import gc
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -14,6 +15,7 @@ from vobench.analysis.scene_survey import EYE_HEIGHT_M, SceneSurvey, scene_surve
 from vobench.geometry.camera import Pinhole
 from vobench.rendering.bake import bake
 from vobench.rendering.baked_scene import BakedScene, BakeSettings
+from vobench.rendering.freed_memory import give_back
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Renderer, single_instant
@@ -21,7 +23,7 @@ from vobench.runner.store import SILENT, Progress
 from vobench.scene.material import srgb
 from vobench.scene.triangles import Triangles
 from vobench.sequence.picture import write_png
-from vobench.suite.scene_build import build
+from vobench.suite.scene_build import build_once
 from vobench.suite.scene_entry import DRAWN, generated_scene
 from vobench.suite.scene_file import read_place
 from vobench.suite.scene_spec import SceneFile
@@ -46,7 +48,9 @@ def save_place_sheet(
     lighting: str = DRAWN,
     progress: Progress = SILENT,
 ) -> None:
-    """Write a PNG of the places of a scene's generator with a number of seeds. Their light is not cached.
+    """Write a PNG of the places of a scene's generator with a number of seeds.
+
+    Their light is not cached. The memory in use is that of one place, whatever the number of places.
 
     Raises UnknownNameError if there is no such scene, SuiteError if it has no generator, and MissingDependencyError if
     this machine cannot render.
@@ -57,12 +61,14 @@ def save_place_sheet(
     for place in progress.track(places, f"places of {first.name}", total=seeds):
         stop.check()
         pictures.append(_picture(place))
+        gc.collect()  # meshes of trimesh refer to themselves, so they are not freed before
+        give_back()
     write_png(path, contact_sheet(pictures))
 
 
 def _picture(place: SceneFile) -> Rgb8:
-    """The picture of one place."""
-    scene = build(place, {})
+    """The picture of one place. Nothing of the place is kept, since 24 places take gigabytes."""
+    scene = build_once(place, {})
     baked = bake(scene, COARSE)
     with closing(RasterRenderer(baked)) as renderer:
         return _view_beside_plan(baked, scene_survey(scene), renderer, place.place_name)

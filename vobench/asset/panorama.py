@@ -52,7 +52,7 @@ class Surroundings:
         return _painted(self, sky.illuminance_lx, sky.kind, (x, y, z), sky.ground_albedo)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=2)  # each takes 42 MB
 def _painted(
     surroundings: Surroundings,
     illuminance_lx: float,

@@ -1,6 +1,6 @@
 """Alpha cut-outs: holes in faces where the opacity of their texture is below a threshold."""
 
-from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -70,8 +70,20 @@ def is_opaque(material: Material, uv_tiles: Array) -> Mask:
     return np.asarray(opacity >= material.cutout)
 
 
-@lru_cache(maxsize=64)
+# Weak keys, because the pixels of a generated place's texture keep all arrays of the place in memory.
+_opacities: WeakKeyDictionary[Material, Floats] = WeakKeyDictionary()
+
+
 def _opacity(material: Material) -> Floats:
+    """The alpha channel (H, W) of a material's texture, from 0 to 1, which is computed once for each material."""
+    opacity = _opacities.get(material)
+    if opacity is None:
+        opacity = _alpha(material)
+        _opacities[material] = opacity
+    return opacity
+
+
+def _alpha(material: Material) -> Floats:
     """The alpha channel (H, W) of a material's texture, from 0 to 1; a single opaque pixel if it has none."""
     if material.texture is not None:
         pixels = material.texture.pixels()

@@ -38,7 +38,7 @@ class Picture:
         return self.values
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, weakref_slot=True)
 class Material:
     """How a surface looks. A body scatters light evenly (Lambert) under a coat; a mirror and a pane have no body.
 

@@ -41,6 +41,15 @@ def build(spec: SceneFile, lighting: Lighting) -> Scene:
     return replace(scene, lights=with_lighting(scene.lights, lighting))
 
 
+def build_once(spec: SceneFile, lighting: Lighting) -> Scene:
+    """The same as `build`, but the scene is not kept for later calls, which saves memory where many are built.
+
+    Raises SuiteError if the lighting names a light that the scene does not have.
+    """
+    scene = _scene(spec)
+    return replace(scene, lights=with_lighting(scene.lights, lighting))
+
+
 CACHED_SCENES = 16
 CACHED_PIECES = 512
 _scenes: OrderedDict[str, Scene] = OrderedDict()
