@@ -1,4 +1,8 @@
-"""Furniture of bedrooms and halls, such as beds and wardrobes. Its back is at x = 0, and its front faces x."""
+"""Furniture of bedrooms and halls, such as beds and wardrobes.
+
+The back of a piece that stands at a wall is at x = 0, and its front faces x. The floor is at z = 0, except for pieces
+that hang on a wall. Sizes of boxes are (depth, width, height).
+"""
 
 from typing import TYPE_CHECKING
 
@@ -16,6 +20,7 @@ if TYPE_CHECKING:
 BED_LENGTH_M = 2.08
 MATTRESS_CENTER_M = 0.4  # the height of the centre of the mattress
 MIN_WIDTH_FOR_TWO_PILLOWS_M = 1.2  # narrower beds have one pillow
+MIN_WIDTH_FOR_WIDE_PILLOWS_M = 1.3
 PILLOW_X_M = 0.3  # the distance from the wall to the centre of a pillow
 PILLOW_HEIGHT_M = 0.585  # the height of the centre of a pillow
 PILLOW_LEAN_DEG = (-24, -14)  # the range of the pitch of a pillow
@@ -78,12 +83,12 @@ def _bed_frame(rng: Rng, width_m: float, look: Material) -> list[Part]:
 def _pillows(rng: Rng, width_m: float, linen: Material) -> list[Part]:
     """Two pillows side by side, or one on a narrow bed. They lean against the headboard."""
     count = 1 if width_m < MIN_WIDTH_FOR_TWO_PILLOWS_M else 2
-    pillow_width_m = 0.68 if width_m > 1.3 else 0.55
+    pillow_width_m = 0.68 if width_m > MIN_WIDTH_FOR_WIDE_PILLOWS_M else 0.55
     pillow = cushion((0.42, pillow_width_m, 0.16), power=2.8, cells=4)
     parts = []
     for index in range(count):
-        places_from_middle = index - (count - 1) / 2
-        y = places_from_middle * 0.5 * width_m
+        offset_in_pillows = index - (count - 1) / 2
+        y = offset_in_pillows * 0.5 * width_m
         lean_deg = rng.uniform(*PILLOW_LEAN_DEG)
         yaw_deg = rng.normal(0, 4)
         parts.append(put(pillow, linen, x=PILLOW_X_M, y=y, z=PILLOW_HEIGHT_M, pitch=lean_deg, yaw=yaw_deg))
@@ -97,29 +102,30 @@ def _quilt(rng: Rng, width_m: float, *, first_m: float = 0.62, last_m: float = 2
     `last_m` is the x at which it ends.
     `rise_m` is its height above a quilt that lies directly on the mattress.
     """
-    # The profile across the bed of one half, from the middle of the bed to the lower edge. The other half mirrors it.
+    # The profile across one half of the bed: two points on the mattress, two at its rounded edge, and the hem, which
+    # hangs down. The other half mirrors it.
     half_m = width_m / 2
     half_across_m = np.array([0.2 * half_m, 0.6 * half_m, half_m - 0.02, half_m + 0.03, half_m + 0.035])
     half_height_m = np.array([0.57, 0.565, 0.545, 0.42, 0.3])
     across_m = np.concatenate([-half_across_m[::-1], half_across_m])
     height_m = np.concatenate([half_height_m[::-1], half_height_m]) + rise_m
     along_m = np.linspace(first_m, last_m, 15)
-    x, y = np.meshgrid(along_m, across_m, indexing="ij")
+    x_m, y_m = np.meshgrid(along_m, across_m, indexing="ij")
 
     # Two waves make the folds, and both ends are lower than the rest.
     phases_rad = rng.uniform(0, 6, 3)
-    long_fold_m = 0.008 * np.sin(9 * x + 4 * y + phases_rad[0])
-    short_fold_m = 0.006 * np.sin(17 * y - 6 * x + phases_rad[1])
+    long_fold_m = 0.008 * np.sin(9 * x_m + 4 * y_m + phases_rad[0])
+    short_fold_m = 0.006 * np.sin(17 * y_m - 6 * x_m + phases_rad[1])
     is_end = (along_m < first_m + 0.05) | (along_m > last_m - 0.05)
     end_drop_m = 0.03 * is_end
     fold_m = long_fold_m + short_fold_m
-    z = np.broadcast_to(height_m, x.shape) + fold_m - end_drop_m[:, None]
+    z_m = np.broadcast_to(height_m, x_m.shape) + fold_m - end_drop_m[:, None]
 
     # The parts that hang down at the sides wave towards the bed and away from it.
-    is_hanging = np.abs(y) > half_m
-    wave_m = 0.012 * np.sin(14 * x + phases_rad[2]) * np.sign(y)
-    waved_y = y + np.where(is_hanging, wave_m, 0)
-    return two_sided(sheet(np.stack([x, waved_y, z], axis=-1)))
+    is_hanging = np.abs(y_m) > half_m
+    wave_m = 0.012 * np.sin(14 * x_m + phases_rad[2]) * np.sign(y_m)
+    waved_y_m = y_m + np.where(is_hanging, wave_m, 0)
+    return two_sided(sheet(np.stack([x_m, waved_y_m, z_m], axis=-1)))
 
 
 def bedside_table(rng: Rng, width_m: float = 0.45, tones: str = "oak") -> list[Part]:

@@ -14,6 +14,12 @@ from vobench.scene.material import Material, Picture, Texture
 
 Ink = tuple[int, int, int]  # red, green and blue
 
+# The second number of the seed of each texture, so that textures with the same seed have independent random numbers.
+LAWN_STREAM = 71
+GRAVEL_STREAM = 72
+TUFT_STREAM = 73
+FLOWER_STREAM = 74
+
 # Mown grass
 LAWN_BLADES = 30_000  # the number of blades in a tile
 LAWN_SOIL = (44, 56, 27)
@@ -50,7 +56,7 @@ FLOWER_BACKGROUND = (80, 104, 48, 0)  # transparent
 @picture.painted
 def lawn(seed: int = 0, px: int = 2048, tile_m: float = 3.0) -> Picture:
     """Mown grass: overlapping green and dry blades with clovers, in lighter and darker patches."""
-    rng = np.random.default_rng([seed, 71])
+    rng = np.random.default_rng([seed, LAWN_STREAM])
     image = Image.new("RGB", (px, px), LAWN_SOIL)
     draw = ImageDraw.Draw(image)
     _draw_blades(draw, rng, px, dry_share=DRY_SHARES[seed % len(DRY_SHARES)])
@@ -71,7 +77,7 @@ def _draw_blades(draw: Draw, rng: Rng, px: int, *, dry_share: float) -> None:
     directions = np.stack([np.cos(angles_rad), np.sin(angles_rad)], axis=1)
     ends_px = starts_px + lengths_px[:, None] * directions
     is_dry = rng.random(count) < dry_share
-    tone_by_height = 0.55 + 0.5 * np.arange(count) / count
+    tone_by_height = 0.55 + 0.5 * np.arange(count) / count  # blades are drawn from the bottom to the top
     tones = tone_by_height * rng.normal(1, 0.12, count)
     for start_px, end_px, dry, tone in zip(starts_px.tolist(), ends_px.tolist(), is_dry, tones, strict=True):
         ink = _toned(DRY_BLADE if dry else GREEN_BLADE, tone, 0, 255)
@@ -89,7 +95,7 @@ def _draw_clover(draw: Draw, x: float, y: float, *, turn_deg: float) -> None:
 @picture.painted
 def gravel(seed: int = 0, px: int = 2048, tile_m: float = 2.6) -> Picture:
     """Gravel: pebbles of several tones in sand, with fallen leaves."""
-    rng = np.random.default_rng([seed, 72])
+    rng = np.random.default_rng([seed, GRAVEL_STREAM])
     blotches = 5 * picture.noise(rng, px, 2, 16)
     grains = 20 * picture.noise(rng, px, 90, 900, slope=0.1)
     tone = 150 + blotches + grains
@@ -132,7 +138,7 @@ def _draw_fallen_leaf(draw: Draw, rng: Rng, x: float, y: float) -> None:
 @picture.painted
 def blades(seed: int = 0, px: int = 256) -> Picture:
     """A tuft of long grass on a transparent background."""
-    rng = np.random.default_rng([seed, 73])
+    rng = np.random.default_rng([seed, TUFT_STREAM])
     image = Image.new("RGBA", (px, px), TUFT_BACKGROUND)
     draw = ImageDraw.Draw(image)
     for index in range(TUFT_BLADES):
@@ -153,7 +159,7 @@ def blades(seed: int = 0, px: int = 256) -> Picture:
 @picture.painted
 def flowers(seed: int = 0, px: int = 256) -> Picture:
     """Flowers of one colour on their stalks, on a transparent background."""
-    rng = np.random.default_rng([seed, 74])
+    rng = np.random.default_rng([seed, FLOWER_STREAM])
     image = Image.new("RGBA", (px, px), FLOWER_BACKGROUND)
     draw = ImageDraw.Draw(image)
     ink = FLOWER_INKS[seed % len(FLOWER_INKS)]

@@ -32,7 +32,9 @@ def ground_places(canvas: PanoramaCanvas) -> tuple[Floats, Floats, Floats]:
     tangent = canvas.tangent[ROWS // 2 :, None]
     tangent_step = canvas.tangent_step[ROWS // 2 :, None]
     distance_m = canvas.eye_m / -tangent
-    footprint_m = distance_m**2 / canvas.eye_m * tangent_step
+    # The derivative of eye / tangent is eye / tangent², which is distance² / eye.
+    metres_per_tangent = distance_m**2 / canvas.eye_m
+    footprint_m = metres_per_tangent * tangent_step
     x_m = distance_m * np.cos(canvas.azimuth)
     y_m = distance_m * np.sin(canvas.azimuth)
     return x_m, y_m, footprint_m
@@ -76,10 +78,12 @@ def _crest(canvas: PanoramaCanvas, rise: float) -> Floats:
     wave_sum = np.cos(angle_rad) @ amplitude
     profile = (wave_sum - wave_sum.min()) / np.ptp(wave_sum)  # from 0 to 1
 
-    roughness = noise(canvas.rng, 512, 20, 256, slope=0.8)[0]
-    closed_roughness = [*roughness, roughness[0]]
-    sample_azimuth = np.linspace(-np.pi, np.pi, len(closed_roughness))
-    trees = np.interp(canvas.azimuth, sample_azimuth, closed_roughness)
+    # A row of the noise goes once around the horizon. Its first sample is repeated at the end, where both are the same.
+    tree_heights = noise(canvas.rng, 512, 20, 256, slope=0.8)[0]
+    closed_tree_heights = [*tree_heights, tree_heights[0]]
+    sample_azimuth = np.linspace(-np.pi, np.pi, len(closed_tree_heights))
+    trees = np.interp(canvas.azimuth, sample_azimuth, closed_tree_heights)
+
     relative_height = LOWEST_CREST + (1 - LOWEST_CREST) * profile
     hills = rise * relative_height
     return np.asarray(hills + TREE_TANGENT * trees)

@@ -121,6 +121,10 @@ STONES = ("#d9d3c7", "#b9b1a4", "#6e6a66", "#45474a", "#9a7a62", "#7d8a84")
 CEMENT = "#aaa49a"
 MORTAR = "#b9b2a6"
 BRASS = (122, 104, 70)
+# Noise is repeated within a tile only if each period has at least this size, and this many cycles of its lowest
+# frequency, so that the repetition is not visible.
+MIN_PERIOD_PX = 1024
+MIN_PERIOD_CYCLES = 16
 SPINE_PX_PER_M = 1300.0  # the resolution of the spines of books
 # The colours of prints, cloths and paints.
 NAVY = "#27445c"
@@ -185,6 +189,7 @@ def rgb(colour: str) -> tuple[int, int, int]:
 
 def _ramp(values: ArrayLike, tones: str) -> Bytes:
     """The colours (..., 3) of values (...) in a palette: 0 is the darkest tone, and 1 is the lightest."""
+    # The colours between those of the palette are interpolated in a table of 256 levels.
     colours = np.array([rgb(tone) for tone in TONES[tones]])
     stops = np.linspace(0, 1, len(colours))
     levels = np.linspace(0, 1, 256)
@@ -216,9 +221,12 @@ def noise(
     `slope` is the exponent of the spectrum, which is f^-slope.
     `stretch` is the length of features along u relative to their length along v.
 
-    With more than 1024 pixels, the noise repeats within the tile if the lowest frequency is high enough for that.
+    Large tiles of high frequencies contain several periods of the noise, which takes less time to compute. A period has
+    at least MIN_PERIOD_PX pixels and MIN_PERIOD_CYCLES cycles.
     """
-    repeats = max(1, min(px // 1024, int(low) // 16))
+    repeats_by_size = px // MIN_PERIOD_PX
+    repeats_by_band = int(low) // MIN_PERIOD_CYCLES
+    repeats = max(1, min(repeats_by_size, repeats_by_band))
     n = px // repeats
     low = low / repeats
     high = high / repeats
@@ -431,10 +439,11 @@ def masonry(
     `bond` is the shift of every other course, as a share of the length of a brick.
     """
     rng = np.random.default_rng(seed)
-    variety = 0.14 if columns > 3 else 0.05
+    variety = 0.14 if columns > 3 else 0.05  # the standard deviation of the tones; that of large slabs is smaller
     shift = bond * (np.arange(rows) % 2)[:, None]
-    cuts = (np.arange(columns) + shift + 1e-3) / columns
-    cell, to_joint = _cells(px, cuts)
+    offset = 1e-3  # keeps joints off the border of the tile
+    cuts = (np.arange(columns) + shift + offset) / columns
+    cell, to_joint_px = _cells(px, cuts)
 
     coarse = noise(rng, px, 4, 60, slope=0.6)
     fine = noise(rng, px, 60, 400, slope=0.2)
@@ -444,10 +453,11 @@ def masonry(
     tone = 0.5 + brick_tone[cell] + variety * 0.5 * roughness - 0.2 * pits
 
     joint_px = 0.006 / tile_m * px
-    is_joint = (to_joint + 0.6 * roughness < joint_px)[..., None]
+    rough_distance_px = to_joint_px + 0.6 * roughness
+    is_joint = (rough_distance_px < joint_px)[..., None]
     stains = 0.3 * variety * noise(rng, px, 1, 8)
-    edge = 0.1 * np.exp(-to_joint / 3)
-    light = 1 + stains - edge + 0.04 * roughness
+    edge_shade = 0.1 * np.exp(-to_joint_px / 3)
+    light = 1 + stains - edge_shade + 0.04 * roughness
     colours = np.where(is_joint, rgb(MORTAR), _ramp(tone, tones))
     return Picture(_scaled(colours, light[..., None]), tile_m)
 
@@ -475,8 +485,8 @@ def ground(kind: str, seed: int = 0, px: int = 1024, tile_m: float = 2.0) -> Pic
 def fabric(seed: int = 0, px: int = 512, tile_m: float = 0.4) -> Picture:
     """A plain weave of threads in slightly different greys. A material that uses it gives it a colour."""
     rng = np.random.default_rng(seed)
-    thread = np.arange(px) // 4
-    bulge = np.abs(np.sin(np.arange(px) * np.pi / 4 + 0.4))
+    thread = np.arange(px) // 4  # the index of the thread at each pixel; threads are 4 pixels wide
+    bulge = np.abs(np.sin(np.arange(px) * np.pi / 4 + 0.4))  # threads are brightest near their middle
     warp_greys = 0.14 * rng.standard_normal(px // 4)
     weft_greys = 0.14 * rng.standard_normal(px // 4)
     warp = 0.5 + warp_greys[thread] + 0.3 * bulge
@@ -503,6 +513,7 @@ def terrazzo(seed: int = 0, px: int = 2048, tile_m: float = 1.6) -> Picture:
     light = 1 + grain
     pixels = _scaled(stone_colours[chips], light[..., None])
 
+    # The brass strips are along the first row and the first column of the tile.
     strip_px = round(0.004 / tile_m * px)
     pixels[:strip_px] = BRASS
     pixels[:, :strip_px] = BRASS
@@ -539,6 +550,7 @@ def _canvas(width: int, height: int, colour: str) -> tuple[Image.Image, Draw]:
 
 @cache
 def _font(size: int) -> Any:
+    """Pillow's built-in font of a size in pixels."""
     return ImageFont.load_default(size)
 
 
@@ -618,7 +630,8 @@ def _curve(
 def _column(draw: Draw, rng: Rng, box: Box, size: float) -> None:
     """Fill a box with paragraphs of text and occasional charts. `size` is the size of the font in pixels."""
     x0, y, x1, y1 = box
-    characters = (x1 - x0) / (0.52 * size)
+    character_width = 0.52 * size
+    characters = (x1 - x0) / character_width
     while y < y1 - size:
         has_chart = rng.random() < 0.07
         if has_chart and y1 - y > 12 * size:
@@ -646,15 +659,16 @@ def pages(seed: int = 0) -> Picture:
 
 def _page(draw: Draw, rng: Rng, x: float, y: float) -> None:
     """Draw a page with its upper left corner at (x, y): a title above one or two columns."""
-    band = one_of(rng, PAPER, PAPER, *INKS)
-    split = rng.choice([220, 440])
+    band = one_of(rng, PAPER, PAPER, *INKS)  # paper twice: it is more frequent
+    column_pitch = rng.choice([220, 440])  # from the left edge of a column to that of the next: two columns or one
     paper = one_of(rng, "#f4f2ec", PAPER, "#ebe8df")
     draw.rectangle([x, y, x + 479, y + 679], fill=paper)
     draw.rectangle([x, y, x + 479, y + 90], fill=band)
     title = _words(rng, 3).title()
     _text(draw, (x + 24, y + 36), title, 29, _text_colour_on(band))
-    for left in range(24, 456, split):
-        _column(draw, rng, (x + left, y + 112, x + left + split - 20, y + 650), 10)
+    for left in range(24, 456, column_pitch):
+        right = left + column_pitch - 20
+        _column(draw, rng, (x + left, y + 112, x + right, y + 650), size=10)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -725,7 +739,7 @@ def _binders(rng: Rng) -> list[Image.Image]:
 
 def _series(rng: Rng) -> list[Image.Image]:
     """The spines of the volumes of a series, or of a single book, drawn horizontally."""
-    volumes = int(rng.choice([1, 1, 1, 1, 2, 5]))
+    volumes = int(rng.choice([1, 1, 1, 1, 2, 5]))  # most are single books
     width = round(rng.uniform(0.012, 0.042) * SPINE_PX_PER_M)
     height_m = float(rng.choice([0.178, 0.2, 0.216, 0.235, 0.24, 0.28]))
     height = round(height_m * SPINE_PX_PER_M)
@@ -737,7 +751,7 @@ def _series(rng: Rng) -> list[Image.Image]:
     image, draw = _canvas(height, width, colour)
     title_band = rng.uniform(-0.6, 0.6)  # the length of the band behind the title; negative for no band
     thin_bands = [(start, 0.012) for start in rng.choice([0.05, 0.09, 0.84], 2)]
-    bands = [(0.13, max(title_band, 0)), *thin_bands]
+    bands = [(0.13, max(title_band, 0)), *thin_bands]  # start and length, as shares of the height of the book
     for start, length in bands:
         end = start + length
         draw.rectangle([start * height, 0, end * height, width], fill=accent)

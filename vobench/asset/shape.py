@@ -43,7 +43,7 @@ def at(
     roll: float = 0.0,
 ) -> Array:
     """The pose (4, 4) with a position and the rotation Rz(yaw) Ry(pitch) Rx(roll), with angles in degrees."""
-    angles_rad = np.deg2rad([yaw, pitch, roll])
+    angles_rad = np.deg2rad([yaw, pitch, roll])  # about z, y and x
     cz, cy, cx = np.cos(angles_rad)
     sz, sy, sx = np.sin(angles_rad)
     Rz = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
@@ -102,6 +102,7 @@ def block_arrays(
     if upright:
         uv = _upright_uv(corners_m)
     else:
+        # u and v are the coordinates of the corners along two axes of the box, and u is along the longer one.
         longest_first = tuple(np.argsort(-half_m, kind="stable").tolist())
         uv = corners_m[cube.uv_index(longest_first)]
     uv = uv + np.asarray(uv_m, float)
@@ -440,6 +441,7 @@ def cushion(size_m: ArrayLike, *, power: float = 5.0, cells: int = 6) -> "Trimes
     sides = []
     for axis in range(3):
         for sign in (1.0, -1.0):
+            # The side that is perpendicular to z. Rolling its coordinates makes it perpendicular to another axis.
             side = np.stack([u * sign, v, sign + 0 * u], axis=-1)
             sides.append(np.roll(side, axis, axis=-1))
     cube = np.stack(sides)  # (6, R, C, 3)
@@ -517,11 +519,14 @@ def cards_arrays(sizes_m: ArrayLike, poses: ArrayLike) -> MeshArrays:
     T = np.asarray(poses, float).reshape(-1, 4, 4)
     R = T[:, :3, :3]
     unit_card = card_arrays((1.0, 1.0))
-    width = sizes[:, 0, None]
-    height = sizes[:, 1, None]
-    y = -width / 2 + [0.0, 1.0, 1.0, 0.0] * width
-    z = -height / 2 + [0.0, 0.0, 1.0, 1.0] * height
-    corners_m = np.stack([0 * y, y, z], axis=-1)  # (N, 4, 3)
+    width_m = sizes[:, 0, None]
+    height_m = sizes[:, 1, None]
+    # The corners of a card, counter-clockwise from the lower left one, as shares of its width and height.
+    y_share = np.array([0.0, 1.0, 1.0, 0.0])
+    z_share = np.array([0.0, 0.0, 1.0, 1.0])
+    y_m = -width_m / 2 + y_share * width_m
+    z_m = -height_m / 2 + z_share * height_m
+    corners_m = np.stack([0 * y_m, y_m, z_m], axis=-1)  # (N, 4, 3)
 
     moved_m = corners_m @ R.swapaxes(1, 2) + T[:, None, :3, 3]
     front_normals = unit(unit_card.normals @ np.linalg.inv(R))
@@ -531,7 +536,7 @@ def cards_arrays(sizes_m: ArrayLike, poses: ArrayLike) -> MeshArrays:
     front_faces = unit_card.faces
     back_faces = front_faces[:, ::-1] + 4
     faces_of_card = np.concatenate([front_faces, back_faces])
-    first_vertex = 8 * np.arange(len(sizes))
+    first_vertex = 8 * np.arange(len(sizes))  # a card has 4 vertices in front and 4 at the back
     faces = first_vertex[:, None, None] + faces_of_card
     return MeshArrays(
         vertices_m.reshape(-1, 3),
@@ -554,7 +559,7 @@ def extrusion(polygon_m: ArrayLike, height_m: float, *, holes_m: Sequence[ArrayL
     triangles = triangulated(rings)
     heights = np.full((*triangles.shape[:2], 1), height_m)
     top = np.concatenate([triangles, heights], axis=-1)
-    bottom = top[:, ::-1] * [1, 1, 0]
+    bottom = top[:, ::-1] * [1, 1, 0]  # reversed, so that it is visible from below, and at z = 0
 
     parts = [_cap(top), _cap(bottom)]
     for ring in rings:

@@ -1,4 +1,4 @@
-"""vobench check."""
+"""The command vobench check, which validates a suite and prints its plan."""
 
 from typing import TYPE_CHECKING, Any
 
@@ -10,13 +10,14 @@ from vobench.suite.suite import read_plan
 if TYPE_CHECKING:
     from rich.console import Console
 
-LEAST_MINUTES_S = 600  # shorter times are printed in seconds
+SHORTEST_IN_MINUTES_S = 600  # shorter durations are printed in seconds
 
 
 def check_command(suite: SuiteName, *, trust: Trust = False, json: Json = False) -> None:
     """Validate a suite and print its plan; nothing is rendered."""
-    del trust  # its callback has the effect
-    print_summary(summarize(read_plan(suite)), as_json=json)
+    del trust  # the callback of --trust has already recorded the consent
+    plan = read_plan(suite)
+    print_summary(summarize(plan), as_json=json)
 
 
 def print_summary(summary: PlanSummary, *, as_json: bool) -> None:
@@ -27,20 +28,24 @@ def print_summary(summary: PlanSummary, *, as_json: bool) -> None:
     console = terminal.console()
     _print_cases(summary, console)
     _print_estimators(summary, console)
-    found_rows = [list(row.values()) for row in summary.found()]
-    console.print(terminal.table("files", ["kind", "name", "origin", "path"], found_rows))
+    file_rows = [list(row.values()) for row in summary.found()]
+    console.print(terminal.table("files", ["kind", "name", "origin", "path"], file_rows))
+
     for case in summary.cases:
         for note in case.notes or ():
             console.print(f"{case.case}: {note}")
     for doubt in summary.doubts:
         console.print(doubt, highlight=False)
-    if summary.stages is not None:
+
+    is_dry_run = summary.stages is not None
+    if is_dry_run:
         _print_stages(summary.tasks(), console)
     counts = f"{len(summary.cases)} cases, {len(summary.estimators())} estimators, {summary.trials} trials"
     console.print(f"{counts}: the suite is valid")
 
 
 def _print_cases(summary: PlanSummary, console: "Console") -> None:
+    """Print a table of the cases. It has a column for the clearance if that of any case is known."""
     has_clearance = any(case.clearance_m is not None for case in summary.cases)
     rows = list[list[str]]()
     for case in summary.cases:
@@ -58,6 +63,7 @@ def _print_cases(summary: PlanSummary, console: "Console") -> None:
 
 
 def _print_estimators(summary: PlanSummary, console: "Console") -> None:
+    """Print a table of the estimators and the inputs that they need."""
     rows = list[list[str]]()
     for estimator in summary.estimators():
         needs = ", ".join(estimator["needs"]) or "nothing"
@@ -66,6 +72,7 @@ def _print_estimators(summary: PlanSummary, console: "Console") -> None:
 
 
 def _print_stages(stages: list[dict[str, Any]], console: "Console") -> None:
+    """Print a table of the tasks of each stage, and the reasons why tasks are not in the cache."""
     rows = list[list[str]]()
     for stage in stages:
         counts = [str(stage[column]) for column in ("tasks", "in the cache", "to do")]
@@ -80,6 +87,6 @@ def _format_duration(seconds: float | None) -> str:
     """The work of one core in seconds or minutes; empty if it is unknown."""
     if seconds is None:
         return ""
-    if seconds < LEAST_MINUTES_S:
+    if seconds < SHORTEST_IN_MINUTES_S:
         return f"{seconds:.0f} s"
     return f"{seconds / 60:.0f} min"

@@ -45,7 +45,8 @@ def compare_command(
 def _print_changes(changes: Sequence[ScoreChange], environment_differences: Sequence[str]) -> None:
     """Print the scores over all cases, the cells that changed, and the differences between the environments."""
     console = terminal.console()
-    totals = [change for change in changes if not change.case]  # a change over all cases names no case
+    # A cell is one estimator on one case. The change of a score over all cases has an empty case.
+    totals = [change for change in changes if not change.case]
     cells = [change for change in changes if change.case]
     changed_cells = [cell for cell in cells if cell.verdict != SAME]
 
@@ -70,7 +71,7 @@ def _print_tables(totals: Sequence[ScoreChange], changed_cells: Sequence[ScoreCh
 
 
 def _row(change: ScoreChange) -> list[str]:
-    """The row of the table for a change, with the columns HEADINGS."""
+    """The cells of a change in the columns HEADINGS."""
     p_value = "" if change.p is None else f"{change.p:.2g}"
     return [change.estimator, change.verdict, change.old, change.new, _format_ratio(change), p_value]
 

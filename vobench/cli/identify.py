@@ -1,4 +1,4 @@
-"""vobench identify: the parameters θ of the Pioneer from recorded drives."""
+"""The command vobench identify, which estimates the parameters θ of the Pioneer from recorded drives."""
 
 import math
 from collections.abc import Sequence
@@ -14,7 +14,8 @@ from vobench.motion.pioneer import Theta
 from vobench.runner.identify import Identification, IdentifiedDrive, identify_drives
 
 PARAMETERS = tuple(f"θ{number}" for number in range(1, 7))
-HEADINGS = ("name", *PARAMETERS, "u_ref rms m/s", "ω_ref rms °/s", "condition")
+RESIDUALS = ("u_ref rms m/s", "ω_ref rms °/s", "condition")  # residuals of the fit, and its condition number
+HEADINGS = ("name", *PARAMETERS, *RESIDUALS)
 
 
 def identify_command(
@@ -40,18 +41,21 @@ def identify_command(
 
 
 def _print_identification(identification: Identification) -> None:
+    """Print a table of the identified parameters, and the reason for each drive that has none."""
+    no_residuals = [""] * len(RESIDUALS)
     rows = list[Sequence[str]]()
     for drive in identification.drives:
         rows.append(_identified_row(drive))
         if drive.driven_theta:
-            rows.append(["  true value", *_parameter_cells(drive.driven_theta), "", "", ""])
+            rows.append(["  true value", *_parameter_cells(drive.driven_theta), *no_residuals])
     console = terminal.console()
     console.print(terminal.table("", HEADINGS, rows))
-    for name, sentence in identification.failures.items():
-        console.print(f"{name}: {sentence}")
+    for name, reason in identification.failures.items():
+        console.print(f"{name}: {reason}")
 
 
 def _identified_row(drive: IdentifiedDrive) -> list[str]:
+    """The identified parameters and residuals of a drive, in the columns HEADINGS."""
     fit = drive.fit
     omega_ref_rms_degps = math.degrees(fit.omega_ref_rms_radps)
     residuals = [f"{fit.u_ref_rms_mps:.4f}", f"{omega_ref_rms_degps:.3f}", f"{fit.condition:.1f}"]
@@ -59,4 +63,5 @@ def _identified_row(drive: IdentifiedDrive) -> list[str]:
 
 
 def _parameter_cells(theta: Theta) -> list[str]:
+    """The six parameters in the columns PARAMETERS."""
     return [f"{value:.4f}" for value in astuple(theta)]

@@ -58,9 +58,9 @@ class TerminalDisplay:
     def hear(self, event: "TaskEvent") -> None:
         """Log and show one event."""
         if self._log:
-            line = json_module.dumps(_logged(event), ensure_ascii=False)
+            line = json_module.dumps(_log_entry(event), ensure_ascii=False)
             print(line, file=self._log, flush=True)
-        if event.what == "told":
+        if event.what == "told":  # a message from a task, which does not change its state
             self.say(event.told)
             return
 
@@ -76,21 +76,25 @@ class TerminalDisplay:
             self._print(f"{_task_name(event)}: failed: {event.reason}")
 
     def _update_overall_bar(self) -> None:
+        """Show the completed share of the run and its remaining time."""
         if self._overall_bar is None:
             return
         status = self._progress.describe(time.monotonic() - self._start_s)
         self._bars.update(self._overall_bar, completed=self._progress.share, status=status)
 
     def _add_bar(self, event: "TaskEvent") -> None:
+        """Add a bar for a task that has started."""
         if self._draws_bars:
             self._bar_by_task[event.task.key] = self._bars.add_task(_task_name(event), total=None, status="")
 
     def _remove_bar(self, event: "TaskEvent") -> None:
+        """Remove the bar of a task, if it has one."""
         bar = self._bar_by_task.pop(event.task.key, None)
         if bar is not None:
             self._bars.remove_task(bar)
 
     def _print_finished(self, event: "TaskEvent") -> None:
+        """Print the name and duration of a finished task, and how many of the planned tasks are finished."""
         if not self._prints_finished:
             return
         planned = self._progress.planned
@@ -118,8 +122,8 @@ def _task_name(event: "TaskEvent") -> str:
     return f"{event.task.stage} {event.task.name}"
 
 
-def _logged(event: "TaskEvent") -> dict[str, Any]:
-    """An event as an object of the log, which has one in each line."""
+def _log_entry(event: "TaskEvent") -> dict[str, Any]:
+    """An event as a JSON object, which is one line of the log."""
     return {
         "t_s": round(time.time(), 3),
         "event": event.what,

@@ -1,4 +1,4 @@
-"""vobench scene."""
+"""The command vobench scene, which describes a scene and draws the places that its generator creates."""
 
 from pathlib import Path
 from typing import Annotated
@@ -64,7 +64,9 @@ def scene_command(
     if json:
         terminal.print_json(report.as_dict())
         return
-    for line in [*report.lines(), *report.notes, *report.doubts()]:
+    description = report.lines()
+    probable_faults = report.doubts()
+    for line in (*description, *report.notes, *probable_faults):
         print(line)
 
 

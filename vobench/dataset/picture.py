@@ -1,4 +1,4 @@
-"""Reads files of datasets within limits, and decodes pictures to 8-bit grey."""
+"""Reads files of datasets within limits, and converts pictures to 8-bit grey."""
 
 import struct
 import zlib
@@ -44,8 +44,8 @@ def read_text(path: Path) -> str:
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        place = error.start
-        raise InputError(f"not a text file in UTF-8 (byte {place} is {data[place]:#04x}): {path}") from None
+        offset = error.start
+        raise InputError(f"not a text file in UTF-8 (byte {offset} is {data[offset]:#04x}): {path}") from None
     if "\0" in text:
         raise InputError(f"not a text file (it has a zero byte): {path}")
     return text
@@ -68,13 +68,17 @@ def refuse_lfs_pointers(folder: Path) -> None:
 
 
 def inside(folder: Path, name: str, place: str) -> Path:
-    """The file below `folder` that a list names. Raises InputError for a name that leads out of the folder."""
+    """The path of a file that a list names, relative to `folder`. `place` is the place in the list, for messages.
+
+    Raises InputError for a name that leads out of the folder, because a list can be hostile.
+    """
     relative = PurePosixPath(name.replace("\\", "/"))
     is_absolute = relative.is_absolute() or PureWindowsPath(name).drive != ""
-    climbs_out = ".." in relative.parts
-    if not 0 < len(name) <= MOST_NAME or is_absolute or climbs_out:
-        start = name[:LONGEST_NAME_SHOWN]
-        raise InputError(f"{place}: a file's name should stay inside {folder}, but is {start!r}")
+    has_parent = ".." in relative.parts
+    has_valid_length = 0 < len(name) <= MOST_NAME
+    if not has_valid_length or is_absolute or has_parent:
+        shown_name = name[:LONGEST_NAME_SHOWN]
+        raise InputError(f"{place}: a file's name should stay inside {folder}, but is {shown_name!r}")
     return folder.joinpath(*relative.parts)
 
 
@@ -88,12 +92,18 @@ def listed(folder: Path) -> list[str]:
 
 def require_free(out: Path) -> None:
     """Raise InputError unless `out` does not exist or is an empty folder."""
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
+    if not out.exists():
+        return
+    is_empty_folder = out.is_dir() and not any(out.iterdir())
+    if not is_empty_folder:
         raise InputError(f"should be a new or empty folder, but exists and is not empty: {out}")
 
 
 def unread(folder: Path, *used: str) -> tuple[str, ...]:
-    """A note on the files and folders that were not read; empty if all were read."""
+    """A note on the files and folders in a folder that were not read; empty if all were read.
+
+    `used` are the names of those that were read. Hidden ones are not mentioned.
+    """
     others = [name for name in listed(folder) if name not in used and not name.startswith(".")]
     if not others:
         return ()
@@ -101,13 +111,14 @@ def unread(folder: Path, *used: str) -> tuple[str, ...]:
 
 
 def enumerated(names: Sequence[str], most: int) -> str:
-    """The first of some names, and the number of the others."""
+    """At most `most` names, and the number of the others."""
     shown = ", ".join(names[:most])
-    more = len(names) - most
-    return f"{shown} and {more} more" if more > 0 else shown
+    omitted_count = len(names) - most
+    return f"{shown} and {omitted_count} more" if omitted_count > 0 else shown
 
 
 Form = Literal["png", "jpeg", "pixels"]
+# The first bytes of files, and the last ones of a JPEG file.
 PNG = b"\x89PNG\r\n\x1a\n"
 JPEG = b"\xff\xd8\xff"
 JPEG_END = b"\xff\xd9"
@@ -157,10 +168,11 @@ def kind_of(picture: EncodedPicture) -> Kind:
 
     refuse_lfs_pointer(content, picture.name)
     if not content.startswith((PNG, JPEG)):
-        begins = f"it begins with {content[:8]!r}" if content else "it is empty"
-        raise InputError(f"a picture should be a PNG or JPEG file, but {begins}: {picture.name}")
+        problem = f"it begins with {content[:8]!r}" if content else "it is empty"
+        raise InputError(f"a picture should be a PNG or JPEG file, but {problem}: {picture.name}")
     kind = _file_kind(content, picture.name)
-    if not 0 < kind.width_px * kind.height_px <= MOST_PIXELS:
+    pixel_count = kind.width_px * kind.height_px
+    if not 0 < pixel_count <= MOST_PIXELS:
         size = f"{kind.width_px} x {kind.height_px}"
         raise InputError(f"a picture should have 1 to {MOST_PIXELS} pixels, but has {size}: {picture.name}")
     return kind
@@ -185,25 +197,27 @@ def as_file(picture: EncodedPicture, kind: Kind) -> tuple[bytes, str]:
     """
     if isinstance(picture.content, bytes) and kind.is_grey8:
         return picture.content, kind.form
-    _, encoded = cv2.imencode(".png", grey(picture, kind))
+    pixels = grey(picture, kind)
+    _, encoded = cv2.imencode(".png", pixels)
     return encoded.tobytes(), "png"
 
 
 def conversions(kind: Kind) -> tuple[str, ...]:
     """Notes on how `grey` converts pictures of a kind."""
-    sentences = []
+    notes = []
     if kind.channels > 2:
-        sentences.append(f"Colour pictures were converted to grey: {GREY_SHARES} (ITU-R BT.601).")
+        notes.append(f"Colour pictures were converted to grey: {GREY_SHARES} (ITU-R BT.601).")
     if kind.channels in (2, 4):
-        sentences.append("The alpha channel of the pictures was dropped.")
+        notes.append("The alpha channel of the pictures was dropped.")
     if kind.bits == 16:
-        sentences.append("Pictures of 16 bits were reduced to their upper 8 bits (divided by 256, rounded down).")
+        notes.append("Pictures of 16 bits were reduced to their upper 8 bits (divided by 256, rounded down).")
     elif kind.bits < 8:
-        sentences.append(f"Pictures of {kind.bits} bits were scaled to 8 bits.")
-    return tuple(sentences)
+        notes.append(f"Pictures of {kind.bits} bits were scaled to 8 bits.")
+    return tuple(notes)
 
 
 def _decoded(picture: EncodedPicture, kind: Kind) -> NDArray[Any]:
+    """The pixels of a PNG or JPEG file. Raises InputError if they cannot be decoded, or differ from `kind` in size."""
     data = np.frombuffer(bytes(picture.content), np.uint8)
     try:
         pixels = cv2.imdecode(data, cv2.IMREAD_UNCHANGED)
@@ -220,12 +234,15 @@ def _decoded(picture: EncodedPicture, kind: Kind) -> NDArray[Any]:
 
 
 def _file_kind(data: bytes, name: str) -> Kind:
+    """The kind of the picture in a PNG or JPEG file. Raises InputError if the file is cut off or damaged."""
     if data.startswith(PNG):
+        # The chunk tRNS adds an alpha channel that the header does not count.
         has_transparency = b"tRNS" in _png_chunks(data, name)
         png = _header(data, "PNG", name)
         return Kind(png.width, png.height, png.channels + has_transparency, png.bits, "png")
 
-    if not data.rstrip(b"\0").endswith(JPEG_END):
+    without_padding = data.rstrip(b"\0")
+    if not without_padding.endswith(JPEG_END):
         raise InputError(f"the JPEG is cut off after {len(data)} bytes: {name}")
     jpeg = _header(data, "JPEG", name)
     if jpeg.bits != 8 or jpeg.channels not in (1, 3):
@@ -234,35 +251,38 @@ def _file_kind(data: bytes, name: str) -> Kind:
 
 
 def _header(data: bytes, form: str, name: str) -> Header:
+    """The header of a PNG or JPEG file. Raises InputError if it has none that is valid."""
     try:
-        stated = header(memoryview(data))
+        parsed = header(memoryview(data))
     except struct.error:
-        stated = None
-    if stated is None or not stated.channels:
+        parsed = None
+    if parsed is None or not parsed.channels:
         raise InputError(f"the {form} has no valid header: {name}")
-    return stated
+    return parsed
 
 
 CHUNK_OVERHEAD = 12  # the bytes of a chunk besides its data: length, type and checksum
+LENGTH_BYTES = 4
 CHECKSUM_BYTES = 4
 
 
 def _png_chunks(data: bytes, name: str) -> set[bytes]:
     """The types of the chunks in a PNG. Raises InputError for a wrong checksum, or if the end chunk is missing."""
-    place = len(PNG)
-    kinds = set()
-    while place + CHUNK_OVERHEAD <= len(data):
-        length, kind = struct.unpack_from(">I4s", data, place)
-        end = place + CHUNK_OVERHEAD + length
+    start = len(PNG)
+    types = set()
+    while start + CHUNK_OVERHEAD <= len(data):
+        length, chunk_type = struct.unpack_from(">I4s", data, start)
+        end = start + CHUNK_OVERHEAD + length
         if end > len(data):
             break
 
-        checked = memoryview(data)[place + 4 : end - CHECKSUM_BYTES]  # all but the length and the checksum itself
-        (stated,) = struct.unpack_from(">I", data, end - CHECKSUM_BYTES)
-        if zlib.crc32(checked) != stated:
-            raise InputError(f"the PNG is damaged (checksum of its chunk at byte {place}): {name}")
-        kinds.add(kind)
-        place = end
-        if kind == b"IEND":
-            return kinds
+        # The checksum at the end of a chunk is that of its type and its data.
+        type_and_data = memoryview(data)[start + LENGTH_BYTES : end - CHECKSUM_BYTES]
+        (stored_checksum,) = struct.unpack_from(">I", data, end - CHECKSUM_BYTES)
+        if zlib.crc32(type_and_data) != stored_checksum:
+            raise InputError(f"the PNG is damaged (checksum of its chunk at byte {start}): {name}")
+        types.add(chunk_type)
+        start = end
+        if chunk_type == b"IEND":
+            return types
     raise InputError(f"the PNG is cut off after {len(data)} bytes: {name}")

@@ -73,10 +73,15 @@ class OverLengths:
 
 @dataclass(frozen=True, slots=True)
 class MetricDefinition:
-    """A metric: its settings, the errors that it does not show, its main statistic, and its measure.
+    """A metric: how it is computed, and what a reader has to know about it.
 
-    A metric with `full` is measured only if all metrics are requested. `measure` returns its errors (N,) in its unit.
-    Metrics of recordings instead of poses, such as coverage, have no measure.
+    `formula` and `source` are its equation and its origin in the literature.
+    `settings` are the names of the settings on which it depends.
+    `blind` describes the errors that it does not show.
+    `headline` is its main statistic.
+    `full` is whether it is measured only if all metrics are requested.
+    `measure` returns its errors (N,) in its unit. It is None for a metric of recordings instead of poses, such as
+    coverage.
     """
 
     id: str
@@ -92,7 +97,7 @@ class MetricDefinition:
 
     @property
     def identity(self) -> str:
-        """The beginning of the ids of its numbers: family.rest."""
+        """The beginning of the ids of its results: `ate_trans` becomes `ate.trans`."""
         return self.id.replace("_", ".", 1)
 
     def as_dict(self) -> dict[str, Any]:
@@ -101,7 +106,7 @@ class MetricDefinition:
         return {name: getattr(self, name) for name in names}
 
 
-# The settings that change poses, and therefore all metrics of poses.
+# The names of the settings that change poses, and therefore all metrics of poses.
 POSES = ("alignment", "align_n", "scale_rule", "project", "association", "max_diff_ns", "offset_ns")
 OURS = "this project"
 STURM_ATE = "Sturm et al. (2012), section V-B"
@@ -131,7 +136,7 @@ def compare(
         raise AlignmentError(_no_overlap(gt, est, settings))
 
     alignment, T_aligned, T_moving = _aligned(matched, settings)
-    if settings.project:
+    if settings.project:  # poses are projected after the alignment, as in evo
         gt = Trajectory(gt.t_ns, in_plane(gt.T_world_frame, settings.project))
         matched = replace(matched, T_gt=in_plane(matched.T_gt, settings.project))
         T_aligned = in_plane(T_aligned, settings.project)
@@ -168,9 +173,10 @@ def _aligned(matched: Matched, settings: ScoreSettings) -> tuple[Alignment, Arra
         T_aligned = alignment.apply(T_est)
         return alignment, T_aligned, T_aligned
 
+    # TartanAir's rule: poses and motions have different scales, and share the rigid part of the alignment.
     scale = ate_scale(T_gt, T_est)
-    scaled = se3.transform(T_est[:, :3, :3], scale * T_est[:, :3, 3])
-    rigid = align(scaled, T_gt, kind=settings.alignment, first_n=settings.align_n)
+    T_scaled = se3.transform(T_est[:, :3, :3], scale * T_est[:, :3, 3])
+    rigid = align(T_scaled, T_gt, kind=settings.alignment, first_n=settings.align_n)
     alignment = replace(rigid, scale=scale)
     motion_alignment = replace(rigid, scale=motion_scale(T_gt, T_est))
     return alignment, alignment.apply(T_est), motion_alignment.apply(T_est)
@@ -187,9 +193,10 @@ def ate_scale(T_gt: Array, T_est: Array) -> float:
     fit = align_positions(gt_m, est_m, kind="se3")
     if "rotation" in fit.unobservable:
         return 1.0
-    x = (gt_m - gt_m.mean(axis=0)) @ fit.rotation.T
-    y = est_m - est_m.mean(axis=0)
-    return float(np.sum(x * x) / np.sum(x * y))
+    centred_est_m = est_m - est_m.mean(axis=0)
+    centred_gt_m = gt_m - gt_m.mean(axis=0)
+    rotated_gt_m = centred_gt_m @ fit.rotation.T
+    return float(np.sum(rotated_gt_m * rotated_gt_m) / np.sum(rotated_gt_m * centred_est_m))
 
 
 def motion_scale(T_gt: Array, T_est: Array) -> float:
@@ -203,8 +210,8 @@ def motion_scale(T_gt: Array, T_est: Array) -> float:
     is_moving = gt_m > STILL_M
     if not is_moving.any():
         return 1.0
-    ratio = float(np.mean(est_m[is_moving] / gt_m[is_moving]))
-    return 1.0 / ratio if ratio > 0 else 1.0
+    mean_ratio = float(np.mean(est_m[is_moving] / gt_m[is_moving]))
+    return 1.0 / mean_ratio if mean_ratio > 0 else 1.0
 
 
 def in_plane(T: Array, plane: Plane) -> Array:
@@ -213,9 +220,10 @@ def in_plane(T: Array, plane: Plane) -> Array:
     The angle is the one about the normal of `roll_pitch_yaw_rad`. Source: evo's project_to_plane.
     """
     normal = {"yz": 0, "xz": 1, "xy": 2}[plane]
-    axes = np.roll(range(3), normal + 1)  # the new places of x, y and z if the normal takes the place of z
     angles_rad = se3.roll_pitch_yaw_rad(T[:, :3, :3])[:, normal]
+    # A rotation about z becomes one about the normal if its rows and columns are permuted cyclically.
     about_z = se3.rotation_z(angles_rad)
+    axes = np.roll(range(3), normal + 1)  # the new places of x, y and z if the normal takes the place of z
     about_normal = about_z[:, axes][:, :, axes]
 
     is_normal = np.arange(3) == normal

@@ -1,7 +1,14 @@
-"""A car: the bicycle model with lagged and limited steering, kept on a planar path by feedback.
+"""A car that follows a planar path: the bicycle model, with feedback control of its speed and steering.
 
-ACKERMANNS: the presets by name. ackermann: the motion.
-x' = u cos psi, y' = u sin psi, psi' = u tan(delta) / L, delta' = (requested - delta) / lag, at the rear axle's middle.
+The state is the position (x, y) of the middle of the rear axle, the heading psi, and the steering angle delta. At the
+speed u, with the wheelbase L:
+
+    x' = u cos(psi)
+    y' = u sin(psi)
+    psi' = u tan(delta) / L
+    delta' = (requested delta - delta) / lag, within the limits of delta and delta'
+
+`ackermann` is the motion, and ACKERMANNS are the vehicles by name.
 """
 
 from dataclasses import dataclass
@@ -17,13 +24,19 @@ from vobench.setting import Positive, settings
 from vobench.trajectory.kinematics import CurveMotion, Kinematics, along, level
 from vobench.trajectory.trajectory import Stamps
 
-STEP_S = 0.01
-CHECKED_POINTS = 8192
+STEP_S = 0.01  # the longest step of the integration
+CHECKED_POINTS = 8192  # the number of points of a path at which its curvature is compared with the limit
 
 
 @settings(kw_only=False)
 class AckermannSettings:
-    """A vehicle and its driver, who returns to the path over about lookahead_m."""
+    """A vehicle and its driver.
+
+    `wheelbase_m` is the distance between the axles.
+    `max_steer_rad` is the largest steering angle, and `max_steer_radps` is its largest rate.
+    `steer_lag_s` is the time constant of the steering.
+    `lookahead_m` is the approximate distance within which the driver corrects an error.
+    """
 
     wheelbase_m: Positive
     max_steer_rad: Annotated[float, Gt(0), Lt(pi / 2)]
@@ -46,9 +59,10 @@ ACKERMANNS = {
 
 
 class Reference(NamedTuple):
-    """Position, heading and motion of the target at an instant; numbers or arrays (K,).
+    """Position, heading and motion of the target at an instant, in SI units. Each is a number or an array (K,).
 
-    curvature: in 1/m, one steering lag later; advance: 1 ahead, -1 back.
+    `curvature` is that of the path one steering lag later, in 1/m, because the steering needs this time to respond.
+    `advance` is 1 if the target moves forwards, and -1 if it moves backwards.
     """
 
     x: Array
@@ -62,7 +76,7 @@ class Reference(NamedTuple):
 
 
 class State(NamedTuple):
-    """Position, heading and steering angle of a car, in m and rad, or their rates; numbers or arrays (K,)."""
+    """Position, heading and steering angle of a car in m and rad, or their rates; numbers or arrays (K,)."""
 
     x: Array
     y: Array
@@ -72,9 +86,12 @@ class State(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class AckermannMotion:
-    """A Motion with the state (M + 1, 4) of x, y, psi, delta at nodes_s, integrated from the node before an instant.
+    """The motion of a car, with its state at nodes in time. Between them it is integrated from the node before.
 
-    advance (M,) is the direction of each step, ahead (1) or back (-1).
+    `nodes_s` (M + 1,) are the times of the nodes.
+    `state` (M + 1, 4) is the state at the nodes: x, y, heading and steering angle.
+    `advance` (M,) is the direction of each step between nodes: 1 is forwards, and -1 is backwards.
+    `breaks_ns` are the breaks of the target, and the times at which the steering begins to respond to them.
     """
 
     target: CurveMotion
@@ -84,7 +101,7 @@ class AckermannMotion:
     advance: Array
     start_ns: int
     end_ns: int
-    breaks_ns: Array  # those of the target, and the times at which the steering begins to answer them
+    breaks_ns: Array
 
     def at(self, t_ns: Stamps | Array) -> Kinematics:
         """The kinematics (K,) after one Runge-Kutta step from the last node."""
@@ -93,15 +110,16 @@ class AckermannMotion:
         node = np.clip(node, 0, len(self.advance) - 1)
         step_s = t_s - self.nodes_s[node]
         stages = []
-        for share in (1.0, 0.5, 0.0):  # of the step before t_s
-            stage_s = t_s - step_s * share
+        for remaining_share in (1.0, 0.5, 0.0):  # the start, middle and end of the step
+            stage_s = t_s - step_s * remaining_share
             stages.append(_reference(self.target, self.settings, stage_s, self.advance[node]))
 
         state = _stepped(State(*self.state[node].T), stages, step_s, self.settings)
         rates, speed, acceleration = _rates(state, stages[-1], self.settings)
-        cosine_squared = np.cos(state.steer) ** 2
-        curvature_rate = speed * rates.steer / cosine_squared
-        angular_acceleration = (acceleration * np.tan(state.steer) + curvature_rate) / self.settings.wheelbase_m
+        # The derivative of the yaw rate u tan(delta) / L.
+        from_speed = acceleration * np.tan(state.steer)
+        from_steering = speed * rates.steer / np.cos(state.steer) ** 2
+        angular_acceleration = (from_speed + from_steering) / self.settings.wheelbase_m
         return along(
             level(state.x, state.y, state.heading),
             speed=speed,
@@ -112,28 +130,27 @@ class AckermannMotion:
 
 
 def ackermann(target: CurveMotion, settings: AckermannSettings = ACKERMANNS["small_robot"]) -> AckermannMotion:
-    """The motion of a car that follows a planar motion from its start, steering by curvature and position error.
+    """The motion of a car that follows a planar motion from its start, with feedback from the position and heading.
 
     Raises MotionError if the target turns on the spot, or more sharply than the steering allows.
     """
     _require_drivable(target, settings)
     breaks_s = _breaks_s(target, settings)
-    ends_s = [target.law.start_s, target.law.end_s]
-    nodes_s = _nodes(np.insert(ends_s, 1, breaks_s))
+    nodes_s = _nodes(np.array([target.law.start_s, *breaks_s, target.law.end_s]))
     step_s = np.diff(nodes_s)
     middles_s = nodes_s[:-1] + step_s / 2
     advance, _ = _by_progress(target, middles_s)
 
-    # The references of all steps at once, as Python floats, which are faster than arrays of one element.
-    stages = []
+    # The references of all steps are computed at once. Python floats are then faster than arrays of one element.
+    stages = []  # for the start, middle and end of steps: a list of the values of each step's reference
     for share in (0.0, 0.5, 1.0):
         reference = _reference(target, settings, nodes_s[:-1] + step_s * share, advance)
         stages.append(np.array(reference).T.tolist())
 
     first = Reference(*stages[0][0])
-    limit = settings.max_steer_rad
-    steer = np.clip(np.arctan(settings.wheelbase_m * first.curvature), -limit, limit)
-    state = State(first.x, first.y, first.heading, steer)
+    first_steer = np.arctan(settings.wheelbase_m * first.curvature)
+    first_steer = np.clip(first_steer, -settings.max_steer_rad, settings.max_steer_rad)
+    state = State(first.x, first.y, first.heading, first_steer)
     states = [state]
     for *step_stages, duration_s in zip(*stages, step_s.tolist(), strict=True):
         references = [Reference(*stage) for stage in step_stages]
@@ -156,38 +173,44 @@ def _rates(
     target: Reference,
     settings: AckermannSettings,
 ) -> tuple[State, Array, Array]:
-    """Rates of the state, the speed and its derivative: the model and its driver.
+    """The rates of the state, the speed and its derivative, from the vehicle model and the control law of its driver.
 
-    After Kanayama et al. (1990), with gains by distance: at rest nothing moves.
+    The control law compares the target with the car, in the axes of the car: e_x is the error ahead, e_y that to the
+    left, and e_psi that of the heading. The target has the speed u_t, the curvature k_t, and the direction a, which is
+    1 forwards and -1 backwards. With the lookahead l:
 
-    At a position error (ahead, aside) and a heading error, the driver goes faster by ahead / lookahead, and increases
-    the curvature by aside / lookahead² + 2 sin(heading error) / lookahead: critically damped along the path, whatever
-    the speed.
+        speed = u_t (cos(e_psi) + a e_x / l)
+        curvature = k_t + e_y / l² + 2 a sin(e_psi) / l
+
+    Gains are per distance instead of per time. Errors are therefore critically damped along the path at any speed, and
+    a car at rest does not move. Source: Kanayama et al. (1990), with these gains.
     """
     x, y, heading, steer = state
     cosine = np.cos(heading)
     sine = np.sin(heading)
     error_x = target.x - x
     error_y = target.y - y
-    ahead = cosine * error_x + sine * error_y
-    aside = cosine * error_y - sine * error_x
+    error_ahead = cosine * error_x + sine * error_y
+    error_left = cosine * error_y - sine * error_x
     heading_error = target.heading - heading
     error_cosine = np.cos(heading_error)
     error_sine = np.sin(heading_error)
     gain = target.advance / settings.lookahead_m
 
-    curvature = target.curvature + aside / settings.lookahead_m**2 + 2 * gain * error_sine
+    curvature = target.curvature + error_left / settings.lookahead_m**2 + 2 * gain * error_sine
     requested_steer = np.arctan(settings.wheelbase_m * curvature)
     requested_steer = _clipped(requested_steer, settings.max_steer_rad)
     steer_rate = (requested_steer - steer) / settings.steer_lag_s
     steer_rate = _clipped(steer_rate, settings.max_steer_radps)
 
-    speed_factor = error_cosine + gain * ahead
+    speed_factor = error_cosine + gain * error_ahead
     speed = target.speed * speed_factor
     heading_rate = speed * np.tan(steer) / settings.wheelbase_m
-    ahead_rate = heading_rate * aside - speed + target.speed * error_cosine
+
+    # The derivative of the speed. That of the target's speed is known; that of the factor follows from the errors.
+    error_ahead_rate = heading_rate * error_left - speed + target.speed * error_cosine
     heading_error_rate = target.angular_velocity - heading_rate
-    speed_factor_rate = gain * ahead_rate - error_sine * heading_error_rate
+    speed_factor_rate = gain * error_ahead_rate - error_sine * heading_error_rate
     acceleration = target.acceleration * speed_factor + target.speed * speed_factor_rate
     rates = State(speed * cosine, speed * sine, heading_rate, steer_rate)
     return rates, speed, acceleration
@@ -229,12 +252,12 @@ def _reference(
 ) -> Reference:
     """The target at t_s (K,), with its curvature one steering lag later."""
     now = target.at(t_s * 1e9)
-    T = now.T_world_body
+    T_world_body = now.T_world_body
     _, curvature = _by_progress(target, t_s + settings.steer_lag_s)
     return Reference(
-        x=T[:, 0, 3],
-        y=T[:, 1, 3],
-        heading=np.arctan2(T[:, 1, 0], T[:, 0, 0]),
+        x=T_world_body[:, 0, 3],
+        y=T_world_body[:, 1, 3],
+        heading=np.arctan2(T_world_body[:, 1, 0], T_world_body[:, 0, 0]),
         speed=now.velocity_mps[:, 0],
         acceleration=now.acceleration_mps2[:, 0],
         angular_velocity=now.angular_velocity_radps[:, 2],
@@ -244,7 +267,11 @@ def _reference(
 
 
 def _by_progress(target: CurveMotion, t_s: Array) -> tuple[Array, Array]:
-    """Advance (K,), 1 ahead, -1 back, 0 on the spot, and curvature in 1/m (K,) of the target at t_s."""
+    """The direction (K,) and the curvature (K,) in 1/m of the target's path at t_s (K,).
+
+    The direction is 1 forwards, -1 backwards, and 0 for a turn on the spot. Both are derivatives by progress along the
+    path, so that they are also defined while the target stands still.
+    """
     inside_s = np.clip(t_s, target.law.start_s, target.law.end_s)
     progress, _, _ = target.law.at(inside_s)
     by_progress = target.curve.at(progress)
@@ -254,7 +281,7 @@ def _by_progress(target: CurveMotion, t_s: Array) -> tuple[Array, Array]:
 
 
 def _breaks_s(target: CurveMotion, settings: AckermannSettings) -> Array:
-    """The times at which the target has a break, or the steering begins to answer one."""
+    """The times at which the target has a break, or at which the steering begins to respond to one."""
     target_breaks_s = target.breaks_ns / 1e9
     steering_breaks_s = target_breaks_s - settings.steer_lag_s
     breaks_s = np.unique(np.concatenate([target_breaks_s, steering_breaks_s]))
@@ -262,15 +289,15 @@ def _breaks_s(target: CurveMotion, settings: AckermannSettings) -> Array:
     return breaks_s[is_inside]
 
 
-def _nodes(marks_s: Array) -> Array:
-    """Times at most STEP_S apart that include all marks."""
-    starts_s = marks_s[:-1]
-    ends_s = marks_s[1:]
-    counts = np.ceil(np.diff(marks_s) / STEP_S).astype(int)
-    spans = []
+def _nodes(required_s: Array) -> Array:
+    """Increasing times that are at most STEP_S apart and include all required times."""
+    starts_s = required_s[:-1]
+    ends_s = required_s[1:]
+    counts = np.ceil(np.diff(required_s) / STEP_S).astype(int)
+    parts_s = []
     for start_s, end_s, count in zip(starts_s, ends_s, counts, strict=True):
-        spans.append(np.linspace(start_s, end_s, count, endpoint=False))
-    return np.concatenate([*spans, marks_s[-1:]])
+        parts_s.append(np.linspace(start_s, end_s, count, endpoint=False))
+    return np.concatenate([*parts_s, required_s[-1:]])
 
 
 def _require_drivable(target: CurveMotion, settings: AckermannSettings) -> None:

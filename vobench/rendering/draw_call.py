@@ -54,7 +54,9 @@ class DrawCalls:
         self._panoramas = panoramas
         self._batches = geometry.batches
         self._textures = batch_textures(geometry.batches)
-        self.shader_defines = list(map(_shader_defines, self._batches, self._textures))
+        self.shader_defines = [
+            _shader_defines(batch, textures) for batch, textures in zip(self._batches, self._textures, strict=True)
+        ]
 
         self._vertex_array = VertexArray(geometry.vertices, geometry.indices)
         self._empty_vertex_array = GL.glGenVertexArrays(1)
@@ -79,7 +81,7 @@ class DrawCalls:
         `weights` are the shares of red, green and blue in the luminance of a framebuffer with one channel.
         """
         uniforms = self._pass_uniforms
-        uniforms[...] = np.zeros((), PASS.dtype)  # reset: values of the last view must not remain
+        uniforms[...] = np.zeros((), PASS.dtype)  # removes the values of the last view
         set_view(uniforms, view, framebuffer, weights)
         if probe:
             set_probe(uniforms, view, probe)
@@ -125,7 +127,8 @@ class DrawCalls:
             all_defines |= {ShaderDefine.IS_MIRRORED}
         if view.extinction_per_m:
             all_defines |= {ShaderDefine.HAS_FOG}
-        self._program("surface", "surface", all_defines).use()
+        program = self._program("surface", "surface", all_defines)
+        program.use()
         self._batch_buffer.use(batch.index)
         textures = self._textures[batch.index]
         if textures.body:
@@ -156,8 +159,10 @@ class DrawCalls:
     def _draw_panorama(
         self, sky: PanoramaSky, view: PinholeView, framebuffer: LayeredFramebuffer, weights: Rgb
     ) -> None:
+        """Draw a panorama behind all surfaces."""
         bind(PANORAMA_UNIT, self._panoramas[sky.index].id)
-        self._program("background", "panorama", _framebuffer_defines(framebuffer)).use(
+        program = self._program("background", "panorama", _framebuffer_defines(framebuffer))
+        program.use(
             world_from_screen=view.world_from_screen,
             illuminance_lx=float(sky.illuminance_lx),
             lamp_share=sky.lamp_share,
@@ -168,8 +173,12 @@ class DrawCalls:
     def _draw_standard_sky(
         self, sky: StandardSky, view: PinholeView, framebuffer: LayeredFramebuffer, weights: Rgb
     ) -> None:
-        mono_colour = np.array([sky.colour[:3] @ weights, 0, 0, 0])
-        self._program("background", "background").use(
+        """Draw a standard sky behind all surfaces."""
+        # The shader writes four channels. A framebuffer with one channel stores the first of them.
+        luminance = sky.colour[:3] @ weights
+        mono_colour = np.array([luminance, 0, 0, 0])
+        program = self._program("background", "background")
+        program.use(
             world_from_screen=view.world_from_screen,
             gradation=sky.gradation,
             scatter=sky.scatter,
@@ -194,12 +203,13 @@ class DrawCalls:
         bind(LAYERS_UNIT, framebuffer.colour_texture, GL.GL_TEXTURE_2D_ARRAY)
         if total.channels == 1 and not framebuffer.is_mono:
             channel_weights = target.weights
-            defines = MONO_DEFINES  # here: the shader adds the three weighted channels up
+            defines = MONO_DEFINES  # this shader then adds up the three weighted channels
         else:
             channel_weights = (1.0, 1.0, 1.0)
             defines = NO_DEFINES
         sample_weights = share / framebuffer.layers * np.array([*channel_weights, 0.0])
-        self._program("fullscreen", "mean", defines).use(count=framebuffer.layers, weight=sample_weights)
+        program = self._program("fullscreen", "mean", defines)
+        program.use(count=framebuffer.layers, weight=sample_weights)
         with blending(GL.GL_ONE, GL.GL_ONE), disabled(GL.GL_DEPTH_TEST):
             self._cover(layers=1)
 

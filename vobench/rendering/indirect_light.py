@@ -53,7 +53,7 @@ class FinalGather:
 class Sample:
     """The result of some of the rays from P points.
 
-    `near` (P, S + L) is a table as in `FinalGather`, of the rays whose last segment is shorter than NEAR_M.
+    `near` (P, S + L) is a table as in `FinalGather`, of the rays that end near, as defined by `RayEnds.is_near`.
     `far` (P, S + L) is the same table of the other rays.
     `sky` (K, P) is the illuminance in lx by each sky, as in `FinalGather`.
     `escaped` (P,) is the share of rays that left the scene, as in `FinalGather`.
@@ -127,6 +127,7 @@ class Gatherer:
     ) -> FinalGather:
         """Cast about `rays` rays from every point, or fewer if there would be more than MOST_RAYS in total.
 
+        Rays are cast on a square grid of directions, so the number of rays of a point is a square number.
         `done` is called with the share of the work that is done.
         """
         rays_per_point = min(rays, MOST_RAYS / max(len(points), 1))
@@ -240,8 +241,8 @@ class Gatherer:
             batch = followed.onward
             if not len(batch.point):
                 break
-        ends = joined_ends(parts)
-        ends.share[:] /= ray_count
+        joined = joined_ends(parts)
+        ends = joined._replace(share=joined.share / ray_count)
         return Sample(
             near=self._table(ends, ends.is_near, len(points)),
             far=self._table(ends, ~ends.is_near, len(points)),
@@ -260,15 +261,16 @@ class Gatherer:
             weight=np.ones(len(rows), np.float32),
             is_direct=photons.is_shown[rows],
         )
-        # The light of shown photons on the first face is already known. They count only after their first reflection.
+        # The light of shown photons on the first face is already counted as direct light. Therefore only their
+        # reflections are followed, together with the first reflections of the other photons.
         shown = batch.take(batch.is_direct)
         batch = batch.take(~batch.is_direct)
-        from_shown = self._tracer.follow(shown, photons.dither, is_first=False).onward
+        reflections_of_shown = self._tracer.follow(shown, photons.dither, is_first=False).onward
         for depth in range(MOST_REFLECTIONS):
             followed = self._tracer.follow(batch, photons.dither, is_first=False)
             batch = followed.onward
             if depth == 0:
-                batch = batch.joined(from_shown)
+                batch = batch.joined(reflections_of_shown)
             ends = followed.ends
             is_surfel = ends.column < self.surfels
             arriving_lm = ends.share[is_surfel] * photons.flux_lm[ends.point[is_surfel]]

@@ -19,9 +19,12 @@ from vobench.scene.triangles import Triangles
 
 @dataclass(frozen=True, slots=True)
 class MeshGroup:
-    """Faces (K,) that become one mesh of Mitsuba.
+    """Faces that become one mesh of Mitsuba.
 
-    They have one material and belong to one mover, -1 for none. They are visible from one side or from both.
+    `mover` is the index of the mover to which all of them belong, -1 for none.
+    `material` is the name of their material.
+    `two_sided` is whether they are visible from both sides.
+    `faces` (K,) are their indices.
     """
 
     mover: int
@@ -41,22 +44,26 @@ def mesh_groups(scene: Scene, faces: Triangles) -> list[MeshGroup]:
     Two faces back to back are represented by the first one, which is visible from both sides. If they emit light, both
     are included, because an emitter of Mitsuba has one side.
     """
-    back = back_faces(faces)[:-1]  # (F,), -1 for none
+    back = back_faces(faces)[:-1]  # (F,), -1 for none; the last entry of `back_faces` is not that of a face
     is_two_sided = (back >= 0) & ~_emits_light(scene, faces)
     is_first = back > np.arange(len(back))
     is_included = (faces.lamp < 0) & (~is_two_sided | is_first)
 
-    # The faces of a thing are consecutive.
+    # The faces of a thing are consecutive, and belong to the same mover.
     starts = np.searchsorted(faces.thing, np.arange(len(faces.things) + 1))
-    parts = dict[tuple[int, str, bool], list[Pixels]]()
+    parts_by_group = dict[tuple[int, str, bool], list[Pixels]]()
     for thing, (start, end) in zip(faces.things, pairwise(starts), strict=True):
-        rows = start + np.flatnonzero(is_included[start:end])
+        included = start + np.flatnonzero(is_included[start:end])
         for two_sided in (False, True):
-            selected = rows[is_two_sided[rows] == two_sided]
+            selected = included[is_two_sided[included] == two_sided]
             if len(selected):
-                mover = int(faces.mover[start])
-                parts.setdefault((mover, thing.material, two_sided), []).append(selected)
-    return [MeshGroup(*mesh, np.concatenate(rows)) for mesh, rows in parts.items()]
+                group = (int(faces.mover[start]), thing.material, two_sided)
+                parts_by_group.setdefault(group, []).append(selected)
+
+    groups = []
+    for (mover, material, two_sided), parts in parts_by_group.items():
+        groups.append(MeshGroup(mover, material, two_sided, faces=np.concatenate(parts)))
+    return groups
 
 
 def _emits_light(scene: Scene, faces: Triangles) -> Mask:
@@ -77,26 +84,27 @@ def load_scene(mi: Any, scene: Scene) -> Any:
     bsdfs = dict[tuple[str, bool], Any]()  # by name of the material, and whether it is visible from both sides
     for group in mesh_groups(scene, bodies):
         material = scene.materials[group.material]
-        look = (group.material, group.two_sided)
-        if look not in bsdfs:
-            bsdfs[look] = mi.load_dict(bsdf_plugin(mi, material, two_sided=group.two_sided))
+        bsdf_key = (group.material, group.two_sided)
+        if bsdf_key not in bsdfs:
+            bsdfs[bsdf_key] = mi.load_dict(bsdf_plugin(mi, material, two_sided=group.two_sided))
+        emits_light = any(material.emission_cd_m2)
         plugins[group.key] = _mesh(
             mi,
             group.key,
             faces,
             group.faces,
-            bsdf=bsdfs[look],
-            emitter=area_emitter(mi, material) if any(material.emission_cd_m2) else None,
+            bsdf=bsdfs[bsdf_key],
+            emitter=area_emitter(mi, material) if emits_light else None,
             tile_m=material.tile_m,
         )
 
     black = mi.load_dict({"type": "diffuse", "reflectance": grey(0)})
     for index, light in enumerate(scene.lights):
         key = light_key(index)
-        rows = np.flatnonzero(faces.lamp == index)
-        if len(rows):
+        lamp_faces = np.flatnonzero(faces.lamp == index)
+        if len(lamp_faces):
             emitter, tile_m = _lamp_emitter(mi, scene, light)
-            plugins[key] = _mesh(mi, key, faces, rows, bsdf=black, emitter=emitter, tile_m=tile_m)
+            plugins[key] = _mesh(mi, key, faces, lamp_faces, bsdf=black, emitter=emitter, tile_m=tile_m)
         else:
             plugins[key] = emitter_plugin(mi, light)
     return mi.load_dict(plugins, optimize=False)
@@ -129,7 +137,7 @@ def _mesh(
     emitter: Any,
     tile_m: float,
 ) -> Any:
-    """The mesh of some faces (K,) of a table. Each face has its own three vertices.
+    """The mesh of the faces with the indices `rows` (K,). Each face has its own three vertices.
 
     `emitter` is None for faces that emit no light. `tile_m` is the side of a tile of the texture.
     """
@@ -166,7 +174,9 @@ def one_sided_shapes(mi: Any, scene: Scene, loaded: Any) -> Any:
 
     is_one_sided = dict[int, bool]()
     for shape in loaded.shapes():
-        index = int(dr.reinterpret_array(mi.UInt32, mi.ShapePtr(shape))[0])
+        # Dr.Jit stores a pointer to a shape as the index of the shape in its registry.
+        pointer = mi.ShapePtr(shape)
+        index = int(dr.reinterpret_array(mi.UInt32, pointer)[0])
         is_one_sided[index] = shape.id() not in visible_from_behind
     count = max(is_one_sided, default=0) + 1
     return mi.Bool([is_one_sided.get(index, False) for index in range(count)])

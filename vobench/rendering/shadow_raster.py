@@ -17,13 +17,14 @@ from vobench.rendering.receiver_plane import ReceiverPlane
 
 NEAR_LAMP = 1e-3  # the share of a shadow ray's length, at the lamp, in which nothing is tested
 MIN_W = NEAR_LAMP / 2  # triangles are clipped here, closer to the lamp than any ray is tested
-MIN_LAMP_HEIGHT_M = 0.05  # of the lower end of a lamp above the plane; below, rays decide
-MIN_ELEVATION_SINE = 0.02  # of a lamp, seen from any cell; below, rays decide
+# Lamps that are lower than one of these limits have no projection. Their shadows are computed by rays.
+MIN_LAMP_HEIGHT_M = 0.05  # the smallest height of the lower end of a lamp above the plane
+MIN_ELEVATION_SINE = 0.02  # the smallest sine of the elevation of a lamp, seen from any cell
 MIN_RELATIVE_AREA = 1e-9  # a projected triangle with a smaller one counts as a line
 MIN_LENGTH = 1e-300  # avoids a division by zero for edges without length
 # A shadow with more cells than this is drawn alone, by slices of the grid instead of lists of cells.
 MAX_CELLS_TOGETHER = 2000
-CELLS_AT_ONCE = 30_000  # of small shadows, which bounds the memory
+CELLS_AT_ONCE = 30_000  # the number of cells of small shadows that are tested at once; it limits the memory
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,9 +32,11 @@ class LampProjection:
     """The projection from a lamp onto a plane.
 
     It maps the point (u, v) at height h above the plane to (u - u_slope h, v - v_slope h, 1 - w_slope h).
-    `u_slope` and `v_slope` have no unit, `w_slope` is in 1/m, and 0 for the sun.
+
+    `u_slope` and `v_slope` have no unit.
+    `w_slope` is in 1/m. It is 0 for the sun.
     `min_sine` is the smallest sine of the lamp's elevation, seen from any cell.
-    `ray_end_w`: shadow rays may end before they reach points with a smaller w.
+    `ray_end_w` is the smallest w that all shadow rays reach. They can end before they reach points with a smaller w.
     """
 
     u_slope: float
@@ -91,7 +94,11 @@ class DrawnShadows(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class ProjectedTriangles:
-    """Triangles in the coordinates of a plane: positions (T, 3, 2) along its axes, and heights (T, 3) above it."""
+    """Triangles in the coordinates of a plane.
+
+    `along_m` (T, 3, 2) are the positions of the corners along the axes of the plane.
+    `heights_m` (T, 3) are their heights above the plane.
+    """
 
     plane: ReceiverPlane
     along_m: Array
@@ -167,7 +174,11 @@ def _chunks(counts: Rows) -> Iterator[slice]:
 
 
 class _CellRanges(NamedTuple):
-    """The first column and row, and the numbers of columns and rows, (T, 2) each, of rectangles of cells."""
+    """T rectangles of cells.
+
+    `first` (T, 2) are the first column and the first row.
+    `sizes` (T, 2) are the numbers of columns and rows.
+    """
 
     first: Rows
     sizes: Rows
@@ -180,13 +191,15 @@ class _CellRanges(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class _Shadows:
-    """Shadows of T triangles on a plane, as three lines each.
+    """Shadows of T triangles on a plane, each as the lines of its three edges.
 
-    `lines` (3, 3, T): the coefficients (first axis) a, b, c of each edge's line (second axis). The signed distance of
-    (u, v) from it is a u + b v + c in metres, positive inside.
-    `low_m` and `high_m` (T, 2): the bounding boxes, with margins.
-    `is_flat` (T,): seen edge-on. All three lines of such a shadow are that of its longest edge.
-    `is_solid` (T,): covers cells.
+    `lines` (3, 3, T) are the coefficients a, b and c (first axis) of the line of each edge (second axis). The signed
+    distance of (u, v) from the line is a u + b v + c in metres. It is positive inside.
+    `low_m` (T, 2) and `high_m` (T, 2) are the bounding boxes, with margins.
+    `margin_m` (T,) is the largest distance by which rounding moves the border of the shadow.
+    `is_flat` (T,) is whether the lamp sees the triangle edge-on. All three lines of such a shadow are that of its
+    longest edge.
+    `is_solid` (T,) is whether the shadow covers cells.
     """
 
     lines: Array
@@ -207,8 +220,10 @@ class _Shadows:
 
         # The determinant of the vertices is proportional to the area, and negative if they are in clockwise order.
         determinant = np.einsum("ti,ti->t", vertices[:, 0], lines[:, 0])
-        scale = np.linalg.norm(vertices, axis=2).max(1) * np.linalg.norm(lines, axis=2).max(1)
-        is_flat = np.abs(determinant) <= MIN_RELATIVE_AREA * scale
+        longest_vertex = np.linalg.norm(vertices, axis=2).max(1)
+        longest_line = np.linalg.norm(lines, axis=2).max(1)
+        max_determinant = longest_vertex * longest_line
+        is_flat = np.abs(determinant) <= MIN_RELATIVE_AREA * max_determinant
 
         flat_rows = np.flatnonzero(is_flat)
         longest_edge = lengths.argmax(1)[flat_rows]
@@ -217,7 +232,8 @@ class _Shadows:
 
         # Scaled to unit normals that point inwards, a line's value at a point is the signed distance in metres.
         sign = np.where(determinant < 0, -1.0, 1.0)
-        lines *= (sign[:, None] / np.maximum(lengths, MIN_LENGTH))[..., None]
+        scale = sign[:, None] / np.maximum(lengths, MIN_LENGTH)
+        lines *= scale[..., None]
         boxes = _bounding_boxes(vertices)
         return cls(
             lines=np.ascontiguousarray(lines.transpose(2, 1, 0)),
@@ -250,7 +266,8 @@ class _Shadows:
         """Mark the cells that shadows touch or cover. The cells of all their bounding boxes are tested in one list."""
         ranges = self.cell_ranges(plane)
         counts = ranges.cell_counts
-        shadow = np.repeat(np.arange(len(counts)), counts)  # (cells of all shadows,)
+        # The arrays from here on have one entry for each cell of each bounding box.
+        shadow = np.repeat(np.arange(len(counts)), counts)
         first_in_list = np.cumsum(counts) - counts
         index_in_box = np.arange(len(shadow)) - first_in_list[shadow]
         row_in_box, column_in_box = np.divmod(index_in_box, ranges.sizes[shadow, 0])
@@ -292,7 +309,9 @@ class _Shadows:
         is_touched: Mask = np.ones(1, bool)
         is_covered = self.is_solid[shadow]
         for edge in range(3):
-            a, b, c = (coefficients[edge][shadow] for coefficients in self.lines)
+            a = self.lines[0, edge][shadow]
+            b = self.lines[1, edge][shadow]
+            c = self.lines[2, edge][shadow]
             distance_m = (a * u_m + c) + b * v_m
             # The corner that is farthest from the edge is this much farther than the centre.
             corner_m = (np.abs(a) + np.abs(b)) * (cell_m / 2)

@@ -1,28 +1,28 @@
-"""A board as records: flat rows of numbers in full, and the same as a pandas table, CSV and JSON."""
+"""A board as records, which are flat rows of unrounded numbers, and as a pandas table, CSV and JSON."""
 
 import json
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from vobench import spreadsheet
 from vobench.report.board_metric import METRICS
 from vobench.report.board_table import remarks
 from vobench.report.cell import Cell
 from vobench.report.leaderboard import Board
 from vobench.report.total import Total
 from vobench.runner.folder import NO_SEQUENCE, TRUTH_COPY
-from vobench.spreadsheet import cell
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Record = dict[str, Any]
 ALL_CASES = "all"
-# Fields of a total that its record has in another form, or that only the board of all records can tell.
+# Fields of a total that its record omits. Intervals and the ATE have other columns; claims and cases have none.
 NOT_IN_RECORD = ("claims", "ranks", "error_interval", "ate_percent", "cases")
 
 
 def as_json(board: Board) -> str:
-    """The whole board as one JSON object, with numbers in full; infinite values are null."""
+    """The whole board as one JSON object, with unrounded numbers. Infinite values are null."""
     environment = board.environment
     content = {
         "title": board.title,
@@ -38,18 +38,19 @@ def as_json(board: Board) -> str:
 
 
 def as_csv(board: Board) -> str:
-    """One row per cell and per total, with numbers in full."""
+    """The rows of `records` as the text of a CSV file, with unrounded numbers."""
     import pandas as pd
 
-    # Objects stay as they are: a column with a gap would otherwise turn whole numbers into floats.
-    table = pd.DataFrame([csv_record(record) for record in records(board)], dtype=object)
+    # With another dtype than object, pandas would turn the integers of a column with missing values into floats.
+    csv_records = [csv_record(record) for record in records(board)]
+    table = pd.DataFrame(csv_records, dtype=object)
     text: str = table.to_csv(index=False, lineterminator="\n")
     return text
 
 
 def csv_record(record: Record) -> Record:
-    """A record whose text no spreadsheet takes for a formula."""
-    return {name: cell(value) for name, value in record.items()}
+    """A record as cells of a CSV file, in which no text can be executed as a formula by a spreadsheet."""
+    return {name: spreadsheet.cell(value) for name, value in record.items()}
 
 
 def data_frame(board: Board) -> "pd.DataFrame":
@@ -60,22 +61,26 @@ def data_frame(board: Board) -> "pd.DataFrame":
 
 
 def records(board: Board) -> list[Record]:
-    """One flat row per cell, then one per total with the case `all`, then one per case without a sequence."""
+    """One flat row per cell, then one per total with the case `all`, then one per case without a sequence.
+
+    Each row ends with the facts about the environment in which the run was made.
+    """
     rows = cell_records(board)
     rows += [_total_record(total) for total in board.totals]
     for group in board.unmade:
         for case in group.cases:
             rows.append({"case": case, "status": NO_SEQUENCE, "reason": group.cause})
-    origin = board.environment.facts() if board.environment else {}
-    return [{**row, **origin} for row in rows]
+    environment_facts = board.environment.facts() if board.environment else {}
+    return [{**row, **environment_facts} for row in rows]
 
 
 def cell_records(board: Board) -> list[Record]:
-    """One flat row per cell: of each metric the median, minimum and maximum."""
+    """One flat row per cell. It has the median, minimum and maximum of each metric."""
     return [_cell_record(cell) for cell in board.cells]
 
 
 def _cell_record(cell: Cell) -> Record:
+    """The row of a cell, with statistics of its trials and of the frames of all trials."""
     frames = cell.answered
     return {
         "case": cell.case,

@@ -25,15 +25,17 @@ class Thumbnails:
         key = case, frame, width_px
         if key not in self._uris and self._bytes < MOST_BYTES:
             try:
-                encoded = _jpeg(self._sequence(case).frame(frame).left, width_px)
+                sequence = self._sequence(case)
+                picture = sequence.frame(frame).left
+                jpeg = _jpeg(picture, width_px)
             except (VobenchError, OSError):
-                return None
-            self._bytes += len(encoded)
-            self._uris[key] = f"data:image/jpeg;base64,{base64.b64encode(encoded).decode()}"
+                return None  # a page without a picture is better than no page
+            self._bytes += len(jpeg)
+            self._uris[key] = _data_uri(jpeg)
         return self._uris.get(key)
 
     def _sequence(self, case: str) -> Any:
-        """The sequence of a case; one is open at a time."""
+        """The sequence of a case. The last one stays open for other frames of its case."""
         from vobench.sequence import Sequence
 
         if case != self._open_case:
@@ -42,8 +44,14 @@ class Thumbnails:
         return self._open_sequence
 
 
+def _data_uri(jpeg: bytes) -> str:
+    """A JPEG file as a URI that a page can contain."""
+    text = base64.b64encode(jpeg).decode()
+    return f"data:image/jpeg;base64,{text}"
+
+
 def _jpeg(picture: Any, width_px: int) -> bytes:
-    """A picture (H, W) or (H, W, 3) in RGB, scaled to a width."""
+    """A picture (H, W) or (H, W, 3) in RGB as a JPEG file, scaled to a width."""
     import cv2
 
     height, width = picture.shape[:2]
@@ -52,5 +60,5 @@ def _jpeg(picture: Any, width_px: int) -> bytes:
     if scaled.ndim == 3:
         scaled = scaled[..., ::-1]  # OpenCV encodes blue, green, red
     _, encoded = cv2.imencode(".jpg", scaled, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    jpeg: bytes = encoded.tobytes()
-    return jpeg
+    content: bytes = encoded.tobytes()
+    return content

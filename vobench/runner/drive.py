@@ -41,9 +41,13 @@ VOLTAGE_COLUMNS = ("left_V", "right_V")
 class TrajectoryDrive:
     """The drive along one trajectory of a suite.
 
-    `body` is the true motion at the stamps of the N frames. `refusals` are the reasons why `vobench run` would refuse
-    cases on this trajectory, for example because a camera leaves the room. `case` is the first of these cases, and
-    `place` the scene of all of them; None if they are in several.
+    `name` is the name of the motion.
+    `case` is the first of the cases with this motion.
+    `motion` is the motion of the body for the whole drive.
+    `body` is the true motion at the stamps of the N frames.
+    `refusals` are the reasons why `vobench run` would refuse cases with this motion, for example because a camera
+    leaves the room.
+    `place` is the scene of all of these cases, or None if they are in several scenes.
     """
 
     name: str
@@ -57,7 +61,9 @@ class TrajectoryDrive:
     def kind(self) -> str:
         """The kind of trajectory and, for a wheeled body, its mover: for example "waypoints, pioneer"."""
         spec = self.case.trajectory
-        return f"{spec.kind}, {spec.mover}" if isinstance(spec, Wheeled) else spec.kind
+        if isinstance(spec, Wheeled):
+            return f"{spec.kind}, {spec.mover}"
+        return spec.kind
 
     @property
     def frames(self) -> slice:
@@ -79,8 +85,9 @@ class TrajectoryDrive:
         rims = self.motion.rims
         if rims is None:
             return None
-        at_frames = np.searchsorted(rims.t_ns, self.motion.t_ns)
-        return rims.rim_rad[at_frames]
+        # Every stamp of a frame is also a stamp of the rims.
+        rows_of_frames = np.searchsorted(rims.t_ns, self.motion.t_ns)
+        return rims.rim_rad[rows_of_frames]
 
     @property
     def references(self) -> Array | None:
@@ -108,15 +115,18 @@ class TrajectoryDrive:
         t_ns = self.motion.t_ns
         voltages_V = self.voltages_V
         reached_s = self.reached_s
+        speeds_mps = np.linalg.norm(self.body.velocity_mps, axis=1)
+        turns_radps = np.linalg.norm(self.body.angular_velocity_radps, axis=1)
+        max_turn_per_frame_rad = _step_angles_rad(self.body).max()
         return {
             "trajectory": self.name,
             "kind": self.kind,
             "frames": len(t_ns),
             "duration_s": float(t_ns[-1] - t_ns[0]) / NS_PER_S,
             "path_m": float(_step_lengths_m(self.body).sum()),
-            "max_speed_mps": float(np.linalg.norm(self.body.velocity_mps, axis=1).max()),
-            "max_turn_degps": float(np.rad2deg(np.linalg.norm(self.body.angular_velocity_radps, axis=1).max())),
-            "max_turn_per_frame_deg": float(np.rad2deg(_step_angles_rad(self.body).max())),
+            "max_speed_mps": float(speeds_mps.max()),
+            "max_turn_degps": float(np.rad2deg(turns_radps.max())),
+            "max_turn_per_frame_deg": float(np.rad2deg(max_turn_per_frame_rad)),
             "wheel_error_m": wheel_error_m(self.case, self.motion),
             "peak_V": None if voltages_V is None else float(np.abs(voltages_V).max()),
             "reached_s": None if reached_s is None else reached_s.tolist(),
@@ -124,16 +134,17 @@ class TrajectoryDrive:
         }
 
     def outlines_m(self) -> Array:
-        """The outlines of the place as segments (S, 2, 2) in the plane; none if the drive is in several places.
+        """The outlines of the place as segments (S, 2, 2) in the plane.
 
-        A place that cannot be built has none. `refusals` says why.
+        There are none if the drive is in several places, or if the place cannot be built. `refusals` has the reason.
         """
+        no_outlines_m = np.zeros((0, 2, 2))
         if self.place is None:
-            return np.zeros((0, 2, 2))
+            return no_outlines_m
         try:
             return floor_outlines_m(self.place)
         except VobenchError:
-            return np.zeros((0, 2, 2))
+            return no_outlines_m
 
     def trajectory(self) -> Trajectory:
         """The true path of the body, with one pose per frame."""
@@ -161,16 +172,17 @@ class TrajectoryDrive:
         ]
 
         heading = ["t_ns"]
-        known = []
+        known_values = []
         for names, values in columns:
             if values is not None:
                 heading += names
-                known.append(values)
+                known_values.append(values)
 
         lines = [",".join(heading)]
-        rows = np.concatenate(known, -1).tolist()
+        rows = np.concatenate(known_values, -1).tolist()
         for t_ns, row in zip(self.motion.t_ns.tolist(), rows, strict=True):
-            lines.append(",".join([str(t_ns), *map(repr, row)]))
+            cells = [str(t_ns), *map(repr, row)]  # repr has all digits of a number
+            lines.append(",".join(cells))
         return "\n".join(lines) + "\n"
 
 
@@ -183,8 +195,8 @@ class SuiteDrive:
     @property
     def refusals(self) -> tuple[str, ...]:
         """The refusals of all drives, without duplicates."""
-        sentences = [sentence for drive in self.drives for sentence in drive.refusals]
-        return tuple(dict.fromkeys(sentences))
+        all_refusals = [refusal for drive in self.drives for refusal in drive.refusals]
+        return tuple(dict.fromkeys(all_refusals))
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values: the summary of each drive."""
@@ -206,14 +218,17 @@ def chosen_trajectories(plan: Plan, *, trajectory: str | None = None) -> tuple[s
         raise InputError(f"suite '{plan.suite.name}' has no trajectory to drive, only recordings")
     if trajectory is None:
         return names
-    chosen = tuple(name for name in names if _is_of(name, trajectory))
+    chosen = tuple(name for name in names if _is_motion_of(name, trajectory))
     if not chosen:
-        require_known("trajectory", trajectory, names)
+        require_known("trajectory", trajectory, names)  # raises, because no motion has this name
     return chosen
 
 
-def _is_of(name: str, trajectory: str) -> bool:
-    """Whether a motion is of a trajectory of the suite, of one of its seeds, or has this name."""
+def _is_motion_of(name: str, trajectory: str) -> bool:
+    """Whether a motion belongs to a trajectory of the suite, or has this name.
+
+    The motions of trajectory t are named `t`, with a seed `t.SEED`, and in a scene `t in SCENE`.
+    """
     return name == trajectory or name.startswith((f"{trajectory}.", f"{trajectory} in "))
 
 
@@ -233,15 +248,23 @@ def drive_trajectory(plan: Plan, name: str) -> TrajectoryDrive:
     """Drive the cases of a plan that have one motion. Raises SuiteError if the body cannot follow it."""
     cases = [case for case in plan.simulated if motion_name(case) == name]
     mistakes = plan.mistakes()
-    with mistakes.at(*place_in_suite(cases[0], "trajectory")):
-        motion = body_motion(cases[0])
+    first_case = cases[0]
+    with mistakes.at(*place_in_suite(first_case, "trajectory")):
+        motion = body_motion(first_case)
     mistakes.require_none()
 
+    # From here on, mistakes do not prevent the drive. They are reported as refusals.
     check_cases(cases, motion, mistakes)
-    refusals = dict.fromkeys(str(mistake) for mistake in mistakes.recorded)
-    scenes = {case.scene.place_name: case.scene for case in cases}
-    place = cases[0].scene if len(scenes) == 1 else None
-    return TrajectoryDrive(name, cases[0], motion, motion.at_frames(), tuple(refusals), place)
+    refusals = dict.fromkeys(str(mistake) for mistake in mistakes.recorded)  # without duplicates
+    place_names = {case.scene.place_name for case in cases}
+    return TrajectoryDrive(
+        name=name,
+        case=first_case,
+        motion=motion,
+        body=motion.at_frames(),
+        refusals=tuple(refusals),
+        place=first_case.scene if len(place_names) == 1 else None,
+    )
 
 
 def _step_lengths_m(body: Kinematics) -> Array:

@@ -15,6 +15,7 @@ from vobench.suite.plan import Plan
 from vobench.suite.source import FILE_KEYS, RecordedCase
 from vobench.suite.yaml_file import plain
 
+# The libraries whose versions are recorded with an imported sequence.
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "mcap", "rosbags")
 
 
@@ -24,24 +25,33 @@ def read_all(plan: Plan) -> dict[str, Recording]:
     Raises SuiteError, with the places in the suite, if recordings cannot be read or have no ground truth.
     """
     recordings = dict[str, Recording]()
-    wrong = plan.mistakes()
+    mistakes = plan.mistakes()
     for case in plan.recorded:
         stop.check()
-        with wrong.at("source", case.entry):
-            recordings[case.name] = recording = read_case(case)
-            if cause := _why_not_scored(recording):
-                raise SuiteError(f"{cause}, so nothing could be scored: {case.source.path}")
-    wrong.require_none()
+        with mistakes.at("source", case.entry):
+            recording = read_case(case)
+            recordings[case.name] = recording
+            obstacle = _scoring_obstacle(recording)
+            if obstacle:
+                raise SuiteError(f"{obstacle}, so nothing could be scored: {case.source.path}")
+    mistakes.require_none()
     return recordings
 
 
-def _why_not_scored(recording: Recording) -> str:
+def _scoring_obstacle(recording: Recording) -> str:
     """The reason why a recording cannot be scored, with the note on its truth; empty if it can be scored."""
     if recording.truth is None:
-        notes = [note.rstrip(".") for note in recording.notes if "truth" in note and note != NO_TRUTH]
-        return f"no ground truth ({notes[-1]})" if notes else "no ground truth"
-    known = int(is_known(recording.truth.t_ns, recording.t_ns).sum())
-    return "" if known > 1 else f"the ground truth covers {known} of {recording.frame_count} pictures in time"
+        truth_notes = [note for note in recording.notes if "truth" in note and note != NO_TRUTH]
+        if not truth_notes:
+            return "no ground truth"
+        last_note = truth_notes[-1].rstrip(".")
+        return f"no ground truth ({last_note})"
+
+    # At least two frames need a true pose, because a single pose has no motion.
+    known_count = int(is_known(recording.truth.t_ns, recording.t_ns).sum())
+    if known_count > 1:
+        return ""
+    return f"the ground truth covers {known_count} of {recording.frame_count} pictures in time"
 
 
 def read_case(case: RecordedCase) -> Recording:
@@ -80,13 +90,14 @@ def import_dataset(path: Path, out: Path, *, form: str | None, options: ReadOpti
     require_free(out)
     recording = read(path, form=form, options=options)
     parent = out.resolve().parent
-    sweep(parent)
+    sweep(parent)  # remove what interrupted imports have left
     with unfinished(parent) as folder:
         import_recording(recording, folder)
         if out.is_dir():
-            out.rmdir()
+            out.rmdir()  # `out` may be an empty folder
         folder.rename(out)
-    return ImportedSequence(recording.form, len(Sequence.open(out)), tuple(recording.notes))
+    frame_count = len(Sequence.open(out))
+    return ImportedSequence(recording.form, frame_count, tuple(recording.notes))
 
 
 def import_recording(recording: Recording, folder: Path) -> None:
@@ -97,7 +108,10 @@ def import_recording(recording: Recording, folder: Path) -> None:
 
 
 def content(case: RecordedCase, recording: Recording) -> dict[str, Any]:
-    """The identity of a recording: the size and modification time of its files, because hashing them would be slow."""
+    """The identity of a recording, from which the key of its sequence in the store is computed.
+
+    Files are identified by their size and modification time, because hashing them would be slow.
+    """
     source = case.source
     listing = []
     for file in (source.path, source.calibration, source.imu):
@@ -126,6 +140,6 @@ def _listing(path: Path) -> list[str]:
         files = sorted(file for file in path.rglob("*") if file.is_file())
     lines = []
     for file in files:
-        facts = file.stat()
-        lines.append(f"{file.relative_to(path)} {facts.st_size} {facts.st_mtime_ns}")
+        status = file.stat()
+        lines.append(f"{file.relative_to(path)} {status.st_size} {status.st_mtime_ns}")
     return lines

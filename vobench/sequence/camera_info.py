@@ -20,10 +20,11 @@ from vobench.sequence.message import header_message
 from vobench.sequence.message_type import new_message
 from vobench.sequence.topic import LEFT, LEFT_INFO, RIGHT
 
-# The names of camera models. ROS defines the first two, vobench the others.
+# The names of distortion models in a CameraInfo. ROS defines the first two, vobench the others.
 PLUMB_BOB = "plumb_bob"
 EQUIDISTANT = "equidistant"
 DOUBLE_SPHERE = "double_sphere"
+# The models whose parameters are focal lengths, a principal point and coefficients.
 FOCAL_MODELS: dict[str, type[BrownConrady] | type[KannalaBrandt] | type[DoubleSphere]] = {
     PLUMB_BOB: BrownConrady,
     EQUIDISTANT: KannalaBrandt,
@@ -62,15 +63,18 @@ def camera_info_message(
     R: Array | None = None,
     P: Array | None = None,
 ) -> Any:
-    """A sensor_msgs/CameraInfo. R (3, 3) and P (3, 4) rectify a stereo pair; a single camera has none."""
+    """A sensor_msgs/CameraInfo. `R` (3, 3) and `P` (3, 4) rectify a stereo pair.
+
+    Without them, R is the identity and P projects with the matrix of the camera, as ROS defines for a single camera.
+    """
     if R is None:
         R = np.eye(3)
     if P is None:
         P = projection(camera.K, 0.0)
-    coefficients = np.zeros(5)
+    coefficients = np.zeros(5)  # those of plumb_bob, which stands for a pinhole camera
     if not isinstance(camera, Pinhole):
         coefficients = np.array([getattr(camera, name) for name in camera.coefficients])
-    full_picture = new_message(
+    full_picture = new_message(  # in ROS, a region of size 0 is the full picture
         "sensor_msgs/msg/RegionOfInterest",
         x_offset=0,
         y_offset=0,
@@ -115,11 +119,12 @@ def parse_camera(message: Any) -> Camera:
     if name == EQUIRECTANGULAR:
         return Equirectangular(*size_px)
     fx_px, _, cx_px, _, fy_px, cy_px = message.k[:6].tolist()
-    if name == PLUMB_BOB and not any(coefficients):
+    has_no_distortion = not any(coefficients)
+    if name == PLUMB_BOB and has_no_distortion:
         return Pinhole(*size_px, fx_px, fy_px, cx_px, cy_px)
     model = FOCAL_MODELS.get(name)
     if model is None or len(coefficients) != len(model.coefficients):
-        known = ", ".join(f"{key} ({len(kind.coefficients)})" for key, kind in FOCAL_MODELS.items())
+        known = ", ".join(f"{key} ({len(known_model.coefficients)})" for key, known_model in FOCAL_MODELS.items())
         raise SequenceError(
             f"camera {message.header.frame_id} has the distortion model '{name}' with {len(coefficients)} "
             f"coefficients. Known: {known}, {EQUIRECTANGULAR} (0)"

@@ -1,9 +1,11 @@
 """Runs the maker or the generator of a scene, which are Python files.
 
 `make(seed)` of a maker returns things, materials and, optionally, lights; `generate(seed, lighting)` of a generator
-returns a GeneratedPlace. Both can be untrusted code. They therefore run in the same sandbox as estimators, where they
-can read the files in their folder but no other files of the user, and return the scene as data. Those that are
-included in vobench are trusted, and run in this process.
+returns a GeneratedPlace.
+
+Both can be untrusted code. They therefore run in the same sandbox as estimators. There they can read the files in their
+folder but no other files of the user, and they return the scene as data. The makers and generators that are included in
+vobench are trusted, and run in this process.
 """
 
 import json
@@ -31,7 +33,7 @@ LIMITS = Limits(trial_s=600.0, threads=os.cpu_count() or 1)  # a large margin: b
 # -P keeps the current folder out of the module search path, so that no file there can replace a module of vobench.
 WORKER = (sys.executable, "-P", "-m", "vobench.suite.maker_worker")
 MAX_SCENE_BYTES = 2 << 30  # so that a hostile maker cannot exhaust the memory
-MAX_ERROR_BYTES = 1 << 16
+MAX_ERROR_BYTES = 1 << 16  # the largest size of the text of an error
 NO_SCENE = "returned no scene"
 
 
@@ -53,7 +55,8 @@ def generate_place(generator: Path, *, seed: int, lighting: str, scene_name: str
 
 def _run(file: Path, function: str, arguments: Sequence[Any], scene_name: str) -> GeneratedPlace:
     """The scene that a function of a file returns; it runs in this process if the file is included in vobench."""
-    if file.resolve().is_relative_to(builtin_root().resolve()):
+    is_builtin = file.resolve().is_relative_to(builtin_root().resolve())
+    if is_builtin:
         return _run_trusted(file, function, arguments)
     trust.admit(file, sources(file), scene_name, is_contained=_is_contained())
     return _run_sandboxed(file, function, arguments)
@@ -69,13 +72,15 @@ def _run_trusted(file: Path, function: str, arguments: Sequence[Any]) -> Generat
 
 def _is_contained() -> bool:
     """Whether the sandbox on this machine hides the user's files."""
-    return isolation.FILES not in sandbox_here().sees
+    accessible = sandbox_here().sees
+    return isolation.FILES not in accessible
 
 
 def _run_sandboxed(file: Path, function: str, arguments: Sequence[Any]) -> GeneratedPlace:
     """The scene that a function returns in a worker process in the sandbox."""
     try:
-        return decode(_worker_output(file, function, arguments))
+        encoded_scene = _worker_output(file, function, arguments)
+        return decode(encoded_scene)
     except EstimatorFailure as failure:
         raise SuiteError(f"{file}: {_failure_reason(failure)}") from None
     except SuiteError as error:

@@ -29,7 +29,8 @@ def read_scene(path: Path) -> SceneFile:
 def read_place(scene: str, *, seed: int | None = None, lighting: str = DRAWN) -> SceneFile:
     """A scene by its name or path: as its file describes it or, with a seed, as its generator creates it.
 
-    Raises UnknownNameError if there is no such scene, and SuiteError if its file is wrong, or if it cannot be had so.
+    Raises UnknownNameError if there is no such scene. Raises SuiteError if its file is wrong, if there is a
+    seed and the scene has no generator, or if there is no seed and the scene has only a generator.
     """
     entry = catalog.find("scene", scene)
     spec = read_scene(entry.path)
@@ -63,7 +64,10 @@ def read_scene_with_mistakes(
 
 
 def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> SceneFile:
-    """The scene with absolute paths of its files. Relative paths start at `folder`."""
+    """The scene with absolute paths of its files. Relative paths start at `folder`.
+
+    A file that does not exist is added to the mistakes, with the keys under which the scene names it.
+    """
 
     def absolute(name: str, *keys: int | str) -> str:
         path = folder / name
@@ -72,24 +76,25 @@ def _with_absolute_paths(spec: SceneFile, folder: Path, mistakes: Mistakes) -> S
                 raise SuiteError(f"there is no such file beside the scene: {path}")
         return str(path.resolve())
 
+    def absolute_if_any(name: str | None, *keys: int | str) -> str | None:
+        return absolute(name, *keys) if name else name
+
     meshes = list[ModelSpec]()
     for index, mesh in enumerate(spec.meshes):
         meshes.append(replace(mesh, file=absolute(mesh.file, "meshes", index, "file")))
     movers = list[MoverSpec]()
     for index, mover in enumerate(spec.movers):
-        file = mover.file and absolute(mover.file, "movers", index, "file")
-        movers.append(replace(mover, file=file))
-    maker = spec.maker and absolute(spec.maker, "maker")
-    generator = spec.generator and absolute(spec.generator, "generator")
+        movers.append(replace(mover, file=absolute_if_any(mover.file, "movers", index, "file")))
+    maker = absolute_if_any(spec.maker, "maker")
+    generator = absolute_if_any(spec.generator, "generator")
     return replace(spec, meshes=tuple(meshes), movers=tuple(movers), maker=maker, generator=generator)
 
 
 def scene_content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
     """The scene as plain JSON values. Files are identified by their name and content, not by their path.
 
-    Makers and generators are identified by all Python files of their folders.
-
-    A scene that is described without a generator does not depend on it.
+    Makers and generators are identified by all Python files of their folders. The generator is omitted if the scene was
+    not created by it.
     """
     scene: dict[str, Any] = yaml_file.plain(spec, exclude=exclude)
     if spec.generated is None:
@@ -106,4 +111,6 @@ def scene_content(spec: SceneFile, *, exclude: Any = None) -> dict[str, Any]:
 
 
 def _file_identity(path: Path) -> str:
-    return f"{path.name} {hashlib.sha256(path.read_bytes()).hexdigest()}"
+    """The name of a file, and the SHA-256 hash of its content."""
+    content_hash = hashlib.sha256(path.read_bytes()).hexdigest()
+    return f"{path.name} {content_hash}"

@@ -11,7 +11,7 @@ from vobench.setting import Name, OneOf, Positive, ShortForm, settings
 
 FILE_KEYS = ("calibration", "imu", "truth")
 TOPICS = ("left", "right", "left_info", "right_info", "truth", "imu")
-MOST_MATCHES = 10_000
+MOST_MATCHES = 10_000  # the largest number of files and folders that a pattern may match
 GLOB = re.compile(r"[*?\[]")
 
 
@@ -90,7 +90,9 @@ def case_name(path: Path) -> str:
     """
     recording = path.parent if path.name == "mav0" else path
     stem = recording.name if recording.is_dir() else recording.stem
-    return re.sub(r"[^a-z0-9_.]+", "_", stem.lower()).strip("_.") or "recording"
+    valid_characters = re.sub(r"[^a-z0-9_.]+", "_", stem.lower())
+    name = valid_characters.strip("_.")
+    return name or "recording"
 
 
 def _recording_paths(pattern: str, folder: Path) -> list[Path]:
@@ -116,13 +118,15 @@ def _matches(pattern: str, folder: Path) -> list[Path]:
     base = Path(*parts[:first_glob])
     pattern_parts = parts[first_glob:]
     try:
-        matches = [*_visible_matches(base, pattern_parts, pattern)]
+        matches = list(_visible_matches(base, pattern_parts, pattern))
     except RecursionError:
         raise SuiteError(f"'{pattern}' cannot be searched for (folders are nested too deep)") from None
     except (OSError, ValueError) as error:
         raise SuiteError(f"'{pattern}' cannot be searched for ({error})") from None
-    only_folders = pattern.endswith("/")
-    return sorted(path for path in matches if path.is_dir() or not only_folders)
+    matches_only_folders = pattern.endswith("/")
+    if matches_only_folders:
+        matches = [path for path in matches if path.is_dir()]
+    return sorted(matches)
 
 
 def _visible_matches(base: Path, pattern_parts: tuple[str, ...], pattern: str) -> Iterator[Path]:
@@ -139,8 +143,10 @@ def _visible_matches(base: Path, pattern_parts: tuple[str, ...], pattern: str) -
 
 
 def _is_hidden(parts: tuple[str, ...]) -> bool:
+    """Whether a part of a path or pattern begins with a dot."""
     return any(part.startswith(".") for part in parts)
 
 
 def _absolute(written: str, folder: Path) -> Path:
+    """The absolute form of a path as written in a suite. `folder` is ignored if the written path is absolute."""
     return folder.resolve() / Path(written).expanduser()

@@ -24,8 +24,8 @@ ENGINES = ("raster", "path", "pyrender")
 MOST_SAMPLES = 65536
 LARGEST_BASE_SEED = 2_000_000_000
 
-NEEDS_NO_SCENES = {"scenarios", "source"}
-NEEDS_SCENES = {"rigs", "trajectories"}
+KEYS_INSTEAD_OF_SCENES = {"scenarios", "source"}  # a suite with one of these keys can omit `scenes`
+KEYS_THAT_NEED_SCENES = {"rigs", "trajectories"}
 
 
 @settings()
@@ -74,6 +74,7 @@ class EstimatorSettings:
 
 
 def _as_tuple(value: Any) -> Any:
+    """A single severity as a tuple."""
     return (value,) if isinstance(value, int) else value
 
 
@@ -99,11 +100,13 @@ Calibrations = Annotated[
 
 
 def _as_named(value: Any) -> Any:
+    """The name of an estimator as settings that have only this name."""
     return {"name": value} if isinstance(value, str) else value
 
 
 ChannelName = Annotated[str, OneOf("ground-truth channel", CHANNELS)]
 NamedEstimator = Annotated[EstimatorSettings, ShortForm(_as_named, {"type": "string"})]
+# The first frame, and the frame after the last one.
 Window = tuple[Annotated[int, Ge(0)], Annotated[int, Ge(2)]]
 Mode = Literal["step", "real_time"]
 
@@ -145,7 +148,8 @@ class Suite:
     estimators: Annotated[tuple[NamedEstimator, ...], MinLen(1)]
 
     def __post_init__(self) -> None:
-        given_keys = {each.name for each in fields(self) if getattr(self, each.name)}
+        # None and empty values count as omitted keys.
+        given_keys = {setting.name for setting in fields(self) if getattr(self, setting.name)}
         missing = missing_axis(given_keys)
         if missing:
             raise SettingError(missing)
@@ -159,13 +163,15 @@ class Suite:
     def _check_spread(self, spread: Spread) -> None:
         """Raise SettingError if an axis of the design has no variants, or an axis of scenarios has several."""
         for axis, key in {"scene": "scenes", "trajectory": "trajectories"}.items():
-            variants = getattr(self, key)
-            if not variants and (self.scenarios or axis in spread.over):
+            is_needed = bool(self.scenarios) or axis in spread.over
+            has_variants = bool(getattr(self, key))
+            if is_needed and not has_variants:
                 raise SettingError(f"requires {key}, and the suite has none", "spread")
         if not self.scenarios:
             return
         for key in ("lightings", "rigs", "cameras"):
-            if len(getattr(self, key) or ()) > 1:
+            variants = getattr(self, key) or ()
+            if len(variants) > 1:
                 raise SettingError(f"scenarios are spread with one variant of {key}, but there are several", key)
 
 
@@ -177,6 +183,8 @@ def missing_axis(given_keys: Collection[str]) -> str | None:
     keys = set(given_keys)
     if "scenes" in keys:
         return None
-    if keys & NEEDS_NO_SCENES and not keys & NEEDS_SCENES:
+    has_other_cases = not keys.isdisjoint(KEYS_INSTEAD_OF_SCENES)
+    needs_scenes = not keys.isdisjoint(KEYS_THAT_NEED_SCENES)
+    if has_other_cases and not needs_scenes:
         return None
     return "scenes: this key is missing; a suite needs scenes, or only scenarios or a source"

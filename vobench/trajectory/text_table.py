@@ -71,10 +71,11 @@ def read_table(
     values = _read_fast(texts, len(columns), separator)
     if values is None:
         values = _read_checked(lines, name=name, columns=columns, separator=separator, row_noun=row)
+    first_fields = [text.split(separator, 1)[0] for text in texts]
     return TextTable(
         file_name=name,
         line_numbers=[line.number for line in lines],
-        first_fields=[text.split(separator, 1)[0].strip() for text in texts],
+        first_fields=[field.strip() for field in first_fields],
         values=values,
     )
 
@@ -105,11 +106,11 @@ def _read_checked(
     for row, line in enumerate(lines):
         place = f"{name}:{line.number}"
         fields = [field.strip() for field in line.text.split(separator)]
-        is_short = len(fields) < len(columns)
-        is_long = len(fields) > len(columns) and not separator
-        if is_short or is_long:
-            is_last = row > 0 and row == len(lines) - 1
-            hint = " (the last row: was the file cut off?)" if is_last else ""
+        has_too_few = len(fields) < len(columns)
+        has_too_many = len(fields) > len(columns) and not separator
+        if has_too_few or has_too_many:
+            is_last_of_several = row > 0 and row == len(lines) - 1
+            hint = " (the last row: was the file cut off?)" if is_last_of_several else ""
             raise TrajectoryError(
                 f"{place}: {row_noun} has {len(columns)} columns ({' '.join(columns)}), "
                 f"this line has {len(fields)}{hint}"
