@@ -1,5 +1,6 @@
 """What a trajectory, a replayed file and an IMU may say, and the one sentence for what they may not."""
 
+import re
 from dataclasses import fields
 from pathlib import Path
 from typing import get_args
@@ -277,11 +278,12 @@ DOCS = Path(__file__).parents[2] / "docs"
 @pytest.mark.parametrize("spec", [*KINDS.values(), MotorConstants], ids=lambda spec: spec.__name__)
 def test_every_key_is_in_the_docs_with_its_default(spec):
     page = (DOCS / "trajectories.md").read_text(encoding="utf-8")
+    entries = [line for line in page.splitlines() if line.startswith(("| ", "- "))]  # of tables and lists
     for field in fields(spec):
         assert f"`{field.name}`" in page, field.name
         if isinstance(field.default, float) and field.default:
-            rows = [row for row in page.splitlines() if row.startswith("|") and f"`{field.name}`" in row.split("|")[1]]
-            assert any(f"{field.default:g}" in row for row in rows), (field.name, rows)
+            of_key = [entry for entry in entries if f"`{field.name}`" in re.split(r" \||: ", entry[2:])[0]]
+            assert any(f"{field.default:g}" in entry for entry in of_key), (field.name, of_key)
 
 
 def test_the_suite_of_the_docs_has_every_kind_but_replay(tmp_path, monkeypatch):
