@@ -56,6 +56,44 @@ def test_a_guess_is_taken_off_once_it_is_large_and_certain(guess_px, sigma_px, i
     assert offset.px == pytest.approx(guess_px if is_taken else 0.0)
 
 
+def learnt_with_a_wrong_object(true_px, error_px, frames):
+    """The estimate after views in which the disparities in a sixteenth of the view have the same error throughout."""
+    rng, offset = np.random.default_rng(3), DisparityOffset()
+    for _ in range(frames):
+        uv, disparity_px, points = cloud(rng, 400, 4.0, 30.0)
+        on_object = (uv[:, 0] < 180) & (uv[:, 1] < 240)
+        near_px = PAIR.focal_baseline / rng.uniform(1.0, 1.5, 400)
+        disparity_px = np.where(on_object, near_px, disparity_px)
+        points = PAIR.points(uv, disparity_px)
+        now = PAIR.left.project(se3.apply(STEP, points)) + rng.normal(0, 0.1, uv.shape)
+        measured_px = disparity_px + true_px + error_px * on_object + rng.normal(0, 0.1, 400)
+        offset = offset.after(PAIR.left.rays(uv), PAIR.left.rays(now), measured_px, STEP, PAIR)
+    return offset
+
+
+def test_the_error_of_one_object_that_stays_in_view_is_no_offset():
+    """It is in every view, so that it would seem certain if successive views counted as independent."""
+    offset = learnt_with_a_wrong_object(0.0, 2.5, 60)
+    sigma_if_independent_px = offset.information**-0.5
+    assert abs(offset.estimate_px) > max(3 * sigma_if_independent_px, 0.15)
+    assert offset.sigma_px > 2 * sigma_if_independent_px
+    assert offset.px == 0.0
+
+
+def test_an_offset_of_the_whole_view_is_applied_though_near_objects_stay_in_view():
+    offset = learnt_with_a_wrong_object(0.5, 0.0, 60)
+    assert offset.px == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("frames", [5, 40])
+def test_the_sum_without_a_cell_has_less_information_than_with_it(frames):
+    offset = learnt(0.0, frames)
+    prior = DisparityOffset().information
+    without = np.array(offset.information_without)
+    assert (without < offset.information).all()
+    assert (without > prior).all()
+
+
 def test_points_at_one_distance_tell_nothing():
     """Their disparities differ by noise alone, which must not be taken for depth."""
     offset = learnt(0.5, 30, flat=True)

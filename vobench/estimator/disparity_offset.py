@@ -8,6 +8,7 @@ disparity  in px; the inverse depth is disparity / (K[0, 0] baseline)
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vobench.estimator.pose import (
     MIN_POINTS,
@@ -31,6 +32,10 @@ NOISE_RATIO = 2.0
 LEAST_NOISE_PX = 0.1
 MOST_BIAS_PX = 0.05
 CORRELATED = 8.0  # the number of neighbouring tracks that count as one, because their errors are correlated
+# Cells of the view. All tracks of one may have the same error in every view, such as those on the edge of one object.
+CELL_COLUMNS = 4
+CELL_ROWS = 2
+CELLS = CELL_COLUMNS * CELL_ROWS
 # Parameters of the fit.
 MOTION = slice(0, 6)
 OFFSET = 6
@@ -40,11 +45,14 @@ OFFSET = 6
 class DisparityOffset:
     """The estimated offset of all disparities of a pair, updated with each pair of views. Its prior is 0.
 
-    The fields are the sum of information (1/px²), and the sum of information times offset (1/px).
+    `information` is the sum of the information of all fits (1/px²), and `weighted` that of information times offset
+    (1/px). `information_without` and `weighted_without` (CELLS,) are the same sums without the tracks of one cell.
     """
 
     information: float = 1 / OFFSET_PRIOR_PX**2
     weighted: float = 0.0
+    information_without: tuple[float, ...] = (1 / OFFSET_PRIOR_PX**2,) * CELLS
+    weighted_without: tuple[float, ...] = (0.0,) * CELLS
 
     @property
     def estimate_px(self) -> float:
@@ -54,9 +62,21 @@ class DisparityOffset:
     @property
     def px(self) -> float:
         """The offset to subtract from every disparity: 0 until the estimate is large and certain enough."""
-        sigma_px = self.information**-0.5
-        threshold_px = max(APPLIED_SIGMAS * sigma_px, LEAST_APPLIED_PX)
+        threshold_px = max(APPLIED_SIGMAS * self.sigma_px, LEAST_APPLIED_PX)
         return self.estimate_px if abs(self.estimate_px) > threshold_px else 0.0
+
+    @property
+    def sigma_px(self) -> float:
+        """The standard deviation of the estimate in px: that of its information, or the jackknife's if it is larger.
+
+        The view hardly changes between successive fits, and errors of stereo at an object repeat with it. Estimates
+        without one cell of the view show them, as they differ: the jackknife with groups.
+        Source: Efron and Tibshirani (1993), chapter 11.
+        """
+        estimates_px = np.divide(self.weighted_without, self.information_without)  # (CELLS,)
+        jackknife_px = float(np.sqrt((CELLS - 1) * estimates_px.var()))
+        of_information_px: float = self.information**-0.5
+        return max(of_information_px, jackknife_px)
 
     def after(
         self, rays0: Array, rays1: Array, disparity_px: Array, T_now_last: Array, pair: StereoPair
@@ -71,10 +91,30 @@ class DisparityOffset:
         if known.sum() < MIN_POINTS:
             return self
         tracks = _Tracks(rays0[known], rays1[known], disparity_px[known], pair)
-        offset_px, information = tracks.fitted_offset(T_now_last, self.estimate_px)
-        if not np.isfinite(offset_px) or information <= 0:
+        fit = tracks.fitted_offset(T_now_last, self.estimate_px)
+        if fit is None:
             return self
-        return DisparityOffset(self.information + information, self.weighted + information * offset_px)
+        information_without = np.add(self.information_without, fit.information_without)
+        weighted_without = np.add(self.weighted_without, fit.information_without * fit.offset_without_px)
+        return DisparityOffset(
+            information=self.information + fit.information,
+            weighted=self.weighted + fit.information * fit.offset_px,
+            information_without=tuple(information_without.tolist()),
+            weighted_without=tuple(weighted_without.tolist()),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class _OffsetFit:
+    """The offset that fits the tracks of two views in px, and its information in 1/px².
+
+    The arrays (CELLS,) are the same without the tracks of one cell.
+    """
+
+    offset_px: float
+    information: float
+    offset_without_px: Array
+    information_without: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,11 +139,11 @@ class _Tracks:
     disparity_px: Array
     pair: StereoPair
 
-    def fitted_offset(self, T: Array, offset_px: float) -> tuple[float, float]:
-        """The offset that fits the tracks, and its information in 1/px² after the motion is eliminated.
+    def fitted_offset(self, T: Array, offset_px: float) -> _OffsetFit | None:
+        """The offset that fits the tracks, after the motion is eliminated.
 
         A point with ray x0 and disparity d moves to R x0 + t (d - o) / (f b). The offset o, t and R are fitted by
-        least squares with Cauchy weights. The information is 0 if the depths vary hardly more than their noise.
+        least squares with Cauchy weights. None if the depths vary hardly more than their noise.
         """
         for _ in range(FIT_STEPS):
             fit = self._linearized(T, offset_px)
@@ -115,10 +155,33 @@ class _Tracks:
 
         bias_px = self._bias_px(fit, information, T[:3, 3])
         if not abs(bias_px) < MOST_BIAS_PX:
-            return offset_px, 0.0
-        of_motion = np.linalg.solve(information[MOTION, MOTION], information[MOTION, OFFSET])
-        marginal = float(information[OFFSET, OFFSET] - information[OFFSET, MOTION] @ of_motion)
-        return offset_px - bias_px, marginal / (CORRELATED * fit.noise_px**2)
+            return None
+        unit = 1 / (CORRELATED * fit.noise_px**2)
+        marginal = unit * _marginal_information(information)
+        if not np.isfinite(offset_px) or marginal <= 0:
+            return None
+
+        # One step of Gauss-Newton without the tracks of each cell, from the fit to all tracks.
+        step_without_px = np.zeros(CELLS)
+        marginal_without = np.full(CELLS, marginal)
+        fit = self._linearized(T, offset_px)
+        cell = self._cell()
+        for k in np.unique(cell):
+            others = cell != k
+            information, gradient = normal_equations(fit.jacobian[others], fit.weight[others], fit.residual_px[others])
+            marginal_without[k] = max(unit * _marginal_information(information), 0.0)
+            step_without_px[k] = np.linalg.solve(information, gradient)[OFFSET]
+        return _OffsetFit(offset_px - bias_px, marginal, offset_px - bias_px + step_without_px, marginal_without)
+
+    def _cell(self) -> NDArray[np.intp]:
+        """The cell (N,) of the view that each track starts in."""
+        pixels = (self.rays0 @ self.pair.K.T)[:, :2]
+        size_px = 2 * self.pair.K[:2, 2]  # about, as the principal point is near the middle
+        column, row = np.floor(pixels / size_px * [CELL_COLUMNS, CELL_ROWS]).astype(np.intp).T
+        in_row = np.clip(column, 0, CELL_COLUMNS - 1)
+        first_of_row = CELL_COLUMNS * np.clip(row, 0, CELL_ROWS - 1)
+        cell: NDArray[np.intp] = first_of_row + in_row
+        return cell
 
     def _linearized(self, T: Array, offset_px: float) -> _Linearization:
         focal_px = np.diag(self.pair.K)[:2]  # (2,), horizontal and vertical
@@ -149,3 +212,9 @@ class _Tracks:
         pull_on_t = noise_rho**2 * weighted @ t_m
         pull = np.r_[pull_on_t, np.zeros(4)]
         return -float(np.linalg.solve(information, pull)[OFFSET])
+
+
+def _marginal_information(information: Array) -> float:
+    """The information of the offset after the motion is eliminated."""
+    of_motion = np.linalg.solve(information[MOTION, MOTION], information[MOTION, OFFSET])
+    return float(information[OFFSET, OFFSET] - information[OFFSET, MOTION] @ of_motion)
