@@ -94,6 +94,18 @@ def test_the_sum_without_a_cell_has_less_information_than_with_it(frames):
     assert (without > prior).all()
 
 
+def test_points_in_one_corner_of_the_view_apply_no_offset():
+    rng = np.random.default_rng(2)
+    offset = DisparityOffset()
+    for _ in range(30):
+        uv = rng.uniform([60, 60], [150, 150], (200, 2))
+        disparity_px = PAIR.focal_baseline / rng.uniform(4.0, 30.0, 200)
+        now = PAIR.left.project(se3.apply(STEP, PAIR.points(uv, disparity_px)))
+        offset = offset.after(PAIR.left.rays(uv), PAIR.left.rays(now), disparity_px + 0.5, STEP, PAIR)
+    assert offset.information > 1 / 0.3**2
+    assert offset.px == 0.0
+
+
 def test_points_at_one_distance_tell_nothing():
     """Their disparities differ by noise alone, which must not be taken for depth."""
     offset = learnt(0.5, 30, flat=True)

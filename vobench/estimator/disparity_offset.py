@@ -168,9 +168,13 @@ class _Tracks:
         cell = self._cell()
         for k in np.unique(cell):
             others = cell != k
+            if others.sum() < MIN_POINTS:
+                marginal_without[k] = 0.0
+                continue
             information, gradient = normal_equations(fit.jacobian[others], fit.weight[others], fit.residual_px[others])
             marginal_without[k] = max(unit * _marginal_information(information), 0.0)
-            step_without_px[k] = np.linalg.solve(information, gradient)[OFFSET]
+            step, *_ = np.linalg.lstsq(information, gradient)  # without a cell the depths may be equal
+            step_without_px[k] = step[OFFSET]
         return _OffsetFit(offset_px - bias_px, marginal, offset_px - bias_px + step_without_px, marginal_without)
 
     def _cell(self) -> NDArray[np.intp]:
