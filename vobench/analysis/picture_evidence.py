@@ -190,6 +190,7 @@ MIN_JUMP_STOPS = 0.3
 BLOCK_SHARE = 12  # blocks along the shorter side of an image
 DARKEST_DN = 4.0  # of blocks whose ratio is measured
 BRIGHTEST_DN = 235.0
+FEW_BLOCKS = 0.15  # the share of blocks that may change the other way
 
 
 def _exposure_jumps(part: RecordingPart, reference: Sequence[RecordingPart]) -> ExposureJumps | None:
@@ -213,13 +214,19 @@ def _exposure_jumps(part: RecordingPart, reference: Sequence[RecordingPart]) -> 
 
 
 def _brightness_steps(images: Sequence[Image]) -> Array:
-    """The brightness (F - 1,) of each image relative to the one before, in stops: the median over blocks."""
+    """The brightness (F - 1,) of each image relative to the one before, in stops: the median over blocks.
+
+    It is 0 unless nearly all blocks become brighter, or nearly all darker, since dirt darkens only some.
+    """
     means = [_block_means(image) for image in images]
     steps = []
     for before, after in pairwise(means):
         is_exposed = (np.minimum(before, after) > DARKEST_DN) & (np.maximum(before, after) < BRIGHTEST_DN)
         is_usable = is_exposed if is_exposed.any() else np.ones_like(is_exposed)
-        steps.append(float(np.median(np.log2((after[is_usable] + 1) / (before[is_usable] + 1)))))
+        stops = np.log2((after[is_usable] + 1) / (before[is_usable] + 1))
+        low, median, high = np.quantile(stops, (FEW_BLOCKS, 0.5, 1 - FEW_BLOCKS)).tolist()
+        has_one_sign = low * high > 0
+        steps.append(median if has_one_sign else 0.0)
     return np.array(steps)
 
 
@@ -260,6 +267,8 @@ LAG_S = 1.0  # after which a moving camera sees something else
 MIN_RELATIVE_MOTION = 0.5  # of the reference's median: pairs of frames with less motion are not compared
 MIN_CORRELATION = 0.2  # by which images 1 s apart are more alike than in the reference
 MIN_PATTERN = 0.15  # of the logarithm of grey values
+COVERED_SIGMAS = 2.0
+CLEAR = 0.85  # a transmission from which a lens counts as clean in what is told
 SMOOTHING_PX = 2.0
 MIN_CONTRAST_DN = 2.0
 
@@ -333,9 +342,11 @@ def _detail(image: Image) -> NDArray[np.float32]:
 
 def _dirt_maps(dirty: Sequence[Image], clean: Sequence[Image]) -> tuple[Array, Array, float]:
     """The transmission and the veil (H, W) of dirt, and the share of the image that it covers."""
-    pattern = np.mean([_detail(image) for image in dirty], 0) - np.mean([_detail(image) for image in clean], 0)
-    pattern = _smoothed(pattern)
-    is_covered = np.abs(pattern) > max(MIN_PATTERN, 3 * _spread(pattern))
+    pattern = _pattern(dirty, clean)
+    # Means of few images of a scene differ by chance too, as two halves of the reference show.
+    half = len(clean) // 2
+    by_chance = _spread(_pattern(clean[:half], clean[half:]))
+    is_covered = np.abs(pattern) > max(MIN_PATTERN, COVERED_SIGMAS * by_chance)
 
     dirty_mean_dn, dirty_contrast_dn = _moments(dirty)
     clean_mean_dn, clean_contrast_dn = _moments(clean)
@@ -343,8 +354,14 @@ def _dirt_maps(dirty: Sequence[Image], clean: Sequence[Image]) -> tuple[Array, A
     transmission = np.clip(dirty_contrast_dn / (scene_contrast * clean_contrast_dn), 0.0, 1.0)
     scene_level = np.median(dirty_mean_dn[~is_covered] / clean_mean_dn[~is_covered])
     veil_dn = dirty_mean_dn - transmission * scene_level * clean_mean_dn
-    share = float(is_covered.mean())
+    share = float((is_covered & (transmission < CLEAR)).mean())
     return np.where(is_covered, transmission, 1.0), np.where(is_covered, veil_dn, 0.0), share
+
+
+def _pattern(images: Sequence[Image], others: Sequence[Image]) -> Array:
+    """The smoothed difference (H, W) between the mean details of images and of others."""
+    difference = np.mean([_detail(image) for image in images], 0) - np.mean([_detail(image) for image in others], 0)
+    return _smoothed(difference)
 
 
 def _moments(images: Sequence[Image]) -> tuple[Array, Array]:
