@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from vobench.notebook.class_source import write_estimator
     from vobench.notebook.makers import trust_maker
     from vobench.notebook.pictures import render
-    from vobench.notebook.questions import causes, drive, explain, realism, shrink, twin
+    from vobench.notebook.questions import causes, drive, explain, explain_recording, realism, shrink, twin
     from vobench.notebook.runs import Check, Run, bundle, check, compare, read_board, read_run, run
     from vobench.notebook.sequences import read_sequence
     from vobench.notebook.simulation import Simulation, simulate
@@ -38,6 +38,7 @@ _HOMES = {
     "causes": "vobench.notebook.questions",
     "drive": "vobench.notebook.questions",
     "explain": "vobench.notebook.questions",
+    "explain_recording": "vobench.notebook.questions",
     "realism": "vobench.notebook.questions",
     "shrink": "vobench.notebook.questions",
     "twin": "vobench.notebook.questions",
@@ -75,6 +76,7 @@ __all__ = [
     "diagnose",
     "drive",
     "explain",
+    "explain_recording",
     "read_board",
     "read_run",
     "read_sequence",

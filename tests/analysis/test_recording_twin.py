@@ -94,12 +94,12 @@ def test_a_recording_that_cannot_be_repeated_is_a_sentence(recording, realism, c
     if "short" in change:
         truth = Trajectory(truth.t_ns[:5], truth.T_world_frame[:5])
     with pytest.raises(InputError, match=sentence):
-        recording_twin._recorded_path(replace(recording, truth=truth), realism)
+        recording_twin.recorded_path(replace(recording, truth=truth), realism.pair)
 
 
 def test_a_recording_without_a_pair_is_a_sentence(recording: Recording, realism: Realism) -> None:
     with pytest.raises(InputError, match="needs a stereo pair that can be rectified and matched"):
-        recording_twin._recorded_path(recording, replace(realism, pair=None))
+        recording_twin.recorded_path(recording, None)
 
 
 def test_what_is_asked_is_checked_before_the_recording_is_read(tmp_path: Path) -> None:
@@ -184,12 +184,12 @@ def test_two_estimators_are_no_order(known) -> None:
 
 
 def test_the_replay_has_the_rate_of_the_recording_and_half_as_many_knots(recording, realism) -> None:
-    settings = recording_twin._recorded_path(recording, realism).trajectory_settings()
+    settings = recording_twin.recorded_path(recording, realism.pair).trajectory_settings()
     assert settings == {"kind": "replay", "file": "path.tum", "rate_hz": 10.0, "knot_hz": 5.0}
 
 
 def test_the_path_in_the_place_is_the_bodys_from_time_0_on(recording, realism) -> None:
-    path = recording_twin._recorded_path(recording, realism)
+    path = recording_twin.recorded_path(recording, realism.pair)
     T_place_world = se3.transform(se3.rotation_z(0.4), (1.0, 2.0, 3.0))
     placed = path.in_place(Placement(T_place_world, 1.0, 0.0, 1))
     assert placed.t_ns[0] == 0
@@ -201,7 +201,7 @@ def test_the_path_in_the_place_is_the_bodys_from_time_0_on(recording, realism) -
 def test_frames_from_the_first_to_the_last_true_pose_are_repeated(recording, realism) -> None:
     t_ns = recording.truth.t_ns
     inner = Trajectory(t_ns[1:-1], recording.truth.T_world_frame[1:-1])
-    path = recording_twin._recorded_path(replace(recording, truth=inner), realism)
+    path = recording_twin.recorded_path(replace(recording, truth=inner), realism.pair)
     assert path.t_ns.tolist() == t_ns[1:-1].tolist()
 
 
@@ -210,10 +210,10 @@ def test_twelve_pictures_are_enough_for_a_twin(recording, realism, count, is_eno
     truth = Trajectory(recording.truth.t_ns[:count], recording.truth.T_world_frame[:count])
     short = replace(recording, truth=truth)
     if is_enough:
-        assert len(recording_twin._recorded_path(short, realism).t_ns) == count
+        assert len(recording_twin.recorded_path(short, realism.pair).t_ns) == count
     else:
         with pytest.raises(InputError, match=f"12 pictures or more with a truth, and this recording has {count}"):
-            recording_twin._recorded_path(short, realism)
+            recording_twin.recorded_path(short, realism.pair)
 
 
 def test_only_a_kitti_recording_is_levelled(recording, realism) -> None:
@@ -222,7 +222,7 @@ def test_only_a_kitti_recording_is_levelled(recording, realism) -> None:
     tilted = replace(recording, truth=Trajectory(recording.truth.t_ns, T))
     heights = {}
     for form in ("kitti", recording.form):
-        path = recording_twin._recorded_path(replace(tilted, form=form), realism)
+        path = recording_twin.recorded_path(replace(tilted, form=form), realism.pair)
         heights[form] = np.ptp(path.T_world_left[:, 2, 3])
     assert heights["kitti"] < 0.2 * heights[recording.form]
 

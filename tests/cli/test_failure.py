@@ -72,6 +72,8 @@ def test_a_trial_that_is_not_there_or_fails_in_nothing_is_a_sentence(vobench: Ca
         (("explain", "runs/tiny/latest/long/stand_still"), "no case named 'long'"),
         (("explain", "runs/tiny/latest/short/still"), "no estimator named 'still'. Did you mean 'stand_still'?"),
         (("explain", "runs/tiny/latest/short/stand_still/7"), "no repeat 7 of stand_still"),
+        (("explain", "runs/tiny/latest/short/stand_still", "--estimate", "a.tum"), "--estimate is for recordings"),
+        (("explain", "runs/tiny/latest/cases/short", "--estimator", "still"), "no estimator named 'still'"),
         (("shrink", "runs/tiny/latest/short/wheel_odometry"), "of the path: nothing fails"),
     ):
         said = vobench(*words)

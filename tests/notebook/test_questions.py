@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 import vobench
-from vobench.analysis import explain_trial, realism_report, recording_twin, run_causes, shrink_trial
+from vobench.analysis import explain_recording, explain_trial, realism_report, recording_twin, run_causes, shrink_trial
 from vobench.errors import InputError
 from vobench.notebook.questions import _trial_path
 from vobench.report.page import write_reports
@@ -68,6 +68,18 @@ def test_realism_compares_with_another_recording_where_one_is_named(asked):
         ((Path("street"),), {"against": None, "form": "kitti"}),
         ((Path("street"),), {"against": Path("twin"), "form": None}),
     ]
+
+
+def test_an_explanation_of_a_recording_has_its_folder(asked, monkeypatch):
+    from vobench.notebook import questions
+
+    plans = []
+    monkeypatch.setattr(questions, "plan_runner", lambda **options: plans.append(options))
+    calls = asked(explain_recording, "explain_recording")
+    vobench.explain_recording("street", estimate="mine.tum", out="why", quiet=True)
+    ((path,), options) = calls[0]
+    assert (path, options["estimate"], options["estimator"]) == (Path("street"), Path("mine.tum"), None)
+    assert (options["out"], plans[0]["out"]) == (Path("why"), Path("why/runs"))
 
 
 def test_a_twin_is_made_in_its_folder_with_reports_of_its_runs(asked, monkeypatch):

@@ -172,11 +172,11 @@ def write_twin_suite(
 
     recorded = read_recording(recording, form=form, options=options)
     realism = realism_of(recorded)
-    path = _recorded_path(recorded, realism)
+    path = recorded_path(recorded, realism.pair)
     pair = stereo_pair(recorded.rig, "the twin")
     placement = place_path(build(scene, {}), path.T_world_left, pair, cell_disparities(path.fit, pair))
 
-    _write_json(out / PLACE_FILE, {**plain(scene), "scale": scene.scale * placement.scale})
+    write_json(out / PLACE_FILE, {**plain(scene), "scale": scene.scale * placement.scale})
     (out / PATH_FILE).write_text(format_tum(path.in_place(placement)), encoding="utf-8")
     suite = {
         "name": "twin",
@@ -184,14 +184,15 @@ def write_twin_suite(
         "scenes": [str((out / PLACE_FILE).resolve())],
         "rigs": {TWIN: path.rig_settings()},
         "trajectories": {TWIN: path.trajectory_settings()},
-        "source": [_source(recording, form, options)],
+        "source": [recording_source(recording, form, options)],
         "estimators": list(estimators or ESTIMATORS),
     }
     file = (out / SUITE_FILE).resolve()
-    _write_json(file, suite)
+    write_json(file, suite)
     # The camera is fitted to pictures of this suite's twin, so the suite is read without a camera first.
-    suite["cameras"] = {TWIN: _fit_camera(file, recorded, gain=path.fit.gain, progress=progress)}
-    _write_json(file, suite)
+    wanted = look_of_recording(recorded)
+    suite["cameras"] = {TWIN: fitted_camera(file, wanted, gain=path.fit.gain, progress=progress)}
+    write_json(file, suite)
     return TwinSuite(file, placement, realism)
 
 
@@ -209,7 +210,7 @@ def compare_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> TwinReport:
     for name in orders.errors:
         errors[name] = {REAL: real_errors[name], TWIN: twin_errors[name]}
     report = TwinReport(suite, folder, orders, errors, twin)
-    _write_json(suite.file.parent / REPORT_FILE, report.as_dict())
+    write_json(suite.file.parent / REPORT_FILE, report.as_dict())
     return report
 
 
@@ -238,7 +239,7 @@ def make_twin(
 
 
 @dataclass(frozen=True, slots=True)
-class _RecordedPath:
+class RecordedPath:
     """The data that a twin repeats: poses T_world_left (N, 4, 4) at t_ns (N,), the rig, and the fit of the rig."""
 
     t_ns: Stamps
@@ -264,9 +265,9 @@ class _RecordedPath:
         return {"kind": "replay", "file": PATH_FILE, "rate_hz": rate_hz, "knot_hz": rate_hz * KNOTS_PER_PICTURE}
 
 
-def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
+def recorded_path(recording: Recording, fit: StereoFit | None) -> RecordedPath:
     """The path of a recording's images that have a true pose. Raises InputError if it cannot be repeated."""
-    if realism.pair is None:
+    if fit is None:
         raise InputError("a twin needs a stereo pair that can be rectified and matched, and this recording has none")
     truth = recording.truth
     if truth is None:
@@ -291,10 +292,10 @@ def _recorded_path(recording: Recording, realism: Realism) -> _RecordedPath:
         T_world_left = levelled(T_world_left)
 
     rig = RigSettings(own=custom_stereo_pair(recording.rig), pitch_deg=0, forward_m=0, height_m=0)
-    return _RecordedPath(t_ns, T_world_left, rig, realism.pair)
+    return RecordedPath(t_ns, T_world_left, rig, fit)
 
 
-def _source(
+def recording_source(
     recording: Path,
     form: str | None,
     options: ReadOptions,
@@ -313,7 +314,7 @@ def _source(
     return {key: value for key, value in source.items() if value}
 
 
-def _write_json(path: Path, content: Any) -> None:
+def write_json(path: Path, content: Any) -> None:
     """Write JSON, which YAML readers take too."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(json.dumps(content, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
@@ -322,14 +323,14 @@ def _write_json(path: Path, content: Any) -> None:
 # --- The camera ---
 
 
-def _fit_camera(
+def fitted_camera(
     file: Path,
-    recording: Recording,
+    wanted: CameraLook,
     *,
     gain: float,
     progress: Progress,
 ) -> dict[str, Any]:
-    """The camera for a suite whose images of the twin look most like those of the recording.
+    """The camera for a suite whose images of the twin have the wanted look most nearly.
 
     `file` is the suite of the twin, still without a camera. `gain` is the ratio of grey values of the right image to
     those of the left one.
@@ -346,11 +347,11 @@ def _fit_camera(
     white_cd_m2 = white_of(case.scene, light)
     with closing(open_renderer(scene, case.rendering, light, white_cd_m2=white_cd_m2)) as renderer:
         develop = exposed_by(case, World(scene, renderer, motion.motion, white_cd_m2), fitted_t_ns)
-        settings, _ = fit_camera(_look(recording), develop)
+        settings, _ = fit_camera(wanted, develop)
     return _camera_settings(settings, gain=gain)
 
 
-def _look(recording: Recording) -> CameraLook:
+def look_of_recording(recording: Recording) -> CameraLook:
     """The look of a recording's images, from some that are spread over it."""
     pictures = [shot.left for run in shots_of(recording) for shot in run]
     return look_of(_evenly(pictures))

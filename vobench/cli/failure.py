@@ -1,17 +1,25 @@
-"""vobench explain and shrink: why a trial fails, and the smallest case in which it does."""
+"""vobench explain and shrink: why a trial or a recording fails, and the smallest case in which a trial does."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from vobench.analysis.explain_recording import explain_recording
 from vobench.analysis.explain_trial import TrialExplanation, explain_trial
+from vobench.analysis.recording_explanation import RecordingExplanation
 from vobench.analysis.shrink_trial import ShrunkTrial, shrink_trial
 from vobench.cli import terminal
-from vobench.cli.option import Json, RerunOptions, with_option_groups
+from vobench.cli.option import Jobs, Json, RerunOptions, with_option_groups
 from vobench.cli.plan_runner import plan_runner
 from vobench.cli.progress import Bars
+from vobench.cli.recording_option import FormCommand, RecordingOptions
+from vobench.errors import InputError
+from vobench.estimator.manifest import MANIFEST_FILE
+from vobench.runner.recording import may_be_recording
 
+COMMAND_CLASS = FormCommand
+TWIN_HEADINGS = ("without", "error", "less", "95 % interval", "survived")
 CHANGE_HEADINGS = ("without", "instead", "error", "less", "95 % interval", "survived", "verdict")
 
 TrialPath = Annotated[
@@ -24,7 +32,14 @@ TrialPath = Annotated[
 
 @with_option_groups
 def explain_command(
-    trial: TrialPath,
+    path: Annotated[
+        Path,
+        typer.Argument(
+            metavar="TRIAL|RECORDING",
+            help="A trial as RUN/CASE/ESTIMATOR, such as runs/quickstart/latest/unlike_eyes-3-room/feature_vo; "
+            "or a recording of a stereo pair with ground truth.",
+        ),
+    ],
     *,
     repeats: Annotated[
         int,
@@ -32,21 +47,84 @@ def explain_command(
             "--repeats", "-n", min=1, max=20, help="The seeds of the first comparison; a random estimator gets more."
         ),
     ] = 3,
-    rerun: RerunOptions,
+    estimate: Annotated[
+        Path | None, typer.Option(help="The estimate of the recording, instead of running --estimator on it.")
+    ] = None,
+    place: Annotated[str, typer.Option(help="The scene or model in which the twin of a recording is.")] = "office",
+    twin: Annotated[Path, typer.Option(help="The new folder for the twin of a recording.")] = Path("explained"),
+    estimator: Annotated[
+        Path | None,
+        typer.Option(
+            help="The folder of a trial's estimator, if it cannot be found by its name; the name or folder of the "
+            "estimator of a recording (lk_epipolar by default)."
+        ),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="The folder for the runs of a trial.")] = Path("runs"),
+    jobs: Jobs = 1,
+    recording_options: RecordingOptions,
     json: Json = False,
 ) -> None:
-    """Run a trial again without each difficulty, and print which of them cause the failure."""
+    """Run a trial again without each difficulty, and print which of them cause the failure.
+
+    Of a recording, the worst five seconds are compared with the rest of it and repeated in a simulated twin.
+    """
+    if may_be_recording(path):
+        found = explain_recording(
+            path,
+            run_plan=plan_runner(out=twin / "runs", jobs=jobs),
+            estimate=estimate,
+            estimator=None if estimator is None else _estimator_name(estimator),
+            place=place,
+            out=twin,
+            repeats=repeats,
+            form=recording_options.form,
+            options=recording_options.read_options(),
+            progress=Bars(),
+        )
+        if json:
+            terminal.print_json(found.as_dict())
+        else:
+            _print_recording(found)
+        return
+
+    if estimate is not None:
+        raise InputError(f"--estimate is for recordings, and this is none: {path}")
     result = explain_trial(
-        trial,
-        run_plan=plan_runner(out=rerun.out, jobs=rerun.jobs),
+        path,
+        run_plan=plan_runner(out=out, jobs=jobs),
         repeats=repeats,
-        estimator=rerun.estimator,
+        estimator=estimator,
         progress=Bars(),
     )
     if json:
         terminal.print_json(result.as_dict())
     else:
         _print_explanation(result)
+
+
+def _estimator_name(estimator: Path) -> str:
+    """The name of an estimator, or the path of its folder."""
+    is_folder = (estimator / MANIFEST_FILE).is_file()
+    return str(estimator.resolve() if is_folder else estimator)
+
+
+def _print_recording(found: RecordingExplanation) -> None:
+    console = terminal.console()
+    rows = [_twin_row(row) for row in found.rows()]
+    if rows:
+        console.print(terminal.table("the twin", TWIN_HEADINGS, rows))
+    for sentence in found.sentences:
+        console.print(sentence, soft_wrap=True)
+
+
+def _twin_row(row: dict[str, Any]) -> list[str]:
+    return [
+        " and ".join(row["removed"]),
+        f"{row['loss']:.1%}",
+        f"{row['reduction']:.0%}",
+        f"{row['low']:.0%} to {row['high']:.0%}",
+        f"{row['survived']} of {row['repeats']}",
+    ]
 
 
 def _print_explanation(result: TrialExplanation) -> None:

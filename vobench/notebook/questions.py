@@ -13,6 +13,7 @@ from vobench.runner.plan_runner import PlanRunner
 if TYPE_CHECKING:
     from vobench.analysis.explain_trial import TrialExplanation
     from vobench.analysis.realism_report import RealismReport
+    from vobench.analysis.recording_explanation import RecordingExplanation
     from vobench.analysis.recording_twin import TwinReport
     from vobench.analysis.run_causes import RunCauses
     from vobench.analysis.shrink_trial import ShrunkTrial
@@ -40,6 +41,39 @@ def explain(
 
     perform = _plan_runner(Path(out), jobs, is_quiet=quiet)
     return explain_trial(_trial_path(run, case, estimator, repeat), run_plan=perform, repeats=repeats)
+
+
+def explain_recording(
+    recording: Path | str,
+    *,
+    estimate: Path | str | None = None,
+    estimator: str | None = None,
+    place: str = "office",
+    form: str | None = None,
+    repeats: int = 3,
+    out: Path | str = Path("explained"),
+    jobs: int | None = None,
+    quiet: bool = False,
+) -> "RecordingExplanation":
+    """Explain why an estimator fails in the worst five seconds of a recording, by a simulated twin of them.
+
+    `estimate` is the file of an estimate; without one, `estimator` (lk_epipolar by default) is run on the recording.
+    `out` is a new folder for the twin. The result has `named`, `sentences` and `rows()`. Raises InputError if the
+    recording has no stereo pair, no ground truth or no failing frames, and UnknownNameError.
+    """
+    from vobench.analysis import explain_recording as analysis
+
+    folder = Path(out)
+    return analysis.explain_recording(
+        Path(recording),
+        run_plan=_plan_runner(folder / "runs", jobs, is_quiet=quiet),
+        estimate=None if estimate is None else Path(estimate),
+        estimator=estimator,
+        place=place,
+        out=folder,
+        repeats=repeats,
+        form=form,
+    )
 
 
 def shrink(

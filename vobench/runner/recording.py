@@ -5,7 +5,7 @@ from pathlib import Path
 from vobench.dataset.layout import read
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
-from vobench.runner.folder import SEQUENCE
+from vobench.runner.folder import SCORE, SEQUENCE
 
 DEFAULT_OPTIONS = ReadOptions()  # without further files: the recording contains everything that is needed
 
@@ -26,3 +26,8 @@ def sequence_path(path: Path) -> Path:
     if linked.is_symlink():
         raise InputError(f"this case's sequence is not in the cache any more; run the suite again: {path}")
     return path
+
+
+def may_be_recording(path: Path) -> bool:
+    """Whether a path may be of a recording: there is a file or a folder, which is not the folder of a trial."""
+    return path.exists() and not (path / SCORE).is_file()

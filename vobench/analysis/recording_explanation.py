@@ -1,0 +1,177 @@
+"""The answer to why an estimator fails in a part of a recording, in sentences."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from vobench.analysis.explanation import Change, Explanation
+from vobench.analysis.frame_failure import Frames, overlap
+from vobench.analysis.picture_change import CHANGE_TEXTS, INSTEAD, PictureChange
+from vobench.geometry.se3 import Array
+
+TRUSTED_OVERLAP = 0.5  # of failing frames: a twin with less does not count
+
+
+@dataclass(frozen=True, slots=True)
+class FailingFrames:
+    """The F frames of the worst part of a recording: their times since its start, and which of them fail.
+
+    `time_s` and `loss` are (F,): time, and error around each frame. `typical` is the median error of the other frames
+    of the recording. `is_failing` (F,) are the frames whose error is far above that.
+    """
+
+    time_s: Array
+    loss: Array
+    typical: float
+    is_failing: Frames
+
+    @property
+    def span_s(self) -> tuple[float, float]:
+        """The times of the first and the last failing frame."""
+        failing_s = self.time_s[self.is_failing]
+        return float(failing_s[0]), float(failing_s[-1])
+
+
+@dataclass(frozen=True, slots=True)
+class TwinTrials:
+    """What the estimator does in the twin: which of the same F frames fail, and what removing each change does.
+
+    `loss` (F,) is the mean error around each frame, and `typical` the median error in the twin without any change.
+    `scale` is the factor by which the place was enlarged, and `misfit` the mean error of the logarithm of disparities.
+    """
+
+    loss: Array
+    typical: float
+    is_failing: Frames
+    explanation: Explanation
+    scale: float
+    misfit: float
+
+
+@dataclass(frozen=True, slots=True)
+class RecordingExplanation:
+    """Why an estimator fails in the worst part of a recording.
+
+    `is_stand_in` states that the estimator in the twin is not the one that the estimate comes from. `changes` are the
+    properties in which the images differ from the rest of the recording. There is no twin if there are none.
+    """
+
+    estimator: str
+    is_stand_in: bool
+    frames: FailingFrames
+    changes: tuple[PictureChange, ...]
+    twin: TwinTrials | None
+
+    @property
+    def overlap(self) -> float:
+        """The number of frames that fail in the recording and in its twin, relative to those that fail in either."""
+        return 0.0 if self.twin is None else overlap(self.frames.is_failing, self.twin.is_failing)
+
+    @property
+    def is_trusted(self) -> bool:
+        """Whether the twin fails in about the same frames as the recording."""
+        return self.overlap >= TRUSTED_OVERLAP
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """The changes that explain the failure in a twin that is trusted; empty if none does."""
+        if self.twin is None or not self.is_trusted:
+            return ()
+        explanation = self.twin.explanation
+        alternatives = [name for removed in explanation.alternatives for name in removed]
+        return (*explanation.named, *alternatives)
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """What fails, why and what to do; how far the twin is to be trusted; and what was seen in the images."""
+        sentences = [self._answer()]
+        if self.twin is not None:
+            sentences += _trust_sentences(self, self.twin)
+        sentences += [f"In the images: {change.evidence}." for change in self.changes]
+        if self.is_stand_in:
+            sentences.append(f"{self.estimator} stands in for the estimator that the estimate comes from.")
+        found = {change.name for change in self.changes}
+        unchanged = [name for name in INSTEAD if name not in found]
+        if unchanged:
+            sentences.append(f"Not found in these frames: {', '.join(unchanged)}.")
+        return tuple(sentences)
+
+    def _answer(self) -> str:
+        """What fails, why, what removes it, and what to do, in one sentence."""
+        begin_s, end_s = self.frames.span_s
+        whose = "The estimate" if self.is_stand_in else self.estimator
+        symptom = f"{whose} fails at {begin_s:.1f} to {end_s:.1f} s"
+        if self.twin is None:
+            return (
+                f"{symptom}, but the images there are as sharp, clean, bright and complete as elsewhere: "
+                "the cause is unknown (the motion, what is in view, or the estimator)."
+            )
+        seen = " and ".join(CHANGE_TEXTS[change.name].because for change in self.changes)
+        if not self.is_trusted:
+            return (
+                f"{symptom}, where {seen}, but its twin does not fail in the same frames: the cause is not confirmed."
+            )
+        if not self.named:
+            return f"{symptom}, where {seen}, but in the twin no removal of these surely helps: the cause is unknown."
+
+        explanation = self.twin.explanation
+        reasons = " and ".join(CHANGE_TEXTS[name].because for name in self.named)
+        advice = "; ".join(CHANGE_TEXTS[name].advice for name in self.named)
+        change = _change_of(explanation, explanation.named)
+        instead = " and ".join(INSTEAD[name] for name in change.removed)
+        interval = f"95 % CI {change.low:.0%} to {change.high:.0%}"
+        return (
+            f"{symptom} because {reasons}. With {instead}, the error in the twin drops by {change.reduction:.0%} "
+            f"({interval}) and {change.survived} of {change.repeats} runs end well: {advice}."
+        )
+
+    def rows(self) -> list[dict[str, Any]]:
+        """One row for each change that was removed from the twin; empty if there is no twin."""
+        if self.twin is None:
+            return []
+        explanation = self.twin.explanation
+        return [asdict(change) for change in (*explanation.singles, *explanation.pairs)]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values, as `vobench explain --json` prints them."""
+        begin_s, end_s = self.frames.span_s
+        facts: dict[str, Any] = {
+            "estimator": self.estimator,
+            "is_stand_in": self.is_stand_in,
+            "fails_from_s": begin_s,
+            "fails_to_s": end_s,
+            "failing_frames": int(self.frames.is_failing.sum()),
+            "typical_error": self.frames.typical,
+            "named": self.named,
+            "changes": {change.name: change.evidence for change in self.changes},
+            "sentences": self.sentences,
+        }
+        if self.twin is not None:
+            facts["overlap"] = self.overlap
+            facts["is_trusted"] = self.is_trusted
+            facts["explanation"] = asdict(self.twin.explanation)
+            facts["place"] = {"scale": self.twin.scale, "misfit": self.twin.misfit}
+        return facts
+
+
+def _change_of(explanation: Explanation, removed: Sequence[str]) -> Change:
+    changes: Mapping[tuple[str, ...], Change] = {
+        change.removed: change for change in (*explanation.singles, *explanation.pairs)
+    }
+    return changes[tuple(removed)]
+
+
+def _trust_sentences(found: RecordingExplanation, twin: TwinTrials) -> list[str]:
+    """How far the twin resembles the recording."""
+    is_failing = found.frames.is_failing
+    failing = int(is_failing.sum())
+    in_both = int((is_failing & twin.is_failing).sum())
+    only_in_twin = int(twin.is_failing.sum()) - in_both
+    real_loss = float(found.frames.loss[is_failing].mean())
+    twin_loss = float(twin.loss[is_failing].mean())
+    return [
+        f"How far to trust this: the twin fails in {in_both} of the {failing} frames in which the recording fails, and "
+        f"in {only_in_twin} others (overlap {found.overlap:.2f}). The mean error of the recording's failing frames is "
+        f"{real_loss:.0%}, and {twin_loss:.0%} in the twin.",
+        f"The twin's place is scaled by {twin.scale:g}, and its disparities differ by {twin.misfit:.0%}.",
+    ]
