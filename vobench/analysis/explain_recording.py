@@ -29,10 +29,10 @@ from vobench.analysis.recording_twin import (
     write_json,
 )
 from vobench.analysis.recording_variants import TwinImages, TwinVariant
+from vobench.analysis.request_folder import claim
 from vobench.analysis.segment_loss import Outcome
 from vobench.analysis.stereo_fit import fit_pair
 from vobench.analysis.trial_data import TrialPaths, read_outcome, read_paths
-from vobench.dataset.picture import require_free
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import StereoPair, stereo_pair
@@ -62,6 +62,7 @@ WINDOW_S = 5.0
 LOOK_IMAGES = 12  # that the camera of the twin is fitted to
 STAND_IN = "lk_epipolar"  # that is run in the twin of a recording of which only an estimate is known
 TIMES = "times.txt"  # of KITTI
+SEQUENCES = "sequences"  # the folder of the variants of the twin
 
 
 def explain_recording(
@@ -89,18 +90,17 @@ def explain_recording(
             None, the estimator is run.
         estimator: the name or the folder of the estimator, which is run in the twin; lk_epipolar if None.
         place: the name of the scene, or the path of its file or model, in which the twin is.
-        out: the new folder for the twin.
+        out: the folder for the twin, new or of the same request when it was interrupted.
         repeats: how many seeds each variant of the twin is screened with.
         form: the form of the recording, if its content does not determine it.
         options: what the recording does not state itself: calibration, ground truth, rate, topics.
         progress: shows what is being done.
 
     Raises:
-        InputError: the folder is in use; the recording has no stereo pair, no ground truth, no frames in which the
-            estimator fails or too few in which it does not; or no free path was found in the place.
+        InputError: the folder is in use for something else; the recording has no stereo pair, no ground truth, no
+            frames in which the estimator fails or too few in which it does not; or no free path was found in the place.
         UnknownNameError: there is no such place or estimator.
     """
-    require_free(out)
     name = estimator or STAND_IN
     seeds = _seeds(name, repeats)
     scene = read_scene(catalog.find("scene", place).path)
@@ -109,6 +109,16 @@ def explain_recording(
     gt = _true_frames(recorded)
     t_ns = gt.t_ns
     gt_left = gt.of_mounted(recorded.rig.T_body_left)
+    request = {
+        "explain": str(recording.resolve()),
+        "form": form,
+        "options": str(options),
+        "estimate": None if estimate is None else str(estimate.resolve()),
+        "estimator": name,
+        "place": place,
+        "repeats": repeats,
+    }
+    claim(out, request, regenerated=(SEQUENCES,))
     if estimate is None:
         progress.say(f"running {name} on the recording")
         source = recording_source(recording, form, options)
@@ -332,7 +342,7 @@ class _VariantRunner:
         self.stages += 1
         sources = []
         for name, variant in variants.items():
-            folder = self.out / "sequences" / name
+            folder = self.out / SEQUENCES / name
             import_recording(self.images.recording(variant), folder)
             sources.append({"path": str(folder.resolve()), "name": name})
         folder_of_run = _run_suite(f"variants_{self.stages}", sources, self.estimator, self.out, self.run_plan)

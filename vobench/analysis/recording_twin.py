@@ -14,8 +14,8 @@ from vobench.analysis.path_placement import Placement, cell_disparities, levelle
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
 from vobench.analysis.realism import Realism, residual, shots_of
 from vobench.analysis.realism_report import RealismReport, realism_of
+from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
-from vobench.dataset.picture import require_free
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import stereo_pair
@@ -153,7 +153,7 @@ def write_twin_suite(
 
     Args:
         recording: a recording with ground truth, or the folder of a run's case.
-        out: the new folder for the suite.
+        out: the folder for the suite, new or of the same request when it was interrupted.
         place: the name of the scene, or the path of its file or model.
         estimators: names of three estimators or more, instead of the default seven.
         form: the form of the recording, if its content does not determine it.
@@ -161,16 +161,24 @@ def write_twin_suite(
         progress: shows the computation of the scene's light, unless that is in the cache.
 
     Raises:
-        InputError: the folder is in use; fewer than three estimators; or the recording has no stereo pair that can be
-            matched, no ground truth, too few pictures, or no motion; or no free path was found in the place.
+        InputError: the folder is in use for something else; fewer than three estimators; or the recording has no stereo
+            pair that can be matched, no ground truth, too few pictures, or no motion; or no free path was found in the
+            place.
         UnknownNameError: there is no such place.
     """
-    require_free(out)
     if estimators and len(estimators) < FEWEST_RANKED:
         raise InputError(f"an order needs {FEWEST_RANKED} estimators or more, and -e names {len(estimators)}")
     scene = read_scene(catalog.find("scene", place).path)
 
     recorded = read_recording(recording, form=form, options=options)
+    request = {
+        "twin": str(recording.resolve()),
+        "form": form,
+        "options": str(options),
+        "place": place,
+        "estimators": list(estimators),
+    }
+    claim(out, request)
     realism = realism_of(recorded)
     path = recorded_path(recorded, realism.pair)
     pair = stereo_pair(recorded.rig, "the twin")
