@@ -8,6 +8,7 @@ from vobench.analysis.image_statistics import (
     TILE_PX,
     corners,
     edge_px,
+    evenly_spaced,
     gradients,
     picture_statistics,
     spectrum,
@@ -18,6 +19,11 @@ from vobench.analysis.image_statistics import (
 def ramp(dx: float, dy: float) -> np.ndarray:
     row, column = np.mgrid[0:60, 0:80]
     return as_grey(128 + dx * (column - 40) + dy * (row - 30))
+
+
+def test_items_are_chosen_evenly_from_the_first_to_the_last() -> None:
+    assert evenly_spaced(list(range(23)), 12) == list(range(0, 23, 2))
+    assert len(evenly_spaced([1, 2, 3], 12)) == 12
 
 
 # --- Gradients and edges ---

@@ -227,11 +227,6 @@ def test_only_a_kitti_recording_is_levelled(recording, realism) -> None:
     assert heights["kitti"] < 0.2 * heights[recording.form]
 
 
-def test_items_are_chosen_evenly_from_the_first_to_the_last() -> None:
-    assert recording_twin._evenly(list(range(23))) == list(range(0, 23, 2))
-    assert len(recording_twin._evenly([1, 2, 3])) == 12
-
-
 def test_the_gain_of_the_right_camera_is_stated_in_the_linear_signal() -> None:
     settings = camera_fit.camera_of(0.8, 0.5, 0.9, 1.0)
     stated = recording_twin._camera_settings(settings, gain=1.1)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.benchmarks.test_planted import load
+from tests.benchmarks.loading import load
 from vobench.rendering import bake
 
 pytestmark = pytest.mark.slow  # run by `pytest -m slow`, and by CI

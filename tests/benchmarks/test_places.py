@@ -1,20 +1,17 @@
 """The benchmark of places measures the share of the surface that another seed changes, and compares bytes."""
 
-import importlib.util
-import sys
 from dataclasses import replace
-from pathlib import Path
 from types import ModuleType
 
 import pytest
 
+from tests.benchmarks.loading import load
 from vobench.asset.shape import at, block
 from vobench.scene.generated_place import GeneratedPlace
 from vobench.scene.material import Material
 from vobench.scene.mesh import moved
 from vobench.scene.triangles import Thing
 
-PLACES = Path(__file__).parents[2] / "benchmarks" / "places.py"
 WOOD = Material(colour=(0.5, 0.4, 0.3))
 CRATE = Thing("crate", block((1.0, 1.0, 1.0), bevel_m=0), "wood")
 SHELF = Thing("shelf", moved(block((1.0, 1.0, 1.0), bevel_m=0), at(5.0, 0.0, 0.0)), "wood")
@@ -24,13 +21,7 @@ PLACE = GeneratedPlace((CRATE, SHELF), {"wood": WOOD})
 @pytest.fixture(scope="module")
 def places() -> ModuleType:
     """The benchmark as a module."""
-    spec = importlib.util.spec_from_file_location("benchmark_places", PLACES)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
+    return load("places")
 
 
 def test_the_same_place_has_no_changed_surface(places: ModuleType) -> None:

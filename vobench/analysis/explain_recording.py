@@ -11,6 +11,7 @@ from vobench.analysis.camera_fit import look_of
 from vobench.analysis.explain import Effort, effort, explain
 from vobench.analysis.explanation import Removal
 from vobench.analysis.frame_failure import FrameRange, failing_loss, frame_losses, worst_window
+from vobench.analysis.image_statistics import evenly_spaced
 from vobench.analysis.nuisance import Nuisance
 from vobench.analysis.path_placement import Placement, cell_disparities, place_path
 from vobench.analysis.picture_change import INSTEAD
@@ -54,6 +55,7 @@ from vobench.suite.scene_file import read_scene
 from vobench.suite.scene_spec import SceneFile
 from vobench.suite.suite import read_plan
 from vobench.suite.yaml_file import plain
+from vobench.trajectory.associate import nearest
 from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps, Trajectory, poses_at
 from vobench.trajectory.tum import format_tum
@@ -192,19 +194,12 @@ def _read_estimate(estimate: Path, recording: Path, t_ns: Stamps) -> Trajectory:
     times = [recording / TIMES] if (recording / TIMES).is_file() else []
     est = read_one(TrajectorySource(estimate), times=times, any_unit=True).trajectory
     largest_ns = int(np.median(np.diff(t_ns))) // 2
-    nearest = _nearest(t_ns, est.t_ns)
-    is_close = np.abs(t_ns[nearest] - est.t_ns) <= largest_ns
-    frames, rows = np.unique(nearest[is_close], return_index=True)
+    frame_of_pose = nearest(est.t_ns, t_ns)
+    is_close = np.abs(t_ns[frame_of_pose] - est.t_ns) <= largest_ns
+    frames, rows = np.unique(frame_of_pose[is_close], return_index=True)
     if not len(frames):
         raise InputError(f"no pose is at the time of a frame of the recording: {estimate}")
     return Trajectory(t_ns[frames], est.T_world_frame[is_close][rows])
-
-
-def _nearest(t_ns: Stamps, wanted_ns: Stamps) -> np.ndarray[Any, np.dtype[np.intp]]:
-    """The indices (M,) of the stamps (N,) that are nearest to those wanted (M,)."""
-    after = np.searchsorted(t_ns, wanted_ns).clip(1, len(t_ns) - 1)
-    is_before_nearer = wanted_ns - t_ns[after - 1] < t_ns[after] - wanted_ns
-    return np.where(is_before_nearer, after - 1, after)
 
 
 def _run_on_recording(
@@ -274,9 +269,8 @@ def _simulate_twin(
     file = (out / SUITE_FILE).resolve()
     write_json(file, suite)
     usual = [shot.left for run in reference for shot in run.shots]
-    chosen = np.linspace(0, len(usual) - 1, LOOK_IMAGES).astype(int)
     gain = 1.0 if evidence.fit is None else evidence.fit.gain
-    camera = fitted_camera(file, look_of([usual[index] for index in chosen]), gain=gain, progress=progress)
+    camera = fitted_camera(file, look_of(evenly_spaced(usual, LOOK_IMAGES)), gain=gain, progress=progress)
     suite["cameras"] = {TWIN: _without_noise(camera)}
     write_json(file, suite)
 
@@ -302,13 +296,13 @@ def _read_twin(
     """The images of the twin, and the frames of the recording that they correspond to."""
     simulated = list(RecordedSequence.open(folder.case(TWIN) / SEQUENCE).frames())
     shots = []
-    for frame in simulated:
-        assert frame.right is not None
-        shots.append((frame.left, frame.right))
-    t_ns = np.array([frame.t_ns for frame in simulated], np.int64)
+    for shot in simulated:
+        assert shot.right is not None
+        shots.append((shot.left, shot.right))
+    t_ns = np.array([shot.t_ns for shot in simulated], np.int64)
     in_recording_ns = part.t_ns - part.t_ns[0]
-    nearest = _nearest(in_recording_ns, t_ns)
-    is_recorded = np.abs(in_recording_ns[nearest] - t_ns) < period_ns / 2
+    frame = nearest(t_ns, in_recording_ns)
+    is_recorded = np.abs(in_recording_ns[frame] - t_ns) < period_ns / 2
     is_recorded[0] = True
     gt_left = read_tum(folder.case(TWIN) / GROUND_TRUTH)
     return TwinImages(
@@ -316,7 +310,7 @@ def _read_twin(
         t_ns=t_ns,
         shots=tuple(shots),
         truth=gt_left.of_mounted(se3.inverse(recorded.rig.T_body_left)),
-        frame=nearest,
+        frame=frame,
         is_recorded=is_recorded,
         changes=evidence.changes,
         noise_dn=evidence.noise_dn,

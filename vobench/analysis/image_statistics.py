@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -16,6 +17,14 @@ MAX_CORNERS = 2000
 CORNER_QUALITY = 0.01
 CORNER_DISTANCE_PX = 8
 CELLS = (8, 6)  # the columns and rows of cells in which corners are counted
+
+Item = TypeVar("Item")
+
+
+def evenly_spaced(items: Sequence[Item], count: int) -> list[Item]:
+    """A number of items that are evenly spaced over all, such as images of a recording; some twice if there are few."""
+    indices = np.linspace(0, len(items) - 1, count).astype(int)
+    return [items[index] for index in indices]
 
 
 def picture_statistics(picture: Image) -> dict[str, float]:

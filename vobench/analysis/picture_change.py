@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.analysis.cause_text import CauseText
+from vobench.analysis.cause_text import CAUSE_TEXTS, CauseText
 from vobench.estimator.stereo import StereoPair
 from vobench.geometry.se3 import Array
 from vobench.sequence.picture import Image
@@ -218,11 +218,9 @@ INSTEAD = {
 }
 CHANGE_TEXTS = {
     BLUR: CauseText("the images are blurred", "focus the lens, expose shorter, or vibrate less"),
-    NOISE: CauseText("the images are noisy", "add light, expose longer with less gain, or smooth the images"),
-    EXPOSURE: CauseText(
-        "the exposure jumps", "fix the exposure, slow its control down, or match independently of brightness"
-    ),
+    NOISE: CAUSE_TEXTS["noise"],
+    EXPOSURE: CauseText("the exposure jumps", CAUSE_TEXTS["auto-exposure"].advice),
     DIRT: CauseText("the lens is dirty", "clean the lens, or mask the dirt"),
     TURNED: CauseText("a camera has turned", "mount the cameras firmly, and calibrate them again"),
-    DROPPED: CauseText("frames are missing", "find out why frames are dropped, such as by a slow bus or disk"),
+    DROPPED: CAUSE_TEXTS["dropped frames"],
 }

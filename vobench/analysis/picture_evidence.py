@@ -13,7 +13,7 @@ import scipy
 from numpy.typing import NDArray
 
 from vobench.analysis.image_noise import noise_dn
-from vobench.analysis.image_statistics import edge_px, gradients
+from vobench.analysis.image_statistics import edge_px, evenly_spaced, gradients
 from vobench.analysis.picture_change import (
     Blur,
     Dirt,
@@ -24,18 +24,18 @@ from vobench.analysis.picture_change import (
     TurnedCamera,
     blurred,
 )
-from vobench.analysis.stereo_fit import StereoFit, Uncertain, fit_pair
+from vobench.analysis.stereo_fit import StereoFit, Uncertain, fit_pair, robust_sigma
 from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.stereo import StereoPair
 from vobench.geometry import se3
 from vobench.geometry.rig import SIDES
 from vobench.geometry.se3 import Array
 from vobench.sequence.picture import Image
+from vobench.trajectory.nanoseconds import NS_PER_S
 from vobench.trajectory.trajectory import Stamps
 
 Frames = NDArray[np.bool_]
 
-MAD_TO_SIGMA = 1.4826  # of a normal distribution
 SIGMAS = 5.0  # a value is far outside of the reference's spread if it is so many standard deviations from its median
 MIN_CHANGED_FRAMES = 3
 SMOOTHED_FRAMES = 3  # a median over so many frames removes single ones and fills gaps
@@ -102,11 +102,6 @@ def find_changes(
     return ImageEvidence(changes, float(np.median(reference_looks[..., NOISE])), reference_fit)
 
 
-def _spread(values: Array) -> float:
-    """The standard deviation of a normal distribution with the median absolute deviation of values."""
-    return MAD_TO_SIGMA * float(np.median(np.abs(values - np.median(values))))
-
-
 def _steady(is_changed: Frames) -> Frames:
     """Changed frames (F, 2) without single ones; none of a side that has too few."""
     smooth = scipy.ndimage.median_filter(is_changed, size=(SMOOTHED_FRAMES, 1), mode="nearest")
@@ -147,12 +142,12 @@ def _blur(
 ) -> Blur | None:
     """Blur by the widths of edges (F, 2), and those (R, 2) of the reference."""
     usual_px = float(np.median(reference_px))
-    limit_px = max(usual_px + SIGMAS * _spread(reference_px), MIN_EDGE_RATIO * usual_px)
+    limit_px = max(usual_px + SIGMAS * robust_sigma(reference_px), MIN_EDGE_RATIO * usual_px)
     is_blurred = _steady((width_px > limit_px) & is_comparable)
     if not is_blurred.any():
         return None
 
-    images = _evenly([shot.left for run in reference for shot in run.shots], BLURRED_IMAGES)
+    images = evenly_spaced([shot.left for run in reference for shot in run.shots], BLURRED_IMAGES)
     widths_px = [_mean_edge_px(images, sigma_px) for sigma_px in SIGMAS_PX.tolist()]
     increasing_px = np.maximum.accumulate(widths_px)
     ratio = width_px / usual_px * increasing_px[0]
@@ -174,7 +169,7 @@ def _mean_edge_px(images: Iterable[Image], sigma_px: float) -> float:
 def _noise(sigma_dn: Array, reference_dn: Array, is_comparable: Frames) -> Noise | None:
     """Noise by its standard deviations (F, 2), and those (R, 2) of the reference."""
     usual_dn = float(np.median(reference_dn))
-    limit_dn = max(usual_dn + SIGMAS * _spread(reference_dn), MIN_NOISE_RATIO * usual_dn, usual_dn + MIN_NOISE_DN)
+    limit_dn = max(usual_dn + SIGMAS * robust_sigma(reference_dn), MIN_NOISE_RATIO * usual_dn, usual_dn + MIN_NOISE_DN)
     is_noisy = _steady((sigma_dn > limit_dn) & is_comparable)
     if not is_noisy.any():
         return None
@@ -199,7 +194,7 @@ def _exposure_jumps(part: RecordingPart, reference: Sequence[RecordingPart]) -> 
     jump_count = 0
     for side in range(len(SIDES)):
         reference_steps = np.concatenate([_brightness_steps(run.images(side)) for run in reference])
-        limit = max(MIN_JUMP_STOPS, SIGMAS * _spread(reference_steps))
+        limit = max(MIN_JUMP_STOPS, SIGMAS * robust_sigma(reference_steps))
         steps = _brightness_steps(part.images(side))
         jumps = np.where(np.abs(steps) > limit, steps, 0.0)
         jump_count = max(jump_count, int((jumps != 0).sum()))
@@ -306,7 +301,7 @@ def _has_fixed_pattern(part: RecordingPart, reference: Sequence[RecordingPart], 
 
     correlation, motion, pairs = _correlations(part, side)
     median = float(np.median(usual_correlation))
-    limit = max(median + SIGMAS * _spread(usual_correlation), median + MIN_CORRELATION)
+    limit = max(median + SIGMAS * robust_sigma(usual_correlation), median + MIN_CORRELATION)
     is_alike = (correlation > limit) & (motion > MIN_RELATIVE_MOTION * np.median(usual_motion))
     has_pattern[pairs[is_alike].ravel()] = True
     return has_pattern
@@ -314,7 +309,7 @@ def _has_fixed_pattern(part: RecordingPart, reference: Sequence[RecordingPart], 
 
 def _correlations(part: RecordingPart, side: int) -> tuple[Array, Array, NDArray[np.intp]]:
     """The correlations (P,) of the details of images one second apart, the motions (P,) between, and frames (P, 2)."""
-    lag_ns = round(LAG_S * 1e9)
+    lag_ns = round(LAG_S * NS_PER_S)
     later = np.searchsorted(part.t_ns, part.t_ns + lag_ns)
     first = np.flatnonzero(later < len(part))
     pairs = np.stack([first, later[first]], -1)
@@ -345,7 +340,7 @@ def _dirt_maps(dirty: Sequence[Image], clean: Sequence[Image]) -> tuple[Array, A
     pattern = _pattern(dirty, clean)
     # Means of few images of a scene differ by chance too, as two halves of the reference show.
     half = len(clean) // 2
-    by_chance = _spread(_pattern(clean[:half], clean[half:]))
+    by_chance = robust_sigma(_pattern(clean[:half], clean[half:]))
     is_covered = np.abs(pattern) > max(MIN_PATTERN, COVERED_SIGMAS * by_chance)
 
     dirty_mean_dn, dirty_contrast_dn = _moments(dirty)
@@ -430,8 +425,3 @@ def _significant(angle: Uncertain | None, usual: Uncertain | None) -> float:
     difference_deg = angle.value - usual.value
     limit_deg = max(MIN_ANGLE_DEG, SIGMAS * float(np.hypot(angle.sigma, usual.sigma)))
     return difference_deg if abs(difference_deg) > limit_deg else 0.0
-
-
-def _evenly(images: Sequence[Image], count: int) -> list[Image]:
-    indices = np.linspace(0, len(images) - 1, count).astype(int)
-    return [images[index] for index in indices]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vobench.analysis.camera_fit import CameraLook, fit_camera, look_of
+from vobench.analysis.image_statistics import evenly_spaced
 from vobench.analysis.path_placement import Placement, cell_disparities, levelled, place_path
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
 from vobench.analysis.realism import Realism, residual, shots_of
@@ -351,7 +352,7 @@ def fitted_camera(
     motion = body_motion(case)
     scene = case.build_scene()
     light = perform(bake_task(case.scene), cache_folder(), progress=progress)
-    fitted_t_ns = _evenly(motion.t_ns.tolist())
+    fitted_t_ns = evenly_spaced(motion.t_ns.tolist(), FITTED_PICTURES)
     white_cd_m2 = white_of(case.scene, light)
     with closing(open_renderer(scene, case.rendering, light, white_cd_m2=white_cd_m2)) as renderer:
         develop = exposed_by(case, World(scene, renderer, motion.motion, white_cd_m2), fitted_t_ns)
@@ -362,13 +363,7 @@ def fitted_camera(
 def look_of_recording(recording: Recording) -> CameraLook:
     """The look of a recording's images, from some that are spread over it."""
     pictures = [shot.left for run in shots_of(recording) for shot in run]
-    return look_of(_evenly(pictures))
-
-
-def _evenly(items: list[Any]) -> list[Any]:
-    """FITTED_PICTURES evenly spaced items."""
-    indices = np.linspace(0, len(items) - 1, FITTED_PICTURES).astype(int)
-    return [items[index] for index in indices]
+    return look_of(evenly_spaced(pictures, FITTED_PICTURES))
 
 
 def _camera_settings(settings: CameraSettings, *, gain: float) -> dict[str, Any]:

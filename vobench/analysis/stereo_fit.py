@@ -93,7 +93,7 @@ def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoF
         focal_px=fx,
         baseline_m=pair.baseline_m,
         matches=matches,
-        row_mad_px=_robust_sigma(np.concatenate(rows_px)),
+        row_mad_px=robust_sigma(np.concatenate(rows_px)),
         row_noise_px=row_noise_px,
         coefficients=coefficients,
         roll_deg=_degrees(-coefficients[1], sigmas[1], fy),
@@ -164,7 +164,7 @@ def robust_fit(terms: Array, values: Array) -> tuple[Array, Array, float]:
     damping = 1e-9 * np.eye(terms.shape[1])
     for _ in range(FIT_STEPS):
         residuals = values - terms @ coefficients
-        noise = max(_robust_sigma(residuals), MIN_NOISE_PX)
+        noise = max(robust_sigma(residuals), MIN_NOISE_PX)
         weight = 1 / (1 + (residuals / (CAUCHY_WIDTH * noise)) ** 2)
         information = terms.T @ (weight[:, None] * terms) + damping
         step = np.linalg.solve(information, terms.T @ (weight * residuals))
@@ -176,7 +176,7 @@ def robust_fit(terms: Array, values: Array) -> tuple[Array, Array, float]:
     return coefficients, sigmas, noise
 
 
-def _robust_sigma(values: Array) -> float:
+def robust_sigma(values: Array) -> float:
     """The standard deviation of a normal distribution with the median absolute deviation of values."""
     deviations = np.abs(values - np.median(values))
     return MAD_TO_SIGMA * float(np.median(deviations))
