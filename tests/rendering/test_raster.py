@@ -4,6 +4,8 @@ import os
 import pkgutil
 import subprocess
 import sys
+from contextlib import closing
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,6 +24,9 @@ from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Radiance, single_instant
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene, ceiling_light, triangles
+from vobench.suite import catalog
+from vobench.suite.scene_build import build
+from vobench.suite.scene_file import read_scene
 
 CAMERA = Pinhole(180, 120, 164.5, 136.2, 89.5, 59.5)
 DOWN, AHEAD = looking(pitch_deg=90, position_m=(0.2, 0.1, 0.4)), looking(pitch_deg=20, position_m=(0.2, 0.1, 0.4))
@@ -160,6 +165,27 @@ def test_rays_and_picture_agree_on_where_the_crate_is(draw: Any, even_light: Any
     whole = (picture < 0.11) | (picture > 0.89)  # pixels without an edge in them
     np.testing.assert_array_equal(picture[whole] > 0.5, distance[whole] < 2.5)
     assert (picture[whole] > 0.5).sum() > 1000
+
+
+def test_a_triangle_seen_edge_on_leaves_no_undefined_pixel() -> None:
+    # The floor of the car park has strips a few millimetres below it. From here, software drawing with llvmpipe
+    # clips one of them to a sliver without area, which covered one sample, and its luminance was not a number.
+    whole = build(read_scene(catalog.find("scene", "car_park").path), {})
+    floor = tuple(thing for thing in whole.things if thing.name == "floor")
+    scene = replace(whole, things=floor, lights=(), movers=())
+    coarse = BakeSettings(spacing_m=0.2, light_rays=1, indirect_spacing_m=0.8, indirect_rays=4, bounces=0)
+    camera = Pinhole(360, 240, 329.1428571428571, 329.1428571428571, 179.5, 119.5)
+    T_world_camera = np.array(
+        [
+            [0.35700336373659386, -0.1622053007753472, 0.919911973332849, 0.5134468947470547],
+            [-0.9341030983145047, -0.061992983533823806, 0.351579680459235, 0.21983566475029082],
+            [0.0, -0.984807753012208, -0.17364817766693033, 0.4],
+            [0.0, 0.0, 0.0, 1.0],
+        ]
+    )
+    with closing(RasterRenderer(bake(scene, coarse))) as renderer:
+        picture = renderer.radiance(camera, single_instant(camera, T_world_camera))
+    assert not np.isnan(picture).any()
 
 
 # Hides X11's libraries, by name as ctypes finds them and by file as it loads them, then imports modules.

@@ -104,6 +104,8 @@ vec3 glint(vec3 from, vec3 N, vec3 V, float arrives, float F)
 
 void main()
 {
+    // What is interpolated over a triangle seen edge-on is undefined: its area is zero in floating point.
+    if (isnan(to_eye.x)) discard;
 #ifdef IS_MIRRORED
     // Not clipped by OpenGL, which would move the ends of edges that must stay the same from mirror to mirror.
     if (before_mirror < 0.0) discard;
