@@ -50,11 +50,11 @@ def test_a_metric_has_the_text_and_the_number_of_each_cell(scored, write_run, tm
     assert data["metrics"]["cpu_ms"]["value"] == [[None, None], [None, 2.0]]
 
 
-def test_totals_have_cost_loss_and_whether_they_are_efficient(scored, write_run, tmp_path):
+def test_ranked_estimators_have_cost_loss_and_whether_they_are_efficient(scored, write_run, tmp_path):
     trials = [scored("a", ate_m=0.05), scored("b", ate_m=0.09)]
     folder = write_run(tmp_path / "run", trials)
     answered = {("down", "a"): EstimatorStatistics(2.0), ("down", "b"): EstimatorStatistics(9.0)}
-    first, second = data_of(folder, trials, answered=answered)["totals"]
+    first, second = data_of(folder, trials, answered=answered)["accuracy_and_cost"]
     assert first == {"name": "a", "group": "", "cpu": 2.0, "loss": pytest.approx(0.25), "on": True}
     assert (second["name"], second["on"]) == ("b", False)
 
@@ -165,3 +165,13 @@ def test_a_case_without_a_ground_truth_has_details_but_no_true_path(scored, writ
     data = data_of(folder, [trial])
     assert data["truths"] == {}
     assert "0|0" in data["details"]
+
+
+def test_baselines_are_the_last_columns_and_not_in_the_chart(scored, write_run, tmp_path):
+    still = scored("still", ate_m=0.001, claims=("baseline",))
+    trials = [still, scored("a", ate_m=0.05), scored("b", ate_m=0.09)]
+    folder = write_run(tmp_path / "run", trials)
+    answered = {("down", name): EstimatorStatistics(2.0) for name in ("a", "b", "still")}
+    data = data_of(folder, trials, answered=answered)
+    assert data["estimators"] == ["a", "b", "still"]
+    assert [point["name"] for point in data["accuracy_and_cost"]] == ["a", "b"]

@@ -59,9 +59,11 @@ class Board:
 
     @property
     def estimators(self) -> list[str]:
-        """The names of all estimators, the best first."""
-        ranked = [total.estimator for total in self.totals]
-        return list(dict.fromkeys([*ranked, *(cell.estimator for cell in self.cells)]))
+        """The names of all estimators: the best first, then those without a rank."""
+        ranked = [total.estimator for total in self.totals if total.rank is not None]
+        all_totals = [total.estimator for total in self.totals]
+        without_total = [cell.estimator for cell in self.cells]
+        return list(dict.fromkeys([*ranked, *all_totals, *without_total]))
 
     @property
     def metrics(self) -> list[str]:

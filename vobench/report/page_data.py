@@ -53,7 +53,7 @@ def page_data(
         "metrics": {name: _metric(board, name, matrix) for name, matrix in matrices.items()},
         "details": details.by_cell,
         "truths": details.truth_by_case,
-        "totals": _totals(board),
+        "accuracy_and_cost": _accuracy_and_cost(board),
         "curves": [asdict(curve) for curve in board.curves],
     }
 
@@ -84,7 +84,8 @@ def _median(cell: Cell | None, metric: str) -> float | None:
     return spread[0]
 
 
-def _totals(board: Board) -> list[JsonObject]:
+def _accuracy_and_cost(board: Board) -> list[JsonObject]:
+    """The points of the charts of accuracy against CPU time: estimators with a rank only."""
     return [
         {
             "name": total.estimator,
@@ -94,6 +95,7 @@ def _totals(board: Board) -> list[JsonObject]:
             "on": total.is_efficient,
         }
         for total in board.totals
+        if total.rank is not None
     ]
 
 
