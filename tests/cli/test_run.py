@@ -25,6 +25,15 @@ def test_run_ends_in_a_leaderboard_and_says_where_everything_is(vobench, here):
     assert text.endswith(f" % of the path: see it (`vobench view {trial}`), ask why (`vobench explain {trial}`)")
 
 
+def test_a_run_on_a_recording_says_how_to_explain_it(vobench, ran):
+    assert vobench("export", "runs/tiny/latest/cases/short/sequence", "walk", "--form", "euroc").code == 0
+    Path("real.yaml").write_text("name: real\nsource: walk\nestimators: [stand_still]\n")
+    text = " ".join(vobench("run", "real.yaml").out.split())
+    latest = (Path("runs") / "real" / "latest").readlink()
+    recording = f"runs/real/{latest}/cases/walk/sequence"
+    assert text.endswith(f"ask why (`vobench explain {recording} --estimator stand_still`)")
+
+
 def test_where_nobody_watches_each_stage_is_one_line_and_one_in_the_cache_is_none(vobench, here):
     stages = re.fullmatch(
         r"light of closet\nsimulate short: (\d+) frames\nwheel_odometry on short: (\d+) frames\n"

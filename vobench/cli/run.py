@@ -344,6 +344,7 @@ def _print_remarks(folder: "RunFolder", scores: "Sequence[TrialScore]", *, share
     """Print where the results of a run are, what affects its CPU times, and which trial to look at."""
     from vobench.report.case_facts import case_facts
     from vobench.report.trial_choice import pick, story
+    from vobench.runner.folder import SEQUENCE
     from vobench.runner.run import BESIDE
 
     console = terminal.console()
@@ -355,10 +356,13 @@ def _print_remarks(folder: "RunFolder", scores: "Sequence[TrialScore]", *, share
     if with_sequence(scores):
         trial = pick(scores, case=None, estimator=None)
         name = f"{folder.path}/{trial.case}/{trial.estimator}"
-        lines = [f"{story(trial, case_facts(folder, trial.case))}:", f"  see it (`{command} view {name}`)"]
-        if "scene" in trial.variant:  # a recording cannot be simulated again
-            lines[-1] += ","
-            lines.append(f"  ask why (`{command} explain {name}`)")
+        is_simulated = "scene" in trial.variant
+        recording = f"{folder.case(trial.case) / SEQUENCE} --estimator {trial.estimator}"
+        lines = [
+            f"{story(trial, case_facts(folder, trial.case))}:",
+            f"  see it (`{command} view {name}`),",
+            f"  ask why (`{command} explain {name if is_simulated else recording}`)",
+        ]
         console.print("\n".join(lines), soft_wrap=True)  # a command can be copied however wide the terminal is
 
 
