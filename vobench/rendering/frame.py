@@ -216,4 +216,4 @@ def _require_tiling(camera: Camera, views: Sequence[View]) -> None:
         raise ValueError(f"views must tile the rows 0 to {camera.height_px}, these cover {edges}")
     frame_counts = {len(view.start_ns) for view in views}
     if len(frame_counts) != 1:
-        raise ValueError("views of one picture must have the same number of sub-frames")
+        raise ValueError("views of one image must have the same number of sub-frames")
