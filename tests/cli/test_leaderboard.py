@@ -172,6 +172,15 @@ def test_a_truth_that_is_submitted_as_an_estimate_is_no_valid_score_and_has_no_r
     assert (said.code, "another score than its run states" in said.err) == (1, True)
 
 
+def test_a_suite_that_has_changed_since_is_named(boards, published, here):
+    assert boards("--json").json["boards"][0]["outdated"] == ""
+    suite = here / "suites" / "tiny.yaml"
+    suite.write_text(suite.read_text() + "cameras: {loud: {gain_db: 6}}\n")
+    said = boards()
+    assert said.code == 0, said.err
+    assert "The suite tiny is not that of results/tiny/builtin.zip: its short is another case" in said.out
+
+
 def test_one_suite_is_shown_by_its_name_and_an_unknown_one_is_a_sentence(boards, published, here):
     shutil.copytree(published.parent, here / "results" / "wide")
     assert boards("tiny").code == 0

@@ -38,7 +38,7 @@ def shown(suite, *sources, apart=""):
     from vobench.report.leaderboard import make_board
 
     board = make_board([], {}, title=suite)
-    return PublishedBoard(suite, board, tuple(sources), apart, RunFolder(Path("none")), ())
+    return PublishedBoard(suite, board, tuple(sources), apart, "", RunFolder(Path("none")), ())
 
 
 def source(name, *, machine="", recordings=""):

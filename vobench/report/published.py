@@ -20,7 +20,13 @@ from vobench.runner.bundle import merged, separate_labels
 from vobench.runner.environment import Environment, differences
 from vobench.runner.folder import RunFolder, TrialScore
 from vobench.runner.store import Tell
-from vobench.runner.submission import Submission, differing_recordings, opened_submission, why_not_comparable
+from vobench.runner.submission import (
+    Submission,
+    differing_recordings,
+    opened_submission,
+    why_not_comparable,
+    why_outdated,
+)
 from vobench.suite.catalog import builtin_root
 from vobench.suite.display_path import display_path
 
@@ -68,6 +74,7 @@ class PublishedBoard:
     """A leaderboard of comparable results of one suite.
 
     `apart` is the reason why it is not part of the first board of the suite; empty for that one.
+    `outdated` states how the suite of its results differs from the suite of that name here; empty if it does not.
     `folder` has the merged runs, while the bundles are open.
     """
 
@@ -75,6 +82,7 @@ class PublishedBoard:
     board: Board
     sources: tuple[ResultSource, ...]
     apart: str
+    outdated: str
     folder: RunFolder
     scores: tuple[TrialScore, ...]
 
@@ -87,7 +95,7 @@ class PublishedBoard:
     @property
     def introduction(self) -> list[str]:
         """The sentences about what the board has in common with others."""
-        sentences = [self.apart] if self.apart else []
+        sentences = [sentence for sentence in (self.apart, self.outdated) if sentence]
         sentences += [source.recordings for source in self.sources if source.recordings]
         if any(source.machine for source in self.sources):
             sentences.append(ONE_MACHINE)
@@ -96,7 +104,8 @@ class PublishedBoard:
     def as_dict(self) -> dict[str, Any]:
         """The board and its sources as plain JSON values."""
         sources = [source.as_dict() for source in self.sources]
-        return {"suite": self.suite, "apart": self.apart, "sources": sources, **json_content(self.board)}
+        why = {"apart": self.apart, "outdated": self.outdated}
+        return {"suite": self.suite, **why, "sources": sources, **json_content(self.board)}
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,7 +228,23 @@ def _board(group: _Group, stack: ExitStack) -> PublishedBoard:
     if has_several_machines:
         board = _without_ranks_of_times(board, sources)
     board = replace(board, title=submissions[0].suite, environment=None)
-    return PublishedBoard(submissions[0].suite, board, sources, group.apart, folder, tuple(scores))
+    return PublishedBoard(
+        suite=submissions[0].suite,
+        board=board,
+        sources=sources,
+        apart=group.apart,
+        outdated=_outdated(submissions[0]),
+        folder=folder,
+        scores=tuple(scores),
+    )
+
+
+def _outdated(submission: Submission) -> str:
+    """How the suite of a submission differs from the suite of that name here, as a sentence; empty if it does not."""
+    difference = why_outdated(submission)
+    if not difference:
+        return ""
+    return f"The suite {submission.suite} is not that of {display_path(submission.path)}: {difference}"
 
 
 def _sources(submissions: Sequence[Submission], labels: Sequence[tuple[str, ...]]) -> tuple[ResultSource, ...]:

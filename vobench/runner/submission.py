@@ -17,6 +17,7 @@ from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.rescore import check, wrong_truths
 from vobench.runner.store import Tell
 from vobench.suite.case import Case
+from vobench.suite.suite import read_plan
 from vobench.suite.yaml_file import checked, plain
 
 Settings = dict[str, Any]
@@ -104,6 +105,11 @@ def _settings(path: Path) -> Settings:
         return {}
     with suppress(ValidationError, VobenchError, ValueError, RecursionError):  # a recording, or of another version
         content = plain(checked(Case, content))
+    return _comparable(content)
+
+
+def _comparable(content: Settings) -> Settings:
+    """The settings of a case without those that depend on the machine."""
     kept = {key: value for key, value in content.items() if key not in OF_IMPORT}
     portable: Settings = _with_short_paths(kept)
     return portable
@@ -138,7 +144,7 @@ def why_not_comparable(one: Submission, other: Submission) -> str:
     """
     if one.environment.vobench != other.environment.vobench:
         return f"it was made by vobench {other.environment.vobench or 'unknown'}, not {one.environment.vobench}"
-    for difference in (_difference_of_cases(one, other), _difference_of_paths(one, other)):
+    for difference in (_difference_of_cases(one.cases, other.cases), _difference_of_paths(one, other)):
         if difference:
             return difference
     changed = differing_recordings(one, other)
@@ -150,16 +156,27 @@ def why_not_comparable(one: Submission, other: Submission) -> str:
     return ""
 
 
-def _difference_of_cases(one: Submission, other: Submission) -> str:
-    """The first difference between the settings of the cases of two submissions in words; empty if there is none."""
-    missing = sorted(one.cases.keys() - other.cases.keys())
+def why_outdated(submission: Submission) -> str:
+    """How the suite of a submission differs from the suite of that name here; empty if it does not, or is unknown."""
+    try:
+        plan = read_plan(submission.suite)
+    except VobenchError:
+        return ""
+    cases = {case.name: _comparable(plain(case)) for case in plan.cases}
+    distinct = {name: settings for name, settings in cases.items() if not _is_repeat(settings, cases)}
+    return _difference_of_cases(submission.cases, distinct)
+
+
+def _difference_of_cases(one: Mapping[str, Settings], other: Mapping[str, Settings]) -> str:
+    """The first difference of other cases from those of one submission in words; empty if there is none."""
+    missing = sorted(one.keys() - other.keys())
     if missing:
         return f"it lacks {_named(missing)}"
-    added = sorted(other.cases.keys() - one.cases.keys())
+    added = sorted(other.keys() - one.keys())
     if added:
         return f"it has other cases too: {_named(added)}"
-    for case, settings in one.cases.items():
-        keys = _differing_keys(settings, other.cases[case])
+    for case, settings in one.items():
+        keys = _differing_keys(settings, other[case])
         if keys:
             return f"its {case} is another case, of other settings: {', '.join(keys)}"
     return ""
