@@ -302,6 +302,17 @@ def test_the_status_is_the_most_frequent_one_and_repeats_differ_if_one_does(hard
     assert found.loss == pytest.approx((0.5 + 0.4 + 0.5) / 3)
 
 
+def test_repeats_differ_if_only_those_of_a_changed_case_do(hard: Case) -> None:
+    def measure(cases: Mapping[str, Case]) -> Mapping[str, Sequence[Outcome]]:
+        made = {}
+        for index, name in enumerate(cases):
+            loss = 1.0 if name.startswith("as_it_is") else 0.1 + 0.01 * index
+            made[name] = [Outcome("ok", True, np.full(24, loss))]
+        return made
+
+    assert explain(hard, nuisances()[:1], measure, seeds=SEEDS, remove=remove).repeats_differ
+
+
 def test_each_variant_removes_what_its_name_says_from_the_case_itself(hard: Case) -> None:
     def measure(cases: Mapping[str, Case]) -> Mapping[str, Sequence[Outcome]]:
         for name, case in cases.items():

@@ -116,7 +116,7 @@ def explain(
     return Explanation(
         loss=_mean_loss(findings.baseline),
         status=_most_frequent_status(findings.baseline),
-        repeats_differ=_differ(findings.baseline),
+        repeats_differ=findings.repeats_differ,
         everything=findings.everything,
         singles=_ranked(findings.singles.values()),
         alone=findings.alone,
@@ -130,7 +130,8 @@ class _Findings:
     """What has been measured so far: the case as it is, and the changes by what is removed.
 
     `everything` is the removal of all that is removable; None if nothing is. `alone` is the error with only one
-    nuisance left. `trials` is the number of trials that were run.
+    nuisance left. `trials` is the number of trials that were run. `repeats_differ` is whether the errors of some
+    repeats of the case, as it is or changed, differ.
     """
 
     baseline: list[Outcome]
@@ -139,6 +140,7 @@ class _Findings:
     pairs: dict[Removal, Change]
     alone: dict[str, float]
     trials: int
+    repeats_differ: bool
 
 
 def _screen(variants: "_Variants[C]", names: Sequence[str], seeds: Effort) -> _Findings:
@@ -154,6 +156,7 @@ def _screen(variants: "_Variants[C]", names: Sequence[str], seeds: Effort) -> _F
         pairs={},
         alone={},
         trials=_count(outcomes),
+        repeats_differ=any(map(_differ, outcomes.values())),
     )
 
     everything = findings.everything
@@ -193,6 +196,7 @@ def _confirm(variants: "_Variants[C]", findings: _Findings, selected: Sequence[R
         everything=confirmed.get(variants.removable, findings.everything),
         pairs={removed: confirmed.get(removed, change) for removed, change in findings.pairs.items()},
         trials=findings.trials + _count(outcomes),
+        repeats_differ=findings.repeats_differ or any(map(_differ, outcomes.values())),
     )
 
 

@@ -19,6 +19,7 @@ MOST_EXACT = 12  # pairs whose signs are all tried; for more, signs are drawn
 SIGN_DRAWS = 4096
 # Repeats of which one has this multiple of another one's error fail by chance, wholly or not at all.
 ALL_OR_NOTHING_RATIO = 4.0
+FAILED_SHARE = 0.5  # of the largest error of both sides; smaller ones have not failed wholly
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,11 +52,11 @@ def reduction_interval(before: Array, after: Array) -> tuple[float, float]:
     or as bad as any, would give.
     """
     low, high = _t_interval(before, after)
-    if not (_is_all_or_nothing(before) or _is_all_or_nothing(after)):
-        return low, high
     everything = np.concatenate([before, after])
     smallest = everything.min()
     largest = everything.max()
+    if not (_is_all_or_nothing(before, largest) or _is_all_or_nothing(after, largest)):
+        return low, high
     pessimistic = _t_interval(np.append(before, smallest), np.append(after, largest))
     optimistic = _t_interval(np.append(before, largest), np.append(after, smallest))
     return min(low, pessimistic[0], optimistic[0]), max(high, pessimistic[1], optimistic[1])
@@ -72,8 +73,11 @@ def _t_interval(before: Array, after: Array) -> tuple[float, float]:
     return float(1 - np.exp(log_ratio + half_width)), float(1 - np.exp(log_ratio - half_width))
 
 
-def _is_all_or_nothing(losses: Array) -> bool:
-    return bool(losses.max() > ALL_OR_NOTHING_RATIO * max(losses.min(), MIN_LOSS))
+def _is_all_or_nothing(losses: Array, largest: float) -> bool:
+    """Whether some of the errors (n,) are near the `largest` of both sides and others far below."""
+    has_failed = losses.max() >= FAILED_SHARE * largest
+    has_spread = losses.max() > ALL_OR_NOTHING_RATIO * max(losses.min(), MIN_LOSS)
+    return bool(has_failed and has_spread)
 
 
 def sign_flip_p(differences: Array) -> float:
