@@ -1,6 +1,7 @@
 """Pages of the site that are not files in docs/, as hooks of MkDocs (mkdocs.yml).
 
-- The README is the first page; CONTRIBUTING, CHANGELOG and SECURITY are pages, too.
+- The README is the first page; CONTRIBUTING, CHANGELOG, SECURITY and results/README are pages, too.
+- `leaderboard.md` has the boards of the bundles in results/, scored again.
 - `commands.md` has the help of every command, and `api.md` the docstrings of the Python interface.
 - Other files of the repository that a page links to are part of the site, below `files/`.
 """
@@ -15,6 +16,9 @@ from mkdocs.structure.pages import Page
 
 import vobench
 from vobench.cli.command_group import COMMANDS, CommandGroup
+from vobench.errors import InputError
+from vobench.report.board_table import DEFAULT_METRIC
+from vobench.report.published import boards_text, published_boards
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -23,8 +27,10 @@ PAGES_OF_ROOT = {
     "CONTRIBUTING.md": "CONTRIBUTING.md",
     "CHANGELOG.md": "CHANGELOG.md",
     "SECURITY.md": "SECURITY.md",
+    "results/README.md": "results.md",
 }
 FILES = "files"
+HEADING = re.compile(r"^(#+ )", re.MULTILINE)
 LINK = re.compile(r"(\]\()([^)\s#]+)(#[^)\s]*)?(\))")
 HELP_WIDTH = 72  # characters, of a code block beside the contents
 
@@ -33,6 +39,7 @@ def on_files(files: Files, config: Any) -> Files:
     """Add the generated pages, and the files that pages link to."""
     for source, page in PAGES_OF_ROOT.items():
         files.append(File.generated(config, page, content=_page_of_root(source)))
+    files.append(File.generated(config, "leaderboard.md", content=_leaderboard()))
     files.append(File.generated(config, "commands.md", content=_commands()))
     files.append(File.generated(config, "api.md", content=_api()))
     for path in sorted(_linked_files()):
@@ -47,8 +54,8 @@ def on_page_markdown(markdown: str, page: Page, **_: Any) -> str:
 
 
 def _page_of_root(source: str) -> str:
-    text = (ROOT / source).read_text(encoding="utf-8")
-    return _with_site_links(text, ROOT)
+    path = ROOT / source
+    return _with_site_links(path.read_text(encoding="utf-8"), path.parent)
 
 
 def _with_site_links(markdown: str, folder: Path) -> str:
@@ -84,6 +91,16 @@ def _linked_files() -> set[str]:
             if path.startswith(f"{FILES}/"):
                 found.add(path.removeprefix(f"{FILES}/"))
     return found
+
+
+def _leaderboard() -> str:
+    """The boards of all published results. Raises InputError if one of them is refused."""
+    with published_boards() as published:
+        if published.refused:
+            raise InputError("; ".join(published.refused))
+        boards = boards_text(published, "md", DEFAULT_METRIC)
+    title = "# Leaderboard\n\nThe [published results](results.md), scored again when this page was made.\n\n"
+    return title + HEADING.sub(r"#\1", boards)
 
 
 def _commands() -> str:

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vobench.notebook.makers import trust_maker
     from vobench.notebook.pictures import render
     from vobench.notebook.questions import causes, drive, explain, explain_recording, realism, shrink, twin
-    from vobench.notebook.runs import Check, Run, bundle, check, compare, read_board, read_run, run
+    from vobench.notebook.runs import Check, Run, bundle, check, compare, leaderboard, read_board, read_run, run
     from vobench.notebook.sequences import read_sequence
     from vobench.notebook.simulation import Simulation, simulate
     from vobench.notebook.trajectories import diagnose, read_trajectory, score
@@ -47,6 +47,7 @@ _HOMES = {
     "bundle": "vobench.notebook.runs",
     "check": "vobench.notebook.runs",
     "compare": "vobench.notebook.runs",
+    "leaderboard": "vobench.notebook.runs",
     "read_board": "vobench.notebook.runs",
     "read_run": "vobench.notebook.runs",
     "run": "vobench.notebook.runs",
@@ -77,6 +78,7 @@ __all__ = [
     "drive",
     "explain",
     "explain_recording",
+    "leaderboard",
     "read_board",
     "read_run",
     "read_sequence",

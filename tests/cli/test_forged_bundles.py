@@ -2,42 +2,17 @@
 
 import json
 import stat
-import warnings
-from dataclasses import dataclass, field
-from hashlib import sha256
-from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
+from zipfile import ZipInfo
 
 import pytest
 
+from tests.forgery import forger_of
 from vobench.runner.bundle import MOST_JSON_BYTES
 
 TRIAL = "cases/short/estimates/stand_still/0"
 OTHER = "cases/short/estimates/wheel_odometry/0"
 TRUTH = "cases/short/ground_truth.tum"
 SCORE = f"{TRIAL}/score.json"
-
-
-@dataclass(slots=True)
-class Forger:
-    """The files of a bundle that a forger changes, and what is appended to the zip file as it is."""
-
-    files: dict[str, bytes]
-    hashes_fit: bool = True
-    appended: list[tuple[ZipInfo | str, bytes]] = field(default_factory=list)
-
-    def edit(self, name, **changes):
-        self.files[name] = json.dumps(json.loads(self.files[name]) | changes).encode()
-
-    def write(self, path):
-        if self.hashes_fit:
-            hashes = json.loads(self.files["hashes.json"])
-            names = [name for name in self.files if name in hashes or name.startswith("cases/")]
-            fresh = {name: sha256(self.files[name]).hexdigest() for name in names}
-            self.files["hashes.json"] = json.dumps(fresh).encode()
-        with ZipFile(path, "w", ZIP_DEFLATED) as file, warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # of a name that is there twice
-            for name, content in [*self.files.items(), *self.appended]:
-                file.writestr(name, content, ZIP_DEFLATED)
 
 
 def rank(forger):
@@ -120,8 +95,7 @@ def test_report_and_compare_name_the_forgery_in_one_line(vobench, ran, here, for
     assert vobench("bundle", ran, "honest.zip").code == 0
     honest = vobench("report", "honest.zip", "--json")
     assert (honest.code, honest.err) == (0, "")
-    with ZipFile(here / "honest.zip") as file:
-        forger = Forger({name: file.read(name) for name in file.namelist()})
+    forger = forger_of(here / "honest.zip")
     forge(forger)
     forger.write(here / "forged.zip")
 

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -124,6 +125,20 @@ def test_a_bundle_is_a_zip_that_compares_with_its_run(ran, tmp_path):
     assert set(vobench.compare(path, ran)["verdict"]) == {"same"}
     with pytest.raises(InputError, match=r"should end in \.zip"):
         vobench.bundle(ran, tmp_path / "run.tar")
+
+
+def test_the_leaderboard_has_published_results_and_runs_of_ones_own(ran, tmp_path):
+    published = tmp_path / "results" / "tiny"
+    published.mkdir(parents=True)
+    vobench.bundle(ran, published / "builtin.zip")
+    alone = vobench.leaderboard(results=tmp_path / "results")
+    assert sorted(alone["estimator"]) == ["stand_still", "wheel_odometry"]
+    assert {Path(file).name for file in alone["file"]} == {"builtin.zip"}
+    with_mine = vobench.leaderboard("tiny", runs=[vobench.read_run(ran)], results=tmp_path / "results")
+    assert (len(with_mine), set(with_mine["board"])) == (4, {1})
+    forged(published / "builtin.zip", published / "forged.zip")
+    with pytest.warns(UserWarning, match=r"refused: stand_still on short, 0: another score .*forged\.zip"):
+        assert len(vobench.leaderboard(results=tmp_path / "results")) == 2
 
 
 def test_a_forged_score_of_a_bundle_is_named_and_does_not_count(ran, tmp_path):

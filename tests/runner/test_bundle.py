@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from vobench.errors import InputError
-from vobench.runner.bundle import bundle, merged, opened, scored_again
+from vobench.runner.bundle import bundle, merged, opened, scored_again, separate_labels
+from vobench.runner.environment import read_environment
 from vobench.runner.folder import (
     CASE,
+    ENVIRONMENT,
     ESTIMATORS,
     NO_SEQUENCE,
     SCORE,
@@ -23,6 +25,7 @@ from vobench.runner.folder import (
 from vobench.runner.frames import COLUMNS, FRAMES, GROUND_TRUTH, TIME_COLUMNS, TIMES, new_table
 from vobench.runner.score import score_estimate
 from vobench.runner.store import write_json
+from vobench.suite.catalog import builtin_root
 from vobench.trajectory.trajectory import Trajectory
 from vobench.trajectory.tum import format_tum
 
@@ -66,13 +69,35 @@ def make(tmp_path):
 
 def test_what_is_bundled_scores_the_same_and_equal_runs_make_equal_bundles(make, tmp_path):
     folder = make("a")
-    assert bundle(folder, tmp_path / "a.zip") == 2 + len(CASES) * (2 + 4)
+    assert bundle(folder, tmp_path / "a.zip") == 3 + len(CASES) * (2 + 4)
     bundle(folder, tmp_path / "b.zip")
     assert (tmp_path / "a.zip").read_bytes() == (tmp_path / "b.zip").read_bytes()
     with opened(tmp_path / "a.zip") as again:
-        assert again.path.parent.name == "a"
+        assert (again.path.parent.name, again.path.name) == ("a", "stamp")
         assert again.scores() == folder.scores()
         assert [same for _, same in scored_again(again)] == [True, True]
+
+
+def test_a_bundle_keeps_the_date_of_its_run_and_not_where_vobench_is(make, tmp_path):
+    folder = make("a")
+    dated = RunFolder(folder.path.rename(folder.path.with_name("20261128T101500_1a2b3c4d")))
+    maker = builtin_root() / "scenes" / "car_park" / "maker.py"
+    write_json(dated.case("down") / CASE, {"name": "down", "scene": {"maker": str(maker)}})
+    write_json(dated.path / ENVIRONMENT, {"vobench": "0.1.0"})
+    bundle(dated, tmp_path / "any_name.zip")
+    with opened(tmp_path / "any_name.zip") as again:
+        assert read_environment(again).date == "2026-11-28"
+        case = json.loads((again.case("down") / CASE).read_text())
+    assert case["scene"]["maker"] == "scenes/car_park/maker.py"
+
+
+def test_labels_of_separate_runs_never_meet(make):
+    runs = [make("a"), make("b"), make("c")]
+    labels = separate_labels(runs, ["a", "mine", "mine"])
+    assert labels == [{"mine": "mine"}, {"mine": "mine of mine"}, {"mine": "mine of mine.3"}]
+    with merged(runs, ["a", "mine", "mine"], labels) as together:
+        found = sorted((s.estimator, s.repeat) for s in together.scores() if s.case == "down")
+    assert found == [("mine", 0), ("mine of mine", 0), ("mine of mine.3", 0)]
 
 
 def test_a_score_that_is_not_its_estimates_is_found_and_scored_anew(make, tmp_path):

@@ -34,6 +34,7 @@ COMMANDS = {
     "twin": "vobench.cli.twin:twin_command",
     "verify": "vobench.cli.verify:verify_command",
     "report": "vobench.cli.report:report_command",
+    "leaderboard": "vobench.cli.leaderboard:leaderboard_command",
     "compare": "vobench.cli.compare:compare_command",
     "plot": "vobench.cli.plot:plot_command",
     "bundle": "vobench.cli.bundle:bundle_command",

@@ -64,7 +64,7 @@ def report_command(
     json: Json = False,
 ) -> None:
     """Print the leaderboard of runs; all trials are scored again from their estimates and ground truth."""
-    format_name = _choose_format(form, out, as_json=json)
+    format_name = choose_format(form, out, as_json=json)
     require_known("metric", metric, METRICS)
     with ExitStack() as stack:
         signatures = [signature for run in runs if (signature := _signature(run, allowed_signers))]
@@ -82,7 +82,8 @@ def report_command(
             print_board(checked.board, metric)
             _print_claimed(checked.claimed)
             return
-        text = _report_text(format_name, folder, checked, metric, out)
+        is_kept = not any(run.is_file() for run in runs) and len(runs) == 1  # not only unpacked or merged for a while
+        text = _report_text(format_name, folder, checked, metric, out, is_kept=is_kept)
 
     if out is None:
         print(text, end="")
@@ -92,7 +93,7 @@ def report_command(
         terminal.print_json({"path": str(out), "format": format_name})
 
 
-def _choose_format(form: str | None, out: Path | None, *, as_json: bool) -> str:
+def choose_format(form: str | None, out: Path | None, *, as_json: bool) -> str:
     """The format of --json, --format, or the file's ending. Raises UnknownNameError."""
     if out is None:
         if as_json:
@@ -123,10 +124,13 @@ def _checked_board(folder: RunFolder, wrong_truth_by_case: dict[str, str], signa
     return _CheckedBoard(board, checked.scores, checked.claimed)
 
 
-def _report_text(format_name: str, folder: RunFolder, checked: _CheckedBoard, metric: str, out: Path | None) -> str:
+def _report_text(
+    format_name: str, folder: RunFolder, checked: _CheckedBoard, metric: str, out: Path | None, *, is_kept: bool
+) -> str:
     if format_name != "html":
         return FORMATS[format_name](checked.board, metric)
-    page_folder = out.resolve().parent if out else folder.path  # where relative links start
+    where_links_start = out.resolve().parent if out else folder.path
+    page_folder = where_links_start if is_kept else None
     return page.board_page(folder, checked.scores, checked.board, page_folder)
 
 

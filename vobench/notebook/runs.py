@@ -391,6 +391,37 @@ def compare(old: Run | Path | str, new: Run | Path | str, *, at_most: float | No
     return pd.DataFrame([_change_row(change) for change in comparison.changes])
 
 
+def leaderboard(
+    suite: str | None = None, *, runs: Sequence[Run | Path | str] = (), results: Path | str | None = None
+) -> "pd.DataFrame":
+    """The leaderboards of published results, with runs of one's own among them: one row per suite and estimator.
+
+    Everything is scored again. A UserWarning names what is refused, and runs that may not be compared with the
+    published ones, which have another number in the column `board`.
+
+    Args:
+        suite: The only suite that is shown; all by default.
+        runs: Runs, their folders or bundles to show among the published results.
+        results: The folder of published bundles, `results`/<suite>/*.zip; by default the one included with vobench.
+
+    Raises:
+        InputError: There is no such folder.
+        UnknownNameError: There are no results of that suite.
+    """
+    import pandas as pd
+
+    from vobench.report.published import board_rows, published_boards
+
+    root = None if results is None else Path(results)
+    paths = [run_path(run) for run in runs]
+    with published_boards(suite, runs=paths, results=root) as published:
+        rows = board_rows(published)
+        sentences = [*published.refused, *(shown.apart for shown in published.boards if shown.apart)]
+    for sentence in sentences:
+        warnings.warn(sentence, stacklevel=2)
+    return pd.DataFrame(rows)
+
+
 def bundle(run: Run | Path | str, out: Path | str) -> Path:
     """Pack a run into a zip file that others can rescore and merge, and return its path.
 

@@ -23,8 +23,13 @@ NOT_IN_RECORD = ("claims", "ranks", "error_interval", "ate_percent", "cases")
 
 def as_json(board: Board) -> str:
     """The whole board as one JSON object, with unrounded numbers. Infinite values are null."""
+    return json.dumps(json_content(board), indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+
+
+def json_content(board: Board) -> Record:
+    """The object of `as_json`."""
     environment = board.environment
-    content = {
+    return {
         "title": board.title,
         "cells": cell_records(board),
         "totals": [asdict(total) for total in board.totals],
@@ -34,7 +39,6 @@ def as_json(board: Board) -> str:
         "unmade": [asdict(group) for group in board.unmade],
         "environment": asdict(environment) if environment else None,
     }
-    return json.dumps(content, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
 
 
 def as_csv(board: Board) -> str:

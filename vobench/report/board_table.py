@@ -173,7 +173,8 @@ def _ate(total: Total) -> str:
 
 def _cpu(total: Total) -> str:
     mark = " ◆" if total.is_efficient else ""
-    return f"{number(total.cpu_ms)}{mark}"
+    machine = f" ({total.machine})" if total.machine and total.cpu_ms is not None else ""
+    return f"{number(total.cpu_ms)}{machine}{mark}"
 
 
 def _memory(total: Total) -> str:

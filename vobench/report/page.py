@@ -141,8 +141,11 @@ def _costs(rows: Sequence[FrameRow]) -> dict[str, str]:
     }
 
 
-def board_page(folder: RunFolder, scores: list[TrialScore], board: Board, beside: Path) -> str:
-    """The page of a board; its links are relative to `beside`, the folder where the page will be."""
+def board_page(folder: RunFolder, scores: list[TrialScore], board: Board, beside: Path | None) -> str:
+    """The page of a board; its links are relative to `beside`, the folder where the page will be.
+
+    It links to no files if `beside` is None, as for runs that are only unpacked for a while.
+    """
     from jinja2 import Environment as Templates
     from jinja2 import FileSystemLoader
 

@@ -42,9 +42,12 @@ def page_data(
     matrices: Mapping[str, Matrix],
     *,
     thumbnails: Thumbnails,
-    beside: Path,
+    beside: Path | None,
 ) -> JsonObject:
-    """All that the script of a page draws; `matrices` are those of the metrics that it can show."""
+    """All that the script of a page draws; `matrices` are those of the metrics that it can show.
+
+    `beside` is that of `board_page`.
+    """
     details = _Details(folder, board, thumbnails, beside)
     details.add_worst(scores)
     return {
@@ -90,7 +93,7 @@ def _accuracy_and_cost(board: Board) -> list[JsonObject]:
         {
             "name": total.estimator,
             "group": total.group,
-            "cpu": total.cpu_ms,
+            "cpu": None if total.machine else total.cpu_ms,  # times of different processors are not drawn together
             "loss": 1 - total.score,
             "on": total.is_efficient,
         }
@@ -102,7 +105,7 @@ def _accuracy_and_cost(board: Board) -> list[JsonObject]:
 class _Details:
     """What a page shows of its worst cells, by 'row|column', and the true paths of the trials shown, by case."""
 
-    def __init__(self, folder: RunFolder, board: Board, thumbnails: Thumbnails, beside: Path) -> None:
+    def __init__(self, folder: RunFolder, board: Board, thumbnails: Thumbnails, beside: Path | None) -> None:
         self.by_cell: JsonObject = {}
         self.truth_by_case: JsonObject = {}
         self._folder = folder
@@ -129,6 +132,13 @@ class _Details:
         if case not in self.truth_by_case and truth.is_file():
             self.truth_by_case[case] = path_points(read_tum(truth).positions_m[:, :2])
 
+    def _links(self, place: Path) -> list[list[str]]:
+        """The name of each file in the folder of a trial, and the link to it."""
+        if self._beside is None:
+            return []
+        link = quote(os.path.relpath(place, self._beside))
+        return [[name, f"{link}/{name}"] for name in FILES if (place / name).is_file()]
+
     def _detail(self, cell: Cell, trial: TrialScore) -> JsonObject:
         """The error of a trial over time, its path, its worst moments and its files."""
         place = self._folder.estimate(trial.case, trial.estimator, trial.repeat)
@@ -138,7 +148,6 @@ class _Details:
         errors_m = np.array([_error_m(row) for row in frames])
         drawn = peak_indices(np.where(np.isinf(errors_m), -1.0, errors_m))
         path_m = _aligned_path(place, trial)
-        link = quote(os.path.relpath(place, self._beside))
         return {
             "case": trial.case,
             "trial": trial.repeat,
@@ -148,7 +157,7 @@ class _Details:
             "path": path_points(path_m),
             "pathe": _errors_along_path(errors_m, len(path_m)),
             "thumbs": self._moments(trial.case, worst_moments(frames, errors_m)),
-            "files": [[name, f"{link}/{name}"] for name in FILES if (place / name).is_file()],
+            "files": self._links(place),
             "view": ["--case", trial.case, "--estimator", trial.estimator],
         }
 

@@ -28,11 +28,16 @@ def board_frame(board: Board) -> "pd.DataFrame":
     """One row per estimator over all cases, the best first; the column `group` names the division."""
     import pandas as pd
 
-    table = pd.DataFrame([_total_record(total) for total in board.totals])
+    table = pd.DataFrame(total_records(board))
     if table.empty:
         return table
     others = [name for name in table.columns if name not in FIRST_COLUMNS]
     return table[[*FIRST_COLUMNS, *others]]
+
+
+def total_records(board: Board) -> list[Record]:
+    """The rows of `board_frame`."""
+    return [_total_record(total) for total in board.totals]
 
 
 def _total_record(total: Total) -> Record:

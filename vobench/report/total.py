@@ -43,6 +43,7 @@ class Total:
     `cpu_ms` is the mean CPU time per frame over cases, in milliseconds.
     `memory_mib` is the largest memory of any case, in MiB.
     `is_efficient` is whether no ranked estimator with a better score used less CPU time.
+    `machine` is a letter for the processor that took the times, on a board with several processors; empty on others.
     """
 
     group: str
@@ -66,6 +67,7 @@ class Total:
     cpu_ms: float | None
     memory_mib: float | None
     is_efficient: bool = False
+    machine: str = ""
 
 
 def ranked_table(cells: Sequence[Cell]) -> tuple[list[str], ranking.TrialTable | None]:

@@ -35,6 +35,7 @@ from vobench.runner.folder import (
     UNTIL,
     RunFolder,
     TrialScore,
+    hashes_in,
     open_run,
     read_hashes,
     read_tum,
@@ -42,12 +43,14 @@ from vobench.runner.folder import (
 from vobench.runner.frames import FRAMES, GROUND_TRUTH, TIMES
 from vobench.runner.rescore import rescored
 from vobench.runner.store import Tell, write_json
+from vobench.suite.catalog import builtin_root
 from vobench.temporary import temporary_folder
 
 OF_RUN = (SUITE, ENVIRONMENT, ESTIMATORS, UNTIL)
 OF_CASE = (CASE, GROUND_TRUTH)
 OF_TRIAL = (SCORE, ESTIMATE, REVISED, COVARIANCE, FRAMES, TIMES, LOG)
 SEQUENCES = "sequence_hashes.json"  # the hashes of the recordings, which are too large for a bundle
+RUN = "run.json"  # the name of the run's folder, which has its date
 MOST_BYTES = 8 << 30  # the largest size of all files after unpacking
 MOST_JSON_BYTES = 64 << 20  # of one file that is read as a whole; parsed, it takes ten times as much memory
 MOST_FILES = 500_000
@@ -68,19 +71,25 @@ def bundle(folder: RunFolder, out: Path) -> int:
     Raises InputError if the folder is not a run.
     """
     root = folder.path.resolve()
-    files = dict[str, bytes]()
+    files = {RUN: json.dumps({"name": root.name}).encode()}
     for name in _bundled_names(folder):
         content = _content(root, name)
         if content is not None:
-            files[name] = content
+            is_case = PurePosixPath(name).name == CASE
+            files[name] = _with_relative_makers(content) if is_case else content
     hashes = {name: sha256(content).hexdigest() for name, content in files.items()}
-    tables = {HASHES: hashes, TIMES_HASHES: {}, SEQUENCES: _sequence_hashes(folder)}
+    tables = {HASHES: hashes, TIMES_HASHES: {}, SEQUENCES: sequence_hashes(folder)}
     with ZipFile(out, "w", ZIP_DEFLATED) as file:
         for name, table in tables.items():
             file.writestr(ZipInfo(name, EPOCH), json.dumps(table, indent=1), ZIP_DEFLATED)
         for name, content in files.items():
             file.writestr(ZipInfo(name, EPOCH), content, ZIP_DEFLATED)
     return len(files)
+
+
+def _with_relative_makers(case: bytes) -> bytes:
+    """The file of a case in which the paths of included makers do not depend on where vobench is installed."""
+    return case.replace(f'"{builtin_root()}/'.encode(), b'"')
 
 
 def _bundled_names(folder: RunFolder) -> Iterator[str]:
@@ -94,9 +103,13 @@ def _bundled_names(folder: RunFolder) -> Iterator[str]:
             yield str(below / name)
 
 
-def _sequence_hashes(folder: RunFolder) -> dict[str, str]:
-    """The hashes of the sequences to which a run links."""
-    hashes = read_hashes(folder)
+def sequence_hashes(folder: RunFolder) -> dict[str, str]:
+    """The hashes of the recordings of a run, by file; a bundle lists those to which its run linked.
+
+    Raises InputError if there are no hashes.
+    """
+    is_unpacked = (folder.path / SEQUENCES).is_file()
+    hashes = hashes_in(folder.path / SEQUENCES) if is_unpacked else read_hashes(folder)
     return {name: value for name, value in hashes.items() if SEQUENCE in PurePosixPath(name).parts}
 
 
@@ -148,7 +161,7 @@ def opened(path: Path, tell: Tell = lambda _: None) -> Iterator[RunFolder]:
         try:
             with ZipFile(path) as file:
                 _require_sizes(file, path)
-                folder = RunFolder(temporary / _suite(file) / (_plain_name(path.stem) or "bundle"))
+                folder = RunFolder(temporary / _suite(file) / _run_name(file, path))
                 names = _unpack(file, folder.path, path)
         except (BadZipFile, NotImplementedError, RuntimeError, EOFError, zlib.error) as error:
             raise InputError(f"neither the folder of a run nor a bundle ({error}): {path}") from None
@@ -233,9 +246,18 @@ def _suite(file: ZipFile) -> str:
     """The name of the suite, as a valid name of a folder."""
     try:
         name = str(json.loads(file.read(SUITE))["name"])
-    except (KeyError, ValueError, TypeError):
+    except (KeyError, ValueError, TypeError, RecursionError):
         return "bundle"
     return name if LABEL.fullmatch(name) else "bundle"
+
+
+def _run_name(file: ZipFile, path: Path) -> str:
+    """The name of the run's folder; that of the bundle if an older vobench packed it."""
+    try:
+        name = str(json.loads(file.read(RUN))["name"])
+    except (KeyError, ValueError, TypeError, RecursionError):
+        name = path.stem
+    return _plain_name(name)[:NAME_LETTERS] or "bundle"
 
 
 def _require_sizes(file: ZipFile, path: Path) -> None:
@@ -291,29 +313,67 @@ def scored_again(
 
 
 @contextmanager
-def merged(folders: Sequence[RunFolder], names: Sequence[str]) -> Iterator[RunFolder]:
+def merged(
+    folders: Sequence[RunFolder], names: Sequence[str], labels: Sequence[Mapping[str, str]] | None = None
+) -> Iterator[RunFolder]:
     """Several runs merged into one, for the duration of the block.
 
-    Trials of the same estimator become repeats. The label of a different estimator with the same label is followed by
-    the name of its run. Raises InputError if two runs have different cases with the same name.
+    Trials with the same label become repeats. `labels` has the label of each estimator in the merged run, one table for
+    each run; by default they are those of `pooled_labels`. `names` are those of the runs.
+    Raises InputError if two runs have different cases with the same name.
     """
     if len(folders) == 1:
         yield folders[0]
         return
+    if labels is None:
+        labels = pooled_labels(folders, names)
     with temporary_folder() as temporary:
         together = RunFolder(temporary / "merged" / "runs")
         together.path.mkdir(parents=True)
         _merge_environments(folders, together)
         _copy_first_decision(folders, together)
-        first_facts: dict[str, Any] = {}  # by the label of an estimator, of the first run that has the label
-        for folder, name in zip(folders, map(_plain_name, names), strict=True):
-            facts = {entry["label"]: entry for entry in _stated(folder)}
+        for folder, name, label_of in zip(folders, map(_plain_name, names), labels, strict=True):
             for score in folder.scores():
-                label = score.estimator
-                is_same_estimator = first_facts.setdefault(label, facts.get(label)) == facts.get(label)
                 _link_case(folder, together, score.case, name)
-                _link_trial(folder, together, score, label if is_same_estimator else f"{label} of {name}")
+                _link_trial(folder, together, score, label_of[score.estimator])
         yield together
+
+
+def pooled_labels(folders: Sequence[RunFolder], names: Sequence[str]) -> list[dict[str, str]]:
+    """The label of each estimator in a merged run, one table for each run.
+
+    Equal estimators with the same label keep it, so that their trials become repeats. The label of a different
+    estimator is followed by the name of its run.
+    """
+    first_facts: dict[str, Any] = {}  # by the label of an estimator, of the first run that has the label
+    tables = []
+    for folder, name in zip(folders, map(_plain_name, names), strict=True):
+        facts = {entry["label"]: entry for entry in _stated(folder)}
+        table = dict[str, str]()
+        for score in folder.scores():
+            label = score.estimator
+            is_same_estimator = first_facts.setdefault(label, facts.get(label)) == facts.get(label)
+            table[label] = label if is_same_estimator else f"{label} of {name}"
+        tables.append(table)
+    return tables
+
+
+def separate_labels(folders: Sequence[RunFolder], names: Sequence[str]) -> list[dict[str, str]]:
+    """As `pooled_labels`, but trials of different runs are never repeats of one another.
+
+    A label that an earlier run has is followed by the name of the run, and if that is in use too, by its number.
+    """
+    used = set[str]()
+    tables = []
+    for number, (folder, name) in enumerate(zip(folders, map(_plain_name, names), strict=True), start=1):
+        table = dict[str, str]()
+        for label in sorted({score.estimator for score in folder.scores()}):
+            named = f"{label} of {name}"
+            numbered = f"{named}.{number}"
+            table[label] = next(each for each in (label, named, numbered) if each not in used)
+        used.update(table.values())
+        tables.append(table)
+    return tables
 
 
 def _merge_environments(folders: Sequence[RunFolder], together: RunFolder) -> None:
@@ -358,7 +418,7 @@ def _stated(folder: RunFolder) -> list[dict[str, Any]]:
     return [entry for entry in entries if isinstance(entry, dict) and "label" in entry]
 
 
-def _is_same_path(one: Path, other: Path) -> bool:
+def is_same_path(one: Path, other: Path) -> bool:
     """Whether two files contain the same true path, except for rounding, which depends on the processor."""
     if one.read_bytes() == other.read_bytes():
         return True
@@ -380,7 +440,7 @@ def _require_same_case(case: str, one: Path, other: Path, name: str) -> None:
     one_truth = one / GROUND_TRUTH
     other_truth = other / GROUND_TRUTH
     has_both = one_truth.is_file() and other_truth.is_file()
-    if has_both and not _is_same_path(one_truth, other_truth):
+    if has_both and not is_same_path(one_truth, other_truth):
         raise InputError(f"case {case!r} is another one in {name}: its true path differs, so runs cannot be compared")
 
 

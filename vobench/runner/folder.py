@@ -336,10 +336,11 @@ def write_hashes(folder: RunFolder) -> None:
 
 def read_hashes(folder: RunFolder) -> dict[str, str]:
     """The hash of each file by its path in the folder. Raises InputError if the run has no hashes."""
-    return {**_hashes_in(folder.path / HASHES), **_hashes_in(folder.path / TIMES_HASHES)}
+    return {**hashes_in(folder.path / HASHES), **hashes_in(folder.path / TIMES_HASHES)}
 
 
-def _hashes_in(path: Path) -> dict[str, str]:
+def hashes_in(path: Path) -> dict[str, str]:
+    """The hash of each file in a table of hashes. Raises InputError if there is no table, or if it is not valid."""
     try:
         hashes = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
