@@ -7,6 +7,7 @@ the light comes from where the drop bends the ray to.
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
@@ -24,6 +25,8 @@ LARGEST_RADIUS_M = 2e-3
 CONTACT_RAD = np.deg2rad(40)  # of water on glass that is not quite clean; clean glass has less, a coated one more
 WATER_ETA = 1.333
 APERTURE_POINTS = 96
+POINT_SPACING_M = APERTURE_M / 2 * np.sqrt(np.pi / APERTURE_POINTS)  # between points of the aperture
+SMOOTH_REACH = 3.0  # of the Gaussian, in standard deviations
 BLOCK_SHARE = 1 / 40  # the side of the blocks that drops show, in widths of the picture
 TINY_M = 1e-12
 STEEPEST = 3.0  # the tangent of the angle to the optical axis up to which the glass has drops
@@ -45,12 +48,14 @@ class LensDrops:
     """Where the light of P pixels comes from behind drops.
 
     `direct` (P,) is the share of each pixel's own light. `bent` (P, B) are the shares of the means of B square blocks
-    of the picture, whose side is `block_px`. All shares of a pixel add up to 1.
+    of the picture, whose side is `block_px`. What `bent` gives is smoothed over `smooth_px`, which stands for rays
+    between those that are traced. Then all shares of a pixel add up to 1.
     """
 
     direct: NDArray[np.float32]
     bent: "scipy.sparse.csr_array"
     block_px: int
+    smooth_px: float
 
     def apply(self, light: NDArray[np.float32]) -> NDArray[np.float32]:
         """The light (H, W) behind the drops, of light (H, W) without them."""
@@ -60,8 +65,9 @@ class LensDrops:
         heights_px = np.diff([*rows, light.shape[0]])
         widths_px = np.diff([*columns, light.shape[1]])
         means = (block_sums / np.outer(heights_px, widths_px)).astype(np.float32)
-        behind = self.direct * light.ravel() + self.bent @ means.ravel()
-        return np.asarray(behind.reshape(light.shape), np.float32)
+        bent_light = (self.bent @ means.ravel()).reshape(light.shape)
+        direct_light = self.direct.reshape(light.shape) * light
+        return np.asarray(direct_light + _smoothed(bent_light, self.smooth_px), np.float32)
 
 
 def lens_drops(
@@ -94,7 +100,14 @@ def lens_drops(
     entries = scipy.sparse.coo_array((weights, (through_drops, sources)), shape)
     bent_shares = scipy.sparse.csr_array(entries, dtype=np.float32)
     covered = np.bincount(through_drops, minlength=len(rays)) * weight
-    return LensDrops((1 - covered).astype(np.float32), bent_shares, block_px)
+    smooth_px = POINT_SPACING_M / GLASS_M * camera.width_px / float(np.ptp(tangents[np.isfinite(tangents[:, 0]), 0]))
+    smooth_cover = _smoothed(covered.reshape(camera.height_px, camera.width_px), smooth_px)
+    return LensDrops((1 - smooth_cover.ravel()).astype(np.float32), bent_shares, block_px, smooth_px)
+
+
+def _smoothed(values: NDArray[Any], smooth_px: float) -> NDArray[Any]:
+    """Values (H, W) that are smoothed by a Gaussian. A constant stays as it is."""
+    return np.asarray(scipy.ndimage.gaussian_filter(values, smooth_px, mode="nearest", truncate=SMOOTH_REACH))
 
 
 def _block_count(size_px: int, block_px: int) -> int:
