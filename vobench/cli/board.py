@@ -134,9 +134,12 @@ def _fits(table: Table, console: Console) -> bool:
 
 
 def _folded(name: str) -> str:
-    """A name that is broken into lines of at most HEADING_WIDTH characters, if possible. Lines end at underscores."""
+    """A name that is broken into lines of at most HEADING_WIDTH characters, if possible.
+
+    Lines end at underscores, and before the name of a run that follows the name of an estimator.
+    """
     lines = [""]
-    for part in name.replace("_", "_\n").split("\n"):
+    for part in name.replace("_", "_\n").replace(" of ", "\nof ").split("\n"):
         is_too_wide = len(lines[-1] + part) > HEADING_WIDTH
         if is_too_wide and lines[-1]:
             lines.append("")

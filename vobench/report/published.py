@@ -31,7 +31,7 @@ from vobench.suite.catalog import builtin_root
 from vobench.suite.display_path import display_path
 
 BUNDLES = "*.zip"
-ONE_MACHINE = "Times of different processors are not compared"
+ONE_MACHINE = "Times of different processors, or taken in different ways, are not compared"
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +41,7 @@ class ResultSource:
     `file` is its path as it is shown.
     `estimators` are the labels of its estimators on the board.
     `environment` is that in which its results were computed.
-    `machine` is a letter for the processor that took its times; empty if the board has one processor.
+    `machine` is a letter for the machine that took its times; empty if all times of the board are of one machine.
     `recordings` states how its recordings differ from those of the first source; empty if they do not.
     """
 
@@ -210,7 +210,7 @@ def _apart(groups: Sequence[_Group], reasons: Sequence[str], submission: Submiss
     if not groups:
         return ""
     first = groups[0].submissions[0]
-    return f"{display_path(submission.path)} is not compared with {display_path(first.path)}: {reasons[0]}"
+    return f"{_shown_path(submission.path)} is not compared with {_shown_path(first.path)}: {reasons[0]}"
 
 
 def _board(group: _Group, stack: ExitStack) -> PublishedBoard:
@@ -244,7 +244,7 @@ def _outdated(submission: Submission) -> str:
     difference = why_outdated(submission)
     if not difference:
         return ""
-    return f"The suite {submission.suite} is not that of {display_path(submission.path)}: {difference}"
+    return f"The suite {submission.suite} is not that of {_shown_path(submission.path)}: {difference}"
 
 
 def _sources(submissions: Sequence[Submission], labels: Sequence[tuple[str, ...]]) -> tuple[ResultSource, ...]:
@@ -255,7 +255,7 @@ def _sources(submissions: Sequence[Submission], labels: Sequence[tuple[str, ...]
     for submission, names, machine in zip(submissions, labels, machines, strict=True):
         letter = ascii_uppercase[distinct.index(machine) % len(ascii_uppercase)] if len(distinct) > 1 else ""
         source = ResultSource(
-            file=display_path(submission.path),
+            file=_shown_path(submission.path),
             estimators=names,
             environment=submission.environment,
             machine=letter,
@@ -265,9 +265,17 @@ def _sources(submissions: Sequence[Submission], labels: Sequence[tuple[str, ...]
     return tuple(sources)
 
 
-def _machine(environment: Environment) -> tuple[str, str]:
-    """What CPU times depend on: the processors, and whether other tasks ran beside the estimators."""
-    return " and ".join(map(str, environment.processors)), environment.timed
+def _shown_path(path: Path) -> str:
+    """The path of a bundle or run as a user would type it; that of a published one starts at `results`."""
+    absolute = path.resolve()
+    root = builtin_root()
+    is_published = absolute.is_relative_to(results_folder())
+    return absolute.relative_to(root).as_posix() if is_published else display_path(path)
+
+
+def _machine(environment: Environment) -> tuple[str, str, bool]:
+    """What CPU times depend on: processors, whether other tasks ran beside the estimators, and portable code."""
+    return " and ".join(map(str, environment.processors)), environment.timed, environment.portable
 
 
 def _recordings_sentence(first: Submission, other: Submission) -> str:
@@ -277,8 +285,8 @@ def _recordings_sentence(first: Submission, other: Submission) -> str:
         return ""
     reasons = "; ".join(differences(first.environment, other.environment))
     return (
-        f"{display_path(other.path)}: {len(changed)} of {len(other.cases)} recordings differ in bytes from those of "
-        f"{display_path(first.path)}, which can change an error by a factor of 3: {reasons}"
+        f"{_shown_path(other.path)}: {len(changed)} of {len(other.cases)} recordings differ in bytes from those of "
+        f"{_shown_path(first.path)}, which can change an error by a factor of 3: {reasons}"
     )
 
 

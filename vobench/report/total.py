@@ -43,7 +43,7 @@ class Total:
     `cpu_ms` is the mean CPU time per frame over cases, in milliseconds.
     `memory_mib` is the largest memory of any case, in MiB.
     `is_efficient` is whether no ranked estimator with a better score used less CPU time.
-    `machine` is a letter for the processor that took the times, on a board with several processors; empty on others.
+    `machine` is a letter for the machine that took the times, on a board with several machines; empty on others.
     """
 
     group: str
