@@ -1,5 +1,6 @@
 """What is published in results/ is scored again: nothing is forged, out of place, or too large for a repository."""
 
+from itertools import product
 from pathlib import Path
 from zipfile import ZipFile
 
@@ -36,6 +37,14 @@ def test_every_suite_has_results_of_the_built_in_estimators():
     assert "quickstart" in {suite.name for suite in suites}
     for suite in suites:
         assert (suite / "builtin.zip").is_file()
+
+
+def test_no_estimator_leaves_out_a_case_that_others_have(published):
+    for shown in published.boards:
+        board = shown.board
+        cells = {(cell.case, cell.estimator) for cell in board.cells}
+        assert cells == set(product(board.cases, board.estimators)), shown.suite
+        assert board.unmade == ()
 
 
 def test_no_label_is_used_twice_on_a_board(published):
