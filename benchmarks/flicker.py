@@ -226,7 +226,7 @@ def report(name: str, arguments: argparse.Namespace) -> None:
         view = View(picture, finest, kinds.of(T_world_camera), cpu_ms)
         views.append(view)
         print(
-            f"{name} {index}: RMS {np.sqrt((view.error**2).mean()):.2f} DN, {cpu_ms:.0f} CPU ms a picture", flush=True
+            f"{name} {index}: RMS {np.sqrt((view.error**2).mean()):.2f} DN, {cpu_ms:.0f} CPU ms per image", flush=True
         )
         if arguments.out:
             arguments.out.mkdir(parents=True, exist_ok=True)
@@ -248,7 +248,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("scenes", nargs="*", default=list(PLACES), help=f"of {', '.join(PLACES)}")
     parser.add_argument("--frames", type=int, default=10, help="of a drive at each place; 0 for none")
-    parser.add_argument("--out", type=Path, help="folder for pictures, references and four times their difference")
+    parser.add_argument("--out", type=Path, help="folder for images, references and four times their difference")
     parser.add_argument("--bakes", type=Path, help="folder to keep bakes in, to compare again sooner")
     arguments = parser.parse_args()
     for name in arguments.scenes:

@@ -132,7 +132,7 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path)
-    parser.add_argument("--out", type=Path, help="write a sheet of pictures for each model into this folder")
+    parser.add_argument("--out", type=Path, help="write a sheet of images for each model into this folder")
     parser.add_argument("--coarse", action="store_true", help="bake with coarser light, in less time")
     arguments = parser.parse_args()
     if arguments.out:

@@ -271,7 +271,7 @@ def report(name: str, light_set: str, arguments: argparse.Namespace) -> None:
             cv2.imwrite(str(arguments.out / f"light_{name}_{light_set}_{index}.png"), side_by_side(pair), best)
     for kind, parts in found.items():
         print(f"  all {kind:10}{pooled(parts).line()}")
-    print(f"bake {bake_s:.0f} s, pictures {time.monotonic() - started_s - bake_s:.0f} s\n", flush=True)
+    print(f"bake {bake_s:.0f} s, images {time.monotonic() - started_s - bake_s:.0f} s\n", flush=True)
 
 
 def main() -> None:
@@ -282,9 +282,7 @@ def main() -> None:
     parser.add_argument("--matt", action="store_true", help="leave coats and metal out")
     parser.add_argument("--samples", type=int, default=256, help="paths a pixel, both halves together")
     parser.add_argument("--width", type=int, default=320, help="pixels; the height is two thirds of it")
-    parser.add_argument(
-        "--out", type=Path, help="folder for the pictures: raster, path tracer, smoothed difference x 4"
-    )
+    parser.add_argument("--out", type=Path, help="folder for the images: raster, path tracer, smoothed difference x 4")
     parser.add_argument("--bakes", type=Path, help="folder to keep bakes in, to compare again sooner")
     arguments = parser.parse_args()
     for name in arguments.scenes:

@@ -110,7 +110,7 @@ def the_rest() -> Iterator[tuple[str, Callable[[], object]]]:
 def main() -> None:
     """Measure everything, print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--pictures", type=int, default=30, help="pictures per measurement")
+    parser.add_argument("--pictures", type=int, default=30, help="images per measurement")
     repeats = parser.parse_args().pictures
     print(f"{platform.machine()}, {os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}")
     whole = {f"chip {name}": sensor for name, sensor in CAMERAS.items()}

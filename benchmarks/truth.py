@@ -71,9 +71,7 @@ def warm_up(caster: TruthCaster, pairs: list[tuple[CameraShot, CameraShot]]) -> 
         for now, _ in pairs:
             caster.frame(LENS, now, ("shadow",))
             pictures += 1
-    print(
-        f"  the first {pictures} pictures' shadow: {1e3 * (time.process_time() - started) / pictures:.0f} CPU ms each"
-    )
+    print(f"  the first {pictures} images' shadow: {1e3 * (time.process_time() - started) / pictures:.0f} CPU ms each")
 
 
 def cast(caster: TruthCaster, pairs: list[tuple[CameraShot, CameraShot]]) -> None:

@@ -108,7 +108,7 @@ MOVED = {
 GONE = {
     "vobench.geometry.rectify": {
         "rectify": "vobench.plugin.rectification gives the rectified views of a rig, vobench.plugin.stereo_pair a pair "
-        "that matches pictures as they are",
+        "that matches images as they are",
     },
     "vobench.plugin": {
         "Mesh": "a mesh is a trimesh.Trimesh; vobench.plugin.make_mesh makes one of vertices, faces, texture "

@@ -66,7 +66,7 @@ def main() -> None:
         branches = grown
     with open(sys.argv[2], "w", encoding="ascii") as file:
         file.write("\n".join([f"{BRANCHES} {LEVELS} 0 0", *lines]) + "\n")
-    print(f"{len(bits)} words of {len(pictures)} pictures, {len(lines)} nodes")
+    print(f"{len(bits)} words of {len(pictures)} images, {len(lines)} nodes")
 
 
 if __name__ == "__main__":

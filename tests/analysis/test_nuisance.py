@@ -93,7 +93,7 @@ CAMERA_CHANGES = {
     },
     "unlike eyes": {"camera.unlike.left.gain": 1.0, "camera.unlike.right.gain": 1.0},
     "dropped frames": {"camera.timing.drop_share": 0.0, "camera.timing.repeat_share": 0.0},
-    "late pictures": {"camera.timing.jitter_ms": 0.0, "camera.timing.right_delay_ms": 0.0},
+    "late images": {"camera.timing.jitter_ms": 0.0, "camera.timing.right_delay_ms": 0.0},
     "late IMU": {"camera.timing.imu_delay_ms": 0.0},
     "rolling shutter": {"camera.shutter": "global", "camera.readout_ms": None},
     "auto-exposure": {"camera.auto_exposure": None},

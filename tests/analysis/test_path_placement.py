@@ -98,7 +98,7 @@ def test_where_a_path_was_is_found_by_its_disparities_along_the_way():
 
 
 def test_a_place_without_a_free_space_is_refused():
-    with pytest.raises(InputError, match=r"no free path of 60.0 m was found in 'hall'; take fewer pictures"):
+    with pytest.raises(InputError, match=r"no free path of 60.0 m was found in 'hall'; take fewer images"):
         place_path(hall(pillar=True), straight(60.0), PAIR, np.full((1, 3, 3), 10.0))
 
 

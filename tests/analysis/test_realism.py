@@ -38,7 +38,7 @@ def test_runs_of_pictures_lie_apart_and_within_the_recording():
         assert all(later - earlier >= WINDOW for earlier, later in pairwise(starts))
         assert starts[0] == 0
         assert starts[-1] + WINDOW <= max(count, WINDOW)
-    with pytest.raises(InputError, match="2 successive pictures"):
+    with pytest.raises(InputError, match="2 successive images"):
         window_starts(1)
 
 

@@ -82,7 +82,7 @@ def test_the_path_of_the_twin_is_that_of_the_recording_moved_as_a_whole(suite: T
     [
         ({"truth": None}, "needs a path, and this recording has none"),
         ({"still": True}, "this recording is stationary"),
-        ({"short": True}, "takes 12 pictures or more with a truth, and this recording has 5"),
+        ({"short": True}, "takes 12 images or more with a truth, and this recording has 5"),
     ],
 )
 def test_a_recording_that_cannot_be_repeated_is_a_sentence(recording, realism, change, sentence) -> None:
@@ -212,7 +212,7 @@ def test_twelve_pictures_are_enough_for_a_twin(recording, realism, count, is_eno
     if is_enough:
         assert len(recording_twin.recorded_path(short, realism.pair).t_ns) == count
     else:
-        with pytest.raises(InputError, match=f"12 pictures or more with a truth, and this recording has {count}"):
+        with pytest.raises(InputError, match=f"12 images or more with a truth, and this recording has {count}"):
             recording_twin.recorded_path(short, realism.pair)
 
 

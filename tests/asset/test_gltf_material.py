@@ -292,14 +292,14 @@ def test_a_picture_that_is_too_large_or_damaged_is_refused_by_its_name(monkeypat
     if most_pixels == 12:
         assert look(source, glb).material.texture.pixels().shape == (3, 4, 3)
         glb.tree["bufferViews"][0]["byteLength"] = 20
-        expected = r"picture 'grain': cannot be read \(.*\); save it as PNG of 12 pixels at most"
+        expected = r"image 'grain': cannot be read \(.*\); save it as PNG of 12 pixels at most"
     else:
-        expected = r"picture 'grain': cannot be read \(4 x 3 pixels\); save it as PNG of 11 pixels at most"
+        expected = r"image 'grain': cannot be read \(4 x 3 pixels\); save it as PNG of 11 pixels at most"
     with pytest.raises(ModelError, match=expected):
         look(source, glb)
 
 
 def test_pictures_in_another_compression_are_refused_with_the_tool_that_converts_them():
     glb = Glb(textures=[{"extensions": {"KHR_texture_basisu": {"source": 0}}}])
-    with pytest.raises(ModelError, match="has KTX2 pictures; make them PNG"):
+    with pytest.raises(ModelError, match="has KTX2 images; make them PNG"):
         look(surface(baseColorTexture={"index": 0}), glb)

@@ -384,7 +384,7 @@ def of_index(vertex: int) -> Glb:
 
 def of_picture(**image: Any) -> Glb:
     glb = triangle(material={"name": "wood", "pbrMetallicRoughness": {"baseColorTexture": {"index": 0}}})
-    glb.tree |= {"textures": [{"source": 0}], "images": [image or {"bufferView": glb.view(b"no picture")}]}
+    glb.tree |= {"textures": [{"source": 0}], "images": [image or {"bufferView": glb.view(b"no image")}]}
     return glb
 
 
@@ -445,14 +445,14 @@ FAULTS: dict[str, tuple[Callable[[], Glb | bytes], str]] = {
         lambda: triangle(nodes=[{"matrix": [1, 2]}]),
         r"node 'tile': expected 16 finite numbers, found \[1, 2\]",
     ),
-    "a lost picture": (
+    "a lost image": (
         lambda: of_picture(uri="a%20b.png"),
-        "material 'wood': picture .*: needs 'a b.png', which is not",
+        "material 'wood': image .*: needs 'a b.png', which is not",
     ),
-    "no picture": (of_picture, "node 'tile': material 'wood': picture '0': cannot be read .*; save it as PNG of"),
-    "a huge picture": (
+    "no image": (of_picture, "node 'tile': material 'wood': image '0': cannot be read .*; save it as PNG of"),
+    "a huge image": (
         of_huge_picture,
-        "picture 'poster': cannot be read .*3600000000 pixels.*; save it as PNG of 67,108,864 pixels at most",
+        "image 'poster': cannot be read .*3600000000 pixels.*; save it as PNG of 67,108,864 pixels at most",
     ),
     "far away": (lambda: triangle(nodes=[{"scale": [1e9, 1, 1]}]), "node 'tile': reaches 1e\\+09 m; is it damaged"),
 }

@@ -5,6 +5,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from vobench.asset import street_furnishing
 from vobench.asset.site import footprint
 from vobench.asset.street_furnishing import (
     CLOSE_M,
@@ -37,6 +38,19 @@ def test_each_lamp_has_a_pose_at_its_foot(furnishing: StreetFurnishing) -> None:
         vertices_m = np.concatenate([part.arrays.vertices_m for part in lamp.parts])
         lowest_m = vertices_m[vertices_m[:, 2].argmin()]
         assert np.linalg.norm(lowest_m - T_world_lamp[:3, 3]) < 0.2
+
+
+def test_a_street_has_no_more_people_than_allowed(
+    furnishing: StreetFurnishing, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def people(furnished: StreetFurnishing) -> int:
+        return sum(piece.name.startswith("person_") for piece in furnished.pieces)
+
+    limit = people(furnishing) - 2
+    assert limit > 0
+    monkeypatch.setattr(street_furnishing, "MOST_PEOPLE", limit)
+    plan = street_plan(np.random.default_rng(1))
+    assert people(furnish_street(plan, seed=1, rng=np.random.default_rng(2))) <= limit
 
 
 def test_names_of_pieces_are_distinct(furnishing: StreetFurnishing) -> None:

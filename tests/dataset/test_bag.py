@@ -262,7 +262,7 @@ def test_pictures_without_a_partner_are_dropped_and_said(scene, tmp_path):
     bag.messages.remove(next(m for m in bag.messages if m[0] == "/cam1/image_raw" and m[2] == scene.t_ns[3]))
     recording = read(bag.write(tmp_path / "bag"))
     assert [frame.t_ns for frame in recording.frames()] == np.delete(scene.t_ns, 3).tolist()
-    assert any("1 left and 0 right pictures without a partner" in note for note in recording.notes)
+    assert any("1 left and 0 right images without a partner" in note for note in recording.notes)
 
 
 def test_a_pose_of_no_named_frame_is_taken_for_the_body_s(scene, tmp_path):
@@ -313,7 +313,7 @@ def test_a_bag_without_pictures_says_what_it_has(scene, tmp_path, ros1):
     bag = Bag(ros1)
     bag.imu("/imu", scene.t_ns[0], "imu", np.zeros(6))
     path = bag.write(tmp_path / ("in.bag" if ros1 else "in"))
-    with pytest.raises(VobenchError, match=r"no pictures .* its topics: /imu \(sensor_msgs/msg/Imu\)"):
+    with pytest.raises(VobenchError, match=r"no images .* its topics: /imu \(sensor_msgs/msg/Imu\)"):
         read(path)
 
 
@@ -362,7 +362,7 @@ def test_rows_shorter_than_their_pixels(scene, tmp_path):
     bag = Bag()
     bag.info("/camera_info", scene.t_ns[0], "optical")
     bag.image("/image_raw", scene.t_ns[0], "optical", scene.left[0], "bgr8")
-    with pytest.raises(VobenchError, match="1536 bytes are not a 48 x 32 picture in bgr8"):
+    with pytest.raises(VobenchError, match="1536 bytes are not a 48 x 32 image in bgr8"):
         read(bag.write(tmp_path / "bag"))
 
 

@@ -57,7 +57,7 @@ def test_a_compressed_picture_is_handed_on() -> None:
 
 @pytest.mark.parametrize("change", [{"height": 0}, {"width": 0}, {"step": 7}, {"height": 7}, {"width": 9}])
 def test_a_size_that_its_bytes_do_not_hold_is_refused(change: dict[str, int]) -> None:
-    with pytest.raises(InputError, match=r"^48 bytes are not a \d x \d picture in mono8 with \d bytes a row: x$"):
+    with pytest.raises(InputError, match=r"^48 bytes are not a \d x \d image in mono8 with \d bytes a row: x$"):
         picture(message("mono8", np.zeros((6, 8), np.uint8), **change), "x")
 
 

@@ -19,13 +19,13 @@ def chosen(types: dict[str, str], **topics: str) -> SelectedTopics:
 def test_a_pair_is_told_by_its_names(left: str, right: str) -> None:
     found = chosen({right: RAW, left: COMPRESSED, "/depth_left": RAW, "/depth_right": RAW})
     assert (found.left, found.right) == (left, right)
-    assert found.notes == (f"The pictures are those of {left} and {right}.",)
+    assert found.notes == (f"The images are those of {left} and {right}.",)
 
 
 def test_a_single_topic_of_pictures_is_one_camera() -> None:
     found = chosen({"/front": RAW, "/front/depth": RAW})
     assert (found.left, found.right) == ("/front", None)
-    assert found.notes == ("The pictures are those of /front, one camera.",)
+    assert found.notes == ("The images are those of /front, one camera.",)
     assert (found.right_info, found.imu, found.truth) == (None, None, None)
 
 
@@ -36,14 +36,14 @@ def test_a_named_topic_is_taken_with_its_only_partner() -> None:
     assert chosen(types, left="/cam2/image_raw").right is None
     assert chosen(types, right="/cam2/image_raw").left == "/cam1/image_raw"
     assert chosen(types, left="/cam2/image_raw", right="/cam0/image_raw").right == "/cam0/image_raw"
-    with pytest.raises(InputError, match=r"^name the left and the right topic of a\.bag; with pictures: /cam0"):
+    with pytest.raises(InputError, match=r"^name the left and the right topic of a\.bag; with images: /cam0"):
         chosen(types)
 
 
 def test_a_right_topic_alone_is_no_single_camera() -> None:
     with pytest.raises(InputError, match="name the left and the right topic"):
         chosen({"/front": RAW}, right="/front")
-    with pytest.raises(InputError, match=r"no pictures \(Image or CompressedImage\) in a\.bag; its topics: none$"):
+    with pytest.raises(InputError, match=r"no images \(Image or CompressedImage\) in a\.bag; its topics: none$"):
         chosen({})
 
 

@@ -99,7 +99,7 @@ def test_a_picture_without_a_partner_is_dropped_and_said(scene, tmp_path):
     listed.write_text("\n".join(rows[:2] + rows[3:]) + "\n")
     recording = read(folder)
     assert [frame.t_ns for frame in recording.frames()] == np.delete(scene.t_ns, 1).tolist()
-    assert "1 left and 0 right pictures without a partner were dropped." in recording.notes
+    assert "1 left and 0 right images without a partner were dropped." in recording.notes
 
 
 @pytest.mark.parametrize(
@@ -135,7 +135,7 @@ def test_readings_beyond_the_pictures_are_cut_but_for_one_each_side(scene, tmp_p
     assert recording.imu.t_ns.tolist() == scene.imu_ns[begin : end + 1].tolist()
     assert np.array_equal(recording.imu.gyro_radps, scene.imu[begin : end + 1, :3])
     outside = 42 - (end + 1 - begin)
-    said = f"{outside} of 42 IMU readings lie outside the pictures' time (0.2 s beside 0.1 s); dropped."
+    said = f"{outside} of 42 IMU readings lie outside the images' time (0.2 s beside 0.1 s); dropped."
     assert said in recording.notes
 
 
@@ -203,7 +203,7 @@ def test_truth_beyond_the_pictures_is_cut_but_for_one_pose_each_side(scene, tmp_
     inside = (stamps >= scene.t_ns[0]) & (stamps <= scene.t_ns[-1])
     assert len(recording.truth) == inside.sum() + 1  # one after the last picture; the first has one of its stamp
     assert recording.truth.t_ns[-1] >= scene.t_ns[-1]
-    assert any("outside the pictures' time; dropped" in note for note in recording.notes)
+    assert any("outside the images' time; dropped" in note for note in recording.notes)
 
 
 def test_truth_of_another_clock_is_dropped(scene, tmp_path):
@@ -211,7 +211,7 @@ def test_truth_of_another_clock_is_dropped(scene, tmp_path):
     (folder / "mav0/state_groundtruth_estimate0/data.csv").write_text("1000,0,0,0,1,0,0,0\n2000,0,0,0,1,0,0,0\n")
     recording = read(folder)
     assert recording.truth is None
-    assert any("shares no time with the pictures" in note for note in recording.notes)
+    assert any("shares no time with the images" in note for note in recording.notes)
 
 
 def test_one_camera_is_enough(scene, tmp_path, imported):

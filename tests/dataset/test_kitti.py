@@ -45,7 +45,7 @@ def test_of_single_cameras_of_both_pairs_one_is_read_and_the_other_one_is_named(
     recording = read(scene.kitti(tmp_path, pair=pair))
     assert recording.rig.right is None
     assert f"There is one camera: {pair[0]} has no partner." in recording.notes
-    assert f"The pictures of {pair[1]} were not used." in recording.notes
+    assert f"The images of {pair[1]} were not used." in recording.notes
 
 
 def test_rotations_of_seven_digits_are_made_exact(scene, tmp_path):
@@ -83,7 +83,7 @@ def test_a_pose_for_each_picture_or_none(scene, tmp_path):
     folder = scene.kitti(tmp_path)
     path = tmp_path / "poses/00.txt"
     path.write_text("".join(path.read_text().splitlines(keepends=True)[:-1]))
-    with pytest.raises(VobenchError, match=r"4 poses without stamps for 5 pictures: give .* picture's number.*00\.txt"):
+    with pytest.raises(VobenchError, match=r"4 poses without stamps for 5 images: give .* image's number.*00\.txt"):
         read(folder)
 
 
@@ -94,13 +94,13 @@ def test_poses_behind_their_picture_s_number_may_be_fewer(scene, tmp_path):
     recording = read(folder)
     assert recording.truth.t_ns.tolist() == whole.t_ns[[0, 1, 4]].tolist()
     assert np.array_equal(recording.truth.T_world_frame, whole.T_world_frame[[0, 1, 4]])
-    assert "00.txt has poses of 3 of 5 pictures, by their numbers." in recording.notes
+    assert "00.txt has poses of 3 of 5 images, by their numbers." in recording.notes
 
 
 @pytest.mark.parametrize(
     ("numbers", "said"),
     [
-        ((0, 1, 5), r"a picture's number, from 0 to 4, but there is 5: .*00\.txt"),
+        ((0, 1, 5), r"an image's number, from 0 to 4, but there is 5: .*00\.txt"),
         ((0, 2, 1), r"00\.txt:3: frame numbers must increase, but 1 follows 2"),
         ((0, 1, -2), r"00\.txt:3: .* an integer from 0, but is -2"),
         ((0, 1, 2.5), r"00\.txt:3: .* an integer from 0, but is 2\.5"),

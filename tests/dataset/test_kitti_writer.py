@@ -12,7 +12,7 @@ START_NS = 1_403_636_579_763_555_584  # of make_sequence: its pictures are about
 def test_pictures_that_all_lie_outside_of_the_truth_are_exported_without_poses(make_sequence, tmp_path, offsets_ns):
     made = make_sequence(truth_ns=START_NS + np.array(offsets_ns))
     exported = export(made.folder, tmp_path / "out", "kitti")
-    assert "No picture lies within the time span of the truth, so there is no poses.txt." in exported.notes
+    assert "No image lies within the time span of the truth, so there is no poses.txt." in exported.notes
     assert not any("interpolated" in note or "frames lie before" in note for note in exported.notes)
     assert not (tmp_path / "out" / "poses.txt").exists()
     assert len((tmp_path / "out" / "times.txt").read_text().splitlines()) == len(made.t_ns)

@@ -46,20 +46,20 @@ def test_the_truth_says_how_many_poses_and_pictures_are_without_the_other(
     assert len(truth) == 4 - dropped
     expected = []
     if dropped:
-        expected.append(f"{dropped} of 4 true poses lie outside the pictures' time; dropped.")
+        expected.append(f"{dropped} of 4 true poses lie outside the images' time; dropped.")
     if bare:
-        expected.append(f"{bare} of 2 pictures lie outside the truth's time; they have no true pose.")
+        expected.append(f"{bare} of 2 images lie outside the truth's time; they have no true pose.")
     assert notes == expected
 
 
 def test_what_shares_no_time_is_dropped_with_both_times() -> None:
     truth, notes = overlapping_truth(truth_at([1, 2, 3]), np.array([5, 6, 7]))
     assert truth is None
-    assert notes == ["The truth (1 to 3 ns) was dropped: it shares no time with the pictures (5 to 7 ns)."]
+    assert notes == ["The truth (1 to 3 ns) was dropped: it shares no time with the images (5 to 7 ns)."]
     readings = ImuReadings(np.array([8, 9, 11]), np.zeros((3, 3)), np.zeros((3, 3)))
     imu, notes = overlapping_imu(readings, np.array([5, 6, 7]))
     assert imu is None
-    assert notes == ["The IMU (8 to 11 ns) was dropped: it shares no time with the pictures (5 to 7 ns)."]
+    assert notes == ["The IMU (8 to 11 ns) was dropped: it shares no time with the images (5 to 7 ns)."]
 
 
 def test_readings_stay_together_and_their_durations_are_in_seconds() -> None:
@@ -70,7 +70,7 @@ def test_readings_stay_together_and_their_durations_are_in_seconds() -> None:
     np.testing.assert_array_equal(imu.t_ns, t_ns[1:3])
     np.testing.assert_array_equal(imu.gyro_radps, values[1:3])
     np.testing.assert_array_equal(imu.accel_mps2, -values[1:3])
-    assert notes == ["3 of 5 IMU readings lie outside the pictures' time (4.0 s beside 0.5 s); dropped."]
+    assert notes == ["3 of 5 IMU readings lie outside the images' time (4.0 s beside 0.5 s); dropped."]
     same, notes = overlapping_imu(ImuReadings(t_ns, values, -values), t_ns)
     assert same is not None
     assert len(same.t_ns) == 5

@@ -122,7 +122,7 @@ def test_the_vignette_moves_with_the_pixels_of_a_rectified_pair(
         u, v = np.moveaxis(rectified(made.rig).source_px[side].astype(np.float32), -1, 0)
         moved = cv2.remap(before.astype(np.float32), u, v, cv2.INTER_LINEAR, borderValue=np.nan)
         ratio = (after / moved)[np.isfinite(moved)]
-        assert np.ptp(ratio) < 0.01, "the same but for the scale, which is each picture's own"
+        assert np.ptp(ratio) < 0.01, "the same but for the scale, which is each image's own"
 
 
 def test_exposures_are_in_milliseconds_by_number_and_stamp(make_sequence: Make, tmp_path: Path) -> None:
@@ -143,7 +143,7 @@ def test_what_is_not_known_is_not_written_and_said(make_sequence: Make, tmp_path
         len(line.split()) == 2 for line in (tmp_path / "out/photometric/cam0/times.txt").read_text().splitlines()
     )
     assert any("not known: there is no pcalib.txt" in note for note in exported.notes)
-    assert any("The exposure of some pictures is not known" in note for note in exported.notes)
+    assert any("The exposure of some images is not known" in note for note in exported.notes)
 
 
 def test_black_level_and_dirt_are_said(make_sequence: Make, tmp_path: Path) -> None:

@@ -53,7 +53,7 @@ def test_16_bits_give_back_8_however_they_were_widened(factor):
 def test_an_alpha_channel_makes_no_difference_but_for_a_note():
     with_alpha = encoded(np.dstack([COLOUR, GREY]))
     assert np.array_equal(as_grey(with_alpha), as_grey(encoded(COLOUR)))
-    assert "The alpha channel of the pictures was dropped." in conversions(kind_of(with_alpha))
+    assert "The alpha channel of the images was dropped." in conversions(kind_of(with_alpha))
 
 
 def chunk(kind: bytes, data: bytes) -> bytes:
@@ -80,7 +80,7 @@ def test_kinds_of_png_that_opencv_does_not_write():
 
 def test_a_header_that_asks_for_the_moon_costs_nothing():
     for width, height in ((2**31 - 1, 2**31 - 1), (0, 4)):
-        with pytest.raises(VobenchError, match="a picture should have 1 to 67108864 pixels, but has "):
+        with pytest.raises(VobenchError, match="an image should have 1 to 67108864 pixels, but has "):
             kind_of(by_hand(width, height, 8, 0, b""))
 
 

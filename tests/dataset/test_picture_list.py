@@ -26,7 +26,7 @@ def test_a_list_is_stamps_and_names_with_or_without_a_header(tmp_path: Path) -> 
     path.write_text("1.5 rgb/a.png\n")
     assert read_list(path, tmp_path, separator=None, unit="s").t_ns.tolist() == [1_500_000_000]
     path.write_text("t rgb/a.png\n")
-    with pytest.raises(InputError, match=r"data\.csv:1: a row should be a stamp and a picture's name, but is 't rgb"):
+    with pytest.raises(InputError, match=r"data\.csv:1: a row should be a stamp and an image's name, but is 't rgb"):
         read_list(path, tmp_path, separator=None, unit="s")
 
 
@@ -39,16 +39,16 @@ def test_a_long_row_is_shown_by_its_start(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("there", "note"),
     [
-        ("bcd", "1 of 4 pictures were dropped because files are missing: 1 at the start. The first is x/data/a.png."),
-        ("abc", "1 of 4 pictures were dropped because files are missing: 1 at the end. The first is x/data/d.png."),
+        ("bcd", "1 of 4 images were dropped because files are missing: 1 at the start. The first is x/data/a.png."),
+        ("abc", "1 of 4 images were dropped because files are missing: 1 at the end. The first is x/data/d.png."),
         (
             "ad",
-            "2 of 4 pictures were dropped because files are missing: "
+            "2 of 4 images were dropped because files are missing: "
             "2 between others (a gap of up to 3 s). The first is x/data/b.png.",
         ),
         (
             "b",
-            "3 of 4 pictures were dropped because files are missing: 1 at the start, 2 at the end. "
+            "3 of 4 images were dropped because files are missing: 1 at the start, 2 at the end. "
             "The first is x/data/a.png.",
         ),
     ],
@@ -73,11 +73,11 @@ def test_pictures_are_paired_within_a_limit_and_a_pair_needs_both_files(tmp_path
     assert left.t_ns.tolist() == [10, 20]
     assert right.t_ns.tolist() == [12, 20]
     assert notes[:2] == (
-        "1 left and 1 right pictures without a partner were dropped.",
-        "Stamps of a pair are up to 2 ns apart; the left picture's stamp was used for both.",
+        "1 left and 1 right images without a partner were dropped.",
+        "Stamps of a pair are up to 2 ns apart; the left image's stamp was used for both.",
     )
     assert notes[2].startswith("1 of 3 pairs were dropped because files are missing: 1 at the end.")
-    with pytest.raises(InputError, match="no left and right picture have stamps within 0 ns of each other in here"):
+    with pytest.raises(InputError, match="no left and right image have stamps within 0 ns of each other in here"):
         partners(left.t_ns, left.t_ns + 1, 0, "here")
     assert partners(left.t_ns, left.t_ns, 0, "here").notes == ()
 
@@ -92,23 +92,23 @@ def test_numbered_pictures_begin_anywhere_and_have_no_gap(tmp_path: Path) -> Non
     ]
     assert numbered(left) == found[:1]
     touch(right, "11.png")
-    with pytest.raises(InputError, match=r"a picture is missing: .*r/10\.png$"):
+    with pytest.raises(InputError, match=r"an image is missing: .*r/10\.png$"):
         numbered(right)
     touch(left, "0011_left.png")
-    with pytest.raises(InputError, match=r"a picture is missing: .*l/0010_left\.png$"):
+    with pytest.raises(InputError, match=r"an image is missing: .*l/0010_left\.png$"):
         numbered(left)
     touch(right, "10.png", "010.png")
-    with pytest.raises(InputError, match=r"two pictures have the number 10: "):
+    with pytest.raises(InputError, match=r"two images have the number 10: "):
         numbered(right)
-    with pytest.raises(InputError, match="no numbered PNG or JPEG picture in"):
+    with pytest.raises(InputError, match="no numbered PNG or JPEG image in"):
         numbered(touch(tmp_path / "none", "a.png"))
 
 
 def test_both_cameras_have_the_same_numbers(tmp_path: Path) -> None:
     left = touch(tmp_path / "l", "0.png", "1.png")
-    with pytest.raises(InputError, match="2 left and 1 right pictures; there should be as many of each"):
+    with pytest.raises(InputError, match="2 left and 1 right images; there should be as many of each"):
         numbered(left, touch(tmp_path / "r", "0.png"))
-    with pytest.raises(InputError, match="the first left and right pictures should have the same number"):
+    with pytest.raises(InputError, match="the first left and right images should have the same number"):
         numbered(left, touch(tmp_path / "s", "1.png", "2.png"))
 
 

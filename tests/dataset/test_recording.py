@@ -25,7 +25,7 @@ def file(end: str = ".png", pixels: np.ndarray = GREY) -> bytes:
 def stream(*frames: tuple[bytes | np.ndarray, ...]) -> PictureStream:
     def shots() -> Iterator[RecordedFrame]:
         for t_ns, contents in enumerate(frames):
-            yield RecordedFrame(t_ns, tuple(EncodedPicture(f"picture {t_ns}", content) for content in contents))
+            yield RecordedFrame(t_ns, tuple(EncodedPicture(f"image {t_ns}", content) for content in contents))
 
     return PictureStream.open(shots)
 
@@ -47,7 +47,7 @@ def test_grey_files_are_kept_and_others_become_png_of_the_same_pixels() -> None:
     assert frame.form == "png"
     np.testing.assert_array_equal(cv2.imdecode(np.frombuffer(frame.left, np.uint8), cv2.IMREAD_UNCHANGED), GREY)
     assert frame.right == frame.left
-    with pytest.raises(InputError, match="a recording should have one picture or more, but has none"):
+    with pytest.raises(InputError, match="a recording should have one image or more, but has none"):
         stream()
 
 
@@ -63,7 +63,7 @@ def test_a_pair_of_two_forms_becomes_one_of_png() -> None:
 
 def test_a_picture_that_is_not_as_the_first_is_refused_by_its_name_but_another_form_is_taken() -> None:
     assert len(list(stream((file(),), (file(".jpg"),)).frames())) == 2
-    with pytest.raises(InputError, match=r"^the first picture has 64 x 48 .*, but this one has 32 x 48 .*: picture 1$"):
+    with pytest.raises(InputError, match=r"^the first image has 64 x 48 .*, but this one has 32 x 48 .*: image 1$"):
         list(stream((GREY,), (GREY[:, ::2],)).frames())
 
 
@@ -83,7 +83,7 @@ def test_the_start_is_the_first_stamp_of_pictures_truth_and_readings(rig_of: Cal
 def test_a_recording_without_readings_has_no_imu_in_its_rig(rig_of: Callable[..., Rig]) -> None:
     rig = rig_of(imu=True)
     assert recording(rig).rig.imu is None
-    assert recording(rig, imu=readings(1, 2)).rig.imu is None, "dropped, for it shares no time with the pictures"
+    assert recording(rig, imu=readings(1, 2)).rig.imu is None, "dropped, for it shares no time with the images"
     assert recording(rig, imu=readings(90, 210)).rig.imu == rig.imu
     assert recording(rig).frame_count == 2
 
@@ -100,7 +100,7 @@ def test_two_cameras_in_one_place_and_pictures_of_another_size_are_refused(rig_o
     with pytest.raises(InputError, match=r"should be more than 1e-06 m apart, but are 1e-06 m apart: c\.yaml$"):
         recording(rig)
     smaller = replace(rig_of(), right=replace(rig_of().left, width_px=63))  # type: ignore[type-var]
-    with pytest.raises(InputError, match=r"^the first right picture has 64 x 48 pixels, but .* for 63 x 48: c\.yaml$"):
+    with pytest.raises(InputError, match=r"^the first right image has 64 x 48 pixels, but .* for 63 x 48: c\.yaml$"):
         recording(smaller)
 
 
@@ -108,7 +108,7 @@ def test_stamps_are_within_the_time_of_ros(rig_of: Callable[..., Rig]) -> None:
     rig = rig_of(imu=True)
     last = END_OF_STAMPS_NS - 1
     assert recording(rig, (0, last)).start_ns == 0
-    for stamps, said in (((-1, 5), "a picture has -1"), ((0, last + 1), f"a picture has {last + 1}")):
+    for stamps, said in (((-1, 5), "an image has -1"), ((0, last + 1), f"an image has {last + 1}")):
         with pytest.raises(InputError, match=rf"^stamps should be within 0 and {last} ns, but {said}$"):
             recording(rig, stamps)
     with pytest.raises(InputError, match=r"but a true pose has -3$"):

@@ -150,6 +150,6 @@ def test_truth_at_its_own_rate_comes_back_at_its_own_stamps(form: str, make_sequ
     back = there_and_back(made.folder, form, tmp_path)
     found = read_truth(back)
     kept = np.isin(dense, found.t_ns)
-    assert kept.sum() == len(found) >= len(dense) - 1, "readers may cut what lies outside the pictures' time"
+    assert kept.sum() == len(found) >= len(dense) - 1, "readers may cut what lies outside the images' time"
     poses = found.of_mounted(Sequence.open(back).rig.T_body_left).T_world_frame
     np.testing.assert_allclose(poses, made.T_world_left[kept], atol=1e-9, rtol=0)

@@ -134,7 +134,7 @@ def test_a_truth_that_ends_early_is_kept_as_far_as_it_goes(scene, tmp_path):
 def test_pictures_that_fail_to_come_are_missed(scene, tmp_path):
     recording = read(scene.kitti(tmp_path))
     more = replace(recording, t_ns=np.append(recording.t_ns, recording.t_ns[-1] + 1))
-    with pytest.raises(VobenchError, match="5 pictures were read, but the recording should have 6"):
+    with pytest.raises(VobenchError, match="5 images were read, but the recording should have 6"):
         convert(more, tmp_path / "out")
     assert not (tmp_path / "out" / "sensors.mcap").exists()
 

@@ -38,12 +38,12 @@ def test_numbered_poses_are_those_of_the_pictures_of_their_numbers(tmp_path: Pat
     path.write_text(f"0 {lines[0]}\n2 {lines[2]}\n")
     truth, notes = read_truth_file(path, FRAMES_NS)
     np.testing.assert_array_equal(truth.t_ns, FRAMES_NS[[0, 2]])
-    assert notes == ("truth.txt has poses of 2 of 3 pictures, by their numbers.",)
+    assert notes == ("truth.txt has poses of 2 of 3 images, by their numbers.",)
     path.write_text(f"0 {lines[0]}\n3 {lines[2]}\n")
-    with pytest.raises(InputError, match=r"a picture's number, from 0 to 2, but there is 3: .*truth\.txt$"):
+    with pytest.raises(InputError, match=r"an image's number, from 0 to 2, but there is 3: .*truth\.txt$"):
         read_truth_file(path, FRAMES_NS)
     path.write_text(format_kitti(POSES[:2]))
-    with pytest.raises(InputError, match=r"^2 poses without stamps for 3 pictures: give one pose a picture"):
+    with pytest.raises(InputError, match=r"^2 poses without stamps for 3 images: give one pose per image"):
         read_truth_file(path, FRAMES_NS)
 
 

@@ -66,7 +66,7 @@ def test_what_was_assumed_and_dropped_is_said(scene, tmp_path):
     for said in (
         "one camera",
         "freiburg1's colour camera",
-        "Depth pictures were dropped",
+        "Depth images were dropped",
         "converted to grey",
         "outside",
     ):

@@ -58,19 +58,19 @@ def test_a_missing_image(euroc, kitti, scene):
     first = picture(scene, euroc, 0, "cam1")
     assert complaint(euroc) == f"the files of all 5 pairs in {lists} are missing; the first missing file is {first}"
     (kitti / "image_1/000002.png").unlink()
-    assert complaint(kitti) == f"a picture is missing: {kitti / 'image_1' / '000002.png'}"
+    assert complaint(kitti) == f"an image is missing: {kitti / 'image_1' / '000002.png'}"
 
 
 def test_left_and_right_counts_that_differ(kitti):
     (kitti / "image_1/000004.png").unlink()
     said = complaint(kitti)
-    assert said.startswith("5 left and 4 right pictures")
+    assert said.startswith("5 left and 4 right images")
     assert str(kitti / "image_1") in said
 
 
 def test_fewer_times_than_pictures(kitti):
     edit(kitti / "times.txt", lambda text: "".join(text.splitlines(keepends=True)[:-1]))
-    assert complaint(kitti) == f"4 times for 5 pictures in {kitti / 'image_0'}: {kitti / 'times.txt'}"
+    assert complaint(kitti) == f"4 times for 5 images in {kitti / 'image_0'}: {kitti / 'times.txt'}"
 
 
 def test_shuffled_stamps(euroc):
@@ -99,7 +99,7 @@ def test_a_wrong_image_size(euroc, scene):
 def test_a_calibration_of_another_size(euroc):
     path = edit(euroc / "mav0/cam0/sensor.yaml", lambda text: text.replace("[48, 32]", "[752, 480]"))
     assert complaint(euroc) == (
-        f"the first left picture has 48 x 32 pixels, but the calibration is for 752 x 480: {path}"
+        f"the first left image has 48 x 32 pixels, but the calibration is for 752 x 480: {path}"
     )
 
 
@@ -171,14 +171,14 @@ def test_a_picture_with_a_flipped_bit(euroc, scene):
 
 def test_something_that_is_no_picture(euroc, scene):
     picture(scene, euroc).write_bytes(b"<!doctype html>")
-    assert complaint(euroc).startswith("a picture should be a PNG or JPEG file, but it begins with b'<!doctyp'")
+    assert complaint(euroc).startswith("an image should be a PNG or JPEG file, but it begins with b'<!doctyp'")
 
 
 @pytest.mark.parametrize(
     ("row", "said"),
     [
-        ("1403636579763555584", "a row should be a stamp and a picture's name"),
-        ("soon,a.png", "a row should be a stamp and a picture's name"),
+        ("1403636579763555584", "a row should be a stamp and an image's name"),
+        ("soon,a.png", "a row should be a stamp and an image's name"),
         ("1e400,a.png", "t should be nanoseconds below"),
     ],
 )
@@ -189,7 +189,7 @@ def test_a_list_with_a_row_that_is_none(euroc, row, said):
 
 def test_a_list_without_a_row(euroc):
     path = edit(euroc / "mav0/cam0/data.csv", lambda text: text.splitlines()[0])
-    assert complaint(euroc) == f"the list has no picture: {path}"
+    assert complaint(euroc) == f"the list has no image: {path}"
 
 
 @pytest.mark.parametrize(
@@ -238,7 +238,7 @@ def test_a_stamp_that_ros_cannot_hold(kitti):
     edit(kitti / "times.txt", lambda text: text.replace(text.splitlines()[-1], "2200000000.5"))
     assert "within 0 and 2147483647999999999 ns" in complaint(kitti)
     edit(kitti / "times.txt", lambda text: "-1.5\n" + text.partition("\n")[2])
-    assert "a picture has -1500000000" in complaint(kitti)
+    assert "an image has -1500000000" in complaint(kitti)
 
 
 def test_two_cameras_in_one_place(euroc, kitti):
@@ -290,7 +290,7 @@ def test_a_folder_where_a_file_should_be(kitti):
 
 def test_two_pictures_of_one_number(kitti):
     shutil.copy(kitti / "image_0/000002.png", kitti / "image_0/000002_left.png")
-    assert complaint(kitti) == f"two pictures have the number 2: {kitti / 'image_0/000002_left.png'}"
+    assert complaint(kitti) == f"two images have the number 2: {kitti / 'image_0/000002_left.png'}"
 
 
 @pytest.mark.parametrize("rate_hz", [0.0, -1.0, float("nan"), float("inf")])

@@ -264,7 +264,7 @@ def test_cameras_that_are_no_pair_side_by_side_are_refused(bed, T_left_right, wh
 
 
 def test_pictures_of_two_sizes_are_refused(bed):
-    with pytest.raises(VobenchError, match=r"two pictures of one size, got \(720, 480\) and \(640, 480\) px"):
+    with pytest.raises(VobenchError, match=r"two images of one size, got \(720, 480\) and \(640, 480\) px"):
         bed.started("lk_epipolar", replace(DOWN, right=PRESETS["tartanair"].right))
 
 

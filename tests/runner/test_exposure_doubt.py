@@ -78,7 +78,7 @@ def test_a_run_is_doubted_by_its_pictures(bench, light, monkeypatch):
     (sentence,) = doubts_of_run(plan, folder)
     assert "98% of the pixels are saturated" in sentence
     assert "lower exposure_gain of the camera from 40 to about" in sentence
-    assert sentence.endswith("(in its first pictures)")
+    assert sentence.endswith("(in its first images)")
     monkeypatch.setattr(exposure_doubt, "_light", lambda _: None)
     (blind,) = doubts_of_run(plan, folder)
     assert "change the camera's exposure_gain, or use auto_exposure" in blind

@@ -262,7 +262,7 @@ def test_a_truth_at_the_pictures_own_stamps_is_taken_as_it_is(first):
 
 
 @pytest.mark.parametrize(
-    ("truth_ns", "sentence"), [([], "no ground truth"), ([100, 200], "covers none of the pictures in time")]
+    ("truth_ns", "sentence"), [([], "no ground truth"), ([100, 200], "covers none of the images in time")]
 )
 def test_a_recording_that_cannot_be_scored_says_why(first, tmp_path, truth_ns, sentence):
     with pytest.raises(SequenceError, match=sentence):

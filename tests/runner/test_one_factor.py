@@ -17,7 +17,7 @@ SCENE = """name: cell
 white_cd_m2: 50
 materials:
   grain: {pattern: terrazzo, albedo: 0.5, contrast: 0.6, resolution_px: 256}
-room: {size_m: [3, 3, 1.5], floor: grain, wall: grain, ceiling: grain}
+PLACE
 lamps: [{name: lamp, center_m: [0, 0, 1.4], size_m: [0.4, 0.4], power_lm: 600}]
 AIR"""
 SUITE = """name: one
@@ -40,7 +40,9 @@ DEFAULTS = {
     "CAMERA": "",
     "TRUTH": "[]",
     "AIR": "",
+    "PLACE": "room: {size_m: [3, 3, 1.5], floor: grain, wall: grain, ceiling: grain}",
 }
+SLAB = "boxes: [{name: slab, center_m: [0, 0, -0.05], size_m: [4, 4, 0.1], material: grain}]"
 LEFT, RIGHT = "sensors/cam_left/image/compressed", "sensors/cam_right/image/compressed"
 PICTURES = {LEFT, RIGHT}
 READINGS, BIAS = "sensors/imu", "truth/ground_truth/imu_bias"
@@ -56,6 +58,7 @@ FACTORS = {
     "vignetting": ({"CAMERA": ", vignetting: 1"}, PICTURES),
     "lens blur": ({"CAMERA": ", blur_sigma_px: 1"}, PICTURES),
     "dirt": ({"CAMERA": ", dirt: 0.1"}, PICTURES),
+    "drops on the lens": ({"CAMERA": ", lens_drops: 0.2"}, PICTURES),
     "motion blur": ({"CAMERA": ", exposure_ms: 40, motion_blur: true"}, {*PICTURES, "sensors/exposure"}),
     "rolling shutter": ({"CAMERA": ", shutter: rolling, readout_ms: 30"}, PICTURES),
     "auto-exposure": (
@@ -96,7 +99,8 @@ def recorded(folder: Path, *, cache: Path | None = None, **factors: str) -> Path
     """The sequence of the suite with these texts in place of its defaults; made anew without a cache."""
     (folder / "scenes").mkdir(parents=True)
     texts = {**DEFAULTS, **factors}
-    (folder / "scenes" / "cell.yaml").write_text(SCENE.replace("AIR", texts.pop("AIR")))
+    scene = SCENE.replace("AIR", texts.pop("AIR")).replace("PLACE", texts.pop("PLACE"))
+    (folder / "scenes" / "cell.yaml").write_text(scene)
     text = SUITE.replace("SCENE", str(folder / "scenes" / "cell.yaml"))
     for key, value in texts.items():
         text = text.replace(key, value)
@@ -152,6 +156,16 @@ def test_fog_changes_pictures_but_no_truth_of_pixels(cache, tmp_path):
     )
     assert any("depth" in topic for topic in clear)
     assert {topic for topic in clear if clear[topic] != foggy[topic]} == PICTURES
+
+
+def test_rain_changes_pictures_but_no_truth_of_pixels(cache, tmp_path):
+    """In the open, where the ground is wet, and drops fall; truth is that of the solid ground."""
+    sky = "sky: {illuminance_lx: 300}\n"
+    outdoors = {"TRUTH": "[depth, flow, occlusion]", "PLACE": SLAB}
+    dry = channels(recorded(tmp_path / "dry", cache=cache, AIR=sky, **outdoors))
+    rainy = channels(recorded(tmp_path / "rainy", cache=cache, AIR=sky + "rain: {rate_mm_per_h: 100}\n", **outdoors))
+    assert any("depth" in topic for topic in dry)
+    assert {topic for topic in dry if dry[topic] != rainy[topic]} == PICTURES
 
 
 def test_slip_changes_the_way_but_no_noise_of_the_chip(base, dry):

@@ -18,6 +18,7 @@ from vobench.runner.simulate import content, frames_of, libraries, open_renderer
 from vobench.runner.store import SilentProgress
 from vobench.scene.fog import Fog
 from vobench.scene.material import Rgb
+from vobench.scene.rain import Rain
 from vobench.scene.scene import Scene
 from vobench.sequence import reader
 from vobench.suite.case import Case
@@ -142,6 +143,13 @@ def test_an_engine_without_what_it_draws_with_is_refused(read) -> None:
 def test_an_engine_that_draws_no_fog_refuses_a_scene_with_fog(engine: str) -> None:
     scene = Scene("yard", (), {}, (), fog=Fog(visibility_m=60.0))
     with pytest.raises(InputError, match=f"yard: fog requires engine raster, but the engine is {engine}"):
+        open_renderer(scene, Rendering(engine=engine), None, white_cd_m2=50.0)
+
+
+@pytest.mark.parametrize("engine", ["path", "pyrender"])
+def test_an_engine_that_draws_no_rain_refuses_a_scene_with_rain(engine: str) -> None:
+    scene = Scene("yard", (), {}, (), rain=Rain(rate_mm_per_h=1.0))
+    with pytest.raises(InputError, match=f"yard: rain requires engine raster, but the engine is {engine}"):
         open_renderer(scene, Rendering(engine=engine), None, white_cd_m2=50.0)
 
 

@@ -10,6 +10,7 @@ import pytest
 from vobench.runner.entry import MANIFEST, seal
 from vobench.runner.task import bake_task, is_done, missing, perform, plan, sequence_tasks
 from vobench.scene.fog import Fog
+from vobench.scene.rain import Rain
 from vobench.suite.scene_spec import LevelSpec
 
 
@@ -60,6 +61,22 @@ def test_equal_cases_of_two_names_share_a_sequence_and_are_scored_each(bench):
 def test_a_change_of_a_scene_that_does_not_light_it_keeps_its_light(bench, change):
     scene = bench.plan().simulated[0].scene
     assert bake_task(replace(scene, **change)).key == bake_task(scene).key
+
+
+@pytest.mark.parametrize(
+    ("rain", "is_kept"),
+    [
+        (Rain(rate_mm_per_h=30.0, wind_mps=(3.0, 0.0), puddles=0.1), True),
+        (Rain(puddles=0.2), False),
+        (Rain(seed=1, puddles=0.1), False),
+        (None, False),
+    ],
+    ids=["rate and wind", "puddles", "seed", "none"],
+)
+def test_of_rain_all_but_its_drops_counts_for_the_light(bench, rain, is_kept):
+    scene = bench.plan().simulated[0].scene
+    wet = bake_task(replace(scene, rain=Rain(puddles=0.1)))
+    assert (bake_task(replace(scene, rain=rain)).key == wet.key) == is_kept
 
 
 @pytest.mark.parametrize(

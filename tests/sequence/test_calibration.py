@@ -89,10 +89,10 @@ def test_what_the_rig_does_not_have_cannot_be_written(recording, tmp_path):
         ):
             with pytest.raises(SequenceError, match=rf"has no sensor for {topic}: "):
                 write(*arguments)
-        with pytest.raises(SequenceError, match=r"^this rig has 1 cameras, but a frame has 2 pictures$"):
+        with pytest.raises(SequenceError, match=r"^this rig has 1 cameras, but a frame has 2 images$"):
             writer.write_frame(1, recording.left[0], recording.right[0])
     with (
-        pytest.raises(SequenceError, match=r"^this rig has 2 cameras, but a frame has 1 pictures$"),
+        pytest.raises(SequenceError, match=r"^this rig has 2 cameras, but a frame has 1 images$"),
         SequenceWriter(tmp_path, recording.rig, case_json=b"") as writer,
     ):
         writer.write_frame(1, recording.left[0], None)

@@ -85,7 +85,7 @@ def test_a_flipped_bit_in_the_index_of_stamps_is_refused(folder, tmp_path):
     at = bag.summary.chunk_indexes[-1].message_index_offsets[channel] + MESSAGE_INDEX_HEAD
     for byte, said in (
         (7, "has stamps that its chunk does not have"),
-        (0, "pictures and calibration should have the same"),
+        (0, "images and calibration should have the same"),
     ):
         data = bytearray(whole)
         data[at + MESSAGE_INDEX_ENTRY + byte] ^= 1
@@ -103,9 +103,9 @@ def test_a_truth_that_was_never_finished_is_not_taken_for_none(folder, tmp_path)
 @pytest.mark.parametrize(
     ("right_ns", "said"),
     [
-        ([], r"as many left as right pictures and at least one, got 2 and 0: "),
-        ([5], r"as many left as right pictures and at least one, got 2 and 1: "),
-        ([5, 7], r"^frame 1 is not a left and a right picture of one stamp in "),
+        ([], r"as many left as right images and at least one, got 2 and 0: "),
+        ([5], r"as many left as right images and at least one, got 2 and 1: "),
+        ([5, 7], r"^frame 1 is not a left and a right image of one stamp in "),
     ],
 )
 def test_pictures_that_are_no_pairs_are_refused(recording, tmp_path, right_ns, said):

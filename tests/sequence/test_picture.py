@@ -63,7 +63,7 @@ def test_another_size_is_refused_with_both():
 
 @pytest.mark.parametrize("form", [".png", ".jpeg"])
 def test_a_picture_cut_within_its_header_is_refused(form):
-    with pytest.raises(SequenceError, match=r"the picture ends within its header: a"):
+    with pytest.raises(SequenceError, match=r"the image ends within its header: a"):
         require_picture(coded(form, GREY)[:20], CAMERA, "a")
 
 
@@ -123,7 +123,7 @@ def test_a_mosaic_begins_with_red() -> None:
 
 
 def test_what_is_neither_png_nor_jpeg_has_an_empty_header() -> None:
-    for data in (b"", b"hello, this is no picture", b"\xff\xd8\xff\xe0\x00\x04\x00\x00junk that is no marker"):
+    for data in (b"", b"hello, this is no image", b"\xff\xd8\xff\xe0\x00\x04\x00\x00junk that is no marker"):
         assert header(memoryview(data)) == ("", 0, 0, 0, 0)
     palette = struct.pack(">IIBB", 7, 5, 2, 3)
     assert header(memoryview(PNG_START + palette)) == ("png", 5, 7, 8, 3)
@@ -141,6 +141,6 @@ def test_a_written_png_has_the_channels_in_their_order(tmp_path, dtype) -> None:
 
 
 def test_a_colour_picture_of_another_shape_is_refused() -> None:
-    with pytest.raises(SequenceError, match=r"^a takes \(32, 48, 3\) uint8 pictures, got \(32, 48\) uint8$"):
+    with pytest.raises(SequenceError, match=r"^a takes \(32, 48, 3\) uint8 images, got \(32, 48\) uint8$"):
         encode(GREY, CAMERA, "a", colour=RGB)
     assert decode(encode(GREY, None, "a"), None, "a").shape == (32, 48)

@@ -76,7 +76,7 @@ def test_truth_may_run_ahead_of_the_frames(recording, tmp_path):
 )
 def test_picture_of_another_form_is_refused(recording, tmp_path, picture, seen):
     with (
-        pytest.raises(SequenceError, match=rf"^cam_right takes \(32, 48\) uint8 pictures, got {seen}$"),
+        pytest.raises(SequenceError, match=rf"^cam_right takes \(32, 48\) uint8 images, got {seen}$"),
         SequenceWriter(tmp_path, recording.rig, case_json=b"") as sequence,
     ):
         sequence.write_frame(0, recording.left[0], picture)

@@ -60,7 +60,7 @@ CALIB, CAMCHAIN = "{pitch_deg: 0, calib: it}", "{pitch_deg: 0, camchain: it}"
         (
             GREY.replace("600", "300"),
             CALIB,
-            "it: P0 has its principal point at [300.0, 180.0], so pictures do not have KITTI",
+            "it: P0 has its principal point at [300.0, 180.0], so images do not have KITTI",
         ),
         (CHAIN.split("cam1", maxsplit=1)[0], CAMCHAIN, "a pair of cameras needs cam1, which is missing in"),
         (CHAIN.replace("  resolution: [640, 400]\n", "", 1), CAMCHAIN, "it: the key cam0.resolution is missing"),

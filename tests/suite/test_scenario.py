@@ -1,5 +1,6 @@
 """Scenarios: one factor at six severities, all else the same."""
 
+from collections import Counter, defaultdict
 from pathlib import Path
 
 import pytest
@@ -172,3 +173,22 @@ def test_the_long_suites_have_every_stock_scenario(name):
     suite = yaml_file.read(catalog.find("suite", name).path, Suite)
     stock = {path.stem for path in (builtin_root() / "suites" / "scenarios").glob("*.yaml")}
     assert suite.scenarios.keys() == stock
+
+
+def test_daily_is_balanced_over_places_indoors_and_out_by_robot_hand_and_car():
+    plan = read_plan("daily")
+    units = Counter(
+        (case.variant["scene"], case.variant["trajectory"]) for case in plan.simulated if case.scene.generated
+    )
+    assert len(units) >= 12
+    assert len(set(units.values())) == 1, "each unit has as many cases"
+    assert {place.split(".")[0] for place, _ in units} == {"flat", "office", "room", "warehouse", "street", "park"}
+    assert {drive.split(".")[0] for _, drive in units} == {"robot", "hand", "car"}
+
+    places_of = defaultdict(set)
+    for case in plan.simulated:
+        if case.scene.generated:
+            places_of[case.scenario].add(case.variant["scene"])
+    assert {len(places) for places in places_of.values()} == {2}
+    biases = {case.severity: case.rig.imu.gyro.bias for case in plan.simulated if case.scenario == "imu_bias"}
+    assert biases == {1: (0.002, -0.0015, 0.002), 3: (0.018, -0.0135, 0.018)}

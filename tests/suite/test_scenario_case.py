@@ -174,6 +174,23 @@ def test_a_scenario_that_changes_its_scene_stays_in_its_own_place(spread_plan):
     assert {case.scene.name for case in cases} == {"closet"}
 
 
+def test_a_scenario_stays_in_its_own_place_if_the_suite_says_so(spread_plan, plan):
+    spread = {case.name for case in spread_plan().simulated}
+    text = SPREAD.replace("each: 2", "each: 2, own_place: [mist]")
+    listed = ", ".join(f"{name}: [1, 3]" for name in NAMES)
+    cases = plan(f"{text}scenarios: {{{listed}, dusk: [0, 5]}}\n").simulated
+    assert [case.name for case in cases if case.scenario == "mist"] == ["mist-1", "mist-3"]
+    assert {case.scene.name for case in cases if case.scenario == "mist"} == {"closet"}
+    assert sum(case.scenario == "haze" for case in cases) == sum(name.startswith("haze") for name in spread) == 4
+
+
+def test_a_scenario_that_stays_must_be_one_of_the_suite(spread_plan, plan):
+    del spread_plan  # it writes the files
+    text = SPREAD.replace("each: 2", "each: 2, own_place: [mits]")
+    with pytest.raises(SuiteError, match="own_place names scenarios that the suite does not have: mits"):
+        plan(f"{text}scenarios: {{mist: 1}}\n")
+
+
 def test_the_rig_and_the_camera_of_the_suite_are_those_of_scenarios_in_units(spread_plan):
     more = "rigs: {ahead: {pitch_deg: 10}}\ncameras: {short: {exposure_ms: 2}}\n"
     case = next(case for case in spread_plan(more).simulated if case.scenario == "mist")

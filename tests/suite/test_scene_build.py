@@ -14,6 +14,7 @@ from vobench.errors import ModelError, SuiteError
 from vobench.scene.fog import Fog
 from vobench.scene.light import AreaLight, PointLight
 from vobench.scene.material import LUMINANCE, linear
+from vobench.scene.rain import Rain
 from vobench.scene.scene import Scene
 from vobench.suite.scene_build import build, build_once
 from vobench.suite.scene_file import read_scene, scene_content
@@ -308,6 +309,20 @@ def test_a_screen_gives_the_light_of_its_picture(yard) -> None:
 def test_a_scene_has_the_fog_of_its_file_which_grows_with_its_scale(tmp_path: Path) -> None:
     (tmp_path / "yard.yaml").write_text(YAML + "fog: {visibility_m: 60, airlight: sky}\nscale: 2\n")
     assert build(read_scene(tmp_path / "yard.yaml"), {}).fog == Fog(visibility_m=120.0, airlight="sky")
+
+
+def test_a_scene_has_the_rain_of_its_file(tmp_path: Path) -> None:
+    (tmp_path / "yard.yaml").write_text(YAML + "rain: {rate_mm_per_h: 5, puddles: 0.1, wind_mps: [2, 0]}\n")
+    rain = build(read_scene(tmp_path / "yard.yaml"), {}).rain
+    assert rain == Rain(rate_mm_per_h=5.0, puddles=0.1, wind_mps=(2.0, 0.0))
+
+
+def test_rain_without_a_sky_is_refused(tmp_path: Path) -> None:
+    lamp = "lamps: [{name: bulb, kind: point, center_m: [0, 0, 2], power_lm: 900}]\n"
+    indoors = YAML.replace("sky: {illuminance_lx: 8000}\n", lamp)
+    (tmp_path / "yard.yaml").write_text(indoors + "rain: {}\n")
+    with pytest.raises(SuiteError, match="rain falls from a sky, and the scene has none"):
+        build(read_scene(tmp_path / "yard.yaml"), {})
 
 
 def test_airlight_of_a_sky_without_a_sky_is_refused(tmp_path: Path) -> None:

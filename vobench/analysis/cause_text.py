@@ -31,7 +31,7 @@ CAUSE_TEXTS = {
         "the two cameras differ", "give both cameras the same exposure and focus, or match independently of brightness"
     ),
     "dropped frames": CauseText("frames are missing", "find out why frames are dropped, such as by a slow bus or disk"),
-    "late pictures": CauseText(
+    "late images": CauseText(
         "images are not taken at their time stamp",
         "trigger both cameras together, and stamp images when they are taken",
     ),

@@ -408,7 +408,7 @@ NUISANCES = (
     Nuisance("noise", "a chip without noise", _without_noise),
     Nuisance("unlike eyes", "two equal cameras", _with_camera(unlike=CameraDifferences())),
     Nuisance("dropped frames", "every frame, once", _with_timing(drop_share=0.0, repeat_share=0.0)),
-    Nuisance("late pictures", "both images taken at their time stamp", _with_timing(jitter_ms=0.0, right_delay_ms=0.0)),
+    Nuisance("late images", "both images taken at their time stamp", _with_timing(jitter_ms=0.0, right_delay_ms=0.0)),
     Nuisance("late IMU", "readings stamped when they are taken", _with_timing(imu_delay_ms=0.0)),
     Nuisance("rolling shutter", "a global shutter", _with_camera(shutter="global", readout_ms=None)),
     Nuisance("auto-exposure", "the first exposure throughout", _with_camera(auto_exposure=None)),
@@ -431,7 +431,7 @@ NUISANCES = (
         is_circumstance=True,
         spoils=ENCODERS,
     ),
-    Nuisance("low frame rate", "twice as many pictures", at_twice_the_rate, is_circumstance=True, spoils=ENCODERS),
+    Nuisance("low frame rate", "twice as many images", at_twice_the_rate, is_circumstance=True, spoils=ENCODERS),
     Nuisance("short baseline", "twice the baseline", _with_twice_the_baseline, is_circumstance=True, needs=STEREO),
     Nuisance("this place", "another place of the same generator", _in_another_place, is_circumstance=True),
 )

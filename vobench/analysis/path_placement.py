@@ -204,7 +204,7 @@ def place_path(
         steps_m = np.diff(T_world_left[:, :3, 3], axis=0)
         length_m = float(np.linalg.norm(steps_m, axis=1).sum())
         raise InputError(
-            f"no free path of {length_m:.1f} m was found in '{scene.name}'; take fewer pictures or another place"
+            f"no free path of {length_m:.1f} m was found in '{scene.name}'; take fewer images or another place"
         )
     return replace(best.placement, tried=tried)
 

@@ -61,7 +61,7 @@ SIDE_EFFECTS = {
     "exposure_gain": "more raises gradients, the standard deviation of grey and saturated pixels together",
     "gain_db": "divide exposure_gain by 10^(dB / 20), or gain also brightens: wider grey, more saturated pixels",
     "blur_sigma_px": "more lowers gradients, their kurtosis and the slope of the spectrum together",
-    "rate_hz": "more makes tracks longer and more of them consistent, and costs as many more pictures",
+    "rate_hz": "more makes tracks longer and more of them consistent, and costs as many more images",
 }
 STATISTICS = (
     Statistic("row_error_px", "row error of the pair", "px", 0.15, 0.5, f"more {ERRORS}", f"less {ERRORS}"),
@@ -76,7 +76,7 @@ STATISTICS = (
     Statistic("tracks_home", "consistent tracks", "%", 50, 75,
               "smaller steps: more rate_hz, less speed",
               "larger steps: less rate_hz, more speed"),
-    Statistic("track_life", "track length, of 13", "pictures", 3, 5,
+    Statistic("track_life", "track length, of 13", "images", 3, 5,
               "smaller steps: more rate_hz, less speed",
               "larger steps: less rate_hz, more speed, movers"),
     Statistic("grey_sd", "standard deviation of grey", "DN", 50, 75,
@@ -137,7 +137,7 @@ GRADIENT_BINS = 128  # of 1 DN
 def window_starts(count: int, *, windows: int = WINDOWS) -> list[int]:
     """The first frames of runs of WINDOW images that are spread over `count` images; one run for a short recording."""
     if count < 2:
-        raise InputError(f"statistics need 2 successive pictures or more, and this recording has {count}")
+        raise InputError(f"statistics need 2 successive images or more, and this recording has {count}")
     fitting = max(1, min(windows, count // WINDOW))
     starts = np.linspace(0, max(count - WINDOW, 0), fitting).tolist()
     return sorted({round(start) for start in starts})
@@ -245,7 +245,7 @@ def _shot(frame: EncodedFrame, recording: Recording) -> FrameSample:
 
 def _decoded(frame: EncodedFrame, recording: Recording, side: Side, encoded: bytes) -> Image:
     camera = recording.rig.camera(side)
-    picture = decode(encoded, camera, f"the {side} picture {frame.index}", colour=frame.colour)
+    picture = decode(encoded, camera, f"the {side} image {frame.index}", colour=frame.colour)
     return grey(picture, frame.colour)
 
 

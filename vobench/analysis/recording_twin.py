@@ -288,7 +288,7 @@ def recorded_path(recording: Recording, fit: StereoFit | None) -> RecordedPath:
     t_ns = recording.t_ns[has_pose]
     if len(t_ns) < FEWEST_PICTURES:
         raise InputError(
-            f"a twin takes {FEWEST_PICTURES} pictures or more with a truth, and this recording has {len(t_ns)}"
+            f"a twin takes {FEWEST_PICTURES} images or more with a truth, and this recording has {len(t_ns)}"
         )
 
     T_world_left = poses_at(truth, t_ns) @ recording.rig.T_body_left
@@ -417,7 +417,7 @@ def _compared(real: Realism, twin: Realism) -> dict[str, tuple[float, float]]:
         ("noise_dn", "noise where flat, DN"),
         ("grey_mean", "mean of grey, DN"),
         ("edge_px", "sharpest edges, px"),
-        ("flow_px", "flow, px a picture"),
+        ("flow_px", "flow, px per image"),
     ):
         compared[title] = (real.also[key], twin.also[key])
     if real.pair and twin.pair:

@@ -30,7 +30,7 @@ DECOMPRESS = "decompress it: gltf-transform cp in.glb out.glb"
 EXTENSIONS = {
     "KHR_draco_mesh_compression": f"is compressed by Draco; {DECOMPRESS}",
     "EXT_meshopt_compression": f"is compressed by meshopt; {DECOMPRESS}",
-    "KHR_texture_basisu": "has KTX2 pictures; make them PNG: gltf-transform ktxdecompress in.glb out.glb",
+    "KHR_texture_basisu": "has KTX2 images; make them PNG: gltf-transform ktxdecompress in.glb out.glb",
     "KHR_materials_pbrSpecularGlossiness": "has materials of an old kind; gltf-transform metalrough in.glb out.glb",
     "KHR_lights_punctual": "",
     "KHR_mesh_quantization": "",

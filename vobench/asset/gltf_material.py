@@ -159,7 +159,7 @@ class MaterialReader:
         texels = MOST_TEXELS / len(self._file.tree["images"])
         side = min(MOST_SIDE, 2 ** int(np.log2(texels) / 2))
         name = str(image.get("name") or image.get("uri") or index)[:60]
-        with located(f"picture '{name}'"):
+        with located(f"image '{name}'"):
             if "bufferView" in image:
                 data: bytes | memoryview = self._file.view(image["bufferView"])
             else:

@@ -46,6 +46,7 @@ KERB_TURNS_DEG = {"sign": 90.0, "bench": 180.0}  # from facing the road; 0 for o
 LAMP_HEIGHT_M = 5.0
 LAMP_REACH_M = 1.2  # from the mast to the middle of the head
 PERSON_M = (1.55, 1.88)  # height
+MOST_PEOPLE = 10  # in a street; each has some 4,400 faces
 PLANT_M = (0.8, 1.3)  # height
 PLANT_TO_HOUSE_M = 0.42  # from the middle of a tub
 WIDE_FOR_PLANTS_M = 2.6  # width of a pavement
@@ -195,7 +196,8 @@ class _Furnisher:
         house_side = -1 if footway.is_mirrored else 1  # the sign of y towards the houses
         x_m = float(rng.uniform(2, 5))
         while x_m < footway.length_m - 2:
-            if rng.random() < 0.35:
+            has_room_for_people = self._number("person") < MOST_PEOPLE
+            if rng.random() < 0.35 and has_room_for_people:
                 free_width_m = max(footway.width_m - 2.3, 0.02)
                 y_m = 1.15 + float(rng.uniform(0, free_width_m))
                 place = footway.frame.frame(x_m, house_side * y_m)

@@ -65,7 +65,7 @@ def view_command(
     json: Json = False,
 ) -> None:
     """Show trials of a run in Rerun, failures first."""
-    form = IMAGE_FORMS[require_known("form of pictures", pictures, IMAGE_FORMS)]
+    form = IMAGE_FORMS[require_known("form of images", pictures, IMAGE_FORMS)]
     selection.require_consistent()
     recordings = save_recordings(
         open_run(run),

@@ -275,10 +275,10 @@ def _read_pictures(
             index = indices[topic].get(stamp_ns(message))
             if index is None:
                 continue
-            name = f"picture {index} of {topic} in {path}"
+            name = f"image {index} of {topic} in {path}"
             waiting.setdefault(index, {})[topic] = picture(message, name)
             if len(waiting) > MOST_WAITING:
-                raise InputError(f"left and right pictures are more than {MOST_WAITING} apart in {path}")
+                raise InputError(f"left and right images are more than {MOST_WAITING} apart in {path}")
             while len(waiting.get(due, ())) == len(indices):
                 by_topic = waiting.pop(due)
                 pictures = tuple(by_topic[topic] for topic in indices)
@@ -336,7 +336,7 @@ def _rig(
 
     rig, notes = info_rig(cameras, contents.transforms, body)
     if any(camera.info.rectified for camera in cameras):
-        notes = (*notes, "The topics' names say that the pictures are rectified: the calibration is their matrix P.")
+        notes = (*notes, "The topics' names say that the images are rectified: the calibration is their matrix P.")
     return CalibratedRig(rig, str(path), notes)
 
 

@@ -57,7 +57,7 @@ def _pixels(
     has_valid_size = height >= 1 and width >= 1 and step >= pixel_bytes
     if not has_valid_size or message.data.size < height * step:
         raise InputError(
-            f"{message.data.size} bytes are not a {width} x {height} picture in {message.encoding} "
+            f"{message.data.size} bytes are not a {width} x {height} image in {message.encoding} "
             f"with {step} bytes a row: {name}"
         )
     data = message.data[: height * step]

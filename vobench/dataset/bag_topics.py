@@ -76,7 +76,7 @@ def choose(types: Types, topics: Topics, path: str) -> SelectedTopics:
     source = f"{left} and {right}" if right else f"{left}, one camera"
     imu, imu_notes = _imu_topic(types, topics)
     truth, truth_notes = _truth_topic(types, topics)
-    notes = (f"The pictures are those of {source}.", *truth_notes, *imu_notes)
+    notes = (f"The images are those of {source}.", *truth_notes, *imu_notes)
     return SelectedTopics(left, right, left_info, right_info, imu, truth, notes)
 
 
@@ -113,8 +113,8 @@ def _only_pair(image_topics: list[str], right_topic: str | None) -> tuple[str, s
 def _undecided(types: Types, image_topics: list[str], path: str) -> InputError:
     """The error about topics that must be named."""
     if not image_topics:
-        return InputError(f"no pictures (Image or CompressedImage) in {path}; its topics: {_listed(types)}")
-    return InputError(f"name the left and the right topic of {path}; with pictures: {', '.join(image_topics)}")
+        return InputError(f"no images (Image or CompressedImage) in {path}; its topics: {_listed(types)}")
+    return InputError(f"name the left and the right topic of {path}; with images: {', '.join(image_topics)}")
 
 
 def _only_partner(left_topic: str, image_topics: list[str]) -> str | None:

@@ -185,7 +185,7 @@ def read_euroc(
 
 def _pictures(root: Path, options: ReadOptions) -> tuple[list[PictureList], Notes]:
     if not (root / CAMERAS[0]).is_dir():
-        raise InputError(f"no folder {CAMERAS[0]} with pictures in {root}")
+        raise InputError(f"no folder {CAMERAS[0]} with images in {root}")
     folders = [root / name for name in CAMERAS if (root / name).is_dir()]
     lists = [(folder / DATA, folder / "data") for folder in folders]
     cameras, notes = listed_pictures(*lists, separator=",", unit="ns", within_ns=options.within_ns)
@@ -212,7 +212,7 @@ def _cameras_on_imu(
     if missing:
         raise kalibr.no_calibration(missing[0])
     rig = mounted_rig(*(sensor_camera(path) for path in sensors))
-    note = "The pictures are not rectified; the distortion of the lens is in the calibration (sensor.yaml)."
+    note = "The images are not rectified; the distortion of the lens is in the calibration (sensor.yaml)."
     return CalibratedRig(rig, str(sensors[0]), (note,))
 
 

@@ -79,7 +79,7 @@ PHOTOMETRIC = "photometric"
 CHAIN = "camchain.yaml"
 IMU_FILE = "imu.yaml"
 NOMINAL = (
-    "The calibration is the nominal one, which estimators are given; the pictures were simulated with another one, "
+    "The calibration is the nominal one, which estimators are given; the images were simulated with another one, "
     "as the case asks, and that one was left out."
 )
 
@@ -172,7 +172,7 @@ def _left_out(source: ExportSource, layout: Writing) -> list[str]:
     notes = []
     first = next(source.sequence.encoded_frames())
     if first.form != PNG:
-        notes.append("The pictures were recorded as JPEG; here they are PNG files of the decoded pictures.")
+        notes.append("The images were recorded as JPEG; here they are PNG files of the decoded images.")
     if source.imu is not None and "imu" not in layout.keeps:
         notes.append("The IMU's readings were left out.")
     if source.rig.wheels is not None:

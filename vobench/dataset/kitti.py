@@ -54,7 +54,7 @@ def read_kitti(folder: Path, options: ReadOptions) -> Recording:
     times = folder / TIMES
     t_ns = parse_times(read_text(times), name=str(times))
     if len(t_ns) != len(pictures[0]):
-        raise InputError(f"{len(t_ns)} times for {len(pictures[0])} pictures in {folder / cameras.names[0]}: {times}")
+        raise InputError(f"{len(t_ns)} times for {len(pictures[0])} images in {folder / cameras.names[0]}: {times}")
     stream = picture_files(t_ns, *pictures)
     calibration = _calibrated_rig(folder, cameras.names, stream.size_px, options)
 
@@ -118,7 +118,7 @@ def _camera_folders(folder: Path) -> _CameraFolders:
             note = f"There is one camera: {left} has no partner."
             return _CameraFolders((left,), (note, *_note_on_unused(present, (left,))))
     pair_phrases = [" and ".join(pair) for pair in PAIRS]
-    raise InputError(f"no folders {' or '.join(pair_phrases)} with pictures in {folder}")
+    raise InputError(f"no folders {' or '.join(pair_phrases)} with images in {folder}")
 
 
 def _note_on_unused(present: list[str], used: tuple[str, ...]) -> Notes:
@@ -126,7 +126,7 @@ def _note_on_unused(present: list[str], used: tuple[str, ...]) -> Notes:
     unused = [name for name in present if name not in used]
     if not unused:
         return ()
-    return (f"The pictures of {' and '.join(unused)} were not used.",)
+    return (f"The images of {' and '.join(unused)} were not used.",)
 
 
 def _calibrated_rig(

@@ -51,7 +51,7 @@ def _require_centered(rig: Rig, place: str) -> None:
     if offset > LARGEST_OFFSET:
         width, height = FIRST_SIZE_PX
         raise InputError(
-            f"{place} has its principal point at {center_px.tolist()}, so pictures do not have "
+            f"{place} has its principal point at {center_px.tolist()}, so images do not have "
             f"KITTI's size of {width} x {height}; pass size_px"
         )
 

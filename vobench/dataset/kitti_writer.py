@@ -72,9 +72,9 @@ def _picture_notes(source: ExportSource, views: Views) -> list[str]:
         return ["The pair was recorded rectified, so its pixels are unchanged."] if is_pair else []
     dark_shares = [views.dark_share(side, source.rig.camera(side)) for side in views.rig.sides]
     dark = max(dark_shares)
-    dark_note = f"; up to {dark:.1%} of a picture is black, because it was not recorded" if dark else ""
+    dark_note = f"; up to {dark:.1%} of an image is black, because it was not recorded" if dark else ""
     return [
-        "KITTI needs rectified pictures: these were resampled, with linear interpolation between pixels, "
+        "KITTI needs rectified images: these were resampled, with linear interpolation between pixels, "
         f"which loses detail{dark_note}."
     ]
 
@@ -86,7 +86,7 @@ def _write_poses(source: ExportSource, rig: Rig, stamps: Stamps, folder: Path) -
         return ["No truth was recorded, so there is no poses.txt."]
     trajectory = left_camera_trajectory(truth, rig, stamps)
     if trajectory is None:
-        return ["No picture lies within the time span of the truth, so there is no poses.txt."]
+        return ["No image lies within the time span of the truth, so there is no poses.txt."]
     (folder / POSES).write_text(format_kitti(trajectory.T_world_frame), encoding="utf-8")
 
     notes = [

@@ -33,11 +33,11 @@ def overlapping_truth(truth: Trajectory, frames_ns: Stamps) -> tuple[Trajectory 
     notes = []
     dropped = len(truth) - len(selected)
     if dropped:
-        notes.append(f"{dropped} of {len(truth)} true poses lie outside the pictures' time; dropped.")
+        notes.append(f"{dropped} of {len(truth)} true poses lie outside the images' time; dropped.")
     is_outside = (frames_ns < t_ns[0]) | (frames_ns > t_ns[-1])
     outside = int(np.sum(is_outside))
     if outside:
-        notes.append(f"{outside} of {len(frames_ns)} pictures lie outside the truth's time; they have no true pose.")
+        notes.append(f"{outside} of {len(frames_ns)} images lie outside the truth's time; they have no true pose.")
     return selected, notes
 
 
@@ -55,7 +55,7 @@ def overlapping_imu(imu: ImuReadings, frames_ns: Stamps) -> tuple[ImuReadings | 
     imu_s = (imu.t_ns[-1] - imu.t_ns[0]) / NS_PER_S
     frames_s = (frames_ns[-1] - frames_ns[0]) / NS_PER_S
     note = (
-        f"{dropped} of {count} IMU readings lie outside the pictures' time "
+        f"{dropped} of {count} IMU readings lie outside the images' time "
         f"({imu_s:.1f} s beside {frames_s:.1f} s); dropped."
     )
     return selected, [note]
@@ -64,4 +64,4 @@ def overlapping_imu(imu: ImuReadings, frames_ns: Stamps) -> tuple[ImuReadings | 
 def _disjoint(what: str, t_ns: Stamps, frames_ns: Stamps) -> str:
     span = f" ({t_ns[0]} to {t_ns[-1]} ns)" if len(t_ns) else ""
     frames_span = f"{frames_ns[0]} to {frames_ns[-1]} ns"
-    return f"The {what}{span} was dropped: it shares no time with the pictures ({frames_span})."
+    return f"The {what}{span} was dropped: it shares no time with the images ({frames_span})."

@@ -52,7 +52,7 @@ class Photometry:
             sentences.append("The light that dirt and flare absorb and scatter is not in vignette.png.")
         if self.readout_ms:
             sentences.append(
-                f"The shutter rolls, with {self.readout_ms:g} ms a picture; stamps are those of the middle row."
+                f"The shutter rolls, with {self.readout_ms:g} ms per image; stamps are those of the middle row."
             )
         if self.cameras_differ:
             sentences.append("The differences between the two cameras (unlike) are not in pcalib.txt or vignette.png.")
@@ -195,7 +195,7 @@ def _times(source: ExportSource, stamps: Stamps) -> tuple[str, list[str]]:
     rows = [row_of[t] for t in t_ns if t in row_of]
     if len(rows) < len(t_ns):
         lines = [f"{index:05d} {format_seconds(t)}\n" for index, t in enumerate(t_ns)]
-        return "".join(lines), ["The exposure of some pictures is not known, so times.txt has no third column."]
+        return "".join(lines), ["The exposure of some images is not known, so times.txt has no third column."]
 
     time_s, gain_db = np.array(rows, float).reshape(-1, 2).T
     notes = []

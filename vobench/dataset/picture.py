@@ -169,12 +169,12 @@ def kind_of(picture: EncodedPicture) -> Kind:
     refuse_lfs_pointer(content, picture.name)
     if not content.startswith((PNG, JPEG)):
         problem = f"it begins with {content[:8]!r}" if content else "it is empty"
-        raise InputError(f"a picture should be a PNG or JPEG file, but {problem}: {picture.name}")
+        raise InputError(f"an image should be a PNG or JPEG file, but {problem}: {picture.name}")
     kind = _file_kind(content, picture.name)
     pixel_count = kind.width_px * kind.height_px
     if not 0 < pixel_count <= MOST_PIXELS:
         size = f"{kind.width_px} x {kind.height_px}"
-        raise InputError(f"a picture should have 1 to {MOST_PIXELS} pixels, but has {size}: {picture.name}")
+        raise InputError(f"an image should have 1 to {MOST_PIXELS} pixels, but has {size}: {picture.name}")
     return kind
 
 
@@ -206,13 +206,13 @@ def conversions(kind: Kind) -> tuple[str, ...]:
     """Notes on how `grey` converts pictures of a kind."""
     notes = []
     if kind.channels > 2:
-        notes.append(f"Colour pictures were converted to grey: {GREY_SHARES} (ITU-R BT.601).")
+        notes.append(f"Colour images were converted to grey: {GREY_SHARES} (ITU-R BT.601).")
     if kind.channels in (2, 4):
-        notes.append("The alpha channel of the pictures was dropped.")
+        notes.append("The alpha channel of the images was dropped.")
     if kind.bits == 16:
-        notes.append("Pictures of 16 bits were reduced to their upper 8 bits (divided by 256, rounded down).")
+        notes.append("Images of 16 bits were reduced to their upper 8 bits (divided by 256, rounded down).")
     elif kind.bits < 8:
-        notes.append(f"Pictures of {kind.bits} bits were scaled to 8 bits.")
+        notes.append(f"Images of {kind.bits} bits were scaled to 8 bits.")
     return tuple(notes)
 
 

@@ -58,7 +58,7 @@ def read_list(
     """
     lines = content_lines(read_text(path))
     if not lines:
-        raise InputError(f"the list has no picture: {path}")
+        raise InputError(f"the list has no image: {path}")
     cells = [_split_row(line.text, separator) for line in lines]
     # `content_lines` removes a header that begins with #, but some CSV files have one without it.
     has_header = separator == "," and not NUMBER.fullmatch(cells[0][0])
@@ -87,7 +87,7 @@ def _require_stamps_and_names(
     for line, row in zip(lines, cells, strict=True):
         if len(row) != 2 or not NUMBER.fullmatch(row[0]):
             start = line.text[:LONGEST_ROW_SHOWN]
-            raise InputError(f"{path}:{line.number}: a row should be a stamp and a picture's name, but is {start!r}")
+            raise InputError(f"{path}:{line.number}: a row should be a stamp and an image's name, but is {start!r}")
 
 
 def _split_row(text: str, separator: str | None) -> list[str]:
@@ -133,7 +133,7 @@ def _drop_missing(cameras: list[PictureList]) -> tuple[list[PictureList], Notes]
 
     first_incomplete = int(np.argmin(exists))
     first_missing = next(path for path in shots[first_incomplete] if not isfile(path))
-    noun = "pairs" if len(cameras) > 1 else "pictures"
+    noun = "pairs" if len(cameras) > 1 else "images"
     if not exists.any():
         names = " and ".join(camera.name for camera in cameras)
         raise InputError(
@@ -159,7 +159,7 @@ def _missing_note(
 
     `exists` (N,) is whether the files of each picture or pair exist.
     `t_ns` (N,) are the stamps.
-    `noun` is "pairs" or "pictures".
+    `noun` is "pairs" or "images".
     """
     indices = np.flatnonzero(exists)
     dropped = len(exists) - len(indices)
@@ -196,10 +196,10 @@ def numbered(*folders: Path) -> list[tuple[Path, ...]]:
     left = tuple(left_by_number.values())
     right = tuple(right_by_number.values())
     if len(left) != len(right):
-        counts = f"{len(left)} left and {len(right)} right pictures"
+        counts = f"{len(left)} left and {len(right)} right images"
         raise InputError(f"{counts}; there should be as many of each: {folders[0]} and {folders[1]}")
     if min(left_by_number) != min(right_by_number):
-        raise InputError(f"the first left and right pictures should have the same number: {left[0]} and {right[0]}")
+        raise InputError(f"the first left and right images should have the same number: {left[0]} and {right[0]}")
     return [left, right]
 
 
@@ -214,15 +214,15 @@ def _pictures_by_number(folder: Path) -> dict[int, Path]:
         if match:
             numbered_names.append((int(match[1]), name))
     if not numbered_names:
-        raise InputError(f"no numbered PNG or JPEG picture in {folder}")
+        raise InputError(f"no numbered PNG or JPEG image in {folder}")
 
     numbered_names.sort()
     first_number, first_name = numbered_names[0]
     for expected, (number, name) in enumerate(numbered_names, first_number):
         if number < expected:
-            raise InputError(f"two pictures have the number {number}: {folder / name}")
+            raise InputError(f"two images have the number {number}: {folder / name}")
         if number > expected:
-            raise InputError(f"a picture is missing: {folder / _renumbered(first_name, expected)}")
+            raise InputError(f"an image is missing: {folder / _renumbered(first_name, expected)}")
     return {number: folder / name for number, name in numbered_names}
 
 
@@ -262,7 +262,7 @@ def partners(
     """
     pairs = associate(left_ns, right_ns, max_diff_ns=within_ns)
     if not len(pairs):
-        raise InputError(f"no left and right picture have stamps within {within_ns} ns of each other in {name}")
+        raise InputError(f"no left and right image have stamps within {within_ns} ns of each other in {name}")
 
     notes = []
     left_indices = pairs.gt
@@ -270,11 +270,11 @@ def partners(
     unpaired_left = len(left_ns) - len(pairs)
     unpaired_right = len(right_ns) - len(pairs)
     if unpaired_left or unpaired_right:
-        notes.append(f"{unpaired_left} left and {unpaired_right} right pictures without a partner were dropped.")
+        notes.append(f"{unpaired_left} left and {unpaired_right} right images without a partner were dropped.")
     differences_ns = np.abs(left_ns[left_indices] - right_ns[right_indices])
     largest_ns = differences_ns.max()
     if largest_ns:
-        notes.append(f"Stamps of a pair are up to {largest_ns} ns apart; the left picture's stamp was used for both.")
+        notes.append(f"Stamps of a pair are up to {largest_ns} ns apart; the left image's stamp was used for both.")
     return Partners(left_indices, right_indices, tuple(notes))
 
 

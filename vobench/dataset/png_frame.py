@@ -29,7 +29,7 @@ def png_frames(sequence: Sequence, views: Views) -> Iterator[PngFrame]:
         for side in views.rig.sides:
             recorded = encoded[side]
             if recorded is None:
-                raise SequenceError(f"a frame has no {side} picture, but the rig has a {side} camera")
+                raise SequenceError(f"a frame has no {side} image, but the rig has a {side} camera")
             is_unchanged = views.source_px is None and frame.form == PNG
             pictures[side] = bytes(recorded) if is_unchanged else _resampled_png(sequence, views, side, recorded)
         yield PngFrame(frame.index, frame.t_ns, pictures)
@@ -37,5 +37,5 @@ def png_frames(sequence: Sequence, views: Views) -> Iterator[PngFrame]:
 
 def _resampled_png(sequence: Sequence, views: Views, side: Side, recorded: bytes) -> bytes:
     """A recorded picture, decoded, resampled to its view and encoded as PNG."""
-    picture = decode(recorded, sequence.rig.camera(side), f"a {side} picture")
+    picture = decode(recorded, sequence.rig.camera(side), f"a {side} image")
     return encode(views.show(side, picture), views.rig.camera(side), side)

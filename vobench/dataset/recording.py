@@ -75,7 +75,7 @@ class PictureStream:
         """The stream of `shots`. The first frame is read. Raises InputError if its pictures cannot be read."""
         first = next(shots(), None)
         if first is None:
-            raise InputError("a recording should have one picture or more, but has none")
+            raise InputError("a recording should have one image or more, but has none")
         kinds = tuple(kind_of(picture) for picture in first.pictures)
         return cls(shots, kinds)
 
@@ -91,7 +91,7 @@ class PictureStream:
             picture_px = (kind.width_px, kind.height_px)
             if picture_px != (camera.width_px, camera.height_px):
                 raise InputError(
-                    f"the first {side} picture has {kind.width_px} x {kind.height_px} pixels, "
+                    f"the first {side} image has {kind.width_px} x {kind.height_px} pixels, "
                     f"but the calibration is for {camera.width_px} x {camera.height_px}: {calibration}"
                 )
 
@@ -118,7 +118,7 @@ class PictureStream:
         for picture, first in zip(shot.pictures, self.kinds, strict=True):
             kind = kind_of(picture)
             if replace(kind, form=first.form) != first:
-                raise InputError(f"the first picture has {first}, but this one has {kind}: {picture.name}")
+                raise InputError(f"the first image has {first}, but this one has {kind}: {picture.name}")
             yield picture, kind
 
 
@@ -217,7 +217,7 @@ def assemble(
     if imu is None:
         rig = replace(rig, imu=None)
 
-    starts_ns = [_checked_start_ns(t_ns, "a picture")]
+    starts_ns = [_checked_start_ns(t_ns, "an image")]
     if truth is not None and len(truth):
         starts_ns.append(_checked_start_ns(truth.t_ns, "a true pose"))
     if imu is not None and len(imu.t_ns):

@@ -122,4 +122,4 @@ def _picture_writes(writer: SequenceWriter, recording: Recording) -> Writes:
             yield frame.t_ns, partial(writer.write_exposure, frame.t_ns, *exposure)
         count += 1
     if count != recording.frame_count:
-        raise InputError(f"{count} pictures were read, but the recording should have {recording.frame_count}")
+        raise InputError(f"{count} images were read, but the recording should have {recording.frame_count}")

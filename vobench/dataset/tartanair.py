@@ -58,7 +58,7 @@ def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
     version = _version_of(folder)
     if version is None:
         names = " or ".join(version.left for version in VERSIONS)
-        raise InputError(f"no folder {names} with pictures in {folder}")
+        raise InputError(f"no folder {names} with images in {folder}")
     folders = [folder / name for name in (version.left, version.right) if (folder / name).is_dir()]
     cameras = numbered(*folders)
     rate_hz = RATE_HZ if options.rate_hz is None else options.rate_hz
@@ -70,7 +70,7 @@ def read_tartanair(folder: Path, options: ReadOptions) -> Recording:
     stream = picture_files(t_ns, *cameras)
     calibration = _rig(folder, stream.size_px, len(cameras), options)
     truth, truth_notes = truth_file(options, [folder / version.poses], t_ns, TRUTH, T_NED_FLU)
-    notes = [f"There are no stamps: the pictures were assumed to be taken at {rate_hz:g} Hz from 0."]
+    notes = [f"There are no stamps: the images were assumed to be taken at {rate_hz:g} Hz from 0."]
     notes += [*calibration.notes, *truth_notes]
     notes += unread(folder, version.left, version.right, version.poses)
     if len(cameras) == 1:
@@ -94,7 +94,7 @@ def _rig(
     if size_px not in SIZES_PX:
         sizes = " or ".join(f"{w} x {h}" for w, h in SIZES_PX)
         raise InputError(
-            f"TartanAir's pictures have {sizes} pixels, these have {width} x {height}: "
+            f"TartanAir's images have {sizes} pixels, these have {width} x {height}: "
             f"name their camchain.yaml for {folder}"
         )
 

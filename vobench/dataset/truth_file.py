@@ -31,7 +31,7 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
     T = parsed.T
     notes = list(parsed.notes)
     if parsed.frames is not None:
-        notes.append(f"{path.name} has poses of {len(T)} of {len(frames_ns)} pictures, by their numbers.")
+        notes.append(f"{path.name} has poses of {len(T)} of {len(frames_ns)} images, by their numbers.")
 
     R = T[:, :3, :3]
     gram = np.swapaxes(R, -1, -2) @ R  # the identity for a rotation
@@ -45,12 +45,12 @@ def read_truth_file(path: Path, frames_ns: Stamps) -> tuple[Trajectory, Notes]:
 def _unstamped(parsed: ParsedTrajectory, frame_count: int, path: Path) -> InputError:
     if parsed.frames is not None:
         return InputError(
-            f"the first of 13 columns should be a picture's number, from 0 to {frame_count - 1}, "
+            f"the first of 13 columns should be an image's number, from 0 to {frame_count - 1}, "
             f"but there is {parsed.frames[-1]}: {path}"
         )
     return InputError(
-        f"{len(parsed.T)} poses without stamps for {frame_count} pictures: give one pose a picture, or each "
-        f"row its picture's number, from 0, as a first of 13 columns: {path}"
+        f"{len(parsed.T)} poses without stamps for {frame_count} images: give one pose per image, or each "
+        f"row its image's number, from 0, as a first of 13 columns: {path}"
     )
 
 

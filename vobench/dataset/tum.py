@@ -53,7 +53,7 @@ def read_tum(folder: Path, options: ReadOptions) -> Recording:
     notes = ["There is one camera, and it is the body: x right, y down, z ahead."]
     notes += [*absence_notes, *calibration.notes, *truth_notes]
     if (folder / DEPTH).exists():
-        notes.append("Depth pictures were dropped.")
+        notes.append("Depth images were dropped.")
     notes += unread(folder, LIST, TRUTH, "rgb", DEPTH, "depth", Path(calibration.source).name)
     return assemble(
         "tum", calibration.rig, stream, pictures.t_ns, truth=truth, notes=notes, calibration=calibration.source
@@ -101,7 +101,7 @@ def write_tum(source: ExportSource, views: Views, folder: Path) -> list[str]:
         stamps.append(frame.t_ns)
     names = [_picture_name("rgb", t_ns) for t_ns in stamps]
     _write_table(folder / LIST, "color images", "filename", stamps, names)
-    notes.append("The pictures are grey. Stamps have 9 decimals, where TUM's own have 6, so that none is rounded.")
+    notes.append("The images are grey. Stamps have 9 decimals, where TUM's own have 6, so that none is rounded.")
     notes += _write_depth(source, folder)
     if source.imu:
         notes += _write_imu(source.imu, folder)

@@ -208,7 +208,7 @@ def stereo_pair(rig: Rig, name: str) -> StereoPair:
     left_size = (rig.left.width_px, rig.left.height_px)
     right_size = (right_camera.width_px, right_camera.height_px)
     if left_size != right_size:
-        raise VobenchError(f"{name} needs two pictures of one size, got {left_size} and {right_size} px")
+        raise VobenchError(f"{name} needs two images of one size, got {left_size} and {right_size} px")
     left = Eye(rig.left, views.R_view_left, views.K)
     right = Eye(right_camera, views.R_view_right, views.K)
     small_maps = (left.small_map(), right.small_map())

@@ -18,6 +18,7 @@ from vobench.rendering.glint import glints, lamp_parts
 from vobench.rendering.illumination import AmbientLight, Illumination
 from vobench.rendering.mover_shade import ShadedLight
 from vobench.rendering.probe import Probe, room_probe
+from vobench.rendering.rain_streaks import RainStreaks
 from vobench.rendering.render_target import RenderTarget, render_target
 from vobench.rendering.renderer import Radiance, View
 from vobench.rendering.sample_pattern import HALVES, PIXEL_CENTRE, ROTATED_GRID
@@ -26,6 +27,7 @@ from vobench.rendering.warp import Warp, warp
 from vobench.scene.fog import Fog
 from vobench.scene.light import STEADY, Light, Steady
 from vobench.scene.material import Rgb
+from vobench.scene.rain import Rain
 from vobench.scene.triangles import Triangles
 
 AWAY_M = 1e6  # the depth below the scene at which movers are while the probe is drawn
@@ -42,6 +44,8 @@ class FrameRenderer:
         self._movers = baked.scene.movers
         self._lights = baked.scene.lights
         self._fog = baked.scene.fog
+        self._rain = baked.scene.rain
+        self._streaks = RainStreaks(baked.scene, self._rain) if self._rain and self._rain.rate_mm_per_h else None
         light_map = self._illumination.at(0, 0)
         is_shaded = bool(self._movers and self._lights)
         self._light = ShadedLight(baked, light_map) if is_shaded else LightTexture(light_map)
@@ -62,11 +66,44 @@ class FrameRenderer:
     ) -> Radiance:
         """The picture of views that tile its rows and have equal numbers of sub-frames; see `Renderer`."""
         _require_tiling(camera, views)
+        picture = self._without_streaks(camera, views, weights)
+        return self._behind_drops(picture, camera, views, weights) if self._streaks else picture
+
+    def _without_streaks(
+        self,
+        camera: Camera,
+        views: Sequence[View],
+        weights: Rgb | None,
+    ) -> Radiance:
         if isinstance(camera, Pinhole):
             return self._pinhole_picture(camera, views, weights)
         lens = self._warp(camera)
         views_in_order = sorted(views, key=lambda view: view.rows.start)
         return np.concatenate([self._strip(lens, view, weights) for view in views_in_order])
+
+    def _behind_drops(
+        self,
+        picture: Radiance,
+        camera: Camera,
+        views: Sequence[View],
+        weights: Rgb | None,
+    ) -> Radiance:
+        """A picture (H, W) or (H, W, 3) behind the drops of rain that are near the camera."""
+        if self._streaks is None:
+            return picture
+        start_ns = int(views[0].start_ns[0])
+        end_ns = int(views[-1].end_ns[-1])
+        drop_cd_m2 = self._drop_cd_m2(start_ns, end_ns)
+        cover = self._streaks.cover(camera, views)
+        if weights is not None:
+            drop = np.float32(drop_cd_m2 @ np.array(weights))
+            return np.asarray(picture + cover * (drop - picture))
+        return np.asarray(picture + cover[..., None] * (drop_cd_m2.astype(np.float32) - picture))
+
+    def _drop_cd_m2(self, start_ns: int, end_ns: int) -> Array:
+        """The luminance (3,) of drops: they refract light from nearly a half-space, whose upper half is the sky."""
+        surfaces_cd_m2 = np.broadcast_to(self._ambient.cd_m2(self._illumination.at(start_ns, end_ns)), 3)
+        return np.asarray((self._background.mean_cd_m2(start_ns, end_ns) + surfaces_cd_m2) / 2)
 
     def _pinhole_picture(
         self,
@@ -182,6 +219,8 @@ class FrameRenderer:
         )
         if self._fog:
             pinhole = self._in_fog(pinhole, self._fog, start_ns, end_ns)
+        if self._rain:
+            pinhole = self._in_rain(pinhole, self._rain, start_ns, end_ns)
         if isinstance(self._light, ShadedLight):
             colours, suns_ns = self._illumination.lights_at(start_ns, end_ns)
             self._light.shade(light, middle_ns, suns_ns, colours, self._draw.views(pinhole, box))
@@ -201,6 +240,18 @@ class FrameRenderer:
             airlight_cd_m2=airlight_cd_m2,
         )
 
+    def _in_rain(self, view: PinholeView, rain: Rain, start_ns: int, end_ns: int) -> PinholeView:
+        """A view through distant drops, which are too small to be seen one by one, besides fog.
+
+        The sky is seen as it is, because rain is not endless.
+        """
+        extinction_per_m = view.extinction_per_m + rain.extinction_per_m
+        if extinction_per_m == 0:
+            return view
+        share = rain.extinction_per_m / extinction_per_m
+        airlight_cd_m2 = (1 - share) * view.airlight_cd_m2 + share * self._drop_cd_m2(start_ns, end_ns)
+        return replace(view, extinction_per_m=extinction_per_m, airlight_cd_m2=airlight_cd_m2)
+
 
 def _steady(light: Light) -> Light:
     """A light at level 1 if its level varies, otherwise as it is."""
@@ -216,4 +267,4 @@ def _require_tiling(camera: Camera, views: Sequence[View]) -> None:
         raise ValueError(f"views must tile the rows 0 to {camera.height_px}, these cover {edges}")
     frame_counts = {len(view.start_ns) for view in views}
     if len(frame_counts) != 1:
-        raise ValueError("views of one picture must have the same number of sub-frames")
+        raise ValueError("views of one image must have the same number of sub-frames")

@@ -110,7 +110,7 @@ def failure(library: Path) -> str:
         try:
             done = stop.run(command, env=environment, timeout_s=PROBE_TIMEOUT_S)
         except subprocess.TimeoutExpired:
-            return f"no picture after {PROBE_TIMEOUT_S} s"
+            return f"no image after {PROBE_TIMEOUT_S} s"
     if done.returncode < 0:
         return f"killed by {signal.Signals(-done.returncode).name}"
     if done.returncode == 0:

@@ -69,7 +69,7 @@ def _bands(axes: "Axes", recordings: Mapping[str, Realism]) -> None:
 
     axes.set_yticks(range(len(STATISTICS)), [_band_label(statistic) for statistic in STATISTICS])
     axes.set(ylim=(len(STATISTICS) - 0.4, -0.6), xlim=(SCALE_LOW - 0.3, SCALE_HIGH + 0.3))
-    axes.set_title("statistics in the bands of real pictures")
+    axes.set_title("statistics in the bands of real images")
     axes.set_xticks([0, 1], ["low end", "high end"])
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.09), ncols=len(recordings), frameon=False)
 
@@ -146,7 +146,7 @@ def _curves(panels: "Mapping[str, Axes]", recordings: Mapping[str, Realism]) -> 
 
     panels["spectrum"].set(title="power spectrum, slope between the dotted lines", xlabel="cycles in 256 px")
     panels["gradient"].set(title="gradients", xlabel="DN per pixel", ylabel="share of pixels")
-    panels["tracks"].set(title="tracks alive", xlabel="pictures later", ylabel="%", ylim=(0, 103))
+    panels["tracks"].set(title="tracks alive", xlabel="images later", ylabel="%", ylim=(0, 103))
     panels["grey"].set(title="grey values", xlabel="DN", ylabel="% of pixels")
 
 

@@ -16,6 +16,7 @@ from vobench.rendering.baked_file import load_baked
 from vobench.rendering.baked_scene import BakedScene
 from vobench.rendering.illumination import Illumination
 from vobench.rendering.texel_owner import owners
+from vobench.rendering.wet_ground import wetted
 from vobench.report.entity import SCENE
 from vobench.report.rerun_stream import FrameStream
 from vobench.runner.folder import CASE, SEQUENCE, RunFolder
@@ -79,7 +80,7 @@ def scene_mesh(folder: RunFolder, case: str) -> SceneMesh | None:
     try:
         lighting = {name: checked(LightOverride, value) for name, value in settings["lighting"].items()}
         scene = build(checked(SceneFile, settings["scene"]), lighting)
-        light = load_baked(baked, scene)
+        light = load_baked(baked, wetted(scene))
     except (VobenchError, ValidationError):
         return None
     return SceneMesh(

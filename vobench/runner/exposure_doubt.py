@@ -69,7 +69,7 @@ def doubts_of_run(plan: Plan, folder: RunFolder) -> list[str]:
         light = _light(case)
         sentence = _doubt_of(case, light, shares) if light else None
         sentences[case.name] = sentence or f"{shares}; change the camera's exposure_gain, or use auto_exposure"
-    return [f"{names}: {sentence} (in its first pictures)" for sentence, names in _grouped(sentences).items()]
+    return [f"{names}: {sentence} (in its first images)" for sentence, names in _grouped(sentences).items()]
 
 
 def _doubt_of(case: Case, light: Path, shares: "ExposedShares | None" = None) -> str | None:

@@ -35,7 +35,7 @@ def left_truth(folder: Path) -> Trajectory:
     if not np.array_equal(stamps, truth.t_ns):
         stamps = stamps[is_known(truth.t_ns, stamps)]
         if not len(stamps):
-            raise SequenceError(f"the ground truth covers none of the pictures in time: {folder}")
+            raise SequenceError(f"the ground truth covers none of the images in time: {folder}")
         truth = Trajectory(stamps, poses_at(truth, stamps))
     return truth.of_mounted(sequence.rig.T_body_left)
 

@@ -51,7 +51,7 @@ def _scoring_obstacle(recording: Recording) -> str:
     known_count = int(is_known(recording.truth.t_ns, recording.t_ns).sum())
     if known_count > 1:
         return ""
-    return f"the ground truth covers {known_count} of {recording.frame_count} pictures in time"
+    return f"the ground truth covers {known_count} of {recording.frame_count} images in time"
 
 
 def read_case(case: RecordedCase) -> Recording:

@@ -285,7 +285,7 @@ def require_possible(case: Case, motion: BodyMotion) -> None:
 def _check_moves(case: Case, motion: BodyMotion) -> None:
     if len(motion.t_ns) < 2:
         raise MotionError(
-            f"the trajectory ends within its first frame at {case.trajectory.rate_hz:g} Hz: one picture shows "
+            f"the trajectory ends within its first frame at {case.trajectory.rate_hz:g} Hz: one image shows "
             "no motion; go further, more slowly or with a higher rate_hz"
         )
 

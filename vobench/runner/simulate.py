@@ -63,13 +63,14 @@ def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
     from vobench.rendering.baked_file import save_baked
     from vobench.rendering.baked_scene import BakeSettings
     from vobench.rendering.raster import require_drawing
+    from vobench.rendering.wet_ground import wetted
     from vobench.suite.scene_build import build
     from vobench.suite.white import look_around
 
     require_drawing()
     scene = build(spec, {})
     with progress.step(f"light of {scene.name}") as tell:
-        baked = bake(scene, BakeSettings(), tell)
+        baked = bake(wetted(scene), BakeSettings(), tell)
         save_baked(folder, baked)
         look_around(baked).save(folder)
 
@@ -83,10 +84,10 @@ def open_renderer(
     for the engine pyrender, which renders 8 bits.
 
     Raises MissingDependencyError if this machine cannot render, and InputError if the engine does not draw the scene's
-    fog.
+    fog or rain.
     """
-    if scene.fog and rendering.engine != "raster":
-        raise InputError(f"{scene.name}: fog requires engine raster, but the engine is {rendering.engine}")
+    if rendering.engine != "raster":
+        _require_clear_air(scene, rendering.engine)
     if rendering.engine == "path":
         from vobench.rendering.path import SAMPLES, PathRenderer
 
@@ -99,10 +100,18 @@ def open_renderer(
         return PyrenderRenderer(scene, white_cd_m2=white_cd_m2)
     from vobench.rendering.baked_file import load_baked
     from vobench.rendering.raster import RasterRenderer
+    from vobench.rendering.wet_ground import wetted
 
     if light is None:
         raise ValueError("the engine raster needs the light of the scene")
-    return RasterRenderer(load_baked(light, scene))
+    return RasterRenderer(load_baked(light, wetted(scene)))
+
+
+def _require_clear_air(scene: "Scene", engine: str) -> None:
+    """Raise InputError if a scene has fog or rain, which only the engine raster draws."""
+    for weather, is_there in (("fog", scene.fog), ("rain", scene.rain)):
+        if is_there:
+            raise InputError(f"{scene.name}: {weather} requires engine raster, but the engine is {engine}")
 
 
 def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progress") -> None:

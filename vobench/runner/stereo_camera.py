@@ -154,7 +154,7 @@ class SimulatedCamera:
         self._light_changes = not all(isinstance(light.level, Steady) for light in world.scene.lights)
         self._settings = case.camera.eye(side)
         self._white_cd_m2 = np.float32(world.white_cd_m2)
-        self._lens = lens_maps(self._settings, self._camera, stream("dirt"))
+        self._lens = lens_maps(self._settings, self._camera, stream("dirt"), stream("drops"))
         self._noise = NoiseStreams(stream("shot"), stream("read"))
         shape = (self._camera.height_px, self._camera.width_px)
         self._pattern = fixed_pattern(shape, case.camera.chip, stream("pattern"))

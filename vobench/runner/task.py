@@ -51,6 +51,7 @@ UNLIT: dict[str, Any] = {
     "sun": {"level"},
     "sky": {"level"},
     "fog": True,
+    "rain": {"rate_mm_per_h", "wind_mps"},
 }
 # The libraries whose versions can change the light of a scene.
 BAKE_LIBRARIES = ("numpy", "scipy", "embreex", "xatlas", "pillow", "trimesh", "opencv-python-headless")

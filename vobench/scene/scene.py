@@ -11,6 +11,7 @@ from vobench.scene.fog import Fog
 from vobench.scene.light import AreaLight, Light, PointLight, SpotLight
 from vobench.scene.material import Material
 from vobench.scene.mesh import moved, quad
+from vobench.scene.rain import Rain
 from vobench.scene.triangles import Thing, Triangles, triangle_table
 from vobench.trajectory.nanoseconds import NS_PER_S
 
@@ -119,7 +120,7 @@ class Mover:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Stationary things, their materials by name, the lights that shine on them, movers, and fog in the air."""
+    """Stationary things, their materials by name, the lights that shine on them, movers, fog, and rain."""
 
     name: str
     things: tuple[Thing, ...]
@@ -127,6 +128,7 @@ class Scene:
     lights: tuple[Light, ...]
     movers: tuple[Mover, ...] = ()
     fog: Fog | None = None
+    rain: Rain | None = None
 
     @property
     def panels(self) -> tuple[AreaLight, ...]:

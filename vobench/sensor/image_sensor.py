@@ -189,6 +189,7 @@ LUMINANCE = (0.2126, 0.7152, 0.0722)
 Falloff = Annotated[float, Ge(0), Le(4)]
 Spread = Annotated[float, Ge(0), Le(100)]
 Dirt = Annotated[float, Ge(0), Le(0.5)]
+Drops = Annotated[float, Ge(0), Le(0.8)]
 Flare = Annotated[float, Ge(0), Le(0.5)]
 Ghost = Annotated[float, Ge(0), Le(0.1)]
 
@@ -226,7 +227,8 @@ class CameraSettings:
     `readout_ms` of a rolling shutter is height × line delay.
     `vignetting` 1 is cos⁴θ (the exponent is 4 · vignetting), cut off by the lens's rims at `vignetting_cutoff_deg`;
     `blur_sigma_px` is a Gaussian's, `defocus_px` the diameter of the disc that a point out of focus makes,
-    `dirt` the mean share of light that dirt on the front lens keeps from its way, `flare` the share that lens and
+    `dirt` the mean share of light that dirt on the front lens keeps from its way, `lens_drops` the share of the glass
+    before the lens that drops of water cover, `flare` the share that lens and
     barrel scatter, `ghost` the share that is mirrored through the picture's middle. `unlike` says how the eyes differ.
     """
 
@@ -246,6 +248,7 @@ class CameraSettings:
     blur_sigma_px: Spread = 0.0
     defocus_px: Spread = 0.0
     dirt: Dirt = 0.0
+    lens_drops: Drops = 0.0
     flare: Flare = 0.0
     ghost: Ghost = 0.0
     jpeg_quality: Annotated[int, Ge(1), Le(100)] | None = None

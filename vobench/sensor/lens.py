@@ -8,6 +8,7 @@ import scipy
 from vobench.geometry.camera import Camera, pixel_grid
 from vobench.geometry.se3 import Array
 from vobench.sensor.image_sensor import CameraSettings, Radiance
+from vobench.sensor.lens_drops import LensDrops, lens_drops
 
 SMUDGES = 5
 SPECKS = 60
@@ -28,20 +29,26 @@ class LensMaps:
     """The effects of one lens, computed once per camera; None is no effect.
 
     `shade` (H, W) is the share of light that is transmitted; `veil` (H, W) the share of the picture's mean that dirt
-    adds; `transfer` (H, W) the blur and flare over the frequencies of a cosine transform.
+    adds; `transfer` (H, W) the blur and flare over the frequencies of a cosine transform; `drops` where the light
+    of each pixel comes from behind drops.
     """
 
     shade: Radiance | None = None
     veil: Radiance | None = None
     transfer: Array | None = None
+    drops: LensDrops | None = None
 
 
 def lens_maps(
     effects: CameraSettings,
     camera: Camera,
     rng: np.random.Generator,
+    drops_rng: np.random.Generator | None = None,
 ) -> LensMaps:
-    """The maps of a camera's lens; only dirt draws from `rng`."""
+    """The maps of a camera's lens; only dirt draws from `rng`, and only drops from `drops_rng`.
+
+    Raises ValueError if there are drops, but nothing to draw them from.
+    """
     shape = (camera.height_px, camera.width_px)
     shade = None
     veil = None
@@ -60,17 +67,24 @@ def lens_maps(
     if effects.flare > 0 or effects.ghost > 0:
         direct = 1.0 if transfer is None else transfer
         transfer = flare_transfer(direct, shape, effects.flare, effects.ghost)
-    return LensMaps(_single(shade), _single(veil), transfer)
+    drops = None
+    if effects.lens_drops > 0:
+        if drops_rng is None:
+            raise ValueError("drops on the lens need drops_rng")
+        drops = lens_drops(camera, effects.lens_drops, drops_rng)
+    return LensMaps(_single(shade), _single(veil), transfer, drops)
 
 
 def apply_lens(radiance: Radiance, maps: LensMaps) -> Radiance:
-    """Radiance (H, W), or (H, W, 3) in colour, as it reaches the chip behind dirt, vignetting, blur and flare.
+    """Radiance (H, W), or (H, W, 3) in colour, as it reaches the chip behind drops, dirt, vignetting, blur and flare.
 
     Source of the dirt's two terms: Gu, Ramamoorthi, Belhumeur and Nayar (2009), equation 3.
     """
     if radiance.ndim == 3:
         channels = [apply_lens(channel, maps) for channel in np.moveaxis(radiance, -1, 0)]
         return np.stack(channels, -1)
+    if maps.drops is not None:
+        radiance = maps.drops.apply(radiance)
     transmitted = radiance if maps.shade is None else radiance * maps.shade
     if maps.veil is not None:
         mean = np.float32(radiance.mean(dtype=np.float64))

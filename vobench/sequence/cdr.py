@@ -62,7 +62,7 @@ class StampedPicture(NamedTuple):
 def parse_picture(data: memoryview) -> StampedPicture:
     """The content of a serialised CompressedImage. Raises ValueError or struct.error if the data is damaged."""
     if data[: len(LITTLE_ENDIAN)] != LITTLE_ENDIAN:
-        raise ValueError("a picture's message is not in little-endian CDR")
+        raise ValueError("an image's message is not in little-endian CDR")
     sec, nanosec = STAMP.unpack_from(data, STAMP_START)
     _, offset = _read_string(data, STAMP_END)  # the name of the frame
     format_name, offset = _read_string(data, offset)
@@ -72,7 +72,7 @@ def parse_picture(data: memoryview) -> StampedPicture:
     colour = named_colour or MONO
     codec, _, _ = codec_and_more.partition(" ")
     if colour not in CHANNELS:
-        raise ValueError(f"a picture has the unknown format {format_name!r}")
+        raise ValueError(f"an image has the unknown format {format_name!r}")
     start, end = _sequence_bounds(data, offset)
     t_ns = sec * NS_PER_S + nanosec
     return StampedPicture(t_ns, codec, colour, data[start:end])

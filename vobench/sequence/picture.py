@@ -88,7 +88,7 @@ def encode(
     height, width = (camera.height_px, camera.width_px) if camera else image.shape[:2]
     expected = _shape(height, width, colour)
     if image.shape != expected or image.dtype != np.uint8:
-        raise SequenceError(f"{name} takes {expected} uint8 pictures, got {image.shape} {image.dtype}")
+        raise SequenceError(f"{name} takes {expected} uint8 images, got {image.shape} {image.dtype}")
     in_cv_order = np.ascontiguousarray(image[..., ::-1]) if image.ndim == 3 else image
     if jpeg_quality is None:
         # Without a compression level, OpenCV's strategy is both faster and smaller than with any level.
@@ -139,7 +139,7 @@ def require_picture(
     try:
         form, height, width, bits, channels = header(data)
     except struct.error:
-        raise SequenceError(f"the picture ends within its header: {name}") from None
+        raise SequenceError(f"the image ends within its header: {name}") from None
     has_wrong_kind = bits != 8 or channels != CHANNELS[colour]
     if has_wrong_kind or not 0 < height * width <= MAX_PX:
         raise SequenceError(f"not an 8-bit {_colour_word(colour)} PNG or JPEG: {name}")

@@ -96,7 +96,7 @@ class Sequence:
         if len(set(counts)) > 1 or not counts[0]:
             got = " and ".join(map(str, counts))
             raise SequenceError(
-                f"a recording needs as many left as right pictures and at least one, got {got}: {bag.path}"
+                f"a recording needs as many left as right images and at least one, got {got}: {bag.path}"
             )
         return cls(bag.path, rig, counts[0], bag)
 
@@ -150,7 +150,7 @@ class Sequence:
                 pictures.append(parse_picture(data))
         stamps = {picture.t_ns for picture in pictures}
         if tuple(topics) != self._image_topics or len(stamps) > 1:
-            raise SequenceError(f"frame {index} is not a left and a right picture of one stamp in {self.path}")
+            raise SequenceError(f"frame {index} is not a left and a right image of one stamp in {self.path}")
         left = pictures[0]
         right = bytes(pictures[1].encoded) if len(pictures) > 1 else None
         return EncodedFrame(index, left.t_ns, left.codec, bytes(left.encoded), right, left.colour)
@@ -161,7 +161,7 @@ class Sequence:
             yield self._decoded(frame if right else replace(frame, right=None))
 
     def _decoded(self, frame: EncodedFrame) -> StereoFrame:
-        name = f"picture {frame.index} of {self.path}"
+        name = f"image {frame.index} of {self.path}"
         left = decode(frame.left, self.rig.left, f"left {name}", colour=frame.colour)
         right = None
         if frame.right is not None:
@@ -189,7 +189,7 @@ class Sequence:
         stamps = self.bag.stamps(LEFT_IMAGE)
         info_stamps = self.bag.stamps(LEFT_INFO)
         if len(stamps) == len(info_stamps) and not np.array_equal(stamps, info_stamps):
-            raise SequenceError(f"pictures and calibration should have the same stamps, but do not in {self.path}")
+            raise SequenceError(f"images and calibration should have the same stamps, but do not in {self.path}")
         return stamps
 
     def encoders(self) -> tuple[Stamps, NDArray[np.int64]]:
@@ -356,7 +356,7 @@ def _sorted_entries(note: dict[str, str]) -> bytes:
 def _pixels(data: memoryview, path: Path) -> bytes:
     with parsing(path):
         picture = parse_picture(data)
-    image = decode(picture.encoded, None, f"a picture of {path}", colour=picture.colour)
+    image = decode(picture.encoded, None, f"an image of {path}", colour=picture.colour)
     return f"{picture.t_ns} {image.shape}\n".encode() + image.tobytes()
 
 

@@ -161,7 +161,7 @@ class SequenceWriter:
         pictures = [picture for picture in (left, right) if picture is not None]
         cameras = len(self._rig.sides)
         if len(pictures) != cameras:
-            raise SequenceError(f"this rig has {cameras} cameras, but a frame has {len(pictures)} pictures")
+            raise SequenceError(f"this rig has {cameras} cameras, but a frame has {len(pictures)} images")
         return pictures
 
     def _write_pictures(

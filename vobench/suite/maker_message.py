@@ -356,4 +356,4 @@ def _require_picture(texture: Picture) -> None:
     is_colour = has_bytes and len(shape) == 3 and shape[2] in (3, 4)
     if not (is_grey or is_colour) or 0 in shape:
         kind = texture.values.dtype.name
-        raise SuiteError(f"returns a picture of shape {shape} and {kind}: (H, W) or uint8 (H, W, 3 or 4) is right")
+        raise SuiteError(f"returns an image of shape {shape} and {kind}: (H, W) or uint8 (H, W, 3 or 4) is right")

@@ -55,12 +55,16 @@ class ScenarioCases:
         scenario = read_scenario(path)
         if scenario.name in (self.suite.trajectories or {}):
             raise SuiteError("a trajectory of the suite has this name, too; rename it")
-        if dealer and scenario.suits_any_place:
+        if dealer and scenario.suits_any_place and not self._stays(name):
             with_base_of_suite = read_scenario(path, self._base())
             yield from self._in_units(with_base_of_suite, severities, dealer)
             return
         for severity in severities:
             yield from self._at_severity(scenario, severity)
+
+    def _stays(self, name: str) -> bool:
+        """Whether the suite leaves a scenario in its own place."""
+        return self.suite.spread is not None and name in self.suite.spread.own_place
 
     def _dealer(self) -> Dealer | None:
         """The dealer that assigns units to scenarios; None if the suite does not spread them, or has mistakes."""
@@ -68,6 +72,9 @@ class ScenarioCases:
         if spread is None or not self.suite.scenarios or self.mistakes.recorded:
             return None
         with self.mistakes.at("spread"):
+            unknown = [name for name in spread.own_place if name not in self.suite.scenarios]
+            if unknown:
+                raise SuiteError(f"own_place names scenarios that the suite does not have: {', '.join(unknown)}")
             for axis in UNIT_AXES:
                 if axis not in spread.over and len(self.axes[axis]) > 1:
                     raise SuiteError(f"scenarios are spread over variants of {axis}; add {axis} to over")

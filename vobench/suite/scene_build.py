@@ -95,9 +95,12 @@ def _scene(spec: SceneFile) -> Scene:
         (*whole.lights, *_area_lights(luminous_things, whole.materials)),
         whole.movers,
         spec.fog,
+        spec.rain,
     )
     if scene.fog and scene.fog.airlight == "sky" and not any(isinstance(light, Sky) for light in scene.lights):
         raise SuiteError(f"{scene.name}: fog with airlight 'sky' requires a sky, and the scene has none; use 'light'")
+    if scene.rain and not any(isinstance(light, Sky) for light in scene.lights):
+        raise SuiteError(f"{scene.name}: rain falls from a sky, and the scene has none")
     return scene if spec.scale == 1 else scripted.sized(scene, spec.scale)
 
 

@@ -25,6 +25,7 @@ from vobench.scene.light import (
     require_increasing,
 )
 from vobench.scene.material import LUMINANCE, WHITE, Material, Rgb
+from vobench.scene.rain import Rain
 from vobench.scene.scene import ceiling_light
 from vobench.setting import ByKind, Name, NonNegative, OneOf, Positive, Share, Triple, ValueCheck, settings
 
@@ -478,6 +479,7 @@ class SceneFile:
     sun: SunSpec | None = None
     sky: SkySpec | None = None
     fog: Fog | None = None
+    rain: Rain | None = None
     movers: tuple[MoverSpec, ...] = ()
 
     def __post_init__(self) -> None:

@@ -30,6 +30,7 @@ class Spread:
     `each` is the number of units in which each scenario runs, at all its severities.
     `pairs` maps a scene to the trajectories that it is combined with, such as {street: [car], flat: [walk]}. Scenes and
     trajectories are named as in the suite, without seeds. A scene that is not listed is combined with all trajectories.
+    `own_place` names scenarios that stay in their own place, although they suit any: their difficulty depends on it.
 
     In a suite without scenarios, the combinations of the other axes are spread instead. All estimators run in the same
     units.
@@ -39,6 +40,7 @@ class Spread:
     units: Annotated[int, Ge(1), Le(MOST_UNITS)]
     each: Annotated[int, Ge(1), Le(MOST_UNITS)] = 3
     pairs: dict[str, tuple[str, ...]] | None = None
+    own_place: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if self.pairs and set(self.over) != set(UNIT_AXES):
