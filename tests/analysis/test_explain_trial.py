@@ -103,7 +103,7 @@ def test_the_number_of_trials_is_announced_before_each_stage(noisy_run: NoisyRun
     found = explain_trial(
         noisy_run.trial("blind"), run_plan=noisy_run.run_plan, estimator=noisy_run.estimator, progress=progress
     )
-    announced = r"trials 1 to \d+ of at most \d+: each of \d+ nuisances removed, with 3 seeds; the estimator takes .* s"
+    announced = r"trials 1 to \d+ of at most \d+, about \d+ s: each of \d+ nuisances removed, with 3 seeds"
     assert re.match(announced, said[0])
     assert said[-1].startswith("trials ")
     assert f"to {found.explanation.trials} of at most" in said[-1]
@@ -119,6 +119,7 @@ def test_the_time_of_a_stage_follows_from_the_trials_before(monkeypatch) -> None
     with forecast.stage(12):
         pass
     most = effort(3, is_deterministic=True).most_trials(10)
+    assert said[0] == f"trials 1 to 30 of at most {most}, about 45 s: each of 10 nuisances removed, with 3 seeds"
     assert said[1] == f"trials 31 to 42 of at most {most}, about 24 s"
 
 
@@ -209,6 +210,12 @@ def test_alternatives_and_pairs_are_said_as_such() -> None:
         "lens, and add light, expose longer with less gain, or smooth the images.",
     )
     assert together.rows()[2]["verdict"] == "fixes it"
+
+
+def test_an_estimator_without_a_single_pose_does_not_lose_track_at_some_time() -> None:
+    found = explained()
+    without_pose = replace(found, explanation=replace(found.explanation, loss=1.0))
+    assert without_pose.symptom == "mine has no pose at any time"
 
 
 def test_where_nothing_is_named_it_is_said_what_was_ruled_out_and_what_is_open() -> None:

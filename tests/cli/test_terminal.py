@@ -29,3 +29,10 @@ def test_no_text_of_others_steers_the_terminal():
 def test_columns_of_numbers_alone_are_aligned_to_the_right(cells, justify):
     column = terminal.table("", ["heading"], [[cell] for cell in cells]).columns[0]
     assert column.justify == justify
+
+
+def test_redirected_lines_have_the_width_of_columns_if_it_is_set(monkeypatch):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    assert terminal.console().width == terminal.REDIRECTED_WIDTH
+    monkeypatch.setenv("COLUMNS", "72")
+    assert terminal.console().width == 72

@@ -89,7 +89,7 @@ def test_a_case_without_a_sequence_is_left_out_and_said_where_it_is_asked_for(sc
 )
 def test_the_story_of_a_failure_names_the_scenario_the_severity_and_the_place(scored, status, words):
     facts = CaseFacts(scenario="low_light", severity=3, place="room")
-    assert story(scored("poor", status), facts) == f"poor {words} in low light at 3 (room)"
+    assert story(scored("poor", status), facts) == f"poor {words} at severity 3 of low_light, in room"
 
 
 def test_the_story_of_any_other_trial_is_its_sentence(scored):
@@ -97,3 +97,10 @@ def test_the_story_of_any_other_trial_is_its_sentence(scored):
     assert story(survivor, CaseFacts(scenario="low_light", severity=3)) == sentence(survivor)
     failed = scored("poor", "lost")
     assert story(failed, CaseFacts()) == sentence(failed)
+
+
+def test_a_trial_whose_recording_lacks_a_sensor_is_not_the_one_to_look_at(scored):
+    refused = scored("fused", "not_applicable")
+    worst = scored("seeing", ate_m=0.05)
+    assert pick([refused, worst], case=None, estimator=None) == worst
+    assert pick([refused], case=None, estimator=None) == refused

@@ -157,6 +157,12 @@ def test_a_clone_is_named_by_its_commit_and_by_whether_its_files_differ(tmp_path
     (tmp_path / "runs").mkdir()
     (tmp_path / "runs" / "board.md").write_text("no part of a result\n")
     assert environments.commit.__wrapped__() == named
+    (tmp_path / "estimators" / "mine").mkdir(parents=True)
+    (tmp_path / "estimators" / "mine" / "estimator.py").write_text("a user's own\n")
+    assert environments.commit.__wrapped__() == named
+    (tmp_path / "vobench" / "b.py").write_text("b = 1\n")
+    assert environments.commit.__wrapped__() == f"{named}+changes"
+    (tmp_path / "vobench" / "b.py").unlink()
     (tmp_path / "vobench" / "a.py").write_text("a = 2\n")
     assert environments.commit.__wrapped__() == f"{named}+changes"
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from vobench.analysis.cause_text import CAUSE_TEXTS
@@ -18,8 +19,9 @@ from vobench.runner.data_frame import data_frame
 from vobench.runner.finished_trial import FinishedTrial, read_finished_trial, run_variants
 from vobench.runner.folder import FINISHED_TRIAL, TrialScore
 from vobench.runner.frames import read_frames
+from vobench.runner.key import cache_folder
 from vobench.runner.plan_runner import PlanRunner
-from vobench.runner.store import SILENT, Progress
+from vobench.runner.store import SILENT, Progress, Store
 from vobench.suite.case import Case
 from vobench.trajectory.nanoseconds import NS_PER_S
 
@@ -37,6 +39,7 @@ SYMPTOMS = {
     "out_of_memory": "takes too much memory",
     "invalid_output": "returns an invalid answer",
 }
+NO_POSE = 1.0  # the mean error of a trial in which no segment has a pose at both ends
 SECONDS_TO_SAY = 5.0  # a stage that took less needs no forecast
 
 
@@ -77,6 +80,8 @@ class TrialExplanation:
     def symptom(self) -> str:
         """What fails and when, such as "mine loses track at 3.2 s"."""
         explanation = self.explanation
+        if explanation.status == "lost" and explanation.loss >= NO_POSE:
+            return f"{self.estimator} has no pose at any time"
         since = "" if self.diverges_at_s is None else f" at {self.diverges_at_s:.1f} s"
         if explanation.status in SYMPTOMS:
             return f"{self.estimator} {SYMPTOMS[explanation.status]}{since}"
@@ -229,7 +234,7 @@ def explain_trial(
     nuisances = _present_nuisances(finished)
     suite_name = f"explain_{finished.score.case.replace('-', '_')}_{finished.score.estimator}"
     seeds = effort(repeats, is_deterministic=finished.estimator_entry.manifest.deterministic)
-    forecast = _Forecast(progress, seeds, len(nuisances), _estimator_seconds(finished))
+    forecast = _Forecast(progress, seeds, len(nuisances), _seconds_per_trial(finished))
 
     def measure(cases: Mapping[str, Case]) -> dict[str, list[Outcome]]:
         with forecast.stage(len(cases)):
@@ -284,7 +289,7 @@ class _Forecast:
     progress: Progress
     seeds: Effort
     nuisances: int
-    estimator_seconds: float
+    seconds_per_trial: float
     done: int = 0
     seconds: float = 0.0
 
@@ -299,21 +304,22 @@ class _Forecast:
 
     def _sentence(self, trials: int) -> str:
         most = self.seeds.most_trials(self.nuisances)
-        if self.done == 0:
-            return (
-                f"trials 1 to {trials} of at most {most}: each of {self.nuisances} nuisances removed, "
-                f"with {self.seeds.screening} seeds; the estimator takes {self.estimator_seconds:.1f} s for each, "
-                "besides the images"
-            )
         numbers = f"trials {self.done + 1} to {self.done + trials} of at most {most}"
+        if self.done == 0:
+            seconds = trials * self.seconds_per_trial
+            each = f"each of {self.nuisances} nuisances removed, with {self.seeds.screening} seeds"
+            return f"{numbers}, about {seconds:.0f} s: {each}"
         if self.seconds < SECONDS_TO_SAY:
             return numbers
         return f"{numbers}, about {trials * self.seconds / self.done:.0f} s"
 
 
-def _estimator_seconds(trial: FinishedTrial) -> float:
-    """How long the estimator took for the frames of a trial."""
-    return sum(row.wall_ms or 0.0 for row in read_frames(trial.path)) / MS_PER_S
+def _seconds_per_trial(trial: FinishedTrial) -> float:
+    """How long a trial takes: a typical simulation on this machine, and the estimator for the frames of this trial."""
+    earlier_s = Store(cache_folder()).seconds("sequence")
+    simulation_s = median(earlier_s) if earlier_s else 0.0
+    estimator_s = sum(row.wall_ms or 0.0 for row in read_frames(trial.path)) / MS_PER_S
+    return simulation_s + estimator_s
 
 
 def _present_nuisances(trial: FinishedTrial) -> tuple[Nuisance, ...]:

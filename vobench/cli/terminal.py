@@ -1,6 +1,7 @@
 """Output of commands: JSON and tables on standard output, warnings on standard error."""
 
 import json
+import os
 import re
 import sys
 from collections.abc import Iterable, Sequence
@@ -34,11 +35,14 @@ def warn(sentence: str) -> None:
 
 
 def console() -> "Console":
-    """A console that prints to standard output without markup. Lines have a fixed width if that is not a terminal."""
+    """A console that prints to standard output without markup.
+
+    If that is not a terminal, lines have the width that the environment variable COLUMNS states, or a fixed one.
+    """
     from rich.console import Console
 
     rich_console = Console(markup=False, highlight=False)
-    if not rich_console.is_terminal:
+    if not rich_console.is_terminal and not os.environ.get("COLUMNS", "").isdigit():
         rich_console.width = REDIRECTED_WIDTH
     return rich_console
 

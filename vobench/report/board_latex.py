@@ -31,6 +31,7 @@ ESCAPED = {
     "|": "$|$",
     **{letter: f"\\{letter}" for letter in "&%$#_{}"},
 }
+UNDECIDED = r"$^{\sim}$"  # beside an error that is not significantly worse than the best
 MOST_UPRIGHT_COLUMNS = 6  # that fit a page with names that are not rotated
 MOST_RANGED_COLUMNS = 3  # that fit a page with the range of each cell
 
@@ -56,7 +57,7 @@ def latex(board: Board, metric: str = DEFAULT_METRIC) -> str:
         r"% Needs \usepackage{booktabs}" + (r" and \usepackage{graphicx}." if is_wide else "."),
         r"\begin{table}",
         r"\centering",
-        rf"\caption{{{_caption(board, metric, has_ranges=has_ranges)}}}",
+        rf"\caption{{{_caption(board, metric, body, has_ranges=has_ranges)}}}",
         rf"\label{{tab:{_label(board.title)}}}",
         r"\footnotesize\setlength{\tabcolsep}{4pt}",
         r"\begin{tabular}{l" + "r" * columns + "}",
@@ -68,6 +69,8 @@ def latex(board: Board, metric: str = DEFAULT_METRIC) -> str:
     if foot:
         lines += [r"\midrule", *(_line(row) for row in foot)]
     lines += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
+    if board.visible:
+        lines.append(f"% {_escaped(board.visible)}")
     if origin(board):
         lines.append(f"% {printable(origin(board))}")
     return "\n".join([*lines, ""])
@@ -98,13 +101,14 @@ def _transposed(table: Sequence[Row]) -> list[Row]:
     return [list(column) for column in zip(*table, strict=True)]
 
 
-def _caption(board: Board, metric: str, *, has_ranges: bool) -> str:
+def _caption(board: Board, metric: str, body: Sequence[Row], *, has_ranges: bool) -> str:
     statistics = "median and range" if has_ranges else "median"
     most_trials = max((cell.trials for cell in board.cells), default=1)
     trials = f", {statistics} of its trials" if most_trials > 1 else ""
-    visible = f" {board.visible}" if board.visible else ""
     heading = _escaped(METRICS[metric].heading)
-    return rf"{heading} of each case{trials}. Bold: best; $^{{\sim}}$: not decided.{_escaped(visible)}"
+    is_marked = any(UNDECIDED in cell for row in body for cell in row)
+    mark = rf"; {UNDECIDED}: not significantly worse" if is_marked else ""
+    return rf"{heading}, by case{trials}. Bold: best{mark}."
 
 
 def _label(title: str) -> str:
@@ -122,7 +126,7 @@ def _cell(shown: ShownCell, *, has_range: bool) -> str:
     elif shown.failed:
         text = rf"\textit{{{text}}}"
     if "~" in shown.mark:
-        text += r"$^{\sim}$"
+        text += UNDECIDED
     if shown.range and (has_range or shown.failed):
         text += rf" {{\tiny {_escaped(shown.range)}}}"
     return text

@@ -45,7 +45,8 @@ def breakdown_figure(cells: Iterable[Cell], index_of: Mapping[str, int], width_i
         for unused_axes in panels[len(curves) :]:
             unused_axes.set_axis_off()
 
-        figure.supxlabel("severity", fontsize=8)
+        for axes in panels[max(0, len(curves) - columns) : len(curves)]:
+            axes.set_xlabel("severity")
         figure.supylabel("lost-aware score", fontsize=8)
         handle_of_label = _handle_of_label(panels)
         handles = list(handle_of_label.values())

@@ -7,7 +7,7 @@ from statistics import fmean
 from vobench.errors import InputError, UnknownNameError
 from vobench.report.cell import CaseFacts
 from vobench.report.division import is_ranked
-from vobench.runner.folder import STATUSES, SURVIVED, TrialScore, with_sequence
+from vobench.runner.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore, with_sequence
 
 CAMERAS = ("stereo", "mono", "colour")
 # What an estimator does whose trial has this status.
@@ -38,6 +38,7 @@ def pick(scores: Sequence[TrialScore], *, case: str | None, estimator: str | Non
     selected = _selected(scores, case, estimator)
     if estimator is None:
         selected = _most_telling(selected)
+    selected = _applicable(selected)
     failed = [score for score in selected if score.status not in SURVIVED]
     if failed:
         return max(failed, key=lambda score: STATUSES.index(score.status))
@@ -53,6 +54,12 @@ def _most_telling(scores: Sequence[TrialScore]) -> list[TrialScore]:
     ranked_scores = [score for score in scores if is_ranked(score)]
     seeing = [score for score in ranked_scores if set(score.sensors) & set(CAMERAS)]
     return seeing or ranked_scores or list(scores)
+
+
+def _applicable(scores: Sequence[TrialScore]) -> list[TrialScore]:
+    """The trials whose case has all sensors that the estimator needs; all if there are none."""
+    applicable = [score for score in scores if score.status != NOT_APPLICABLE]
+    return applicable or list(scores)
 
 
 def _selected(scores: Sequence[TrialScore], case: str | None, estimator: str | None) -> list[TrialScore]:
@@ -97,9 +104,8 @@ def story(score: TrialScore, facts: CaseFacts) -> str:
     if score.status in SURVIVED or not facts.scenario or facts.severity is None:
         return sentence(score)
     deed = DEEDS.get(score.status, f"fails ({score.status})")
-    scenario = facts.scenario.replace("_", " ")
-    place = f" ({facts.place})" if facts.place else ""
-    return f"{score.estimator} {deed} in {scenario} at {facts.severity}{place}"
+    place = f", in {facts.place}" if facts.place else ""
+    return f"{score.estimator} {deed} at severity {facts.severity} of {facts.scenario}{place}"
 
 
 def sentence(score: TrialScore) -> str:

@@ -216,8 +216,9 @@ def commit() -> str:
     if not (clone / ".git").exists():
         return ""
     named = _git(clone, "rev-parse", "--short=10", "HEAD")
-    changed = _git(clone, "status", "--porcelain", "--", *SOURCES)
-    return f"{named}{'+changes' if named and changed else ''}"
+    changed = _git(clone, "status", "--porcelain", "--untracked-files=no", "--", *SOURCES)
+    added = _git(clone, "ls-files", "--others", "--exclude-standard", "--", "vobench")  # not a user's own estimators
+    return f"{named}{'+changes' if named and (changed or added) else ''}"
 
 
 def _git(clone: Path, *words: str) -> str:
