@@ -43,7 +43,7 @@ rigs: {ahead: {pitch_deg: 10, calibration_error: {right_yaw_deg: 0.1}}}
 trajectories: {short: {targets_m: [[0.3, 0]], tolerance_m: 0.03, rate_hz: 5}}
 cameras:
   bad: {sensor: mt9v034, auto_exposure: {}, shutter: rolling, readout_ms: 20, motion_blur: true, vignetting: 1,
-        dirt: 0.1, flare: 0.1, jpeg_quality: 50, exposure_gain: 2,
+        dirt: 0.1, lens_drops: 0.1, flare: 0.1, jpeg_quality: 50, exposure_gain: 2,
         unlike: {right: {gain: 0.5}}, timing: {drop_share: 0.2, jitter_ms: 1, imu_delay_ms: 1}}
 estimators: [stand_still]
 """

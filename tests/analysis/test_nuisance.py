@@ -12,7 +12,9 @@ from vobench.analysis.nuisance import COATED_FINISHES, FAINT_FINISHES, NUISANCES
 from vobench.geometry import se3
 from vobench.geometry.rig import looking
 from vobench.motion.wander import Wander
+from vobench.scene.fog import Fog
 from vobench.scene.material import reflectance
+from vobench.scene.rain import Rain
 from vobench.sensor.image_sensor import CameraDifference, CameraDifferences, NoiseStreams, expose
 from vobench.sensor.imu import FLAWLESS, IMUS
 from vobench.sequence.reader import StereoFrame
@@ -36,8 +38,8 @@ from vobench.trajectory.trajectory import Trajectory
 BURNT = "burnt pixels"
 LOW_LIGHT = "low light"  # more light than there is can always be had
 REPEATABLE = (BURNT, LOW_LIGHT)
-# What the fixtures do not have: an IMU, a generator, and a case that can be simulated.
-ABSENT = ("IMU errors",)
+# What the fixtures do not have: an IMU, weather, a generator, and a case that can be simulated.
+ABSENT = ("IMU errors", "fog", "rain")
 REMOVABLE = [nuisance for nuisance in NUISANCES if not nuisance.is_circumstance and nuisance.name not in ABSENT]
 NAMES = [nuisance.name for nuisance in REMOVABLE]
 
@@ -98,6 +100,7 @@ CAMERA_CHANGES = {
     "rolling shutter": {"camera.shutter": "global", "camera.readout_ms": None},
     "auto-exposure": {"camera.auto_exposure": None},
     "vignetting and dirt": {"camera.vignetting": 0, "camera.vignetting_cutoff_deg": None, "camera.dirt": 0},
+    "drops on the lens": {"camera.lens_drops": 0.0},
     "flare": {"camera.flare": 0, "camera.ghost": 0},
     "JPEG": {"camera.jpeg_quality": None},
     "calibration": {"rig.calibration_error.right_yaw_deg": 0.0},
@@ -113,6 +116,15 @@ def test_a_removal_sets_exactly_the_settings_of_its_nuisance(worst: Case, name: 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_removal_removes_its_nuisance_and_leaves_all_others(hard: Case, name: str) -> None:
     assert removable(without(hard, [name])) == [other for other in NAMES if other != name or name in REPEATABLE]
+
+
+@pytest.mark.parametrize("name", ["fog", "rain"])
+def test_weather_is_removed_from_the_scene(hard: Case, name: str) -> None:
+    weather = {"fog": Fog(visibility_m=20.0), "rain": Rain(rate_mm_per_h=5.0)}[name]
+    foul = replace(hard, scene=replace(hard.scene, **{name: weather}))
+    assert removable(foul).count(name) == 1
+    assert dict(changes(foul, without(foul, [name]))) == {f"scene.{name}": None}
+    assert name not in removable(hard)
 
 
 # --- What the frames show ---

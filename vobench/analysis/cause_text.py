@@ -43,6 +43,9 @@ CAUSE_TEXTS = {
         "the exposure changes", "fix the exposure, slow its control down, or match independently of brightness"
     ),
     "vignetting and dirt": CauseText("the lens is dirty or dark at its borders", "clean the lens, or mask its borders"),
+    "drops on the lens": CauseText("drops are on the lens", "shield or wipe the lens, or mask the drops"),
+    "fog": CauseText("fog lowers the contrast", "use nearby points, or sensors that see through fog"),
+    "rain": CauseText("rain falls, and wet ground mirrors", "reject outliers near the camera and on wet ground"),
     "flare": CauseText("light strays in the lens", "shade or clean the lens"),
     "JPEG": CauseText("the images are compressed", "use a higher quality, or lossless images"),
     "calibration": CauseText("the calibration is wrong", "calibrate the cameras again"),

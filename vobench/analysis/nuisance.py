@@ -239,6 +239,14 @@ def _without_movers(case: Case) -> Case:
     return replace(case, scene=replace(case.scene, movers=()))
 
 
+def _without_fog(case: Case) -> Case:
+    return replace(case, scene=replace(case.scene, fog=None))
+
+
+def _without_rain(case: Case) -> Case:
+    return replace(case, scene=replace(case.scene, rain=None))
+
+
 def _with_materials(change: MaterialChange) -> Change:
     """A change of every material that a scene uses.
 
@@ -393,6 +401,8 @@ NUISANCES = (
     Nuisance("shadows", "light from the whole ceiling or sky", _without_shadows, "shadow_edge"),
     Nuisance("changing light", "steady lamps and sun", _with_steady_light),
     Nuisance("moving things", "a static scene", _without_movers, "moving"),
+    Nuisance("fog", "clear air", _without_fog),
+    Nuisance("rain", "dry air over dry ground", _without_rain),
     Nuisance("low texture", "strong patterns on faint surfaces", _with_materials(_with_strong_texture)),
     Nuisance(
         "low light",
@@ -415,6 +425,7 @@ NUISANCES = (
     Nuisance(
         "vignetting and dirt", "an even, clean lens", _with_camera(vignetting=0, vignetting_cutoff_deg=None, dirt=0)
     ),
+    Nuisance("drops on the lens", "a dry lens", _with_camera(lens_drops=0.0)),
     Nuisance("flare", "a lens without stray light", _with_camera(flare=0, ghost=0)),
     Nuisance("JPEG", "lossless images", _with_camera(jpeg_quality=None)),
     Nuisance("calibration", "the true calibration", _with_true_calibration),

@@ -37,7 +37,12 @@ KINDS: dict[Stage, str] = {
 }
 # The entry modules of each stage. Its key hashes all code that they import. A package stands for all of its modules.
 ENTRIES: dict[Stage, tuple[str, ...]] = {
-    "bake": ("vobench.rendering.bake", "vobench.suite.scene_build", "vobench.suite.white"),
+    "bake": (
+        "vobench.rendering.bake",
+        "vobench.rendering.wet_ground",
+        "vobench.suite.scene_build",
+        "vobench.suite.white",
+    ),
     "sequence": ("vobench.runner.simulate", "vobench.runner.ground_truth"),
     "import": ("vobench.runner.import_recording", "vobench.runner.ground_truth", "vobench.dataset"),
     "estimate": ("vobench.runner.estimate", "vobench.estimator.worker"),
