@@ -249,3 +249,11 @@ def test_a_page_without_the_ate_begins_with_its_first_metric(run, mixed, monkeyp
     others = [name for name in board.metrics if name != "ate"]
     monkeypatch.setattr(Board, "metrics", others)
     assert f'<option value="{others[0]}" selected>' in page.board_page(run, mixed, board, run.path)
+
+
+def test_trials_that_lack_a_sensor_are_counted_apart_from_failures(scored, write_run, tmp_path):
+    trials = [scored("a"), scored("b", "lost"), scored("c", "not_applicable")]
+    folder = write_run(tmp_path / "suite" / "stamp", trials)
+    text = page.board_page(folder, trials, page.run_board(folder, trials), tmp_path)
+    assert "3, 1 failed, 1 not applicable" in text
+    assert text.count('class="cell failed"') == 1

@@ -11,6 +11,7 @@ from vobench.report.cell_notes import notes
 from vobench.report.leaderboard import Board
 from vobench.report.marks import marks
 from vobench.report.total import CHOSEN_RATIO, Total
+from vobench.runner.folder import NOT_APPLICABLE
 
 NO_VALUE = "–"
 DEFAULT_METRIC = "ate"
@@ -47,7 +48,7 @@ class ShownCell:
     `range` gives the lowest and the highest value, and the number of failed trials. It is empty if all values are equal
     and no trial failed.
     `mark` is `*`, `~` or empty. LEGEND explains the marks.
-    `failed` is whether any trial failed.
+    `failed` is whether any trial failed, although its recording had all sensors that the estimator needs.
     """
 
     text: str
@@ -80,6 +81,8 @@ def _shown(cell: Cell, metric: str, mark: str) -> ShownCell:
     failures = f"{cell.failed}/{cell.trials} {cell.status}"
     all_failed = cell.failed == cell.trials
     if all_failed and metric not in COSTS:
+        if cell.status == NOT_APPLICABLE:
+            return ShownCell(cell.status)
         text = cell.status if cell.trials == 1 else failures
         return ShownCell(text, failed=True)
 

@@ -23,7 +23,17 @@ from vobench.report.run_tables import trial_csv
 from vobench.report.thumbnail import Thumbnails
 from vobench.report.until_decided import recorded_ratio
 from vobench.runner.environment import Environment, read_environment
-from vobench.runner.folder import CASE, PAGE, SUITE, SURVIVED, RunFolder, TrialScore, visible_to, with_sequence
+from vobench.runner.folder import (
+    CASE,
+    NOT_APPLICABLE,
+    PAGE,
+    SUITE,
+    SURVIVED,
+    RunFolder,
+    TrialScore,
+    visible_to,
+    with_sequence,
+)
 from vobench.runner.frames import TIMES, FrameRow, new_table, read_frames
 
 TEMPLATES = Path(__file__).parent / "templates"
@@ -203,9 +213,12 @@ def _header(folder: RunFolder, scores: list[TrialScore]) -> dict[str, Any]:
 
 def _suite_facts(suite: dict[str, Any], scores: list[TrialScore]) -> dict[str, Any]:
     trials = with_sequence(scores)
-    failed = sum(trial.status not in SURVIVED for trial in trials)
+    applicable = [trial for trial in trials if trial.status != NOT_APPLICABLE]
+    failed = sum(trial.status not in SURVIVED for trial in applicable)
+    left_out = len(trials) - len(applicable)
+    not_applicable = f", {left_out} not applicable" if left_out else ""
     return {
-        "trials": f"{len(trials)}, {failed} failed",
+        "trials": f"{len(trials)}, {failed} failed{not_applicable}",
         "seed": suite.get("seed"),
         "repeats": suite.get("repeats"),
     }
