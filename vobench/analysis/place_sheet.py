@@ -35,6 +35,9 @@ PLACE_WIDTH_PX = 340  # of the view of a place, which stands beside its plan
 PLACE_HEIGHT_PX = 224
 PLACE_COLUMNS = 4
 GAP_PX = 6
+OUTLINE_PX = ((-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1))  # around a label
+WHITE = (255, 255, 255)
+BLACK = (0, 0, 0)
 PLACE_LENS = Pinhole(PLACE_WIDTH_PX, PLACE_HEIGHT_PX, 190.0, 190.0, 169.5, 111.5)
 DIRECTIONS = 16  # in which a view may look
 
@@ -86,10 +89,18 @@ def _view_beside_plan(baked: BakedScene, survey: SceneSurvey, renderer: Renderer
     square = whole_plan[:, left_px : left_px + CELL_HEIGHT_PX]
     small_plan = cv2.resize(square, (PLACE_HEIGHT_PX, PLACE_HEIGHT_PX), interpolation=cv2.INTER_AREA)
     picture = np.hstack([view, small_plan])
-    position_px = (8, PLACE_HEIGHT_PX - 10)
-    for colour, width_px in (((0, 0, 0), 3), ((255, 255, 255), 1)):
-        cv2.putText(picture, label, position_px, cv2.FONT_HERSHEY_SIMPLEX, FONT_SCALE, colour, width_px, cv2.LINE_AA)
+    _write_label(picture, label)
     return picture
+
+
+def _write_label(picture: Rgb8, label: str) -> None:
+    """Write white text with a black outline, which is the same text moved by a pixel: thicker text would be longer."""
+    left_px = 8
+    base_px = PLACE_HEIGHT_PX - 10
+    for right_px, down_px in (*OUTLINE_PX, (0, 0)):
+        position_px = (left_px + right_px, base_px + down_px)
+        colour = WHITE if (right_px, down_px) == (0, 0) else BLACK
+        cv2.putText(picture, label, position_px, cv2.FONT_HERSHEY_SIMPLEX, FONT_SCALE, colour, 1, cv2.LINE_AA)
 
 
 def _widest_view(faces: Triangles, survey: SceneSurvey) -> Viewpoint:
