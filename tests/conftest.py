@@ -35,3 +35,9 @@ def _own_makers(tmp_path_factory: pytest.TempPathFactory) -> None:
     """On a machine without a sandbox, the makers of scenes that tests write run as those of the user."""
     ours = (Path.cwd(), tmp_path_factory.getbasetemp())
     trust.adopt(trust.TrustPolicy(tuple(folder.resolve() for folder in ours)))
+
+
+@pytest.fixture(autouse=True)
+def _no_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Output that is not a terminal has its own width, not that of the terminal of whoever runs the tests."""
+    monkeypatch.delenv("COLUMNS", raising=False)
