@@ -39,7 +39,7 @@ SYMPTOMS = {
     "out_of_memory": "takes too much memory",
     "invalid_output": "returns an invalid answer",
 }
-NO_POSE = 1.0  # the mean error of a trial in which no segment has a pose at both ends
+NEVER_TRACKS = 1.0  # the mean error of a trial in which no segment has a pose at both ends
 SECONDS_TO_SAY = 5.0  # a stage that took less needs no forecast
 
 
@@ -80,8 +80,8 @@ class TrialExplanation:
     def symptom(self) -> str:
         """What fails and when, such as "mine loses track at 3.2 s"."""
         explanation = self.explanation
-        if explanation.status == "lost" and explanation.loss >= NO_POSE:
-            return f"{self.estimator} has no pose at any time"
+        if explanation.status == "lost" and explanation.loss >= NEVER_TRACKS:
+            return f"{self.estimator} never tracks"
         since = "" if self.diverges_at_s is None else f" at {self.diverges_at_s:.1f} s"
         if explanation.status in SYMPTOMS:
             return f"{self.estimator} {SYMPTOMS[explanation.status]}{since}"
