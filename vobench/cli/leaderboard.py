@@ -8,7 +8,7 @@ import typer
 from vobench.cli import terminal
 from vobench.cli.board import print_board
 from vobench.cli.option import Json
-from vobench.cli.report import TERMINAL, MetricName, choose_format
+from vobench.cli.report import TERMINAL, BoardFile, BoardFormat, MetricName, choose_format
 from vobench.errors import require_known
 from vobench.report.board_metric import METRICS
 from vobench.report.board_table import DEFAULT_METRIC
@@ -29,13 +29,8 @@ def leaderboard_command(
             metavar="FOLDER", help="The published bundles, FOLDER/SUITE/*.zip; by default vobench's results/."
         ),
     ] = None,
-    form: Annotated[
-        str | None,
-        typer.Option(
-            "--format", help="terminal, md, csv, json, latex or html; by default that of the ending of --out."
-        ),
-    ] = None,
-    out: Annotated[Path | None, typer.Option(help="Write to this file instead of the terminal.")] = None,
+    form: BoardFormat = None,
+    out: BoardFile = None,
     metric: MetricName = DEFAULT_METRIC,
     json: Json = False,
 ) -> None:

@@ -35,6 +35,11 @@ AllowedSigners = Annotated[
         help="Who may sign bundles: a file in the form of ssh-keygen(1).",
     ),
 ]
+BoardFormat = Annotated[
+    str | None,
+    typer.Option("--format", help="terminal, md, csv, json, latex or html; by default that of the ending of --out."),
+]
+BoardFile = Annotated[Path | None, typer.Option(help="Write to this file instead of the terminal.")]
 MetricName = Annotated[str, typer.Option(help=f"The metric of the matrix: {', '.join(METRICS)}.")]
 
 
@@ -52,13 +57,8 @@ def report_command(
         list[Path], typer.Argument(metavar="RUN...", help="Runs or bundles; several are merged into one board.")
     ],
     *,
-    form: Annotated[
-        str | None,
-        typer.Option(
-            "--format", help="terminal, md, csv, json, latex or html; by default that of the ending of --out."
-        ),
-    ] = None,
-    out: Annotated[Path | None, typer.Option(help="Write to this file instead of the terminal.")] = None,
+    form: BoardFormat = None,
+    out: BoardFile = None,
     metric: MetricName = DEFAULT_METRIC,
     allowed_signers: AllowedSigners = None,
     json: Json = False,
