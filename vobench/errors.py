@@ -170,3 +170,10 @@ def listed(phrases: Sequence[str]) -> str:
     if len(phrases) < 2:
         return "".join(phrases)
     return f"{', '.join(phrases[:-1])} and {phrases[-1]}"
+
+
+def enumerated(names: Sequence[str], most: int) -> str:
+    """At most `most` names, and the number of the others."""
+    shown = ", ".join(names[:most])
+    omitted_count = len(names) - most
+    return f"{shown} and {omitted_count} more" if omitted_count > 0 else shown

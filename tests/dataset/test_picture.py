@@ -9,7 +9,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from vobench.dataset.picture import EncodedPicture, as_file, conversions, enumerated, grey, kind_of, unread
+from vobench.dataset.picture import EncodedPicture, as_file, conversions, grey, kind_of, unread
 from vobench.errors import VobenchError
 
 RNG = np.random.default_rng(4)
@@ -108,13 +108,6 @@ def test_spoilt_bytes_are_a_picture_or_a_sentence(ending, colour, data):
         return
     assert result.dtype == np.uint8
     assert ending == ".jpg"
-
-
-@pytest.mark.parametrize(
-    ("count", "said"), [(1, "a0"), (3, "a0, a1, a2"), (4, "a0, a1, a2 and 1 more"), (9, "a0, a1, a2 and 6 more")]
-)
-def test_long_lists_of_names_end_with_how_many_more_there_are(count, said):
-    assert enumerated([f"a{index}" for index in range(count)], 3) == said
 
 
 def test_what_was_not_read_is_named_but_hidden_files_are_not(tmp_path):

@@ -9,9 +9,9 @@ from vobench.geometry.camera import Pinhole
 from vobench.geometry.rig import looking
 from vobench.geometry.triangle import areas_m2
 from vobench.rendering.renderer import single_instant
-from vobench.rendering.wet_ground import FILM_ROUGHNESS, WATER_ETA, random_puddles, wetted
+from vobench.rendering.wet_ground import FILM_ROUGHNESS, random_puddles, wetted
 from vobench.scene.light import Sky
-from vobench.scene.material import LUMINANCE, Material, fresnel, inner_reflectance
+from vobench.scene.material import LUMINANCE, WATER_ETA, Material, fresnel, inner_reflectance
 from vobench.scene.mesh import as_arrays, face_corners, joined, quad
 from vobench.scene.rain import Rain
 from vobench.scene.scene import Scene

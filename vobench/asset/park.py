@@ -16,7 +16,7 @@ from vobench.asset.site import Site, Structure
 from vobench.asset.street import asphalt
 from vobench.geometry.se3 import Array
 from vobench.scene.light import AreaLight, Light
-from vobench.scene.material import Material
+from vobench.scene.material import WATER_ETA, Material
 from vobench.scene.mesh import as_mesh
 from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 
@@ -45,7 +45,6 @@ ASPHALT_TINTS = ("#ffffff", "#f0e4d8")
 PAVING_TINTS = ("#f2eee6", "#d9c8b8", "#c9ccd0")
 OVERLAP_M = 0.008  # height of a path above the next one, where they cross
 WATER_TINTS = ("#1c241c", "#232a22", "#1a2426")
-WATER_ETA = 1.33  # index of refraction
 WATER_SHARE = 1.18  # extent of the mesh of the water relative to the shore, below the ground
 WATER_SIDES = 48
 

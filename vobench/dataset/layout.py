@@ -11,11 +11,11 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
 
-from vobench.dataset.picture import enumerated, listed, refuse_lfs_pointer
+from vobench.dataset.picture import listed, refuse_lfs_pointer
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.dataset.rectified_view import Views
 from vobench.dataset.source import ExportSource
-from vobench.errors import InputError, unknown_name_sentence
+from vobench.errors import InputError, enumerated, unknown_name_sentence
 from vobench.geometry.rig import Rig
 from vobench.trajectory.trajectory import Stamps, Trajectory
 

@@ -2,7 +2,6 @@
 
 import struct
 import zlib
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Any, Literal
@@ -11,7 +10,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vobench.errors import InputError
+from vobench.errors import InputError, enumerated
 from vobench.sequence.picture import Header, Image, header
 from vobench.trajectory.any_format import LFS_POINTER
 
@@ -108,13 +107,6 @@ def unread(folder: Path, *used: str) -> tuple[str, ...]:
     if not others:
         return ()
     return (f"Not read: {enumerated(others, MOST_NAMES_SHOWN)}.",)
-
-
-def enumerated(names: Sequence[str], most: int) -> str:
-    """At most `most` names, and the number of the others."""
-    shown = ", ".join(names[:most])
-    omitted_count = len(names) - most
-    return f"{shown} and {omitted_count} more" if omitted_count > 0 else shown
 
 
 Form = Literal["png", "jpeg", "pixels"]

@@ -67,7 +67,7 @@ class FrameRenderer:
         """The picture of views that tile its rows and have equal numbers of sub-frames; see `Renderer`."""
         _require_tiling(camera, views)
         picture = self._without_streaks(camera, views, weights)
-        return self._behind_drops(picture, camera, views, weights) if self._streaks else picture
+        return self._behind_drops(picture, camera, views, weights)
 
     def _without_streaks(
         self,
@@ -245,10 +245,11 @@ class FrameRenderer:
 
         The sky is seen as it is, because rain is not endless.
         """
-        extinction_per_m = view.extinction_per_m + rain.extinction_per_m
+        drops_per_m = rain.extinction_per_m
+        extinction_per_m = view.extinction_per_m + drops_per_m
         if extinction_per_m == 0:
             return view
-        share = rain.extinction_per_m / extinction_per_m
+        share = drops_per_m / extinction_per_m
         airlight_cd_m2 = (1 - share) * view.airlight_cd_m2 + share * self._drop_cd_m2(start_ns, end_ns)
         return replace(view, extinction_per_m=extinction_per_m, airlight_cd_m2=airlight_cd_m2)
 

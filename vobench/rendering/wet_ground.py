@@ -18,13 +18,12 @@ from vobench.geometry.triangle import areas_m2, face_normals
 from vobench.geometry.vector import cross_2d
 from vobench.rendering.array_types import Mask, Rows
 from vobench.rendering.geometry import FAR_M, RayCaster, offset_from_surface
-from vobench.scene.material import Material
+from vobench.scene.material import WATER_ETA, Material
 from vobench.scene.mesh import as_arrays, as_mesh
 from vobench.scene.mesh_arrays import MeshArrays, joined_arrays
 from vobench.scene.rain import Rain
 from vobench.scene.scene import Scene, triangles
 
-WATER_ETA = 1.33
 FILM_ROUGHNESS = 0.25  # GGX alpha of a film that follows the grain of asphalt; an assumption
 WET_COSINE = 0.8  # of the slope up to which the film stays
 LEVEL_COSINE = np.cos(np.deg2rad(0.5))  # of the slope up to which puddles form

@@ -12,7 +12,7 @@ from typing import Any, Final, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
 
-from vobench.errors import InputError, TrajectoryError
+from vobench.errors import InputError, TrajectoryError, enumerated
 from vobench.estimator.sandbox import Sandbox
 from vobench.runner.consistency import CovarianceConsistency
 from vobench.runner.entry import file_hash
@@ -125,9 +125,7 @@ class UnavailableCases:
     @property
     def names(self) -> str:
         """The names of the first cases, and the number of the others."""
-        named = ", ".join(self.cases[:MOST_NAMED])
-        others = len(self.cases) - MOST_NAMED
-        return f"{named} and {others} more" if others > 0 else named
+        return enumerated(self.cases, MOST_NAMED)
 
 
 def unavailable_cases(scores: Iterable[TrialScore]) -> tuple[UnavailableCases, ...]:

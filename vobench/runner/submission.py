@@ -9,10 +9,10 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from vobench.errors import InputError, VobenchError
+from vobench.errors import InputError, VobenchError, enumerated
 from vobench.runner.bundle import is_same_path, opened, sequence_hashes
 from vobench.runner.environment import Environment, differences, read_environment
-from vobench.runner.folder import CASE, SUITE, RunFolder, TrialScore
+from vobench.runner.folder import CASE, MOST_NAMED, SUITE, RunFolder, TrialScore
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.rescore import check, wrong_truths
 from vobench.runner.store import Tell
@@ -28,7 +28,6 @@ OF_IMPORT = ("source", "import")
 # Paths of files differ between machines; their last parts count.
 PATH_KEYS = ("maker", "generator", "file", "calib", "camchain")
 PATH_PARTS = 2
-MOST_NAMED = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -150,7 +149,7 @@ def why_not_comparable(one: Submission, other: Submission) -> str:
     changed = differing_recordings(one, other)
     if changed and not differences(one.environment, other.environment):
         return (
-            f"its recordings of {_named(changed)} differ on the same processor, driver and libraries, "
+            f"its recordings of {enumerated(changed, MOST_NAMED)} differ on the same processor, driver and libraries, "
             f"so the scenes or the simulator have changed ({_commits(one, other)})"
         )
     return ""
@@ -171,10 +170,10 @@ def _difference_of_cases(one: Mapping[str, Settings], other: Mapping[str, Settin
     """The first difference of other cases from those of one submission in words; empty if there is none."""
     missing = sorted(one.keys() - other.keys())
     if missing:
-        return f"it lacks {_named(missing)}"
+        return f"it lacks {enumerated(missing, MOST_NAMED)}"
     added = sorted(other.keys() - one.keys())
     if added:
-        return f"it has other cases too: {_named(added)}"
+        return f"it has other cases too: {enumerated(added, MOST_NAMED)}"
     for case, settings in one.items():
         keys = _differing_keys(settings, other[case])
         if keys:
@@ -206,13 +205,6 @@ def differing_recordings(one: Submission, other: Submission) -> list[str]:
             _, case, *_ = PurePosixPath(name).parts
             changed.add(case)
     return sorted(changed & one.cases.keys())
-
-
-def _named(cases: list[str]) -> str:
-    """The names of the first cases, and the number of the others."""
-    named = ", ".join(cases[:MOST_NAMED])
-    others = len(cases) - MOST_NAMED
-    return f"{named} and {others} more" if others > 0 else named
 
 
 def _commits(one: Submission, other: Submission) -> str:

@@ -11,6 +11,7 @@ from vobench.geometry.se3 import Array
 Map = NDArray[np.float32]
 Rgb = tuple[float, float, float]
 WHITE: Rgb = (1.0, 1.0, 1.0)
+WATER_ETA = 1.33  # the refractive index of water
 # What red, green and blue of ITU-R BT.709 add to luminance.
 LUMINANCE: Rgb = (0.2126, 0.7152, 0.0722)
 
