@@ -251,8 +251,9 @@ def _hill_m(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return 0.4 * np.sin(0.4 * x) + 0.3 * np.cos(0.3 * y)
 
 
-def test_the_map_of_uneven_ground_has_its_heights_and_leaves_out_water_and_things() -> None:
-    pond = floor(4, 4, x_m=5, y_m=5, z_m=0.8)
+@pytest.mark.parametrize("water_m", [0.8, 2.0])  # the ground is at 0.4 m: shallower or deeper than a body is high
+def test_the_map_of_uneven_ground_has_its_heights_and_leaves_out_water_and_things(water_m: float) -> None:
+    pond = floor(4, 4, x_m=5, y_m=5, z_m=water_m)
     faces = triangles(scene(hills(), pond, box(-5, -5, (1, 1, 2), z_m=-1)), t_ns=0)
     ground = floor_map(faces, RayCaster(faces))
     assert ground is not None

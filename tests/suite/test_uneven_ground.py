@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from vobench.asset.shape import sheet
+from vobench.asset.shape import at, block, sheet
 from vobench.scene.material import Material
-from vobench.scene.mesh import quad
+from vobench.scene.mesh import moved, quad
 from vobench.scene.scene import Scene, triangles
 from vobench.scene.triangles import Thing, Triangles
-from vobench.suite.uneven_ground import ground_heights_m, uneven_ground
+from vobench.suite.uneven_ground import ground_heights_m, is_under_sheet, uneven_ground
 
 GREY = {"grey": Material(colour=(0.5, 0.5, 0.5))}
 
@@ -62,3 +62,11 @@ def test_heights_are_those_of_the_ground_and_nan_beside_it() -> None:
     heights_m = ground_heights_m(faces, is_hills, places_m)
     assert heights_m[:2] == pytest.approx(hill_m(places_m[:2, 0], places_m[:2, 1]), abs=0.02)
     assert np.isnan(heights_m[2])
+
+
+def test_points_below_a_sheet_are_found_and_those_below_a_box_are_not() -> None:
+    water = Thing("water", quad((-2, -2, 0), (4, 0, 0), (0, 4, 0)), "grey")
+    roof = Thing("roof", moved(block((1, 1, 1)), at(5, 0, 2)), "grey")
+    points_m = np.array([[0.0, 0.0, -1.0], [0.0, 0.0, 1.0], [3.0, 0.0, -1.0], [5.0, 0.0, 0.0]])
+    assert is_under_sheet(faces_of(water, roof), points_m).tolist() == [True, False, False, False]
+    assert is_under_sheet(faces_of(roof), points_m).tolist() == [False] * 4

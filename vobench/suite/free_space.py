@@ -17,7 +17,7 @@ from vobench.rendering.geometry import RayCaster
 from vobench.scene.scene import Scene, triangles
 from vobench.scene.triangles import Triangles
 from vobench.suite.level_floor import FLOOR_STEP_M, level_floor
-from vobench.suite.uneven_ground import ground_heights_m, uneven_ground
+from vobench.suite.uneven_ground import ground_heights_m, is_under_sheet, uneven_ground
 
 # The map of the floor, and the height of a body.
 CELL_M = 0.1
@@ -193,10 +193,14 @@ def _map_of_uneven_ground(
 ) -> FloorMap:
     """The map of ground with a height (H * W,) in each cell, NaN where there is none."""
     has_ground = ~np.isnan(heights_m)
+    # What is less than a step below a sheet, such as the ground under a path, is no obstacle.
+    above_step_m = np.column_stack([grid.centres_m, heights_m + GROUND_STEP_M])
+    is_dry = has_ground.copy()
+    is_dry[has_ground] = ~is_under_sheet(faces, above_step_m[has_ground])
     is_free = np.zeros(len(heights_m), bool)
-    is_free[has_ground] = _is_free(
-        grid.centres_m[has_ground],
-        heights_m[has_ground],
+    is_free[is_dry] = _is_free(
+        grid.centres_m[is_dry],
+        heights_m[is_dry],
         faces,
         caster,
         cell_m=grid.cell_m,

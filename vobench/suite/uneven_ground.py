@@ -50,6 +50,22 @@ def uneven_ground(faces: Triangles) -> Mask:
     return is_ground
 
 
+def is_under_sheet(faces: Triangles, points_m: Array) -> Mask:
+    """Whether each point (N, 3) is below a sheet, such as the surface of water.
+
+    A sheet is a stationary thing without sides or a bottom: all of its faces are gentle slopes that face up.
+    """
+    is_other = (faces.plane[:, 2] <= GENTLE) | (faces.mover >= 0)
+    other_faces_by_thing = np.bincount(faces.thing[is_other], minlength=len(faces.things))
+    is_sheet = (other_faces_by_thing == 0)[faces.thing] & ~is_other
+    if not is_sheet.any():
+        return np.zeros(len(points_m), bool)
+    sheet_caster = RayCaster(faces, np.flatnonzero(is_sheet))
+    hits = sheet_caster.hits(points_m, np.tile([0.0, 0.0, 1.0], (len(points_m), 1)))
+    is_under: Mask = hits.face >= 0
+    return is_under
+
+
 def _extent_m(corners_m: Array) -> float:
     """The longer side of the box in plan around faces (F, 3, 3)."""
     points_m = corners_m.reshape(-1, 3)[:, :2]
