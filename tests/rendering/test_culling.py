@@ -81,7 +81,7 @@ def test_no_face_that_can_be_seen_is_left_out_and_most_others_are(mirrors: int, 
     )
     for turn in rng.normal(0, 0.2, (mirrors, 3)):
         towards_camera = turn - (se3.inverse(view.T_world_camera) @ view.images)[2, :3]
-        view = view.through(Plane(towards_camera / np.linalg.norm(towards_camera), 2.0))
+        view = view.through(Plane(towards_camera / np.linalg.norm(towards_camera), 2.0), strength=1.0)
     found = set(CullingSet(drawn.clusters).visible(view, box))
     must = {batch.index for batch in drawn.batches if shown(batch, quads[nth_quad(batch)], view, box)}
     assert must <= found

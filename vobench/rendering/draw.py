@@ -19,7 +19,8 @@ from vobench.rendering.view import Box, PinholeView, Plane, visible_boxes, withi
 
 # The largest number of mirrors whose reflections are drawn, at each depth of reflection. Other mirrors show the probe.
 FOLLOWED = (6, 3, 2)
-LEAST_SHARE = 5e-4  # the smallest share of the picture, times its reflectance, for which a reflection is drawn
+# The smallest share of the picture, times the reflectance of all mirrors on the way, for which a reflection is drawn.
+LEAST_SHARE = 5e-4
 
 
 class BatchDraw:
@@ -72,7 +73,7 @@ class BatchDraw:
             mirror = self._mirrors[index]
             plane = _plane_towards(mirror, view)
             if plane and self._is_visible(mirror, visible):
-                views += self.views(view.through(plane), mirror_box)
+                views += self.views(view.through(plane, strength=mirror.strength), mirror_box)
         return views
 
     def draw(self, view: PinholeView, target: RenderTarget, box: Box) -> None:
@@ -176,7 +177,7 @@ class BatchDraw:
         ranked = []
         for index, (u0, u1, v0, v1) in boxes.items():
             box_px = (u1 - u0) * (v1 - v0)
-            shown_px = box_px * self._mirrors[index].strength
+            shown_px = box_px * self._mirrors[index].strength * view.reflected_share
             ranked.append((shown_px, index))
         ranked.sort(reverse=True)
 
@@ -208,7 +209,7 @@ class BatchDraw:
         if part and plane:
             reflections = target.framebuffers[view.depth + 1]
             reflections.clear(part)
-            self.draw(view.through(plane), target, part)
+            self.draw(view.through(plane, strength=mirror.strength), target, part)
             self._begin(view, target, box)
             bind(LAYERS_UNIT, reflections.colour_texture, GL.GL_TEXTURE_2D_ARRAY)
             reflected = ShaderDefine.HAS_REFLECTION

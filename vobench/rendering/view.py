@@ -113,6 +113,7 @@ class PinholeView:
     `images` (4, 4) maps the world to the place where the camera sees it in the mirrors.
     `glints` (G, 4, 4) are as in `glint`.
     `mirrors` are the planes of the mirrors, from the camera on.
+    `reflected_share` is the share of light that all these mirrors reflect.
     `extinction_per_m` and `airlight_cd_m2` (3,) are those of fog, 0 in clear air.
     """
 
@@ -127,11 +128,12 @@ class PinholeView:
     images: Array
     glints: Array = field(default_factory=lambda: NO_GLINTS)
     mirrors: tuple[Plane, ...] = ()
+    reflected_share: float = 1.0
     extinction_per_m: float = 0.0
     airlight_cd_m2: Array = field(default_factory=lambda: np.zeros(3))
 
-    def through(self, mirror: Plane) -> "PinholeView":
-        """The view into a mirror."""
+    def through(self, mirror: Plane, *, strength: float) -> "PinholeView":
+        """The view into a mirror, which reflects a share `strength` of the light."""
         reflection = mirror.reflection
         return replace(
             self,
@@ -139,6 +141,7 @@ class PinholeView:
             view_projection=self.view_projection @ reflection,
             images=self.images @ reflection,
             mirrors=(*self.mirrors, mirror),
+            reflected_share=self.reflected_share * strength,
         )
 
     @property

@@ -28,6 +28,7 @@ from vobench import __version__, stop, trust
 from vobench.errors import InputError, MissingDependencyError, VobenchError
 from vobench.runner.fork_server import ForkServer, WorkerProcess, shared_server, watch
 from vobench.runner.key import code_digest
+from vobench.runner.simulate import last_renderer
 from vobench.runner.store import STATE, Progress, SilentProgress, Store, Tell
 from vobench.runner.task import ENTRIES, NO_LIMIT, Stage, Task, perform
 from vobench.temporary import remove_abandoned_folders
@@ -120,6 +121,7 @@ class Serial:
 
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
+        last_renderer.is_kept = True
 
     def submit(self, task: Task, store: Path, slot: int, threads: int, tell: Tell) -> "Future[TaskOutcome]":
         """Perform the task immediately."""
@@ -129,7 +131,9 @@ class Serial:
         return future
 
     def close(self) -> None:
-        """Nothing to do, because no task runs."""
+        """Close the renderer of the last sequence. No task runs."""
+        last_renderer.close()
+        last_renderer.is_kept = False
 
 
 def performed(task: Task, store: Path, threads: int, progress: Progress) -> TaskOutcome:
@@ -362,6 +366,7 @@ def work(connection: Connection, vobench_fd: int) -> None:
         with suppress(OSError):
             os.chdir(folder)
         os.sched_setaffinity(0, cores)
+        last_renderer.is_kept = True
         while True:
             task, store, threads = connection.recv()
             connection.send(performed(task, store, threads, SilentProgress(connection.send)))

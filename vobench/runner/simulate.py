@@ -1,12 +1,14 @@
 """Case to sequence: light is computed, the body moves, cameras and other sensors measure, the recording keeps."""
 
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vobench.errors import InputError
 from vobench.geometry.rig import SIDES
 from vobench.runner.key import canonical, versions
+from vobench.runner.last_renderer import LastRenderer
 from vobench.runner.motion import BodyMotion, body_motion, generator, require_possible
 from vobench.suite.scene_file import scene_content
 from vobench.suite.yaml_file import plain
@@ -37,6 +39,8 @@ UNSIMULATED: dict[str, Any] = {
 }
 LIBRARIES = ("numpy", "scipy", "opencv-python-headless", "embreex", "mcap", "rosbags")
 ENGINE_LIBRARIES = {"raster": ("PyOpenGL",), "path": ("mitsuba",), "pyrender": ("PyOpenGL", "pyrender2")}
+
+last_renderer = LastRenderer()  # of the sequences that this process simulates
 
 
 def libraries(rendering: "Rendering") -> tuple[str, ...]:
@@ -129,16 +133,21 @@ def simulate(case: "Case", folder: Path, *, light: Path | None, progress: "Progr
     scene = case.build_scene()
     truth = PixelTruth(case, scene, travel.motion) if case.truth else None
     white_cd_m2 = white_of(case.scene, light)
-    renderer = open_renderer(scene, case.rendering, light, white_cd_m2=white_cd_m2)
-    try:
+    opened = partial(open_renderer, scene, case.rendering, light, white_cd_m2=white_cd_m2)
+    with last_renderer.using(_shown(case, light, white_cd_m2), opened) as renderer:
         camera = StereoCamera(case, World(scene, renderer, travel.motion, white_cd_m2))
         camera.skip(travel.first)
         frames = frames_of(case, travel)
         watched = progress.track(_pairs(camera, frames), f"simulate {case.name}", total=len(frames.t_ns))
         with _writer(case, folder, truth) as writer:
             _write(writer, travel, frames, feed=SensorFeed(case, travel), pairs=watched, truth=truth)
-    finally:
-        renderer.close()
+
+
+def _shown(case: "Case", light: Path | None, white_cd_m2: float) -> str:
+    """What the renderer of a case depends on, as a text."""
+    settings = content(case)
+    shown = {name: settings[name] for name in ("scene", "lighting", "rendering")}
+    return canonical({**shown, "light": str(light), "white_cd_m2": white_cd_m2})
 
 
 def frames_of(case: "Case", travel: BodyMotion) -> "Schedule":
