@@ -22,8 +22,9 @@ from vobench.runner.estimate import ESTIMATE
 from vobench.runner.executor import TaskOutcome
 from vobench.runner.folder import ENVIRONMENT, PAGE, SCORE, SEQUENCE, TIMES_HASHES, read_tum
 from vobench.runner.frames import GROUND_TRUTH, TIMES
+from vobench.runner.import_recording import read_all
 from vobench.runner.run import _Gathering
-from vobench.runner.task import Task, sequence_tasks
+from vobench.runner.task import Task, missing, plan, sequence_tasks
 from vobench.sequence import Sequence, payload_hash, read_truth
 
 
@@ -266,6 +267,15 @@ def test_a_failure_is_a_row_and_is_tried_again_when_its_cause_may_be_gone(bench,
         assert f"which an estimator may not read: name it in {READ_VARIABLE}" in out_of_reach.reason
     monkeypatch.setenv(READ_VARIABLE, str(tmp_path))
     assert {s.status for s in bench.run(change).scores()} == {"ok"}
+
+
+def test_that_a_recording_lacks_a_sensor_is_not_found_again_by_the_next_run(bench, first, plugin):
+    change = ("[wheel_odometry, stand_still]", f"[{plugin('return Result(np.eye(4))', needs='[imu]')}]")
+    unfit = bench.run(change)
+    assert {s.status for s in unfit.scores()} == {"not_applicable"}
+    recordings, store = read_all(bench.plan(change)), bench.folder / "cache"
+    assert missing(plan(bench.plan(change), recordings), store) == []
+    assert [s.reason for s in bench.run(change).scores()] == [s.reason for s in unfit.scores()]
 
 
 @pytest.mark.parametrize(("step_m", "status"), [("1e5", "diverged"), ("1e200", "invalid_output")])

@@ -249,10 +249,16 @@ def is_done(task: Task, root: Path) -> bool:
 
 
 def has_failed(task: Task, folder: Path) -> bool:
-    """Whether a folder contains the result of a trial whose estimator failed."""
-    from vobench.runner.estimate import FINISHED, read_outcome
+    """Whether a folder contains the result of a trial whose estimator failed.
 
-    return task.stage in ("estimate", "score") and read_outcome(folder).kind != FINISHED
+    That a recording lacks a sensor is no failure here, because the same recording always lacks it.
+    """
+    from vobench.runner.estimate import FINISHED, read_outcome
+    from vobench.runner.folder import NOT_APPLICABLE
+
+    if task.stage not in ("estimate", "score"):
+        return False
+    return read_outcome(folder).kind not in (FINISHED, NOT_APPLICABLE)
 
 
 def perform(
