@@ -57,6 +57,12 @@ def test_headings_break_before_cells_do(monkeypatch):
     assert any("gloss ×3, turn ×2" in line for line in shown(HEADINGS, ROWS))
 
 
+def test_lines_of_a_heading_count_by_themselves(monkeypatch):
+    monkeypatch.setenv("COLUMNS", "30")
+    lines = shown(("case", "wheel_\nodometry", "two words"), [["short", "1\n0.5 to 2", "3"]])
+    assert any("two words" in line for line in lines)
+
+
 def test_a_table_is_as_wide_as_its_cells_if_the_console_is_wider(monkeypatch):
     monkeypatch.setenv("COLUMNS", "200")
     header = next(line for line in shown(HEADINGS, ROWS) if "trial" in line)

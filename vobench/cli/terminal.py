@@ -87,11 +87,13 @@ def _column_widths(
     word_widths = list[int]()
     for heading, *column in zip(headings, *cells, strict=True):
         words = [word for text in (heading, *column) for word in text.split()]
+        lines = [line for text in column for line in text.splitlines()]
         word_width = max(map(cell_len, words), default=0)
-        cell_width = max(map(cell_len, column), default=0)
+        cell_width = max(map(cell_len, lines), default=0)
+        heading_width = max(map(cell_len, heading.splitlines()), default=0)
         word_widths.append(word_width)
         cell_widths.append(max(cell_width, word_width))
-        natural_widths.append(max(cell_width, cell_len(heading)))
+        natural_widths.append(max(cell_width, heading_width))
 
     unset = [None] * len(headings)
     available -= TABLE_EDGES + COLUMN_GAP * (len(headings) - 1)
