@@ -34,7 +34,7 @@ class ScoreOptions:
         typer.Option(help="Use the settings of evo, kitti, rpg, tum, openvins, tartanair or tartanair_mono."),
     ] = None
     alignment: Annotated[
-        str | None, typer.Option("--align", "-a", help="none, origin, se3 (default), sim3, scale or yaw; evo's -a, -s and -as.")
+        str | None, typer.Option("--align", "-a", help="none, origin, se3 (default), sim3, scale, yaw; or evo's -as.")
     ] = None
     align_n: Annotated[int | None, typer.Option(help="Align with only this many of the first matched poses.")] = None
     rpe_delta: Annotated[
