@@ -21,15 +21,32 @@ def test_no_import_leads_back_to_where_it_began() -> None:
     TopologicalSorter(modules).prepare()
 
 
+def _sources(folder: Path) -> list[Path]:
+    """The Python files below a folder, without those in hidden folders such as an environment `.venv`."""
+    found = []
+    for path in sorted(folder.rglob("*.py")):
+        is_hidden = any(part.startswith(".") for part in path.relative_to(folder).parts)
+        if not is_hidden:
+            found.append(path)
+    return found
+
+
 @cache
 def _nodes() -> list[tuple[Path, ast.AST]]:
     """The nodes of all sources that these tests look at, with their files."""
     nodes = []
     for folder in SOURCES:
-        for path in sorted((ROOT / folder).rglob("*.py")):
+        for path in _sources(ROOT / folder):
             tree = ast.parse(path.read_text(encoding="utf-8"))
             nodes += [(path, node) for node in ast.walk(tree) if isinstance(node, KINDS)]
     return nodes
+
+
+def test_an_environment_in_a_folder_is_not_read(tmp_path: Path) -> None:
+    for name in ("own.py", ".venv/lib/other.py", "sub/own.py"):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).touch()
+    assert [path.name for path in _sources(tmp_path)] == ["own.py", "own.py"]
 
 
 def _is_packed(node: ast.AST) -> bool:

@@ -52,6 +52,7 @@ def test_noise_is_named_as_the_cause_and_the_failure_shrinks_to_a_suite_of_its_o
     assert said.json["singles"][0]["survived"] == 6  # with the seeds that confirm it
     assert said.json["relation"] == "one"
     shown = vobench("explain", failed, "--repeats", 1)
+    assert "noise → a chip without noise" in shown.out
     assert "because the images are noisy. With a chip without noise, the error drops by" in shown.out
     assert "trials 1 to" in shown.err
 

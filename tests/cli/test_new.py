@@ -23,6 +23,18 @@ def test_from_new_to_a_row_of_the_board_in_three_commands(vobench, here, words):
     assert "crashed" not in ran.out
 
 
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("mine", "Mine"), ("my_vo", "MyVo"), ("vo2_fast_", "Vo2Fast"), ("none", "NoneEstimator")],
+)
+def test_the_class_has_the_name_of_the_estimator(vobench, here, name, expected):
+    vobench("new", "estimator", name)
+    folder = Path("estimators") / name
+    assert f"class: estimator:{expected} " in (folder / "estimator.yaml").read_text()
+    assert f"class {expected}:" in (folder / "estimator.py").read_text()
+    compile((folder / "estimator.py").read_text(), "estimator.py", "exec")
+
+
 def test_the_scaffold_tests_itself(vobench, here):
     vobench("new", "estimator", "mine")
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "estimators/mine"]

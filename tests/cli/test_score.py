@@ -649,8 +649,11 @@ def test_positions_too_far_apart_to_square_are_no_number(vobench, files_scoring)
     assert "nan" not in said.err
 
 
+def halved(row):
+    return [row[0], *(repr(0.5 * float(value)) for value in row[1:4]), *row[4:]]
+
+
 EVO = {
-    "-a": ("-a", "se3"),
     "--align_origin": ("-a", "origin"),
     "--all_pairs": ("--all-pairs",),
     "--pairs_from_reference": ("--pairs-from", "gt"),
@@ -673,12 +676,20 @@ def evo_cases():
 
 def ours(flags):
     """evo's options in our words, which are nearly the same."""
-    if "-a -s" in flags:
-        return ("--like", "evo", "-a", "sim3")
     words = []
     for word in shlex.split(flags.replace("--t_max_diff", "--t-max-diff")):
         words += EVO.get(word, (word,))
     return ("--like", "evo", *words)
+
+
+def test_the_scale_is_aligned_by_evos_flags(vobench, files_scoring):
+    (files_scoring / "half").write_text(rewritten((files_scoring / "e.format_tum").read_text(), halved))
+    by_kind = vobench("score", "g.format_tum", "half", "-a", "sim3", "--json").json
+    assert by_kind["alignment"]["scale"] == pytest.approx(2.0, rel=0.1)
+    for flags in (("-as",), ("-a", "-s"), ("-vas",)):
+        assert vobench("score", "g.format_tum", "half", *flags, "--json").json == by_kind
+    rigid = vobench("score", "g.format_tum", "half", "-a", "--like", "evo", "--json").json
+    assert rigid["alignment"]["kind"] == "se3"
 
 
 @WITH_DATA_scoring

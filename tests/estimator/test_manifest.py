@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from vobench.errors import SuiteError, VobenchError
-from vobench.estimator import Frame
 from vobench.estimator.worker import load
 from vobench.suite.manifest import read_manifest
 
@@ -179,16 +178,6 @@ def test_a_class_in_a_file_that_is_not_there_is_named(tmp_path):
     folder = plugin(tmp_path, **{"class": "elsewhere:Mine"})
     with pytest.raises(VobenchError, match=r"there is no .*elsewhere\.py"):
         loaded(folder)
-
-
-def test_the_example_of_the_docs_works(tmp_path):
-    page = (ESTIMATORS.parent / "docs" / "estimators.md").read_text(encoding="utf-8")
-    manifest, code = (page.split(f"```{language}\n")[1].split("```")[0] for language in ("yaml", "python"))
-    (tmp_path / "estimator.yaml").write_text(manifest)
-    (tmp_path / "estimator.py").write_text(code)
-    estimator = loaded(tmp_path)
-    estimator.start(None, read_manifest(tmp_path).params, 0)
-    assert estimator.process(Frame(2, 0)).T_odom_frame[:3, 3].tolist() == [0.02, 0.002, 0.0]
 
 
 MANIFESTS = {path.stem: path for path in (ESTIMATORS.parent / "examples" / "manifests").glob("*.yaml")}

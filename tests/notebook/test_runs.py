@@ -151,7 +151,7 @@ def test_a_forged_score_of_a_bundle_is_named_and_does_not_count(ran, tmp_path):
 def test_plots_take_the_cases_and_estimators_that_there_are(ran):
     run = vobench.read_run(ran)
     names = [text.get_text() for text in run.plot("short").axes[0].get_legend().get_texts()]
-    assert names == ["ground truth", "start", "stand_still", "wheel_odometry"]
+    assert names == ["ground truth", "start", "wheel_odometry", "stand_still"]
     names = [text.get_text() for text in run.plot(estimators="stand_still").axes[0].get_legend().get_texts()]
     assert names == ["ground truth", "start", "stand_still"]
     with pytest.raises(UnknownNameError, match="no estimator named 'stand_stil'"):

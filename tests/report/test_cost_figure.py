@@ -38,6 +38,15 @@ def test_the_line_joins_estimators_that_no_cheaper_one_beats(scored):
     assert set(labels(axes)[1:]) == {"fast", "slow", "poor"}
 
 
+def test_all_groups_have_a_panel_and_their_estimators_are_in_one_legend(scored):
+    trials = [scored("eyes", ate_m=0.1, sensors=("stereo",)), scored("wheels", ate_m=0.2, sensors=("encoders",))]
+    answered = {("down", name): EstimatorStatistics(ms_per_frame=1.0) for name in ("eyes", "wheels")}
+    figure = cost_figure(make_board(trials, answered).totals, {"eyes": 0, "wheels": 1}, 3.5)
+    assert len(figure.axes) == 2
+    (legend,) = figure.legends
+    assert {text.get_text() for text in legend.get_texts()} == {"eyes", "wheels"}
+
+
 def test_without_costs_there_is_nothing_to_draw(scored):
     totals = make_board([scored("a", ate_m=0.1)], {}).totals
     with pytest.raises(InputError, match="no ranked estimator has both an error and a CPU time"):

@@ -1,12 +1,15 @@
 """The kinds of figures, and of which case and estimators they are."""
 
+import json
+
 import pytest
 
 from tests.report.paths import case_of, labels, path
 from vobench.errors import InputError, UnknownNameError
 from vobench.report.figure_kind import FILE_KINDS, FigureOptions, FileFigures, RunFigures
-from vobench.report.figure_style import COLUMN_INCHES, PAGE_INCHES
+from vobench.report.figure_style import COLUMN_INCHES, PAGE_INCHES, line_style
 from vobench.runner.estimate import ESTIMATE
+from vobench.runner.folder import ESTIMATORS
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.trajectory.tum import format_tum
 
@@ -46,13 +49,28 @@ def test_an_estimator_keeps_its_colour_if_others_are_left_out(folder):
     assert part.get_lines()[2].get_color() == colour_of["zen"]
 
 
+def test_colours_follow_the_list_of_estimators_of_the_run(folder):
+    listed = [{"label": label} for label in ("zen", "gone", "apt")]
+    (folder.path / ESTIMATORS).write_text(json.dumps(listed))
+    (axes,) = RunFigures(folder, cases=["room-a"]).draw("path").axes
+    assert labels(axes)[2:] == ["zen", "apt", "bad"]
+    colours = [line.get_color() for line in axes.get_lines()[2:]]
+    assert colours == [line_style(index)["color"] for index in range(3)]
+
+
+def test_a_wide_matrix_is_as_wide_as_a_page(scored, write_run, tmp_path):
+    trials = [scored(f"e{number}", ate_m=0.01) for number in range(6)]
+    figures = RunFigures(write_run(tmp_path / "run", trials))
+    assert figures.draw("matrix").get_size_inches()[0] == PAGE_INCHES
+
+
 def test_figures_of_all_cases_leave_out_those_that_were_not_chosen(folder):
     everything = RunFigures(folder).draw("matrix").axes[0]
     assert [text.get_text() for text in everything.get_yticklabels()] == ["room-a", "room-b"]
     chosen = RunFigures(folder, cases=["room-b"], estimators=["apt", "bad"]).draw("matrix").axes[0]
     assert [text.get_text() for text in chosen.get_yticklabels()] == ["room-b"]
     assert [text.get_text() for text in chosen.get_xticklabels()] == ["apt", "bad"]
-    assert [text.get_text() for text in chosen.texts] == ["1", "lost"]
+    assert [text.get_text() for text in chosen.texts] == ["1.0", "lost"]
 
 
 def test_wide_kinds_are_as_wide_as_a_page_unless_a_width_is_given():

@@ -33,7 +33,12 @@ def test_another_ending_and_a_folder_that_is_missing_are_errors(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("ends", "shown"), [((0.5, 20), ["1", "2", "5", "10", "20"]), ((0.01, 100), ["0.1", "1", "10"])]
+    ("ends", "shown"),
+    [
+        ((0.5, 20), ["1", "2", "5", "10", "20"]),
+        ((0.01, 100), ["0.1", "1", "10"]),
+        ((0.34, 0.55), ["0.36", "0.42", "0.48", "0.54"]),
+    ],
 )
 def test_a_logarithmic_axis_has_plain_numbers(ends, shown):
     with new_figure(3, 3) as figure:
@@ -43,3 +48,13 @@ def test_a_logarithmic_axis_has_plain_numbers(ends, shown):
     figure.canvas.draw()
     texts = [text.get_text() for text in axes.get_yticklabels()]
     assert set(shown) <= set(texts)
+
+
+def test_a_very_short_axis_is_not_crowded():
+    with new_figure(3, 3) as figure:
+        axes = figure.subplots()
+        axes.set(yscale="log", ylim=(1.9, 4.5))
+        label_plainly(axes.yaxis)
+    figure.canvas.draw()
+    assert len([tick for tick in axes.get_yticks() if 1.9 <= tick <= 4.5]) <= 5
+    assert len(axes.yaxis.get_minorticklocs()) == 0

@@ -46,6 +46,15 @@ def test_the_last_pose_of_an_estimate_that_ends_early_is_marked():
 def test_an_estimate_without_a_pose_is_in_the_legend_with_its_status():
     (axes,) = path_figure(case_of(path(), None, statuses=["lost", "crashed"]), 3.5).axes
     assert labels(axes)[2:] == ["e0 (lost)", "e1 (crashed)"]
+    assert [line.get_linestyle() for line in axes.get_lines()[2:]] == ["-", "None"]
+
+
+def test_the_legend_says_which_estimates_leave_the_view():
+    case = case_of(path(40.0), path(0.01))
+    (axes,) = path_figure(case, 3.5).axes
+    assert labels(axes)[2:] == ["e0, leaves the view", "e1"]
+    for axes in axes_figure(case, 3.5).axes:
+        assert labels(axes)[1:] == ["e0, leaves the view", "e1"]
 
 
 def test_three_axes_show_one_coordinate_each_over_seconds_since_the_start():

@@ -4,7 +4,7 @@ import pytest
 
 from vobench.report.board_metric import METRICS
 from vobench.report.leaderboard import make_board
-from vobench.report.run_tables import FIRST_COLUMNS, board_frame, cell_frame, frames_frame, trial_frame
+from vobench.report.run_tables import FIRST_COLUMNS, board_frame, cell_frame, frames_frame, trial_csv, trial_frame
 
 CLAIMS = ("not causal", "whole recording")
 
@@ -45,6 +45,13 @@ def test_a_trial_has_its_choices_and_every_metric_but_costs(scored):
     assert (row["ate"], row["ate_mm"]) == pytest.approx((0.5, 20.0))
     assert row["score"] == METRICS["score"].read(trial)
     assert not {"cpu_ms", "memory_mib"} & set(row)
+
+
+def test_trials_as_csv_have_seven_significant_digits(scored):
+    trial = scored("a", ate_m=0.02 / 3, path_m=1.0, coverage=1 / 3)
+    header, row = trial_csv([trial], {}).splitlines()
+    cells = dict(zip(header.split(","), row.split(","), strict=True))
+    assert (cells["coverage"], cells["ate_mm"], cells["repeat"]) == ("0.3333333", "6.666667", "0")
 
 
 def test_frames_of_all_trials_are_one_table_with_the_trial_in_front(run, mixed):

@@ -7,6 +7,7 @@ import pytest
 
 from vobench.errors import InputError
 from vobench.report import strip_figure as module
+from vobench.report.figure_style import line_style
 from vobench.report.strip_figure import _lost_spans, shown_frames, strip_figure
 from vobench.runner.folder import SEQUENCE
 from vobench.runner.frames import FrameRow
@@ -57,7 +58,11 @@ def drawn(scored, write_run, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "read_frames", lambda _: rows)
     monkeypatch.setattr(module, "read_tracks", lambda _: iter(tracks.items()))
     monkeypatch.setattr(module, "Recording", FakeRecording)
-    return strip_figure(folder, trial, 6.0)
+    return strip_figure(folder, trial, 3, 6.0)
+
+
+def test_the_error_has_the_colour_of_the_estimator(drawn):
+    assert drawn.axes[-1].get_lines()[0].get_color() == line_style(3)["color"]
 
 
 def test_lost_frames_are_named_framed_and_shaded(drawn):
@@ -89,7 +94,7 @@ def test_errors_are_in_mm_over_seconds(drawn):
 def test_a_run_whose_pictures_are_gone_says_how_to_make_them_again(scored, write_run, tmp_path):
     folder = write_run(Path(tmp_path / "run"), [scored("a")])
     with pytest.raises(InputError, match="run the suite again to recreate it"):
-        strip_figure(folder, scored("a"), 6.0)
+        strip_figure(folder, scored("a"), 0, 6.0)
 
 
 @pytest.mark.parametrize(

@@ -17,9 +17,10 @@ if TYPE_CHECKING:
 # A condition is listed for a trial or a segment if it multiplies the error by more than this.
 LEAST_FACTOR = 1.1
 MOST_FACTORS = 3
+MOST_NAMES = 2  # of conditions that vary together are named for a trial or a segment
 CAUSE_HEADINGS = ("condition", "factor", "95 % interval", "verdict")
-TRIAL_HEADINGS = ("case", "repeat", "status", "diverges at frame", "contributing conditions")
-SEGMENT_HEADINGS = ("case", "repeat", "frames", "error per path", "with")
+TRIAL_HEADINGS = ("trial", "status", "first bad frame", "contributing conditions")
+SEGMENT_HEADINGS = ("trial", "frames", "error per path", "with")
 
 
 def causes_command(
@@ -42,42 +43,56 @@ def _print_causes(causes: EstimatorCauses, *, worst: int) -> None:
     console = terminal.console()
     attribution = causes.attribution
     if attribution is None:
-        console.print(f"{causes.estimator}: no answer. {causes.reason}", soft_wrap=True)
+        console.print(f"{causes.estimator}: no answer. {causes.reason}\n", soft_wrap=True)
         return
     _print_attribution(causes.estimator, attribution, console)
     for symptom in causes.symptoms:
-        console.print(f"symptom, besides these: {' + '.join(symptom.conditions)} ×{symptom.factor:.2g}")
+        factor = _with_factor(symptom, symptom.factor)
+        console.print(f"Symptom, besides these: {factor}.", soft_wrap=True)
     if causes.has_one_drive:
-        console.print("all cases share one drive: what recurs on it is named only if no other time on it fits as well")
-    console.print(terminal.table("trials", TRIAL_HEADINGS, _trial_rows(causes, attribution)))
-    console.print(terminal.table("worst segments", SEGMENT_HEADINGS, _segment_rows(attribution, worst)))
+        console.print(
+            "All cases follow one trajectory: a condition that recurs on it is significant only if the errors fit no "
+            "other time as well.",
+            soft_wrap=True,
+        )
+    console.print()
+    console.print(terminal.table(f"{causes.estimator}: trials", TRIAL_HEADINGS, _trial_rows(causes, attribution)))
+    segments = _segment_rows(attribution, worst)
+    console.print(terminal.table(f"{causes.estimator}: worst segments", SEGMENT_HEADINGS, segments))
 
 
 def _print_attribution(estimator: str, attribution: Attribution, console: "Console") -> None:
-    """Print the factor of each condition, and how much of the error the conditions explain."""
-    title = f"{estimator}: factor of the error from a low to a high level of each condition"
+    """Print what the error depends on in one sentence, then the factor of each condition."""
+    console.print(f"{estimator}: {_answer(attribution)}\n", soft_wrap=True)
+    title = "Factor of the error from a low to a high level of each condition"
     rows = [_cause_row(cause) for cause in attribution.causes]
     console.print(terminal.table(title, CAUSE_HEADINGS, rows))
-    console.print(f"together they explain {attribution.explained:.0%} of the variance of the error's logarithm")
-    if attribution.is_mostly_unexplained:
-        console.print(
-            f"Most of the error has a cause that is not in this list (they would explain {MIN_EXPLAINED:.0%} or more).",
-            soft_wrap=True,
-        )
-    else:
-        named = ", ".join(" + ".join(cause.conditions) for cause in attribution.named)
-        console.print(f"Significant: {named or 'none of these'}.", soft_wrap=True)
     if any(len(cause.conditions) > 1 for cause in attribution.causes):
-        console.print("conditions joined by + vary together in this run, so a regression cannot separate them")
+        console.print(
+            "Conditions joined by + vary together in this run, so a regression cannot separate them.", soft_wrap=True
+        )
     if attribution.constant:
-        console.print(f"unknown, because constant in all segments: {', '.join(attribution.constant)}")
+        console.print(f"Unknown, because constant in all segments: {', '.join(attribution.constant)}.", soft_wrap=True)
+
+
+def _answer(attribution: Attribution) -> str:
+    """Which conditions the error depends on, and how much of it all conditions explain."""
+    explained = f"{attribution.explained:.0%}"
+    if attribution.is_mostly_unexplained:
+        return (
+            "most of the error has a cause that is not among the conditions; they explain "
+            f"{explained} of the variance of its logarithm, and nothing is named below {MIN_EXPLAINED:.0%}."
+        )
+    named = ", ".join(_with_interval(cause) for cause in attribution.named)
+    answer = f"the error depends on {named}" if named else "the error depends significantly on none of the conditions"
+    return f"{answer}. All conditions explain {explained} of the variance of its logarithm."
 
 
 def _cause_row(cause: Cause) -> list[str]:
     conditions = " + ".join(cause.conditions)
-    interval = f"{cause.low:.2f} to {cause.high:.2f}"
+    interval = f"{_two_digits(cause.low)} to {_two_digits(cause.high)}"
     verdict = "significant" if cause.is_sure else "not significant"
-    return [conditions, f"{cause.factor:.2f}", interval, verdict]
+    return [conditions, _two_digits(cause.factor), interval, verdict]
 
 
 def _trial_rows(causes: EstimatorCauses, attribution: Attribution) -> list[list[str]]:
@@ -86,7 +101,7 @@ def _trial_rows(causes: EstimatorCauses, attribution: Attribution) -> list[list[
         frame = trial["first_divergence_frame"]
         divergence = "" if frame is None else str(frame)
         factors = _largest_factors(attribution.cases[trial["case"]])
-        rows.append([trial["case"], str(trial["repeat"]), trial["status"], divergence, factors])
+        rows.append([_trial_name(trial["case"], trial["repeat"]), trial["status"], divergence, factors])
     return rows
 
 
@@ -95,8 +110,13 @@ def _segment_rows(attribution: Attribution, worst: int) -> list[list[str]]:
     for segment in attribution.segments[:worst]:
         frames = f"{segment.first} to {segment.end - 1}"
         factors = _largest_factors(segment.factors)
-        rows.append([segment.case, str(segment.repeat), frames, f"{segment.loss:.1%}", factors])
+        rows.append([_trial_name(segment.case, segment.repeat), frames, f"{segment.loss:.1%}", factors])
     return rows
+
+
+def _trial_name(case: str, repeat: int) -> str:
+    """The name of a case, and the repeat if it is not the first, as in paths of trials."""
+    return case if repeat == 0 else f"{case}/{repeat}"
 
 
 def _largest_factors(factors: Sequence[tuple[Cause, float]]) -> str:
@@ -104,5 +124,25 @@ def _largest_factors(factors: Sequence[tuple[Cause, float]]) -> str:
     texts = list[str]()
     for cause, factor in factors[:MOST_FACTORS]:
         if factor > LEAST_FACTOR:
-            texts.append(f"{' + '.join(cause.conditions)} ×{factor:.2g}")
+            texts.append(_with_factor(cause, factor))
     return ", ".join(texts)
+
+
+def _with_interval(cause: Cause) -> str:
+    """The conditions, their factor and its interval."""
+    interval = f"{_two_digits(cause.low)} to {_two_digits(cause.high)}"
+    return f"{_with_factor(cause, cause.factor)} (95 % interval {interval})"
+
+
+def _with_factor(cause: Cause, factor: float) -> str:
+    """The first names of the conditions that vary together, and a factor."""
+    names = " + ".join(cause.conditions[:MOST_NAMES])
+    further = len(cause.conditions) - MOST_NAMES
+    if further > 0:
+        names = f"{names} + {further} more"
+    return f"{names} ×{_two_digits(factor)}"
+
+
+def _two_digits(factor: float) -> str:
+    """A factor with two significant digits, or all digits of its integer part."""
+    return f"{factor:.0f}" if factor >= 100 else f"{factor:.2g}"

@@ -20,7 +20,7 @@ from vobench.runner.recording import may_be_recording
 
 COMMAND_CLASS = FormCommand
 TWIN_HEADINGS = ("without", "error", "less", "95 % interval", "survived")
-CHANGE_HEADINGS = ("without", "instead", "error", "less", "95 % interval", "survived", "verdict")
+CHANGE_HEADINGS = ("change", "error", "less", "95 % interval", "survived", "verdict")
 
 TrialPath = Annotated[
     Path,
@@ -150,9 +150,10 @@ def _change_rows(result: TrialExplanation) -> list[list[str]]:
 
 def _change_row(row: dict[str, Any], everything: tuple[str, ...]) -> list[str]:
     is_everything = len(everything) > 1 and row["removed"] == everything
+    removed = "all of these" if is_everything else " and ".join(row["removed"])
+    change = f"{removed} → {row['instead']}" if row["instead"] else f"without {removed}"
     return [
-        "all of these" if is_everything else " and ".join(row["removed"]),
-        row["instead"],
+        change,
         f"{row['loss']:.1%}",
         f"{row['reduction']:.0%}",
         f"{row['low']:.0%} to {row['high']:.0%}",

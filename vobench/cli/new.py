@@ -12,6 +12,8 @@ from vobench.cli.option import Json
 from vobench.errors import InputError, require_known
 from vobench.suite.scaffold import new_scene, new_suite, require_free, require_name
 
+# Names that a class in the scaffold cannot have: it imports the first two, and the others are words of Python.
+TAKEN_CLASS_NAMES = ("Result", "Status", "None", "True", "False")
 SCAFFOLD = Path(__file__).parent / "scaffold"
 # The next steps. {0} is the name, or the path if the name would not be found.
 NEXT_STEPS = {
@@ -72,10 +74,17 @@ def _create_estimator(request: _Request) -> Path:
     folder.mkdir(parents=True)
     scaffold = SCAFFOLD / ("command" if request.is_command else "class")
     for template in sorted(scaffold.iterdir()):
-        text = template.read_text(encoding="utf-8").replace("NAME", request.name)
+        text = template.read_text(encoding="utf-8")
+        text = text.replace("NAME", request.name).replace("CLASS", class_name(request.name))
         file = folder / template.name.replace(".txt", ".py")
         file.write_text(text, encoding="utf-8")
     return folder
+
+
+def class_name(name: str) -> str:
+    """The name of an estimator's class: `my_vo` becomes `MyVo`."""
+    joined = "".join(word.capitalize() for word in name.split("_"))
+    return f"{joined}Estimator" if joined in TAKEN_CLASS_NAMES else joined
 
 
 def _create_suite(request: _Request) -> Path:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, get_args
 import typer
 
 from vobench.cli import terminal
+from vobench.cli.evo_align import EvoAlignCommand
 from vobench.cli.option import Json, option_group, with_option_groups
 from vobench.cli.trajectory_option import TrajectoryOptions
 from vobench.errors import InputError, SettingError
@@ -19,6 +20,7 @@ from vobench.trajectory.nanoseconds import NS_PER_S
 if TYPE_CHECKING:
     from vobench.runner.score_files import FilePair, ScoredFiles
 
+COMMAND_CLASS = EvoAlignCommand
 # Options whose names differ from the setting's.
 OPTION_BY_SETTING = {"alignment": "--align", "align_n": "--align-n", "rpe_delta": "--delta"}
 
@@ -32,7 +34,7 @@ class ScoreOptions:
         typer.Option(help="Use the settings of evo, kitti, rpg, tum, openvins, tartanair or tartanair_mono."),
     ] = None
     alignment: Annotated[
-        str | None, typer.Option("--align", "-a", help="none, origin, se3 (default), sim3, scale or yaw.")
+        str | None, typer.Option("--align", "-a", help="none, origin, se3 (default), sim3, scale, yaw; or evo's -as.")
     ] = None
     align_n: Annotated[int | None, typer.Option(help="Align with only this many of the first matched poses.")] = None
     rpe_delta: Annotated[

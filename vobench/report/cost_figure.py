@@ -12,7 +12,9 @@ from vobench.report.inline_figure import new_figure
 from vobench.report.path_figure import LEGEND_INCHES
 from vobench.report.total import Total
 
-RELATIVE_PANEL_HEIGHT = 0.7  # the height of a panel relative to its width
+ERROR_LABEL = "median ATE (% of the path)"
+RELATIVE_HEIGHT = 0.7  # the height of a single panel relative to its width
+RELATIVE_HEIGHT_OF_MANY = 0.42  # the height of each of several panels relative to its width
 
 
 def cost_figure(totals: Sequence[Total], index_of: Mapping[str, int], width_inches: float) -> Figure:
@@ -29,7 +31,8 @@ def cost_figure(totals: Sequence[Total], index_of: Mapping[str, int], width_inch
     if not points_by_group:
         raise InputError("no ranked estimator has both an error and a CPU time")
     rows = len(points_by_group)
-    panel_height_inches = RELATIVE_PANEL_HEIGHT * width_inches
+    relative_height = RELATIVE_HEIGHT if rows == 1 else RELATIVE_HEIGHT_OF_MANY
+    panel_height_inches = relative_height * width_inches
     height_inches = rows * panel_height_inches + LEGEND_INCHES
     with new_figure(width_inches, height_inches) as figure:
         panels = figure.subplots(rows, 1, sharex=True, squeeze=False)[:, 0]
@@ -37,9 +40,12 @@ def cost_figure(totals: Sequence[Total], index_of: Mapping[str, int], width_inch
             _draw_points(axes, points, index_of)
             if rows > 1:
                 axes.set_title(group)
+        if rows > 1:
+            figure.supylabel(ERROR_LABEL, fontsize="medium")
+        else:
+            panels[0].set_ylabel(ERROR_LABEL)
         panels[-1].set_xlabel("CPU time (ms per frame)")
-        handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=2)
+        figure.legend(loc="outside lower center", ncols=2)
     return figure
 
 
@@ -53,7 +59,7 @@ def _draw_points(axes: Axes, points: Sequence["_Point"], index_of: Mapping[str, 
     for point in points:
         style = marker_style(index_of[point.total.estimator])
         axes.plot(point.cpu_ms, point.ate_percent, ls="none", ms=6, label=_label(point.total), **style)
-    axes.set(xscale="log", yscale="log", ylabel="median ATE (% of the path)")
+    axes.set(xscale="log", yscale="log")
     axes.margins(0.15)
     label_plainly(axes.xaxis)
     label_plainly(axes.yaxis)

@@ -40,6 +40,7 @@ RUN_KINDS: Mapping[str, str] = {
 }
 BOARD_KINDS = ("cumulative", "breakdown", "cost", "matrix")
 WIDE_KINDS = ("breakdown", "strip")
+MOST_COLUMNS = 5  # of a matrix that is as wide as a column of a paper
 FILE_KINDS = ("path", "axes", "error", "segments", "cumulative")
 
 
@@ -87,7 +88,8 @@ class RunFigures:
     """The figures of a run, or of some of its cases and estimators.
 
     Figures of one case show the first case that was named, or else that of the trial that is most worth a look.
-    An estimator has the same colour in all figures of a run.
+    An estimator has the same colour in all figures of a run. It is chosen by the position in the suite's list of
+    estimators, so that further estimators at the end of the list do not change it.
     """
 
     kinds = tuple(RUN_KINDS)
@@ -108,7 +110,7 @@ class RunFigures:
         self._folder = folder
         self._options = options
         self._cases = _matching("case", cases, sorted({score.case for score in scores}))
-        all_estimators = sorted({score.estimator for score in scores})
+        all_estimators = _in_order(folder.estimator_labels(), {score.estimator for score in scores})
         self._index_of = {estimator: index for index, estimator in enumerate(all_estimators)}
         self._estimators = _matching("estimator", estimators, all_estimators)
         self._scores = [score for score in scores if score.case in self._cases and score.estimator in self._estimators]
@@ -124,7 +126,9 @@ class RunFigures:
         if kind == "segments":
             return segment_figure([self._scored_case(case) for case in self._cases], self._options.width_of(kind))
         if kind == "strip":
-            return strip_figure(self._folder, self._telling_trial(), self._options.width_of(kind))
+            trial = self._telling_trial()
+            index = self._index_of[trial.estimator]
+            return strip_figure(self._folder, trial, index, self._options.width_of(kind))
         return _case_figure(kind, self.case(), self._options)
 
     def _board_figure(self, kind: str) -> "Figure":
@@ -137,6 +141,8 @@ class RunFigures:
             return breakdown_figure(self._board.cells, self._index_of, width_inches)
         if kind == "cost":
             return cost_figure(self._board.totals, self._index_of, width_inches)
+        if self._options.width_inches is None and len(self._board.estimators) > MOST_COLUMNS:
+            width_inches = PAGE_INCHES
         return matrix_figure(self._board, self._options.metric, width_inches)
 
     @cached_property
@@ -168,6 +174,12 @@ def _case_figure(kind: str, case: ScoredCase, options: FigureOptions) -> "Figure
     if kind == "axes":
         return axes_figure(case, options.width_of(kind))
     return error_figure(case, options.width_of(kind), over=options.over)
+
+
+def _in_order(listed: Sequence[str], names: set[str]) -> list[str]:
+    """Names in the order of a list; those that are not in it come last, sorted."""
+    further = sorted(names.difference(listed))
+    return [name for name in listed if name in names] + further
 
 
 def _matching(kind: str, patterns: Sequence[str], known: Sequence[str]) -> list[str]:

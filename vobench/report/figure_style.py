@@ -32,6 +32,8 @@ MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 NEUTRAL = "#7f7f7f"
 LINE_WIDTH = 1.2  # points
 SHORT_RANGE = 100  # ratio of the ends of a logarithmic axis below which 2 and 5 are labelled, too
+VERY_SHORT_RANGE = 5  # ratio below which a range may have fewer than two of the numbers 1, 2 and 5
+MOST_INTERVALS = 4  # between evenly spaced ticks
 COLUMN_INCHES = 3.5  # the width of a column of a paper with two columns, by the templates of IEEE
 PAGE_INCHES = 7.16  # the width of both columns
 
@@ -51,12 +53,19 @@ def marker_style(index: int) -> dict[str, Any]:
 
 
 def label_plainly(axis: "Axis") -> None:
-    """Label the ticks of a logarithmic axis with plain numbers: 1, 2 and 5 times powers of ten over a short range."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    """Label the ticks of a logarithmic axis with plain numbers: 1, 2 and 5 times powers of ten over a short range.
+
+    A range that has few of these has evenly spaced ticks.
+    """
+    from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
     low, high = axis.get_view_interval()
-    is_short = high < SHORT_RANGE * low
-    axis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5) if is_short else (1,)))
+    if high < VERY_SHORT_RANGE * low:
+        axis.set_major_locator(MaxNLocator(MOST_INTERVALS))
+        axis.set_minor_locator(NullLocator())
+    else:
+        is_short = high < SHORT_RANGE * low
+        axis.set_major_locator(LogLocator(base=10, subs=(1, 2, 5) if is_short else (1,)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axis.set_minor_formatter(NullFormatter())
 

@@ -34,19 +34,36 @@ def path_figure(case: ScoredCase, width_inches: float) -> Figure:
 
 
 def draw_paths(axes: Axes, case: ScoredCase) -> None:
-    """Draw a case from above. An estimate without a score appears only in the legend.
+    """Draw a case from above. An estimate without a score appears only in the legend, without a line.
 
     The view is limited to a square around the ground truth, so that a diverged estimate cannot shrink the other paths.
+    The legend says which estimates leave it.
     """
+    _limit_to_truth(axes, case.truth)
     x_m, y_m, _ = case.truth.positions_m.T
     axes.plot(x_m, y_m, **TRUTH_STYLE, label="ground truth")
     axes.plot(x_m[:1], y_m[:1], "o", color="black", ms=4, label="start")
     for estimate in case.estimates:
         estimate_m = _positions_with_gaps(estimate)
-        axes.plot(*estimate_m[:, :2].T, lw=LINE_WIDTH, label=estimate.label, **line_style(estimate.index))
+        leaves = _exceeds(estimate_m[:, 0], axes.get_xlim()) or _exceeds(estimate_m[:, 1], axes.get_ylim())
+        axes.plot(*estimate_m[:, :2].T, **_estimate_style(estimate, leaves_view=leaves))
         _mark_end(axes, estimate)
     axes.set(xlabel="x (m)", ylabel="y (m)")
-    _limit_to_truth(axes, case.truth)
+
+
+def _exceeds(values: Array, limits: tuple[float, float]) -> bool:
+    """Whether any of some values (N,), or NaN, is outside of limits."""
+    low, high = limits
+    return bool(np.any((values < low) | (values > high)))
+
+
+def _estimate_style(estimate: ScoredEstimate, *, leaves_view: bool) -> dict[str, Any]:
+    """The line of an estimate and its label. Without a score, there is a label only."""
+    style = {"lw": LINE_WIDTH, **line_style(estimate.index)}
+    if estimate.score is None:
+        style["ls"] = "none"
+    label = f"{estimate.label}, leaves the view" if leaves_view else estimate.label
+    return {**style, "label": label}
 
 
 def _mark_end(axes: Axes, estimate: ScoredEstimate) -> None:
@@ -88,6 +105,7 @@ def axes_figure(case: ScoredCase, width_inches: float) -> Figure:
 
 def _draw_coordinate(axes: Axes, case: ScoredCase, axis: int) -> None:
     """Draw one coordinate over time. The view is limited to the range of the ground truth and a margin around it."""
+    axes.set_ylim(_limits_m(case.truth, axis))
     start_ns = case.truth.t_ns[0]
     truth_s = (case.truth.t_ns - start_ns) / NS_PER_S
     truth_m = case.truth.positions_m[:, axis]
@@ -95,14 +113,26 @@ def _draw_coordinate(axes: Axes, case: ScoredCase, axis: int) -> None:
     for estimate in case.estimates:
         coordinate_m = _positions_with_gaps(estimate)[:, axis]
         time_s = _times_with_gaps_s(estimate, start_ns)
-        axes.plot(time_s, coordinate_m, lw=LINE_WIDTH, label=estimate.label, **line_style(estimate.index))
-    low_m = float(truth_m.min())
-    high_m = float(truth_m.max())
-    ranges_m = np.ptp(case.truth.positions_m, axis=0)  # (3,)
+        style = _estimate_style(estimate, leaves_view=_leaves_a_view(estimate, case.truth))
+        axes.plot(time_s, coordinate_m, **style)
+    axes.set_ylabel(f"{'xyz'[axis]} (m)")
+
+
+def _leaves_a_view(estimate: ScoredEstimate, truth: Trajectory) -> bool:
+    """Whether any coordinate of an estimate is outside of the limits of its axes."""
+    positions_m = _positions_with_gaps(estimate)  # (N, 3)
+    return any(_exceeds(positions_m[:, axis], _limits_m(truth, axis)) for axis in range(3))
+
+
+def _limits_m(truth: Trajectory, axis: int) -> tuple[float, float]:
+    """The limits of one coordinate over time: the range of the ground truth, and a margin around it."""
+    coordinate_m = truth.positions_m[:, axis]
+    low_m = float(coordinate_m.min())
+    high_m = float(coordinate_m.max())
+    ranges_m = np.ptp(truth.positions_m, axis=0)  # (3,)
     largest_range_m = max(float(ranges_m.max()), LEAST_RANGE_M)
     margin_m = max(RELATIVE_MARGIN * (high_m - low_m), LEAST_MARGIN * largest_range_m)
-    axes.set_ylim(low_m - margin_m, high_m + margin_m)
-    axes.set_ylabel(f"{'xyz'[axis]} (m)")
+    return low_m - margin_m, high_m + margin_m
 
 
 def _positions_with_gaps(estimate: ScoredEstimate) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vobench.errors import InputError
 from vobench.geometry.se3 import Array
-from vobench.report.figure_style import COLOURS, LINE_WIDTH, NEUTRAL
+from vobench.report.figure_style import COLOURS, LINE_WIDTH, NEUTRAL, line_style
 from vobench.report.frame_moment import worst_moments
 from vobench.report.inline_figure import new_figure
 from vobench.report.trial_choice import sentence
@@ -26,7 +26,7 @@ PICTURES = 5
 LEAST_PICTURE_INCHES = 1.2
 ERROR_HEIGHT_INCHES = 1.15
 HEAD_INCHES = 0.45  # of the titles above the pictures
-LOST_COLOUR = COLOURS[1]
+LOST_COLOUR = "#4d4d4d"  # no estimator has a grey
 INLIER_COLOUR = COLOURS[5]
 OUTLIER_COLOUR = COLOURS[4]
 LOST_STATUSES = ("lost", NO_OUTPUT, "")
@@ -36,10 +36,11 @@ MM_PER_M = 1e3
 Table = NDArray[np.float32]
 
 
-def strip_figure(folder: RunFolder, trial: TrialScore, width_inches: float) -> Figure:
+def strip_figure(folder: RunFolder, trial: TrialScore, index: int, width_inches: float) -> Figure:
     """Pictures of a trial at its start, its end and its worst moments, and its position error over time.
 
-    Tracks are blue, and orange where the estimator rejected them. Frames without a pose are shaded.
+    `index` chooses the colour of the estimator. Tracks are blue, and orange where the estimator rejected them. Frames
+    without a pose are shaded.
     Raises InputError if the sequence of the trial is no longer in the cache, or the trial has no frames.
     """
     link = folder.case(trial.case) / SEQUENCE
@@ -61,9 +62,9 @@ def strip_figure(folder: RunFolder, trial: TrialScore, width_inches: float) -> F
         strip, plot = figure.subfigures(2, 1, height_ratios=heights, squeeze=False)[:, 0]
         figure.suptitle(textwrap.fill(sentence(trial), round(TITLE_CHARACTERS_PER_INCH * width_inches)))
         panels = np.atleast_1d(strip.subplots(1, len(shown)))
-        for axes, index in zip(panels, shown, strict=True):
-            _draw_picture(axes, recording, rows[index], index, tracks)
-        _draw_errors(plot.subplots(), rows, shown)
+        for axes, row_index in zip(panels, shown, strict=True):
+            _draw_picture(axes, recording, rows[row_index], row_index, tracks)
+        _draw_errors(plot.subplots(), rows, shown, index)
     return figure
 
 
@@ -88,7 +89,7 @@ def _middle_of_longest_gap(indices: Sequence[int]) -> int:
 
 
 def _draw_picture(axes: Axes, recording: Recording, row: FrameRow, index: int, tracks: Mapping[int, Table]) -> None:
-    """Draw a frame with its tracks, framed in orange if the estimator lost track there."""
+    """Draw a frame with its tracks, framed if the estimator lost track there."""
     axes.imshow(recording.frame(index).left, cmap="gray", vmin=0, vmax=255, interpolation="nearest")
     if index in tracks:
         u_px, v_px = tracks[index][:, 2:4].T
@@ -109,18 +110,25 @@ def _title_colour(*, is_lost: bool) -> str:
     return LOST_COLOUR if is_lost else "black"
 
 
-def _draw_errors(axes: Axes, rows: Sequence[FrameRow], shown: Sequence[int]) -> None:
-    """Draw the position error over time, the times of the pictures, and where there is no pose."""
+def _draw_errors(axes: Axes, rows: Sequence[FrameRow], shown: Sequence[int], index: int) -> None:
+    """Draw the position error over time, the times of the pictures, and where there is no pose.
+
+    `index` chooses the colour of the estimator.
+    """
     time_s = np.array([(row.t_ns - rows[0].t_ns) / NS_PER_S for row in rows])
     errors_m = np.array([np.nan if row.position_error_m is None else row.position_error_m for row in rows])
-    axes.plot(time_s, MM_PER_M * errors_m, color=COLOURS[0], lw=LINE_WIDTH)
+    axes.plot(time_s, MM_PER_M * errors_m, lw=LINE_WIDTH, **line_style(index))
     is_lost = np.array([row.status in LOST_STATUSES for row in rows])
     for low_s, high_s in _lost_spans(time_s, is_lost):
         axes.axvspan(low_s, high_s, color=LOST_COLOUR, alpha=0.3, lw=0)
-    for index in shown:
-        axes.axvline(time_s[index], color=NEUTRAL, lw=0.6, ls=":")
+    for row_index in shown:
+        axes.axvline(time_s[row_index], color=NEUTRAL, lw=0.6, ls=":")
     axes.set_xlim(time_s[0], time_s[-1] or 1.0)
-    axes.set_ylim(bottom=0)
+    if np.isnan(errors_m).all():
+        axes.text(0.5, 0.5, "no pose in any frame", transform=axes.transAxes, ha="center", va="center")
+        axes.set_yticks([])
+    else:
+        axes.set_ylim(bottom=0)
     axes.set(xlabel="time (s)", ylabel="position\nerror (mm)")
 
 

@@ -250,6 +250,19 @@ class RunFolder:
             scores.append(score)
         return scores
 
+    def estimator_labels(self) -> list[str]:
+        """The labels of the estimators of the run, in the order of its suite; empty if the run does not list them.
+
+        Raises InputError if the list is invalid.
+        """
+        path = self.path / ESTIMATORS
+        if not path.exists():
+            return []
+        try:
+            return [entry["label"] for entry in json.loads(path.read_bytes())]
+        except (ValueError, TypeError, KeyError):
+            raise InputError(f"not a list of estimators as vobench writes it: {path}") from None
+
 
 def read_score(path: Path) -> TrialScore:
     """The score of a trial. Raises InputError if the file is not a score."""
