@@ -1,10 +1,10 @@
 """Recordings with known damage: whether `vobench explain RECORDING` names it, and whether the twin fails alike.
 
-    python benchmarks/damaged_recordings.py [--only NAME ...] [--world 0|1] [--out FOLDER]
+    python benchmarks/damaged_recordings.py [--only NAME ...] [--world 0|1|2] [--out FOLDER]
 
 Recordings of a small hall are simulated and exported in the form of EuRoC. Then three seconds of their pictures are
 damaged by formulas that are not those of `explain`. The twin is simulated in another hall. Prints for each recording
-which damage was named, the overlap of failing frames and the errors on both sides, and in the last line how many were
+which damage was named, the overlap of errors in time, and the errors on both sides; and in the last line how many were
 right. `nothing` is the recording without damage, of which nothing should be named.
 """
 
@@ -81,8 +81,19 @@ PLACES: dict[str, dict[str, Any]] = {
         "contrast": 0.55,
         "power_lm": 6000,
     },
+    "depot": {
+        "room": {"size_m": [7.4, 8.2, 3.1], "floor": "floor", "wall": "wall", "ceiling": "wall"},
+        "boxes": [
+            {"center_m": [0.2, -0.3, 0.5], "size_m": [0.8, 0.6, 1.0], "material": "box", "yaw_deg": 35},
+            {"center_m": [-3.1, -2.6, 0.8], "size_m": [0.6, 0.8, 1.6], "material": "box", "yaw_deg": 10},
+            {"center_m": [3.2, 2.2, 0.6], "size_m": [0.5, 0.9, 1.2], "material": "box", "yaw_deg": -15},
+            {"center_m": [-1.6, 3.4, 0.7], "size_m": [1.0, 0.6, 1.4], "material": "box", "yaw_deg": 50},
+        ],
+        "contrast": 0.5,
+        "power_lm": 4500,
+    },
 }
-WORLDS = ("hall", "gallery")
+WORLDS = ("hall", "gallery", "depot")
 PATHS = {
     "hall": [[2.2, 0, 1.2], [1.5, 1.6, 1.3], [0, 2.1, 1.2], [-1.6, 1.5, 1.1], [-2.2, 0, 1.2], [-1.5, -1.6, 1.3]],
     "gallery": [
@@ -92,6 +103,14 @@ PATHS = {
         [2.2, -0.3, 1.2],
         [2.0, 1.2, 1.3],
         [0.6, 1.6, 1.2],
+    ],
+    "depot": [
+        [-2.6, 0.4, 1.2],
+        [-1.4, -1.8, 1.1],
+        [0.6, -2.4, 1.2],
+        [2.4, -1.4, 1.3],
+        [1.8, 0.6, 1.2],
+        [0.2, 1.8, 1.1],
     ],
 }
 
@@ -320,7 +339,8 @@ def _line(found: RecordingExplanation, *, is_right: bool) -> str:
     failing = found.frames.is_failing
     reductions = ", ".join(f"{'+'.join(c.removed)} {c.reduction:.0%}" for c in found.twin.explanation.singles)
     return (
-        f"{line}, {found.twin.is_failing.sum()} in the twin, overlap {found.overlap:.2f}; error "
+        f"{line}, {found.twin.is_failing.sum()} in the twin, overlap {found.overlap:.2f} (by chance "
+        f"{found.twin.coincidence.by_chance:.2f}, p {found.twin.coincidence.p:.2f}); error "
         f"{found.frames.loss[failing].mean():.1%} and {found.twin.loss[failing].mean():.1%} (typical "
         f"{found.frames.typical:.1%} and {found.twin.typical:.1%}); without {reductions}; "
         f"scale {found.twin.scale:g}, misfit {found.twin.misfit:.0%}"

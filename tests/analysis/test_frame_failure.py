@@ -1,9 +1,10 @@
-"""Failing frames, the worst part of a recording, and the overlap of two trials."""
+"""Failing frames, the worst part of a recording, and the errors of two trials in time."""
 
 import numpy as np
 import pytest
+import scipy
 
-from vobench.analysis.frame_failure import failing_loss, frame_losses, overlap, worst_window
+from vobench.analysis.frame_failure import coincidence, failing_loss, frame_losses, worst_window
 from vobench.geometry import se3
 from vobench.trajectory.trajectory import Trajectory
 
@@ -83,10 +84,76 @@ def test_a_frame_fails_by_its_error_relative_to_a_typical_one(typical: float, li
     assert failing_loss(typical) == pytest.approx(limit)
 
 
-def test_the_overlap_is_the_share_of_frames_in_both_of_those_in_either() -> None:
-    frames = np.array([True, True, True, False])
-    others = np.array([False, True, True, True])
-    assert overlap(frames, others) == 0.5
-    assert overlap(frames, frames) == 1
-    assert overlap(frames, ~frames) == 0
-    assert overlap(frames & False, others & False) == 0
+def test_a_failure_that_is_longer_than_the_part_is_shown_with_its_beginning_or_its_end() -> None:
+    t_ns = (np.arange(300) * 10**8).astype(np.int64)
+    loss = np.full(300, 0.01)
+    loss[100:200] = 0.5
+    window = worst_window(t_ns, loss, 5.0)
+    is_large = loss[window.frames] > 0.1
+    assert 0.75 < is_large.mean() < 0.85
+
+
+def test_errors_that_are_large_throughout_have_a_worst_part_too() -> None:
+    t_ns = (np.arange(100) * 10**8).astype(np.int64)
+    assert len(worst_window(t_ns, np.full(100, 0.5), 5.0)) == 51
+
+
+FRAMES = 50
+
+
+def block(first: int, end: int, *, height: float = 1.0) -> np.ndarray:
+    """An error that is large from one frame to before another."""
+    errors = np.zeros(FRAMES)
+    errors[first:end] = height
+    return errors
+
+
+def test_the_overlap_of_constant_errors_is_the_share_of_frames_in_both_of_those_in_either() -> None:
+    assert coincidence(block(10, 30), block(15, 35)).overlap == pytest.approx(15 / 25)
+    assert coincidence(block(10, 30), block(10, 30)).overlap == pytest.approx(1)
+    assert coincidence(block(10, 30), block(30, 50)).overlap == 0
+
+
+def test_the_overlap_does_not_depend_on_the_sizes_of_the_errors_nor_on_their_order() -> None:
+    rng = np.random.default_rng(0)
+    errors = rng.uniform(size=FRAMES) ** 3
+    others = rng.uniform(size=FRAMES) ** 3
+    found = coincidence(errors, others)
+    assert coincidence(errors, 0.1 * others).overlap == pytest.approx(found.overlap)
+    assert coincidence(others, errors).overlap == pytest.approx(found.overlap)
+    assert coincidence(others, errors).p == pytest.approx(found.p)
+
+
+def test_neither_a_large_nor_a_small_error_elsewhere_decides_alone() -> None:
+    whole = block(5, 25)
+    with_small_ones = whole + block(30, 45, height=0.05)
+    assert coincidence(whole, with_small_ones).overlap > 0.9
+    with_a_large_one = whole + block(10, 11, height=9.0)
+    assert coincidence(whole, with_a_large_one).overlap > 0.7
+
+
+def test_chance_is_what_rotations_of_one_error_in_time_reach() -> None:
+    exact = coincidence(block(10, 30), block(10, 30))
+    assert exact.p == pytest.approx(1 / FRAMES)
+    two_late = coincidence(block(10, 30), block(12, 32))
+    assert two_late.p == pytest.approx(5 / FRAMES)  # by -2 to 2 frames
+    assert two_late.by_chance == pytest.approx(exact.by_chance)
+
+    throughout = coincidence(block(0, FRAMES), block(0, FRAMES))
+    assert (throughout.overlap, throughout.by_chance, throughout.p) == (pytest.approx(1), pytest.approx(1), 1)
+
+
+def test_errors_at_independent_times_coincide_as_often_as_stated() -> None:
+    rng = np.random.default_rng(1)
+    p_values = []
+    for _ in range(1000):
+        spikes = rng.exponential(size=(2, FRAMES)) ** 2
+        errors, others = scipy.ndimage.gaussian_filter1d(spikes, 2.0, axis=1, mode="wrap")
+        p_values.append(coincidence(errors, others).p)
+    assert np.mean(np.array(p_values) <= 0.1) == pytest.approx(0.1, abs=0.03)
+
+
+def test_without_an_error_nothing_coincides() -> None:
+    nothing = np.zeros(FRAMES)
+    for found in (coincidence(nothing, block(0, 9)), coincidence(block(0, 9), nothing)):
+        assert (found.overlap, found.p) == (0, 1)

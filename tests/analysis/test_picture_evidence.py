@@ -9,7 +9,13 @@ import pytest
 
 from tests.analysis.pictures import HEIGHT_PX, PERIOD_NS, WIDTH_PX, pair, part
 from vobench.analysis.picture_change import BLUR, DIRT, DROPPED, EXPOSURE, NOISE, TURNED, turned
-from vobench.analysis.picture_evidence import ImageEvidence, RecordingPart, find_changes
+from vobench.analysis.picture_evidence import (
+    ImageEvidence,
+    RecordingPart,
+    _turned_stretch,
+    _TurnedChunk,
+    find_changes,
+)
 from vobench.analysis.stereo_matches import PairShot
 
 COUNT = 40
@@ -108,8 +114,24 @@ def test_a_turned_camera_is_found_with_its_angles() -> None:
     evidence = found(turn, only_right=True)
     camera = only(evidence, TURNED)
     first, end = where(camera.angles_deg)
-    assert (first, end) == (pytest.approx(12, abs=5), pytest.approx(30, abs=5))
+    assert (first, end) == (pytest.approx(12, abs=3), pytest.approx(30, abs=3))
     assert camera.angles_deg[18:24, 1] == pytest.approx(0.2, abs=0.02)
+
+
+@pytest.mark.parametrize(("first", "end"), [(0, 28), (3, 31), (12, 33), (22, 50), (0, 50)])
+def test_the_ends_of_a_turned_stretch_are_finer_than_the_chunks_that_measure_it(first: int, end: int) -> None:
+    rng = np.random.default_rng(0)
+    sigma_deg = 0.003
+    chunks = []
+    for chunk_first in range(0, 41, 5):
+        chunk_end = chunk_first + 10
+        turned_frames = max(min(end, chunk_end) - max(first, chunk_first), 0)
+        measured_deg = np.array([0.0, 0.0, 0.05 * turned_frames / 10]) + rng.normal(0, sigma_deg, 3)
+        chunks.append(_TurnedChunk(chunk_first, chunk_end, measured_deg, np.full(3, sigma_deg)))
+    is_yaw = np.array([False, False, True])
+    found_first, found_end, angle_deg = _turned_stretch(chunks, is_yaw, 50)
+    assert (found_first, found_end) == (pytest.approx(first, abs=1), pytest.approx(end, abs=1))
+    assert angle_deg == pytest.approx([0, 0, 0.05], abs=0.003)
 
 
 def test_a_camera_that_stands_still_is_not_taken_for_dirt() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 from tests.analysis.changes import change
 from vobench.analysis.explanation import Explanation
+from vobench.analysis.frame_failure import coincidence
 from vobench.analysis.picture_change import BLUR, DROPPED, NOISE, Blur, MissingFrames
 from vobench.analysis.recording_explanation import FailingFrames, RecordingExplanation, TwinTrials
 
@@ -35,6 +36,7 @@ def answer(
         loss=np.where(in_twin, 0.3, 0.01),
         typical=0.01,
         is_failing=in_twin,
+        coincidence=coincidence(is_failing.astype(float), in_twin.astype(float)),
         explanation=found or explanation(change(BLUR, reduction=0.8)),
         scale=1.4,
         misfit=0.12,
@@ -55,9 +57,11 @@ def test_the_first_sentence_says_what_fails_when_why_and_what_to_do() -> None:
 def test_it_is_said_how_far_the_twin_is_to_be_trusted_and_what_was_seen() -> None:
     found = answer()
     assert found.overlap == pytest.approx(18 / 22)
-    assert found.sentences[1].startswith(
-        "How far to trust this: the twin fails in 18 of the 20 frames in which the recording fails, and in 2 others "
-        "(overlap 0.82). The mean error of the recording's failing frames is 40%, and 27% in the twin."
+    assert found.sentences[1:3] == (
+        "How far to trust this: the errors of the recording and of the twin overlap in time by 0.82. If the twin's are "
+        "shifted in time, it is 0.31 on average, and as large for 10% of the shifts.",
+        "The twin fails in 18 of the 20 frames in which the recording fails, and in 2 others. The mean error of the "
+        "recording's failing frames is 40%, and 27% in the twin.",
     )
     assert f"In the images: {BLURRED.evidence}." in found.sentences
     assert found.sentences[-1].startswith("Not found in these frames: noisy images, exposure jumps,")
@@ -67,7 +71,17 @@ def test_a_twin_that_fails_elsewhere_names_nothing() -> None:
     found = answer(twin_frames=(25, 45))
     assert not found.is_trusted
     assert found.named == ()
-    assert "its twin does not fail in the same frames: the cause is not confirmed" in found.sentences[0]
+    assert "its twin does not fail at the same times: the cause is not confirmed" in found.sentences[0]
+
+
+def test_a_twin_that_fails_throughout_as_the_recording_does_names_nothing() -> None:
+    found = answer()
+    assert found.twin is not None
+    throughout = coincidence(np.ones(FRAMES), np.ones(FRAMES))
+    found = replace(found, twin=replace(found.twin, coincidence=throughout))
+    assert found.overlap == pytest.approx(1)
+    assert not found.is_trusted
+    assert found.named == ()
 
 
 def test_a_removal_that_does_not_help_names_nothing() -> None:
@@ -109,5 +123,7 @@ def test_the_dictionary_is_plain() -> None:
     facts = json.loads(json.dumps(answer().as_dict()))
     assert facts["named"] == [BLUR]
     assert facts["overlap"] == pytest.approx(18 / 22)
+    assert facts["overlap_by_chance"] < facts["overlap"]
+    assert facts["overlap_p"] == pytest.approx(0.1)
     assert (facts["fails_from_s"], facts["fails_to_s"], facts["failing_frames"]) == (6.0, pytest.approx(7.9), 20)
     assert "overlap" not in replace(answer(), changes=(), twin=None).as_dict()

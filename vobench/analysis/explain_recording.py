@@ -10,7 +10,7 @@ import numpy as np
 from vobench.analysis.camera_fit import look_of
 from vobench.analysis.explain import Effort, effort, explain
 from vobench.analysis.explanation import Removal
-from vobench.analysis.frame_failure import FrameRange, failing_loss, frame_losses, worst_window
+from vobench.analysis.frame_failure import FrameRange, coincidence, failing_loss, frame_losses, worst_window
 from vobench.analysis.image_statistics import evenly_spaced
 from vobench.analysis.nuisance import Nuisance
 from vobench.analysis.path_placement import Placement, cell_disparities, place_path
@@ -83,7 +83,7 @@ def explain_recording(
     """Explain why an estimator fails in the worst five seconds of a recording.
 
     The images there are compared with those of the rest of the recording. A twin of the part is simulated, with what
-    differs and without each of it. The answer counts if the twin fails in the same frames as the recording.
+    differs and without each of it. The answer counts if the twin fails at the same times as the recording.
 
     Args:
         recording: a recording of a stereo pair with ground truth, or the folder of a run's case.
@@ -148,7 +148,7 @@ def explain_recording(
             run_plan=run_plan, progress=progress,
         )  # fmt: skip
         runner = _VariantRunner(images, name, out, run_plan)
-        twin = _twin_trials(runner, placement, frames.time_s, seeds=seeds)
+        twin = _twin_trials(runner, placement, frames, seeds=seeds)
     return RecordingExplanation(
         estimator=name,
         is_stand_in=estimator is None and estimate is not None,
@@ -356,7 +356,7 @@ class _VariantRunner:
         return np.asarray(np.mean(losses, axis=0), float)
 
 
-def _twin_trials(runner: "_VariantRunner", placement: Placement, time_s: Array, *, seeds: Effort) -> TwinTrials:
+def _twin_trials(runner: "_VariantRunner", placement: Placement, frames: FailingFrames, *, seeds: Effort) -> TwinTrials:
     """Run the estimator in the twin with all changes, without each and without all, and compare."""
     images = runner.images
     nuisances = [Nuisance(change.name, INSTEAD[change.name], lambda case: case) for change in images.changes]
@@ -367,14 +367,20 @@ def _twin_trials(runner: "_VariantRunner", placement: Placement, time_s: Array, 
         seeds=seeds,
         remove=_without,
     )
-    since_first_s = time_s - time_s[0]
+    since_first_s = frames.time_s - frames.time_s[0]
     loss = runner.mean_loss((), since_first_s)
     everything = tuple(change.name for change in images.changes)
     typical = float(np.median(runner.mean_loss(everything, since_first_s)))
+
+    # Errors are compared at regular times, also where frames are missing.
+    regular_s = images.t_ns / NS_PER_S
+    rise = runner.mean_loss((), regular_s) - runner.mean_loss(everything, regular_s)
+    excess = np.interp(regular_s, since_first_s, frames.loss) - frames.typical
     return TwinTrials(
         loss=loss,
         typical=typical,
         is_failing=loss > failing_loss(typical),
+        coincidence=coincidence(excess.clip(min=0), rise.clip(min=0)),
         explanation=explanation,
         scale=placement.scale,
         misfit=placement.misfit,

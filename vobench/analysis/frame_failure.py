@@ -1,4 +1,4 @@
-"""Finds the frames in which an estimate fails, the worst part of a recording, and how far two trials fail alike."""
+"""Finds the frames in which an estimate fails, the worst part of a recording, and how far two errors coincide."""
 
 from dataclasses import dataclass
 
@@ -16,6 +16,11 @@ HALF_SPAN_S = 0.2  # the error of a frame is that of the motion from so long bef
 FAILING_FACTOR = 3.0  # a frame fails if its error is so many times that of a typical frame, ...
 MIN_FAILING_LOSS = 0.02  # ... and at least this
 MAX_FAILING_LOSS = 0.5
+
+LOW_ERROR = 0.5  # of the mean error of a part: a smaller error is low
+MIN_LOW_SHARE = 0.2  # of the time of a part, in which the error is low
+
+ROUNDING = 1e-9  # of an overlap
 
 
 def frame_losses(gt: Trajectory, est: Trajectory, *, scale: float = 1.0) -> Array:
@@ -57,6 +62,8 @@ class FrameRange:
 def worst_window(t_ns: Stamps, loss: Array, duration_s: float) -> FrameRange:
     """The frames of the part of a duration with the largest mean error. `t_ns` and `loss` are (N,).
 
+    A failure that is longer than the part is shown with its beginning or its end: only parts count in which the error
+    is low for a fifth of the time, if there are any. Errors that are large throughout could not be compared in time.
     Of parts with equal errors it is the middle one, so that large errors in the middle of small ones are centred.
     """
     ends = np.searchsorted(t_ns, t_ns + round(duration_s * NS_PER_S), side="right")
@@ -69,12 +76,59 @@ def worst_window(t_ns: Stamps, loss: Array, duration_s: float) -> FrameRange:
 
     # Missing frames count as much as others, so errors are weighted by time.
     means = totals / (ends[starts] - starts) * durations_s
+    has_low_errors = np.array(
+        [_has_low_errors(t_ns[a:b], loss[a:b]) for a, b in zip(starts, ends[starts], strict=True)]
+    )
+    if has_low_errors.any():
+        means = np.where(has_low_errors, means, 0.0)
     best = np.flatnonzero(means >= 0.98 * means.max())
     middle = int(starts[best[len(best) // 2]])
     return FrameRange(middle, int(ends[middle]))
 
 
-def overlap(frames: Frames, others: Frames) -> float:
-    """The number of frames (N,) in both sets relative to those in either, 0 to 1; 0 if there are none."""
-    in_either = int((frames | others).sum())
-    return int((frames & others).sum()) / in_either if in_either else 0.0
+def _has_low_errors(t_ns: Stamps, loss: Array) -> bool:
+    """Whether the error (F,) at `t_ns` (F,) is low for some of the time."""
+    if len(loss) < 2:
+        return False
+    weights = np.gradient(t_ns.astype(float))
+    mean = float(np.average(loss, weights=weights))
+    low_share = float(np.average(loss < LOW_ERROR * mean, weights=weights))
+    return low_share >= MIN_LOW_SHARE
+
+
+@dataclass(frozen=True, slots=True)
+class Coincidence:
+    """How far two errors occur at the same times, and how far they would by chance.
+
+    `overlap` is 0 for errors at different times and 1 for proportional ones; see `coincidence`. Chance is all rotations
+    of one error in time: `by_chance` is the mean overlap, and `p` the share of rotations, with that by 0, whose overlap
+    is as large.
+    """
+
+    overlap: float
+    by_chance: float
+    p: float
+
+
+def coincidence(errors: Array, others: Array) -> Coincidence:
+    """How far two errors (K,) at the same regular times occur together, whatever their sizes.
+
+    A threshold for errors would depend on the level of each side, and a sum of shared errors on a few large ones. So
+    each error becomes a unit vector of the roots of its shares in time. The product b of the two is the Bhattacharyya
+    coefficient of the shares, and the overlap is the Tanimoto coefficient b / (2 - b) of the vectors: for errors that
+    are constant in equal numbers of frames, it is the number of frames in both relative to those in either. It is 0 if
+    one of the errors is 0 throughout.
+
+    Source: Bhattacharyya (1943), "On a measure of divergence between two statistical populations"; Harris (2020), "A
+    shift test for independence in generic time series", for the rotations.
+    """
+    if not errors.any() or not others.any():
+        return Coincidence(0.0, 0.0, 1.0)
+    root_shares = np.sqrt(errors / errors.sum())
+    other_root_shares = np.sqrt(others / others.sum())
+    overlaps = []
+    for shift in range(len(root_shares)):
+        product = root_shares @ np.roll(other_root_shares, shift)
+        overlaps.append(product / (2 - product))
+    is_as_large = np.array(overlaps) >= overlaps[0] - ROUNDING
+    return Coincidence(float(overlaps[0]), float(np.mean(overlaps)), float(is_as_large.mean()))

@@ -5,7 +5,7 @@ The rest is the reference: a property has changed in a frame if its value is far
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations_with_replacement, pairwise
 
 import cv2
 import numpy as np
@@ -376,6 +376,26 @@ def _smoothed(values: Array) -> Array:
 CHUNK_FRAMES = 10  # to which the pair is fitted
 CHUNK_STEP = 5
 MIN_ANGLE_DEG = 0.015
+AXES = ("roll", "pitch", "yaw")
+
+
+@dataclass(frozen=True, slots=True)
+class _TurnedChunk:
+    """Successive frames, and by how much roll, pitch and yaw (3,) of the right camera differ there in degrees.
+
+    `sigma_deg` (3,) are the standard deviations; infinite for an angle that is unknown.
+    """
+
+    first: int
+    end: int
+    difference_deg: Array
+    sigma_deg: Array
+
+    @property
+    def significant(self) -> Frames:
+        """Which angles (3,) differ significantly."""
+        limit_deg = np.maximum(MIN_ANGLE_DEG, SIGMAS * self.sigma_deg)
+        return np.asarray(np.abs(self.difference_deg) > limit_deg)
 
 
 def _turned_camera(
@@ -387,41 +407,75 @@ def _turned_camera(
     """A rotation of the right camera, by fits of the pair to successive unchanged frames and to the reference."""
     if reference is None or len(part) < CHUNK_FRAMES:
         return None
-    starts = range(0, len(part) - CHUNK_FRAMES + 1, CHUNK_STEP)
-    is_turned = np.ones(len(part), bool)
-    sums_deg = np.zeros((len(part), 3))
-    counts = np.zeros(len(part))
-    for first in starts:
-        end = first + CHUNK_FRAMES if first != starts[-1] else len(part)
-        fit = fit_pair([part.shots[first:end]], pair) if is_unchanged[first:end].all() else None
-        difference_deg = np.zeros(3) if fit is None else _significant_difference_deg(fit, reference)
-        is_turned[first:end] &= difference_deg.any()
-        sums_deg[first:end] += difference_deg
-        counts[first:end] += 1
-    if not is_turned.any():
+    chunks = _turned_chunks(part, pair, reference, is_unchanged)
+    if not any(chunk.significant.any() for chunk in chunks):
         return None
 
-    angles_deg = np.where(is_turned[:, None], sums_deg / counts[:, None], 0.0)
-    mean_deg = angles_deg[is_turned].mean(0)
-    axes = zip(("roll", "pitch", "yaw"), mean_deg.tolist(), strict=True)
-    rotation = ", ".join(f"{name} {angle_deg:+.3f}°" for name, angle_deg in axes if angle_deg)
-    evidence = f"matches of the pair shift as if the right camera were turned by {rotation} in {is_turned.sum()} frames"
+    axes = np.any([chunk.significant for chunk in chunks], axis=0)
+    first, end, angle_deg = _turned_stretch(chunks, axes, len(part))
+    angles_deg = np.zeros((len(part), len(AXES)))
+    angles_deg[first:end] = angle_deg
+    named_axes = zip(AXES, angle_deg.tolist(), strict=True)
+    rotation = ", ".join(f"{name} {angle_deg:+.3f}°" for name, angle_deg in named_axes if angle_deg)
+    evidence = f"matches of the pair shift as if the right camera were turned by {rotation} in {end - first} frames"
     return TurnedCamera(evidence, angles_deg, pair)
 
 
-def _significant_difference_deg(fit: StereoFit, reference: StereoFit) -> Array:
-    """By how much roll, pitch and yaw (3,) differ from the reference, in degrees; 0 where that is not significant."""
-    angles = (
-        (fit.roll_deg, reference.roll_deg),
-        (fit.pitch_deg, reference.pitch_deg),
-        (fit.yaw_deg, reference.yaw_deg),
-    )
-    return np.array([_significant(angle, usual) for angle, usual in angles])
+def _turned_chunks(
+    part: RecordingPart, pair: StereoPair, reference: StereoFit, is_unchanged: Frames
+) -> list[_TurnedChunk]:
+    """The rotation in chunks of unchanged frames that have enough matches."""
+    chunks = []
+    last_first = len(part) - CHUNK_FRAMES
+    for first in (*range(0, last_first, CHUNK_STEP), last_first):
+        end = first + CHUNK_FRAMES
+        fit = fit_pair([part.shots[first:end]], pair) if is_unchanged[first:end].all() else None
+        if fit is None:
+            continue
+        differences = [
+            _difference(fit.roll_deg, reference.roll_deg),
+            _difference(fit.pitch_deg, reference.pitch_deg),
+            _difference(fit.yaw_deg, reference.yaw_deg),
+        ]
+        difference_deg = np.array([difference.value for difference in differences])
+        sigma_deg = np.array([difference.sigma for difference in differences])
+        chunks.append(_TurnedChunk(first, end, difference_deg, sigma_deg))
+    return chunks
 
 
-def _significant(angle: Uncertain | None, usual: Uncertain | None) -> float:
+def _difference(angle: Uncertain | None, usual: Uncertain | None) -> Uncertain:
+    """By how much an angle differs from the usual one."""
     if angle is None or usual is None:
-        return 0.0
-    difference_deg = angle.value - usual.value
-    limit_deg = max(MIN_ANGLE_DEG, SIGMAS * float(np.hypot(angle.sigma, usual.sigma)))
-    return difference_deg if abs(difference_deg) > limit_deg else 0.0
+        return Uncertain(0.0, np.inf)
+    return Uncertain(angle.value - usual.value, float(np.hypot(angle.sigma, usual.sigma)))
+
+
+def _turned_stretch(chunks: Sequence[_TurnedChunk], axes: Frames, frame_count: int) -> tuple[int, int, Array]:
+    """The first frame of a rotated stretch, the one after its last, and its rotation (3,) about some axes in degrees.
+
+    A chunk that is rotated in part of its frames measures that share of the rotation. The stretch and its constant
+    rotation fit the chunks best in the sense of weighted least squares, so that its ends are finer than the chunks.
+    """
+    firsts = np.array([chunk.first for chunk in chunks])
+    ends = np.array([chunk.end for chunk in chunks])
+    measured_deg = np.array([chunk.difference_deg for chunk in chunks])  # (chunks, 3)
+    weights = np.array([chunk.sigma_deg for chunk in chunks]) ** -2.0 * axes
+
+    best_gain = -np.inf
+    best = (0, frame_count, np.zeros(len(AXES)))
+    for first, last in combinations_with_replacement(range(frame_count), 2):
+        end = last + 1
+        overlap_frames = np.clip(np.minimum(ends, end) - np.maximum(firsts, first), 0, None)
+        shares = (overlap_frames / (ends - firsts))[:, None]
+        information = (weights * shares**2).sum(0)
+        if not information.any():
+            continue
+        projection = (weights * shares * measured_deg).sum(0)
+        angle_deg = np.divide(projection, information, out=np.zeros(len(AXES)), where=information > 0)
+
+        # The decrease of the squared residuals relative to no rotation.
+        gain = float((angle_deg * projection).sum())
+        if gain > best_gain:
+            best_gain = gain
+            best = (first, end, angle_deg)
+    return best

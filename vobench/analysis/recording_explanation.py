@@ -5,11 +5,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from vobench.analysis.explanation import Change, Explanation
-from vobench.analysis.frame_failure import Frames, overlap
+from vobench.analysis.frame_failure import Coincidence, Frames
 from vobench.analysis.picture_change import CHANGE_TEXTS, INSTEAD, PictureChange
 from vobench.geometry.se3 import Array
 
-TRUSTED_OVERLAP = 0.5  # of failing frames: a twin with less does not count
+TRUSTED_OVERLAP = 0.6  # of errors in time: a twin with less does not count, ...
+TRUSTED_P = 0.1  # nor does one whose overlap a larger share of shifts in time reaches
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,12 +38,14 @@ class TwinTrials:
     """What the estimator does in the twin: which of the same F frames fail, and what removing each change does.
 
     `loss` (F,) is the mean error around each frame, and `typical` the median error in the twin without any change.
+    `coincidence` compares when the recording's error is above its typical one, and when the changes raise the twin's.
     `scale` is the factor by which the place was enlarged, and `misfit` the mean error of the logarithm of disparities.
     """
 
     loss: Array
     typical: float
     is_failing: Frames
+    coincidence: Coincidence
     explanation: Explanation
     scale: float
     misfit: float
@@ -64,13 +67,15 @@ class RecordingExplanation:
 
     @property
     def overlap(self) -> float:
-        """The number of frames that fail in the recording and in its twin, relative to those that fail in either."""
-        return 0.0 if self.twin is None else overlap(self.frames.is_failing, self.twin.is_failing)
+        """How far the errors of the recording and of its twin occur at the same times; see `Coincidence`."""
+        return 0.0 if self.twin is None else self.twin.coincidence.overlap
 
     @property
     def is_trusted(self) -> bool:
-        """Whether the twin fails in about the same frames as the recording."""
-        return self.overlap >= TRUSTED_OVERLAP
+        """Whether the changes raise the twin's error when the recording's is large, more than by chance."""
+        if self.twin is None:
+            return False
+        return self.overlap >= TRUSTED_OVERLAP and self.twin.coincidence.p <= TRUSTED_P
 
     @property
     def named(self) -> tuple[str, ...]:
@@ -108,9 +113,7 @@ class RecordingExplanation:
             )
         seen = " and ".join(CHANGE_TEXTS[change.name].because for change in self.changes)
         if not self.is_trusted:
-            return (
-                f"{symptom}, where {seen}, but its twin does not fail in the same frames: the cause is not confirmed."
-            )
+            return f"{symptom}, where {seen}, but its twin does not fail at the same times: the cause is not confirmed."
         if not self.named:
             return f"{symptom}, where {seen}, but in the twin no removal of these surely helps: the cause is unknown."
 
@@ -148,6 +151,8 @@ class RecordingExplanation:
         }
         if self.twin is not None:
             facts["overlap"] = self.overlap
+            facts["overlap_by_chance"] = self.twin.coincidence.by_chance
+            facts["overlap_p"] = self.twin.coincidence.p
             facts["is_trusted"] = self.is_trusted
             facts["explanation"] = asdict(self.twin.explanation)
             facts["place"] = {"scale": self.twin.scale, "misfit": self.twin.misfit}
@@ -169,9 +174,13 @@ def _trust_sentences(found: RecordingExplanation, twin: TwinTrials) -> list[str]
     only_in_twin = int(twin.is_failing.sum()) - in_both
     real_loss = float(found.frames.loss[is_failing].mean())
     twin_loss = float(twin.loss[is_failing].mean())
+    coincidence = twin.coincidence
     return [
-        f"How far to trust this: the twin fails in {in_both} of the {failing} frames in which the recording fails, and "
-        f"in {only_in_twin} others (overlap {found.overlap:.2f}). The mean error of the recording's failing frames is "
-        f"{real_loss:.0%}, and {twin_loss:.0%} in the twin.",
+        f"How far to trust this: the errors of the recording and of the twin overlap in time by "
+        f"{coincidence.overlap:.2f}. If the twin's are shifted in time, it is {coincidence.by_chance:.2f} on average, "
+        f"and as large for {coincidence.p:.0%} of the shifts.",
+        f"The twin fails in {in_both} of the {failing} frames in which the recording fails, and in {only_in_twin} "
+        f"others. The mean error of the recording's failing frames is {real_loss:.0%}, and {twin_loss:.0%} in the "
+        f"twin.",
         f"The twin's place is scaled by {twin.scale:g}, and its disparities differ by {twin.misfit:.0%}.",
     ]
