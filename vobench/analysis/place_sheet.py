@@ -104,7 +104,7 @@ def _write_label(picture: Rgb8, label: str) -> None:
 
 
 def _widest_view(faces: Triangles, survey: SceneSurvey) -> Viewpoint:
-    """The viewpoint from which the surfaces in view are farthest away; without a free circle, one from around."""
+    """The viewpoint from which the surfaces in view are farthest away on average; without a free circle, one from around."""
     free = survey.free_circle
     if free is None or not survey.is_place:
         return around(survey.low_m, survey.high_m, count=1)[0]
@@ -116,7 +116,8 @@ def _widest_view(faces: Triangles, survey: SceneSurvey) -> Viewpoint:
         viewpoint = Viewpoint(eye_m, yaw_deg, VIEW_PITCH_DEG)
         rays = viewpoint.rays(COARSE_LENS)
         hits = caster.hits(np.tile(eye_m, (len(rays), 1)), rays)
-        distance_m = float(np.median(np.where(hits.face >= 0, hits.distance, 0.0)))
+        # Not the median: along a street, few surfaces are far away, and most of what is seen is its ground.
+        distance_m = float(np.mean(np.where(hits.face >= 0, hits.distance, 0.0)))
         if distance_m > farthest_m:
             farthest_m = distance_m
             best = viewpoint
