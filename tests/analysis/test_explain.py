@@ -193,6 +193,30 @@ def test_no_explanation_takes_more_trials_than_were_announced(hard: Case) -> Non
         assert SEEDS.screening_trials(8) <= found.trials <= SEEDS.most_trials(8)
 
 
+@pytest.mark.parametrize("count", [1, 2])
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_of_one_or_two_nuisances_no_more_trials_are_run_than_were_announced(
+    hard: Case, count: int, share: float
+) -> None:
+    """`share` is that of the nuisances' errors in the error."""
+    few = nuisances()[:count]
+    ran: list[str] = []
+
+    def measure(cases: Mapping[str, Case]) -> Mapping[str, Sequence[Outcome]]:
+        ran.extend(cases)
+        outcomes = {}
+        for name, case in cases.items():
+            removed = [name for name in case.variant["removed"].split(",") if name]
+            left = count - len(removed)
+            outcomes[name] = [Outcome("ok", True, np.full(24, 0.01 + share * 0.4 * left / count))]
+        return outcomes
+
+    explain(hard, few, measure, seeds=SEEDS, remove=remove)
+    assert len(ran) <= SEEDS.most_trials(count)
+    if share:
+        assert len(ran) == SEEDS.most_trials(count)
+
+
 def test_the_announced_screening_is_all_that_is_run_where_nothing_helps(hard: Case) -> None:
     assert explained(hard, lambda _: 0.3, spread=0.02).trials == SEEDS.screening_trials(len(nuisances()))
 

@@ -10,6 +10,7 @@ from vobench.errors import InputError, UnknownNameError
 from vobench.geometry import se3
 from vobench.runner.folder import RunFolder
 from vobench.runner.recording import read_recording
+from vobench.runner.store import SilentProgress
 from vobench.suite.plan import Plan
 from vobench.trajectory.trajectory import Trajectory, poses_at
 from vobench.trajectory.tum import format_tum
@@ -73,6 +74,21 @@ def test_a_folder_in_use_is_refused_before_anything_is_run(recorded_case, tmp_pa
     (tmp_path / "mine").write_text("")
     with pytest.raises(InputError):
         explain_recording(recorded_case, run_plan=run_nothing, estimator="lk_epipolar", out=tmp_path)
+
+
+def test_the_cost_is_stated_before_anything_is_run(recorded_case, body, tmp_path) -> None:
+    said: list[str] = []
+    with pytest.raises(InputError, match="no frame has an error"):
+        explain_recording(
+            recorded_case,
+            run_plan=run_nothing,
+            estimate=write(tmp_path, body),
+            out=tmp_path / "out",
+            progress=SilentProgress(said.append),
+        )
+    (cost,) = said
+    assert "the images of the worst" in cost
+    assert "lk_epipolar runs in a twin of them, 18 times for one difference: about" in cost
 
 
 def test_an_unknown_estimator_is_refused_before_anything_is_run(recorded_case, tmp_path):

@@ -8,8 +8,7 @@ import pytest
 
 from tests.analysis.conftest import NoisyRun
 from vobench.analysis import explain_trial as explain_trial_module
-from vobench.analysis.explain import effort
-from vobench.analysis.explain_trial import TrialExplanation, _Forecast, explain_trial
+from vobench.analysis.explain_trial import TrialExplanation, explain_trial
 from vobench.analysis.explanation import Change, Explanation
 from vobench.errors import InputError, UnknownNameError
 
@@ -105,20 +104,6 @@ def test_the_number_of_trials_is_announced_before_each_stage(noisy_run: NoisyRun
     assert re.match(announced, said[0])
     assert said[-1].startswith("trials ")
     assert f"to {found.explanation.trials} of at most" in said[-1]
-
-
-def test_the_time_of_a_stage_follows_from_the_trials_before(monkeypatch) -> None:
-    said = []
-    clock = iter([0.0, 60.0, 60.0, 80.0])
-    monkeypatch.setattr(explain_trial_module, "time", SimpleNamespace(monotonic=lambda: next(clock)))
-    forecast = _Forecast(SimpleNamespace(say=said.append), effort(3, is_deterministic=True), 10, 1.5)
-    with forecast.stage(30):
-        pass
-    with forecast.stage(12):
-        pass
-    most = effort(3, is_deterministic=True).most_trials(10)
-    assert said[0] == f"trials 1 to 30 of at most {most}, about 45 s: each of 10 nuisances removed, with 3 seeds"
-    assert said[1] == f"trials 31 to 42 of at most {most}, about 24 s"
 
 
 # --- Rows and verdicts, without a run ---

@@ -19,6 +19,7 @@ from vobench.geometry.se3 import Array
 
 PROMISING = 0.2  # the reduction from which a variant is confirmed with other seeds
 SUSPECTS = 3  # nuisances that are removed in pairs, and single changes that are confirmed
+FEWEST_IN_PAIRS = 3  # nuisances: two are a pair anyway, and are removed together as all of them
 MIN_REPEATS = 3
 RANDOM_FACTOR = 2  # so many times the repeats for an estimator that is not deterministic
 CONFIRMING_FACTOR = 2  # times the repeats of the screening
@@ -70,6 +71,11 @@ class Effort:
 
     def most_trials(self, nuisances: int) -> int:
         """The largest number of trials: with each nuisance alone, pairs, and the confirmation of all that may be."""
+        if nuisances < FEWEST_IN_PAIRS:
+            # Each set of them is a variant, and all variants may be confirmed.
+            variants = int(2**nuisances)
+            return (self.screening + self.confirming) * variants
+
         each_alone = nuisances
         pairs = SUSPECTS * (SUSPECTS - 1) // 2
         further_screening = self.screening * (each_alone + pairs)
@@ -275,7 +281,7 @@ def _changes(outcomes: Outcomes, *, is_confirmed: bool) -> dict[Removal, Change]
 
 def _needs_pairs(singles: Mapping[Removal, Change], everything: Change, removable: Removal) -> bool:
     """Whether removing all nuisances seems to help, but no single one explains it."""
-    if len(removable) < 3 or everything.reduction < PROMISING:
+    if len(removable) < FEWEST_IN_PAIRS or everything.reduction < PROMISING:
         return False
     best = max(singles[(name,)].reduction for name in removable)
     return best < SUFFICIENT_SHARE * everything.reduction

@@ -34,6 +34,7 @@ from vobench.analysis.request_folder import claim
 from vobench.analysis.segment_loss import Outcome
 from vobench.analysis.stereo_fit import fit_pair
 from vobench.analysis.trial_data import TrialPaths, read_outcome, read_paths
+from vobench.analysis.trial_forecast import TrialForecast, estimator_seconds
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import StereoPair, stereo_pair
@@ -65,6 +66,11 @@ LOOK_IMAGES = 12  # that the camera of the twin is fitted to
 STAND_IN = "lk_epipolar"  # that is run in the twin of a recording of which only an estimate is known
 TIMES = "times.txt"  # of KITTI
 SEQUENCES = "sequences"  # the folder of the variants of the twin
+# To compare the images, simulate the twin and explain one difference, for each image pair of the worst part and each
+# 10⁶ pixels of an image: measured by benchmarks/damaged_recordings.py.
+SECONDS_PER_MEGAPIXEL = 20.0
+PIXELS_PER_MEGAPIXEL = 1e6
+START_S = 1.5  # to start an estimator and to write the images of a trial
 
 
 def explain_recording(
@@ -121,16 +127,18 @@ def explain_recording(
         "repeats": repeats,
     }
     claim(out, request, regenerated=(SEQUENCES,))
+    period_ns = int(np.median(np.diff(recorded.t_ns)))
+    progress.say(_cost_sentence(name, seeds, pair, t_ns, period_ns=period_ns, is_run=estimate is None))
+    seconds_per_frame = None
     if estimate is None:
-        progress.say(f"running {name} on the recording")
         source = recording_source(recording, form, options)
-        est, scale = _run_on_recording(source, name, out, gt_left, run_plan)
-        loss = frame_losses(gt_left, est, scale=scale)
+        trial = _run_on_recording(source, name, out, gt_left, run_plan)
+        loss = frame_losses(gt_left, trial.est, scale=trial.scale)
+        seconds_per_frame = trial.seconds / len(recorded.t_ns)
     else:
         est = _read_estimate(estimate, recording, t_ns)
         loss = _smaller_losses(est, gt, gt_left)
 
-    period_ns = int(np.median(np.diff(recorded.t_ns)))
     window = worst_window(t_ns, loss, WINDOW_S)
     frames = _failing_frames(t_ns - recorded.t_ns[0], loss, window)
     runs = reference_runs(window, loss > failing_loss(frames.typical), frames_of_run(period_ns))
@@ -147,7 +155,9 @@ def explain_recording(
             recorded, part, reference, evidence, pair, period_ns=period_ns, scene=scene, out=out,
             run_plan=run_plan, progress=progress,
         )  # fmt: skip
-        runner = _VariantRunner(images, name, out, run_plan)
+        seconds_per_trial = None if seconds_per_frame is None else START_S + seconds_per_frame * len(images.t_ns)
+        forecast = TrialForecast(progress, seeds, len(images.changes), seconds_per_trial, removed="differences")
+        runner = _VariantRunner(images, name, out, run_plan, forecast)
         twin = _twin_trials(runner, placement, frames, seeds=seeds)
     return RecordingExplanation(
         estimator=name,
@@ -155,6 +165,24 @@ def explain_recording(
         frames=frames,
         changes=evidence.changes,
         twin=twin,
+    )
+
+
+# --- The cost ---
+
+
+def _cost_sentence(name: str, seeds: Effort, pair: StereoPair, t_ns: Stamps, *, period_ns: int, is_run: bool) -> str:
+    """What will be done, and about how long it takes; the trials are forecast again when the differences are known."""
+    duration_s = min(WINDOW_S, int(t_ns[-1] - t_ns[0]) / NS_PER_S)
+    frame_count = duration_s * NS_PER_S / period_ns
+    camera = pair.left.camera
+    megapixels = frame_count * camera.width_px * camera.height_px / PIXELS_PER_MEGAPIXEL
+    seconds = SECONDS_PER_MEGAPIXEL * megapixels
+    on_recording = f"{name} runs on {len(t_ns)} frames; then " if is_run else ""
+    return (
+        f"{on_recording}the images of the worst {duration_s:.0f} s are compared with others and, if they differ, "
+        f"{name} runs in a twin of them, {seeds.most_trials(1)} times for one difference: about {seconds:.0f} s on one "
+        "core, and a minute or more for the light of a new place"
     )
 
 
@@ -202,18 +230,28 @@ def _read_estimate(estimate: Path, recording: Path, t_ns: Stamps) -> Trajectory:
     return Trajectory(t_ns[frames], est.T_world_frame[is_close][rows])
 
 
+@dataclass(frozen=True, slots=True)
+class _RecordingTrial:
+    """An estimate of a recording, the scale of its alignment, and the seconds that the estimator took for it."""
+
+    est: Trajectory
+    scale: float
+    seconds: float
+
+
 def _run_on_recording(
     source: Mapping[str, Any], name: str, out: Path, gt_left: Trajectory, run_plan: PlanRunner
-) -> tuple[Trajectory, float]:
-    """Run an estimator on a recording; return its estimate of the left camera, and the scale of its alignment."""
+) -> _RecordingTrial:
+    """Run an estimator on a recording; the estimate is of the left camera."""
     folder = _run_suite("recording", [source], name, out, run_plan)
     (score,) = folder.scores()
     paths = read_paths(folder, score)
+    seconds = estimator_seconds(folder.estimate(score.case, score.estimator, score.repeat))
     est = paths.est
     if not len(est):
-        return est, 1.0
+        return _RecordingTrial(est, 1.0, seconds)
     known = np.isin(est.t_ns, gt_left.t_ns)
-    return Trajectory(est.t_ns[known], est.T_world_frame[known]), paths.scale
+    return _RecordingTrial(Trajectory(est.t_ns[known], est.T_world_frame[known]), paths.scale, seconds)
 
 
 def _failing_frames(since_start_ns: Stamps, loss: Array, window: FrameRange) -> FailingFrames:
@@ -328,11 +366,16 @@ class _VariantRunner:
     estimator: str
     out: Path
     run_plan: PlanRunner
+    forecast: TrialForecast
     stages: int = 0
     paths: dict[str, tuple[TwinVariant, TrialPaths]] = field(default_factory=dict)
 
     def measure(self, variants: Mapping[str, TwinVariant]) -> dict[str, list[Outcome]]:
         """Run the estimator once on each variant."""
+        with self.forecast.stage(len(variants)):
+            return self._measure(variants)
+
+    def _measure(self, variants: Mapping[str, TwinVariant]) -> dict[str, list[Outcome]]:
         self.stages += 1
         sources = []
         for name, variant in variants.items():

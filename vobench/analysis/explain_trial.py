@@ -1,24 +1,22 @@
 """Explains why a trial fails by running its case again without each of its nuisances."""
 
-import time
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from statistics import median
 from typing import TYPE_CHECKING, Any
 
 from vobench.analysis.cause_text import CAUSE_TEXTS
-from vobench.analysis.explain import Effort, effort, explain
+from vobench.analysis.explain import effort, explain
 from vobench.analysis.explanation import MATERIAL, Change, Explanation, is_sufficient
 from vobench.analysis.nuisance import NUISANCES, Nuisance, nuisances_of, without
 from vobench.analysis.segment_loss import Outcome
 from vobench.analysis.trial_data import read_conditions, read_error_series, read_outcome, read_paths
+from vobench.analysis.trial_forecast import TrialForecast, estimator_seconds
 from vobench.errors import InputError
 from vobench.runner.data_frame import data_frame
 from vobench.runner.finished_trial import FinishedTrial, read_finished_trial, run_variants
 from vobench.runner.folder import FINISHED_TRIAL, TrialScore
-from vobench.runner.frames import read_frames
 from vobench.runner.key import cache_folder
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.store import SILENT, Progress, Store
@@ -29,7 +27,6 @@ if TYPE_CHECKING:
     from vobench.runner.data_frame import DataFrame
 
 
-MS_PER_S = 1e3
 # What an estimator does whose trial ended with a status. For others, the error is stated.
 SYMPTOMS = {
     "lost": "loses track",
@@ -40,7 +37,6 @@ SYMPTOMS = {
     "invalid_output": "returns an invalid answer",
 }
 NEVER_TRACKS = 1.0  # the mean error of a trial in which no segment has a pose at both ends
-SECONDS_TO_SAY = 5.0  # a stage that took less needs no forecast
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,7 +230,7 @@ def explain_trial(
     nuisances = _present_nuisances(finished)
     suite_name = f"explain_{finished.score.case.replace('-', '_')}_{finished.score.estimator}"
     seeds = effort(repeats, is_deterministic=finished.estimator_entry.manifest.deterministic)
-    forecast = _Forecast(progress, seeds, len(nuisances), _seconds_per_trial(finished))
+    forecast = TrialForecast(progress, seeds, len(nuisances), _seconds_per_trial(finished), removed="nuisances")
 
     def measure(cases: Mapping[str, Case]) -> dict[str, list[Outcome]]:
         with forecast.stage(len(cases)):
@@ -282,44 +278,11 @@ def _require_answers(explained: TrialScore, scores: Sequence[TrialScore]) -> Non
     )
 
 
-@dataclass(slots=True)
-class _Forecast:
-    """Says how many trials an explanation runs, and how long the rest may take by the trials so far."""
-
-    progress: Progress
-    seeds: Effort
-    nuisances: int
-    seconds_per_trial: float
-    done: int = 0
-    seconds: float = 0.0
-
-    @contextmanager
-    def stage(self, trials: int) -> Iterator[None]:
-        """Announce a stage of the explanation, and measure how long it takes."""
-        self.progress.say(self._sentence(trials))
-        began_s = time.monotonic()
-        yield
-        self.seconds += time.monotonic() - began_s
-        self.done += trials
-
-    def _sentence(self, trials: int) -> str:
-        most = self.seeds.most_trials(self.nuisances)
-        numbers = f"trials {self.done + 1} to {self.done + trials} of at most {most}"
-        if self.done == 0:
-            seconds = trials * self.seconds_per_trial
-            each = f"each of {self.nuisances} nuisances removed, with {self.seeds.screening} seeds"
-            return f"{numbers}, about {seconds:.0f} s: {each}"
-        if self.seconds < SECONDS_TO_SAY:
-            return numbers
-        return f"{numbers}, about {trials * self.seconds / self.done:.0f} s"
-
-
 def _seconds_per_trial(trial: FinishedTrial) -> float:
     """How long a trial takes: a typical simulation on this machine, and the estimator for the frames of this trial."""
     earlier_s = Store(cache_folder()).seconds("sequence")
     simulation_s = median(earlier_s) if earlier_s else 0.0
-    estimator_s = sum(row.wall_ms or 0.0 for row in read_frames(trial.path)) / MS_PER_S
-    return simulation_s + estimator_s
+    return simulation_s + estimator_seconds(trial.path)
 
 
 def _present_nuisances(trial: FinishedTrial) -> tuple[Nuisance, ...]:

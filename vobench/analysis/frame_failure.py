@@ -76,9 +76,9 @@ def worst_window(t_ns: Stamps, loss: Array, duration_s: float) -> FrameRange:
 
     # Missing frames count as much as others, so errors are weighted by time.
     means = totals / (ends[starts] - starts) * durations_s
-    has_low_errors = np.array(
-        [_has_low_errors(t_ns[a:b], loss[a:b]) for a, b in zip(starts, ends[starts], strict=True)]
-    )
+    has_low_errors = np.zeros(len(starts), bool)
+    for index, (start, end) in enumerate(zip(starts.tolist(), ends[starts].tolist(), strict=True)):
+        has_low_errors[index] = _has_low_errors(t_ns[start:end], loss[start:end])
     if has_low_errors.any():
         means = np.where(has_low_errors, means, 0.0)
     best = np.flatnonzero(means >= 0.98 * means.max())

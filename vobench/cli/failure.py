@@ -71,7 +71,7 @@ def explain_command(
     if may_be_recording(path):
         found = explain_recording(
             path,
-            run_plan=plan_runner(out=twin / "runs", jobs=jobs),
+            run_plan=plan_runner(out=twin / "runs", jobs=jobs, has_short_tasks=True),
             estimate=estimate,
             estimator=None if estimator is None else _estimator_name(estimator),
             place=place,

@@ -12,15 +12,17 @@ if TYPE_CHECKING:
     from vobench.runner.run import Finish
 
 
-def plan_runner(*, out: Path, jobs: int, finish: "Finish | None" = None) -> PlanRunner:
+def plan_runner(*, out: Path, jobs: int, finish: "Finish | None" = None, has_short_tasks: bool = False) -> PlanRunner:
     """A function that runs a plan in a new folder below `out` with `jobs` parallel tasks, and shows its progress.
 
-    `finish` adds reports to the folder of the run; by default there are none.
+    `finish` adds reports to the folder of the run; by default there are none. Of many short tasks, their number is
+    shown, and not the progress within each.
     """
+    shows_each_task = jobs == 1 and not has_short_tasks
     return launch.plan_runner(
         out=out,
         jobs=jobs,
-        make_display=lambda: TerminalDisplay(is_serial=jobs == 1),
+        make_display=lambda: TerminalDisplay(is_serial=shows_each_task),
         finish=finish,
-        task_progress=Bars(),
+        task_progress=Bars() if shows_each_task else None,
     )

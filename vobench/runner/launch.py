@@ -13,7 +13,7 @@ from vobench.runner.key import cache_folder
 from vobench.runner.plan_runner import PlanRunner
 from vobench.runner.preflight import preflight
 from vobench.runner.progress import RunDisplay
-from vobench.runner.store import SILENT, Progress, Store, why_unwritable
+from vobench.runner.store import Progress, Store, why_unwritable
 from vobench.runner.task import KINDS, Task, missing
 from vobench.suite.plan import Plan
 
@@ -46,7 +46,7 @@ def run_plan(
     recordings: "Mapping[str, Recording] | None" = None,
     jobs: int | None = None,
     scheduler: str | None = None,
-    task_progress: Progress = SILENT,
+    task_progress: Progress | None = None,
     shares_time: bool = False,
     is_fresh: bool = False,
     require_all: bool = False,
@@ -57,7 +57,7 @@ def run_plan(
     `finish` writes the reports.
     `jobs` is the number of tasks at once, by default `default_jobs()`.
     `scheduler` is the address of a Dask scheduler whose workers perform the tasks instead.
-    `task_progress` shows the progress within a task if `jobs` is 1.
+    `task_progress` shows the progress within a task if `jobs` is 1. Without it, the display shows a task's messages.
 
     Raises SuiteError if the plan is not valid, InputError if `out` cannot be written, NoSequenceError if no case could
     be simulated or imported, or with `require_all` if any could not, MissingDependencyError if this machine lacks a
@@ -99,7 +99,7 @@ def plan_runner(
     jobs: int | None,
     make_display: Callable[[], RunDisplay],
     finish: "Finish | None" = None,
-    task_progress: Progress = SILENT,
+    task_progress: Progress | None = None,
 ) -> PlanRunner:
     """A function that runs a plan in a new folder below `out` and shows its progress on a new display.
 
@@ -131,7 +131,7 @@ def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | N
     """
     store = cache_folder().resolve()
     kept = Store(store)
-    executor = make_executor(jobs, None, SILENT)
+    executor = make_executor(jobs, None, None)
     with stop.cleanup_after(executor.close), display, kept.in_use(display.say):
         to_make = missing(tasks, store)
         if to_make:
@@ -144,7 +144,7 @@ def perform_tasks(tasks: "Sequence[Task]", *, display: RunDisplay, jobs: int | N
     return store / tasks[-1].key
 
 
-def make_executor(jobs: int | None, scheduler: str | None, task_progress: Progress) -> Executor:
+def make_executor(jobs: int | None, scheduler: str | None, task_progress: Progress | None) -> Executor:
     """The requested executor: the workers of Dask, this process for one job, or processes of this machine."""
     if scheduler:
         return Dask(scheduler)
