@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
+from vobench.asset import furniture
 from vobench.asset.furniture import Part
 from vobench.asset.room import KINDS
 from vobench.geometry.triangle import face_normals
@@ -68,3 +69,8 @@ def test_reflectances_are_those_of_real_things() -> None:
         for part in made(kind):
             assert 0 <= min(part.material.colour) <= max(part.material.colour) <= 1
             assert part.material.kind != "body" or part.material.eta in (1.0, 1.5)
+
+
+def test_a_low_shelf_with_boxes_only_has_no_part_without_faces() -> None:
+    shelves = [furniture.shelf(np.random.default_rng(seed), height_m=0.8) for seed in range(300)]
+    assert min(len(part.mesh.faces) for parts in shelves for part in parts) > 0

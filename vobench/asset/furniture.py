@@ -373,7 +373,9 @@ def shelf(
         else:
             row_of_books = _books(rng, spines, bay_m - 0.03, row_m - 0.03)
             books.append(row_of_books.moved(at(depth_m / 2 - 0.02, y, z)))
-    return [*parts, Part(joined_arrays(books), matt(texture=spines.picture))]
+    if books:  # a low shelf may have boxes only
+        parts.append(Part(joined_arrays(books), matt(texture=spines.picture)))
+    return parts
 
 
 def papers(rng: Rng, count: int = 4, spread_m: float = 0.07, seed: int = 0) -> list[Part]:
