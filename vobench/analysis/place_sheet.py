@@ -104,7 +104,10 @@ def _write_label(picture: Rgb8, label: str) -> None:
 
 
 def _widest_view(faces: Triangles, survey: SceneSurvey) -> Viewpoint:
-    """The viewpoint from which the surfaces in view are farthest away on average; without a free circle, one from around."""
+    """The viewpoint from which the surfaces in view are farthest away on average.
+
+    Without a free circle, it is one from around the place.
+    """
     free = survey.free_circle
     if free is None or not survey.is_place:
         return around(survey.low_m, survey.high_m, count=1)[0]
