@@ -90,9 +90,8 @@ def _answer(attribution: Attribution) -> str:
 
 def _cause_row(cause: Cause) -> list[str]:
     conditions = " + ".join(cause.conditions)
-    interval = f"{_two_digits(cause.low)} to {_two_digits(cause.high)}"
     verdict = "significant" if cause.is_sure else "not significant"
-    return [conditions, _two_digits(cause.factor), interval, verdict]
+    return [conditions, _two_digits(cause.factor), _interval(cause), verdict]
 
 
 def _trial_rows(causes: EstimatorCauses, attribution: Attribution) -> list[list[str]]:
@@ -130,8 +129,11 @@ def _largest_factors(factors: Sequence[tuple[Cause, float]]) -> str:
 
 def _with_interval(cause: Cause) -> str:
     """The conditions, their factor and its interval."""
-    interval = f"{_two_digits(cause.low)} to {_two_digits(cause.high)}"
-    return f"{_with_factor(cause, cause.factor)} (95 % interval {interval})"
+    return f"{_with_factor(cause, cause.factor)} (95 % interval {_interval(cause)})"
+
+
+def _interval(cause: Cause) -> str:
+    return f"{_two_digits(cause.low)} to {_two_digits(cause.high)}"
 
 
 def _with_factor(cause: Cause, factor: float) -> str:
