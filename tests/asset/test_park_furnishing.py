@@ -26,6 +26,16 @@ def test_no_piece_overlaps_another_one(furnishing: ParkFurnishing) -> None:
     assert all(one.overlap_depth_m(other, CLOSE_M) == 0 for one, other in combinations(footprints, 2))
 
 
+def test_people_leave_the_middle_of_paths_free() -> None:
+    plan = park_plan(np.random.default_rng([158, 0]))  # where a person stood next to the middle of the loop
+    furnishing = furnish_park(plan, seed=158)
+    people = [footprint(piece) for piece in furnishing.pieces if piece.name.startswith("person_")]
+    assert people
+    for path in plan.paths:
+        for person in people:
+            assert np.linalg.norm(path.points_m[:, None] - person.corners_m, axis=2).min() > 0.4
+
+
 def test_each_lamp_has_a_globe_above_its_foot(furnishing: ParkFurnishing) -> None:
     lamps = [piece for piece in furnishing.pieces if piece.name.startswith("lamp_")]
     assert len(lamps) == len(furnishing.bulbs) > 0

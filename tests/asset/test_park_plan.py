@@ -79,6 +79,15 @@ def test_loops_close_and_have_the_same_width_and_direction_at_both_ends(plans: l
         assert loop.directions[0] == pytest.approx(loop.directions[-1])
 
 
+@pytest.mark.parametrize("seed", [10, 97, 107, 151, 372])  # whose first loops have bends sharper than they are wide
+def test_the_inner_edge_of_a_loop_does_not_fold(seed: int) -> None:
+    loop = park_plan(np.random.default_rng([seed, 0])).loop
+    for side in (-0.5, 0.5):
+        edge_m = loop.points_m + side * loop.widths_m[:, None] * loop.left
+        ahead = (np.diff(edge_m, axis=0) * np.diff(loop.points_m, axis=0)).sum(axis=1)
+        assert (ahead > 0).all()
+
+
 def test_points_of_paths_are_evenly_spaced(plans: list[ParkPlan]) -> None:
     for plan in plans:
         for path in plan.paths:

@@ -31,7 +31,7 @@ TUFT_SPACING_M = 0.5
 BED_SPACING_M = 0.3
 
 CLOSE_M = 0.01  # that footprints may share
-PASSAGE_M = 1.2  # of a path, which a person on it leaves free on one side
+PASSAGE_M = 0.45  # on both sides of the middle of a path, which a person on it leaves free
 SUNK_M = 0.02  # of a piece below the lowest ground under it
 DRY_SHARE = 1.2  # distance from the middle of the pond relative to the shore, beyond which the ground is dry
 
@@ -94,7 +94,7 @@ def _without_overlaps(candidates: Sequence[SitePiece], plan: ParkPlan) -> list[S
 
 
 def _leaves_room(piece: SitePiece, ground: Footprint, path: Path) -> bool:
-    """Whether a piece stands beside a path, or, if it is a person, leaves room to get past."""
+    """Whether a piece stands beside a path, or, if it is a person, leaves its middle free."""
     middle_m = ground.corners_m.mean(axis=0)
     reach_m = float(np.linalg.norm(ground.corners_m - middle_m, axis=1).max())
     distances_m = np.linalg.norm(path.points_m - middle_m, axis=1)
@@ -104,7 +104,7 @@ def _leaves_room(piece: SitePiece, ground: Footprint, path: Path) -> bool:
     if is_beside:
         return True
     if piece.name.startswith("person"):
-        return bool(distances_m[nearest] + half_width_m - reach_m > PASSAGE_M)
+        return bool(distances_m[nearest] - reach_m > PASSAGE_M)
     # The circle around the piece meets the path, but its corners may not.
     nearest_corner_m = np.linalg.norm(path.points_m[:, None] - ground.corners_m, axis=2).min()
     return bool(nearest_corner_m > half_width_m + CLOSE_M)

@@ -23,6 +23,9 @@ POND_TRIES = 30
 LEAST_POND_M = 2.4  # radius
 POND_LOBES = (2, 3, 4)  # numbers of waves of a shore
 HILL_WAVES = 5
+LOOP_WIDTH_M = (1.9, 3.0)
+WIDTH_WAVES_M = (0.1, 0.06)  # amplitudes of the changes of a path's width
+LEAST_RADIUS_M = 1.75  # of the bends of a loop, more than half its greatest width, so that its inner edge does not fold
 LINK_TRIES = 12
 LINK_APART_M = 3.0  # between a link and all other paths
 LINK_MEDIAN_APART_M = 4.0  # likewise, if it crosses one
@@ -185,7 +188,7 @@ def park_plan(rng: Rng) -> ParkPlan:
     has_pond = rng.random() < POND_SHARE
     pond = _pond(rng, loop_m, half_m) if has_pond else None
     ground = _ground(rng, half_m, pond)
-    loop = _path(rng, loop_m, width_m=float(rng.uniform(1.9, 3.0)))
+    loop = _path(rng, loop_m, width_m=float(rng.uniform(*LOOP_WIDTH_M)))
     links = _links(rng, loop, pond)
     exits = _exits(rng, loop, half_m, pond)
     return ParkPlan(half_m, ground, (loop, *links, *exits))
@@ -224,7 +227,24 @@ def _resampled(points_m: Array) -> Array:
 
 
 def _loop(rng: Rng, half_m: tuple[float, float]) -> Array:
-    """A closed curve (N, 2) around the middle of the park."""
+    """A closed curve (N, 2) around the middle of the park, without sharp bends."""
+    while True:
+        curve_m = _closed_curve(rng, half_m)
+        if _sharpest_bend_m(curve_m) > LEAST_RADIUS_M:
+            return curve_m
+
+
+def _sharpest_bend_m(curve_m: Array) -> float:
+    """The least radius of the bends of a closed curve (N, 2) of points STEP_M apart."""
+    steps_m = np.diff(curve_m, axis=0)
+    steps_around_m = np.concatenate([steps_m, steps_m[:1]])
+    headings_rad = np.unwrap(np.arctan2(steps_around_m[:, 1], steps_around_m[:, 0]))
+    turns_rad = np.diff(headings_rad)
+    return float(STEP_M / np.abs(turns_rad).max())
+
+
+def _closed_curve(rng: Rng, half_m: tuple[float, float]) -> Array:
+    """A random closed curve (N, 2) around the middle of the park."""
     count = int(rng.integers(6, 11))  # of points through which the curve runs
     numbers = np.arange(count) + rng.uniform(-0.22, 0.22, count)
     bearings_rad = 2 * np.pi * numbers / count + rng.uniform(0, 2 * np.pi)
@@ -292,7 +312,7 @@ def _path(rng: Rng, points_m: Array, width_m: float) -> Path:
     phases_rad = rng.uniform(0, 2 * np.pi, 2)
     slow = np.sin(round(length_m / 7) * turn_rad + phases_rad[0])
     fast = np.sin(round(length_m / 2.7) * turn_rad + phases_rad[1])
-    wobble_m = 0.1 * slow + 0.06 * fast
+    wobble_m = WIDTH_WAVES_M[0] * slow + WIDTH_WAVES_M[1] * fast
     return Path(points_m, width_m + wobble_m)
 
 
