@@ -60,10 +60,10 @@ estimators: [wheel_odometry, stand_still]
 """
 
 
-def write_cell(folder: Path, generator: str = GENERATOR) -> Path:
-    """Write the scene `cell` and its generator into a folder of their own. Returns the path of the scene."""
+def write_cell(folder: Path, generator: str = GENERATOR, *, name: str = "cell") -> Path:
+    """Write the scene `cell`, or one of another name, and its generator into a folder. Returns the path of the scene."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "generator.py").write_text(generator, encoding="utf-8")
     scene = folder / "scene.yaml"
-    scene.write_text(SCENE, encoding="utf-8")
+    scene.write_text(SCENE.replace("cell", name), encoding="utf-8")
     return scene

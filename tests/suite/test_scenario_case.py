@@ -1,6 +1,7 @@
 """The cases of scenarios: their names, what they share with the suite, and how often files are read."""
 
 from collections import Counter, defaultdict
+from dataclasses import replace
 
 import pytest
 
@@ -189,6 +190,76 @@ def test_a_scenario_that_stays_must_be_one_of_the_suite(spread_plan, plan):
     text = SPREAD.replace("each: 2", "each: 2, own_place: [mits]")
     with pytest.raises(SuiteError, match="own_place names scenarios that the suite does not have: mits"):
         plan(f"{text}scenarios: {{mist: 1}}\n")
+
+
+FOGGY = """name: smog
+base: {scene: closet, rig: {pitch_deg: 90}, trajectory: {targets_m: [[0.5, 0]]}}
+severity: [{}, {scene_changes: {fog: {visibility_m: 100}}}, {scene_changes: {fog: {visibility_m: 50}}},
+  {scene_changes: {fog: {visibility_m: 25}}}, {scene_changes: {fog: {visibility_m: 12}}},
+  {scene_changes: {fog: {visibility_m: 6}}}]
+"""
+
+
+@pytest.fixture
+def weather_plan(spread_plan, plan, tmp_path):
+    """Reads the plan of a suite with a scenario `smog` in two kinds of places."""
+    del spread_plan  # it writes the files
+    write_cell(tmp_path / "scenes" / "yard", name="yard")
+    (tmp_path / "suites" / "scenarios" / "smog.yaml").write_text(FOGGY)
+    scenes = "scenes: [{name: cell, seeds: 2}, {name: yard, seeds: 3}]\n"
+    drives = "trajectories: {tour: {kind: wander, length_m: 1}}\n"
+
+    def read(spread, *, each=2, scenarios="smog: [0, 2, 4], mist: [1]"):
+        return plan(f"{scenes}{drives}spread: {{units: 5, each: {each}{spread}}}\nscenarios: {{{scenarios}}}\n")
+
+    return read
+
+
+def test_the_weather_changes_in_the_places_that_the_suite_names_and_nothing_else(weather_plan):
+    cases = [case for case in weather_plan(", places: {smog: [yard]}").simulated if case.scenario == "smog"]
+    assert len(cases) == 3 * 2
+    assert {case.scene.name for case in cases} == {"yard"}
+    by_severity = defaultdict(list)
+    for case in cases:
+        by_severity[case.severity].append(case)
+    visibility_m = {
+        severity: [case.scene.fog and case.scene.fog.visibility_m for case in same]
+        for severity, same in by_severity.items()
+    }
+    assert visibility_m == {0: [None, None], 2: [50, 50], 4: [12, 12]}
+    for clear, foggy in zip(by_severity[0], by_severity[4], strict=True):
+        assert unit(clear) == unit(foggy)
+        assert replace(foggy.scene, fog=None) == clear.scene
+        assert (foggy.camera, foggy.rig, foggy.trajectory) == (clear.camera, clear.rig, clear.trajectory)
+
+
+def test_a_scenario_of_the_weather_stays_in_its_own_place_unless_the_suite_names_places(weather_plan):
+    cases = [case for case in weather_plan("").simulated if case.scenario == "smog"]
+    assert [case.scene.name for case in cases] == ["closet"] * 3
+
+
+def test_a_scenario_that_suits_any_place_can_be_kept_to_some(weather_plan):
+    cases = weather_plan(", places: {mist: [cell]}").simulated
+    assert {case.scene.name for case in cases if case.scenario == "mist"} == {"cell"}
+
+
+@pytest.mark.parametrize(
+    ("spread", "message"),
+    [
+        (", places: {smug: [yard]}", "places names scenarios that the suite does not have: smug"),
+        (", places: {smog: [yart]}", "places.smog names scenes that the suite does not have: yart"),
+        (", places: {dusk: [yard]}", "spread.places names it, but its severities change its own place"),
+        (", over: [trajectory], places: {smog: [yard]}", "is for designs over scenes"),
+    ],
+)
+def test_places_that_do_not_fit_are_named(weather_plan, spread, message):
+    with pytest.raises(SuiteError, match=message):
+        weather_plan(spread, scenarios="smog: 1, dusk: 1")
+
+
+def test_more_units_than_the_places_of_a_scenario_have_are_refused(weather_plan):
+    with pytest.raises(SuiteError, match="spread runs each scenario in 4 units, but yard has 3"):
+        weather_plan(", places: {smog: [yard]}", each=4)
 
 
 def test_the_rig_and_the_camera_of_the_suite_are_those_of_scenarios_in_units(spread_plan):

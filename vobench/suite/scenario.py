@@ -9,6 +9,8 @@ from typing import Annotated, Any
 from annotated_types import MaxLen, MinLen
 
 from vobench.errors import Mistake, SuiteError
+from vobench.scene.fog import Fog
+from vobench.scene.rain import Rain
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.setting import Name, merged_over, settings
 from vobench.suite import yaml_file
@@ -19,6 +21,7 @@ from vobench.suite.trajectory import TrajectorySpec
 MOST_SEVERE = 5
 SEVERITY_COUNT = MOST_SEVERE + 1  # with severity 0, the base
 PLACE_KEYS = ("scene", "scene_changes", "lighting", "trajectory")  # the keys of a setup that describe place and drive
+WEATHER_KEYS = ("fog", "rain")  # the changes of a scene that suit any place below the sky
 DEFAULT_CAMERA = CameraSettings()
 
 
@@ -35,6 +38,14 @@ class Setup:
     rig: RigSettings
     trajectory: TrajectorySpec
     camera: Camera = DEFAULT_CAMERA
+
+
+@settings()
+class Weather:
+    """What the severities of a scenario change if they change the weather alone."""
+
+    fog: Fog | None = None
+    rain: Rain | None = None
 
 
 @settings()
@@ -55,11 +66,15 @@ class ScenarioFile:
 
 @dataclass(frozen=True, slots=True)
 class Scenario:
-    """A scenario: its name, its file, and the setup of each severity from 0."""
+    """A scenario: its name, its file, and the setup of each severity from 0.
+
+    `weathers` has the weather of each severity, if nothing else of the scene changes; otherwise it is empty.
+    """
 
     name: str
     path: Path
     setups: tuple[Setup, ...]
+    weathers: tuple[Weather, ...] = ()
 
     @property
     def suits_any_place(self) -> bool:
@@ -67,8 +82,17 @@ class Scenario:
 
         Then no severity changes the place or the drive, and the base has no lighting of its own.
         """
-        changed_keys = [key for key in PLACE_KEYS if self._is_changed_by_any_severity(key)]
-        return not changed_keys and not self.setups[0].lighting
+        return not self._changed_place_keys and not self.setups[0].lighting
+
+    @property
+    def suits_any_sky(self) -> bool:
+        """Whether its severities change the weather, and nothing else of the place, the light or the drive."""
+        return bool(self.weathers) and self._changed_place_keys == ["scene_changes"]
+
+    @property
+    def _changed_place_keys(self) -> list[str]:
+        """The keys of place and drive that differ between severities."""
+        return [key for key in PLACE_KEYS if self._is_changed_by_any_severity(key)]
 
     @property
     def varied_rig_keys(self) -> set[str]:
@@ -134,16 +158,20 @@ def read_scenario(path: Path, replaced: Mapping[str, Any] = MappingProxyType({})
     # The changes are applied to the base as written, so that they can change single keys of its sections.
     written_base = {**source.plain["base"], **replaced}
     setups: list[Setup] = []
+    weathers: list[Weather] = []
     mistakes: list[Mistake] = []
     for severity, changes in enumerate(scenario_file.severity):
         place = source.place(("severity", severity))
         merged = merged_over(written_base, changes)
         try:
             setup = yaml_file.checked_section(Setup, merged, place)
+            if setup.scene_changes.keys() <= set(WEATHER_KEYS):
+                weathers.append(yaml_file.checked_section(Weather, setup.scene_changes, place))
         except SuiteError as error:
             mistakes += error.mistakes
         else:
             setups.append(setup)
     if mistakes:
         raise SuiteError(*mistakes)
-    return Scenario(scenario_file.name, path, tuple(setups))
+    only_weather = len(weathers) == len(setups)
+    return Scenario(scenario_file.name, path, tuple(setups), tuple(weathers) if only_weather else ())

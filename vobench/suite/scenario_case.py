@@ -1,6 +1,6 @@
 """The cases of a suite's scenarios: each scenario at each severity, with each calibration."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,9 @@ from vobench.suite.case import Case
 from vobench.suite.lookup import Lookup
 from vobench.suite.scenario import Scenario, Setup, read_scenario
 from vobench.suite.scene_entry import described_scene
+from vobench.suite.scene_lighting import Lighting
 from vobench.suite.scene_spec import SceneFile
-from vobench.suite.spread import UNIT_AXES, Dealer, Unit, UnitAxis, units
+from vobench.suite.spread import UNIT_AXES, Dealer, Spread, Unit, UnitAxis, units
 from vobench.suite.suite_case import Axes, check_buildable, scene_lights, shared_settings
 from vobench.suite.suite_spec import Suite
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
@@ -55,16 +56,32 @@ class ScenarioCases:
         scenario = read_scenario(path)
         if scenario.name in (self.suite.trajectories or {}):
             raise SuiteError("a trajectory of the suite has this name, too; rename it")
-        if dealer and scenario.suits_any_place and not self._stays(name):
+        if dealer and self._is_spread(name, scenario):
             with_base_of_suite = read_scenario(path, self._base())
-            yield from self._in_units(with_base_of_suite, severities, dealer)
+            yield from self._in_units(with_base_of_suite, severities, dealer, self._kinds_of(name))
             return
         for severity in severities:
             yield from self._at_severity(scenario, severity)
 
-    def _stays(self, name: str) -> bool:
-        """Whether the suite leaves a scenario in its own place."""
-        return self.suite.spread is not None and name in self.suite.spread.own_place
+    def _is_spread(self, name: str, scenario: Scenario) -> bool:
+        """Whether a scenario of a suite with a design leaves its own place.
+
+        Raises SuiteError if the suite names places for a scenario that cannot leave its own.
+        """
+        spread = self.suite.spread
+        if spread is None or name in spread.own_place:
+            return False
+        has_places = self._kinds_of(name) is not None
+        if has_places and not (scenario.suits_any_place or scenario.suits_any_sky):
+            raise SuiteError("spread.places names it, but its severities change its own place, its lights or its drive")
+        return has_places or scenario.suits_any_place
+
+    def _kinds_of(self, name: str) -> Collection[str] | None:
+        """The scenes that the suite spreads a scenario over; None if it does not say so."""
+        spread = self.suite.spread
+        if spread is None or spread.places is None:
+            return None
+        return spread.places.get(name)
 
     def _dealer(self) -> Dealer | None:
         """The dealer that assigns units to scenarios; None if the suite does not spread them, or has mistakes."""
@@ -72,14 +89,28 @@ class ScenarioCases:
         if spread is None or not self.suite.scenarios or self.mistakes.recorded:
             return None
         with self.mistakes.at("spread"):
-            unknown = [name for name in spread.own_place if name not in self.suite.scenarios]
-            if unknown:
-                raise SuiteError(f"own_place names scenarios that the suite does not have: {', '.join(unknown)}")
+            self._require_scenarios("own_place", spread.own_place)
+            self._require_scenarios("places", spread.places or ())
+            self._require_scenes(spread)
             for axis in UNIT_AXES:
                 if axis not in spread.over and len(self.axes[axis]) > 1:
                     raise SuiteError(f"scenarios are spread over variants of {axis}; add {axis} to over")
             return Dealer(units(spread, self.axes), spread.each, self.suite.seed)
         return None
+
+    def _require_scenarios(self, key: str, names: Collection[str]) -> None:
+        """Raise SuiteError if a key of `spread` names scenarios that the suite does not have."""
+        unknown = [name for name in names if name not in (self.suite.scenarios or {})]
+        if unknown:
+            raise SuiteError(f"{key} names scenarios that the suite does not have: {', '.join(unknown)}")
+
+    def _require_scenes(self, spread: Spread) -> None:
+        """Raise SuiteError if `spread.places` names scenes that the suite does not have."""
+        kinds = {scene.split(".")[0] for scene in self.axes["scene"]}
+        for scenario, scenes in (spread.places or {}).items():
+            unknown = [scene for scene in scenes if scene not in kinds]
+            if unknown:
+                raise SuiteError(f"places.{scenario} names scenes that the suite does not have: {', '.join(unknown)}")
 
     def _base(self) -> dict[str, Any]:
         """The rig and the camera in the file of the suite, which replace those of a scenario's base."""
@@ -90,10 +121,19 @@ class ScenarioCases:
                 base[key] = variant
         return base
 
-    def _in_units(self, scenario: Scenario, severities: Sequence[int], dealer: Dealer) -> Iterator[Case]:
-        """The cases of a scenario in its units. All severities have the same units, so that they can be compared."""
+    def _in_units(
+        self,
+        scenario: Scenario,
+        severities: Sequence[int],
+        dealer: Dealer,
+        kinds: Collection[str] | None,
+    ) -> Iterator[Case]:
+        """The cases of a scenario in its units, which are in places of some kinds, or of all.
+
+        All severities have the same units, so that they can be compared.
+        """
         runs = sum(len(self._calibration_levels(severity)) for severity in severities)
-        chosen = dealer.deal(runs)
+        chosen = dealer.deal(runs, kinds)
         self._require_free_mounts(scenario, chosen)
         for severity in severities:
             rig = scenario.setups[severity].rig
@@ -105,7 +145,8 @@ class ScenarioCases:
                 yield from self._cases(
                     scenario,
                     severity,
-                    scene=self.axes["scene"][scene_name],
+                    scene=_in_weather(self.axes["scene"][scene_name], scenario, severity),
+                    lighting={},
                     trajectory=trajectory,
                     replayed=self.replayed.get(trajectory_name),
                     variant={**variant, "scene": scene_name, "trajectory": trajectory_name},
@@ -146,6 +187,7 @@ class ScenarioCases:
             scenario,
             severity,
             scene=scene,
+            lighting=setup.lighting,
             trajectory=setup.trajectory,
             replayed=_replayed_poses(setup, scenario.path.parent),
             variant=scenario.variant_names(severity, scene_entry.name),
@@ -158,6 +200,7 @@ class ScenarioCases:
         severity: int,
         *,
         scene: SceneFile,
+        lighting: Lighting,
         trajectory: TrajectorySpec,
         replayed: str | None,
         variant: dict[str, str],
@@ -177,7 +220,7 @@ class ScenarioCases:
                 name=f"{scenario.name}-{severity}{suffix}{in_unit}",
                 variant={**variant, "rig": f"{variant['rig']}{suffix}"},
                 scene=scene,
-                lighting=setup.lighting,
+                lighting=lighting,
                 rig=check_buildable(level_rig),
                 trajectory=trajectory,
                 replayed=replayed,
@@ -205,6 +248,14 @@ class ScenarioCases:
             scene_mistakes.require_none()
             self.scenes[key] = described_scene(scene)
         return self.scenes[key]
+
+
+def _in_weather(scene: SceneFile, scenario: Scenario, severity: int) -> SceneFile:
+    """A scene of the suite in the weather of a severity, or as it is if the scenario does not change the weather."""
+    if not scenario.suits_any_sky:
+        return scene
+    weather = scenario.weathers[severity]
+    return replace(scene, fog=weather.fog or scene.fog, rain=weather.rain or scene.rain)
 
 
 def _replayed_poses(setup: Setup, folder: Path) -> str | None:

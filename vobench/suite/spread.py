@@ -31,6 +31,8 @@ class Spread:
     `pairs` maps a scene to the trajectories that it is combined with, such as {street: [car], flat: [walk]}. Scenes and
     trajectories are named as in the suite, without seeds. A scene that is not listed is combined with all trajectories.
     `own_place` names scenarios that stay in their own place, although they suit any: their difficulty depends on it.
+    `places` maps a scenario to the scenes that it is spread over, such as {rain: [street, park]}. Scenarios of the
+    weather are spread only if they are listed here; others are spread over all scenes if they are not.
 
     In a suite without scenarios, the combinations of the other axes are spread instead. All estimators run in the same
     units.
@@ -41,8 +43,11 @@ class Spread:
     each: Annotated[int, Ge(1), Le(MOST_UNITS)] = 3
     pairs: dict[str, tuple[str, ...]] | None = None
     own_place: tuple[str, ...] = ()
+    places: dict[str, tuple[str, ...]] | None = None
 
     def __post_init__(self) -> None:
+        if self.places and "scene" not in self.over:
+            raise SettingError(f"is for designs over scenes (over is {list(self.over)})", "places")
         if self.pairs and set(self.over) != set(UNIT_AXES):
             raise SettingError(f"are for designs over scene and trajectory (over is {list(self.over)})", "pairs")
         if len(set(self.over)) != len(self.over):
@@ -205,10 +210,19 @@ class Dealer:
             raise SuiteError(f"spread runs each scenario in {self.each} units, but there are {len(self.units)}")
         self._rng = np.random.default_rng([self.seed, SPREAD_STREAM])
 
-    def deal(self, runs: int = 1) -> list[Unit]:
-        """The units of the next treatment. The treatment has `runs` runs in each of its units."""
+    def deal(self, runs: int = 1, kinds: Collection[str] | None = None) -> list[Unit]:
+        """The units of the next treatment. The treatment has `runs` runs in each of its units.
+
+        `kinds` are the kinds of places in which its units are; by default, all.
+        Raises SuiteError if there are fewer than `each` such units.
+        """
         order = self._rng.permutation(len(self.units)).tolist()
         candidates = [self.units[index] for index in order]
+        if kinds is not None:
+            candidates = [unit for unit in candidates if unit.kind in kinds]
+        if len(candidates) < self.each:
+            listed = ", ".join(kinds or ())
+            raise SuiteError(f"spread runs each scenario in {self.each} units, but {listed} has {len(candidates)}")
         chosen = list[Unit]()
         chosen_by_kind = Counter[str]()
         chosen_by_place = Counter[str]()
