@@ -61,7 +61,7 @@ estimators: [wheel_odometry, stand_still]
 
 
 def write_cell(folder: Path, generator: str = GENERATOR, *, name: str = "cell") -> Path:
-    """Write the scene `cell`, or one of another name, and its generator into a folder. Returns the path of the scene."""
+    """Write the scene `cell`, or another name, and its generator into a folder. Returns the path of the scene."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "generator.py").write_text(generator, encoding="utf-8")
     scene = folder / "scene.yaml"
