@@ -10,6 +10,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from vobench.report import rerun
+from vobench.report.blueprint import ESTIMATOR_COLORS
 from vobench.report.rerun import application_id, first_failure, rerun_matrix, save_trial
 from vobench.sequence import EncodedFrame
 from vobench.sequence.picture import BAYER, encode
@@ -47,6 +48,15 @@ def test_recording_opens_with_a_layout_of_its_own(rrd):
     assert layout.application_id == reader.recordings()[0].application_id == "vobench-room-stereo-0"
     entities = {chunk.entity_path.split("/")[-1] for chunk in reader.stream(store=layout)}
     assert {"EyeControls3D", "time_panel"} <= entities
+
+
+def test_an_estimator_has_the_colour_of_its_position_in_the_run(run_viewer, tmp_path):
+    first, second = replace(run_viewer, label="a", position=2), replace(run_viewer, label="b", position=0)
+    save_trial(tmp_path / "two.rrd", first, second)
+    for label, name in (("a", "cyan"), ("b", "blue")):
+        (row,) = rows(tmp_path / "two.rrd", f"/world/{label}/path", static=True)
+        (color,) = row["LineStrips3D:colors"]
+        assert (color >> 24, color >> 16 & 255, color >> 8 & 255) == ESTIMATOR_COLORS[name]
 
 
 def test_tracks_move_by_half_a_pixel_because_rerun_counts_from_the_corner(rrd):
@@ -273,7 +283,7 @@ def test_a_layout_has_a_plot_of_numbers_and_of_costs_where_there_are_some(run_vi
     plain = names(run_viewer)
     assert "Right" in plain
     assert not {"Numbers reported by the estimator", "Latency (ms), exposure (ms), gain (dB)"} & plain
-    assert "Truth green, estimate orange, error red" in plain
+    assert "Truth green, estimate blue, error red" in plain
 
 
 def test_each_status_has_its_colour_and_an_unknown_one_is_grey(run_viewer, tmp_path):

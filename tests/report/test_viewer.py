@@ -1,5 +1,6 @@
 """Which trials are written to which files, and how the viewer is started."""
 
+import json
 import sys
 
 import pytest
@@ -13,7 +14,11 @@ from vobench.report.viewer import open_viewer, save_recordings
 def saved(monkeypatch):
     """The paths and the titles of what would be written."""
     written = []
-    monkeypatch.setattr(viewer, "trial_view", lambda folder, trial, window: (trial.estimator, trial.case, trial.repeat))
+
+    def name_of(folder, trial, window, position):
+        return trial.estimator, trial.case, trial.repeat
+
+    monkeypatch.setattr(viewer, "trial_view", name_of)
     monkeypatch.setattr(viewer, "save_trial", lambda path, *views, form: written.append((path, views, form)))
     return written
 
@@ -52,6 +57,21 @@ def test_the_worst_trials_are_files_of_their_own(saved, folder, tmp_path):
         folder.estimate("down", "b", 1) / "run.rrd",
         folder.estimate("ahead", "a", 0) / "run.rrd",
     ]
+
+
+def test_a_view_knows_the_position_of_its_estimator_in_the_suite(saved, folder, monkeypatch):
+    positions = {}
+
+    def with_position(folder, trial, window, position):
+        positions[trial.estimator] = position
+        return trial.estimator
+
+    monkeypatch.setattr(viewer, "trial_view", with_position)
+    save_recordings(folder, case="down", compare=("b", "a"))
+    assert positions == {"a": 0, "b": 1}  # the run lists none, so the order is that of names
+    (folder.path / "estimators.json").write_text(json.dumps([{"label": "b"}, {"label": "a"}]))
+    save_recordings(folder, case="down", compare=("a", "b"))
+    assert positions == {"b": 0, "a": 1}
 
 
 def test_a_file_that_is_named_is_written(saved, folder, tmp_path):

@@ -24,13 +24,15 @@ from vobench.report.viewpoint import eye_and_target, grid_spacing_m, near_truth,
 
 FRAME_TIMELINE = "frame"
 
-# The names and RGB values of the estimators' colours; the first estimator has the first colour.
+# The names and RGB values of the estimators' colours, by the position in the run. They are like those of figures
+# (figure_style.COLOURS), but light, since Rerun's background is dark, and without green and red, the colours of truth
+# and errors.
 ESTIMATOR_COLORS = {
-    "orange": (255, 150, 40),
     "blue": (80, 160, 255),
+    "orange": (255, 150, 40),
+    "cyan": (120, 220, 220),
     "violet": (200, 110, 230),
     "yellow": (240, 220, 90),
-    "cyan": (120, 220, 220),
 }
 GRID_COLOR = (255, 255, 255, 24)
 REPLAY_FPS = 5.0  # slow enough to see each frame
@@ -52,17 +54,35 @@ class LayoutOptions:
     """What a recording shows besides paths and errors.
 
     `replayed_frames` are the first and last frame of the initial replay; without them, the recording starts paused.
-    `labels` are the names of the estimators. Each has a picture with its tracks. Rerun shows one colour for each, so
-    there can be no more labels than ESTIMATOR_COLORS.
+    `labels` are the names of the estimators. Each has a picture with its tracks. `colors` are the names of their
+    colours.
     `channels` are the channels of per-pixel ground truth. They are shown in one tab per camera.
     `has_stats` and `has_costs` add a plot of the numbers that an estimator reports, and of the cost of each frame.
     """
 
     replayed_frames: tuple[int, int] | None
     labels: Sequence[str] = ("estimate",)
+    colors: Sequence[str] = ("blue",)
     channels: Sequence[str] = ()
     has_stats: bool = False
     has_costs: bool = False
+
+
+def estimator_colors(positions: Sequence[int]) -> list[str]:
+    """The names of the colours of the estimators at these positions of a run, all different.
+
+    An estimator whose colour another one has already gets the next free one. Raises ValueError if there are more
+    estimators than colours.
+    """
+    names = list(ESTIMATOR_COLORS)
+    if len(positions) > len(names):
+        raise ValueError(f"Rerun shows at most {len(names)} estimators, got {len(positions)}")
+    chosen: list[str] = []
+    for position in positions:
+        by_preference = [names[(position + step) % len(names)] for step in range(len(names))]
+        free = [name for name in by_preference if name not in chosen]
+        chosen.append(free[0])
+    return chosen
 
 
 def layout(truth_m: Array, estimates_m: Array, options: LayoutOptions) -> rrb.Blueprint:
@@ -89,7 +109,7 @@ def _paths_column(truth_m: Array, estimates_m: Array, options: LayoutOptions) ->
     further_estimators = len(options.labels) - 1
     status_share = STATUS_SHARE + STATUS_SHARE_PER_ESTIMATOR * further_estimators
     views: list[rrb.View | rrb.Container] = [
-        _paths_view(truth_m, shown_m, options.labels),
+        _paths_view(truth_m, shown_m, options),
         rrb.Horizontal(_plot(POSITION_ERROR, "Position error"), _plot(ROTATION_ERROR, "Rotation error")),
         rrb.StateTimelineView(origin=STATUS, name="Status of each frame"),
     ]
@@ -139,14 +159,13 @@ def _truth_tab(side: str, channels: Sequence[str]) -> rrb.Grid:
     return rrb.Grid(*views, name=f"Truth, {side}")
 
 
-def _paths_view(truth_m: Array, shown_m: Array, labels: Sequence[str]) -> rrb.Spatial3DView:
+def _paths_view(truth_m: Array, shown_m: Array, options: LayoutOptions) -> rrb.Spatial3DView:
     """The 3-D view of the paths, from a viewpoint at which the points `shown_m` (K, 3) fill it.
 
     Its name is a legend of the colours.
     """
     eye_m, target_m = eye_and_target(shown_m)
-    colors = list(ESTIMATOR_COLORS)[: len(labels)]
-    estimates = [f"{label} {color}" for label, color in zip(labels, colors, strict=True)]
+    estimates = [f"{label} {color}" for label, color in zip(options.labels, options.colors, strict=True)]
     grid = rrb.LineGrid3D(
         visible=True,
         spacing=grid_spacing_m(2 * radius_m(truth_m)),

@@ -12,6 +12,7 @@ from vobench.report.breakdown_figure import breakdown_figure
 from vobench.report.cost_figure import cost_figure
 from vobench.report.cumulative_figure import cumulative_figure, pose_distributions, trial_distributions
 from vobench.report.error_figure import error_figure
+from vobench.report.estimator_order import estimator_positions
 from vobench.report.figure_style import COLUMN_INCHES, PAGE_INCHES, Abscissa
 from vobench.report.matrix_figure import matrix_figure
 from vobench.report.page import run_board
@@ -110,9 +111,8 @@ class RunFigures:
         self._folder = folder
         self._options = options
         self._cases = _matching("case", cases, sorted({score.case for score in scores}))
-        all_estimators = _in_order(folder.estimator_labels(), {score.estimator for score in scores})
-        self._index_of = {estimator: index for index, estimator in enumerate(all_estimators)}
-        self._estimators = _matching("estimator", estimators, all_estimators)
+        self._index_of = estimator_positions(folder.estimator_labels(), [score.estimator for score in scores])
+        self._estimators = _matching("estimator", estimators, list(self._index_of))
         self._scores = [score for score in scores if score.case in self._cases and score.estimator in self._estimators]
         if not self._scores:
             raise InputError(f"no trial of these cases and estimators is in the run {folder.path}")
@@ -174,12 +174,6 @@ def _case_figure(kind: str, case: ScoredCase, options: FigureOptions) -> "Figure
     if kind == "axes":
         return axes_figure(case, options.width_of(kind))
     return error_figure(case, options.width_of(kind), over=options.over)
-
-
-def _in_order(listed: Sequence[str], names: set[str]) -> list[str]:
-    """Names in the order of a list; those that are not in it come last, sorted."""
-    further = sorted(names.difference(listed))
-    return [name for name in listed if name in names] + further
 
 
 def _matching(kind: str, patterns: Sequence[str], known: Sequence[str]) -> list[str]:

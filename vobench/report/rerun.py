@@ -15,7 +15,7 @@ from vobench import stop
 from vobench.geometry.camera import Camera
 from vobench.geometry.se3 import Array
 from vobench.report import blueprint
-from vobench.report.blueprint import ESTIMATOR_COLORS, LayoutOptions
+from vobench.report.blueprint import ESTIMATOR_COLORS, LayoutOptions, estimator_colors
 from vobench.report.entity import COSTS, STATS, TRUTH_LEFT, TRUTH_PATH, TRUTH_RIGHT, WORLD, EstimatorEntities
 from vobench.report.rerun_scene import log_scene
 from vobench.report.rerun_stream import (
@@ -80,9 +80,8 @@ def save_trial(path: Path, trial: TrialView, *others: TrialView, form: PictureFo
         if trial.scene is not None:
             log_scene(log, trial.scene)
         unit = _unit(trials)
-        colors = list(ESTIMATOR_COLORS.values())[: len(trials)]
-        for view, color in zip(trials, colors, strict=True):
-            _log_trial(log, view, color, unit)
+        for view, color in zip(trials, _colors(trials), strict=True):
+            _log_trial(log, view, ESTIMATOR_COLORS[color], unit)
         if trial.truth is not None:
             log_truth(stream, trial.truth)
         stream.send_blueprint(_layout(trials))
@@ -99,11 +98,17 @@ def application_id(title: str) -> str:
     return f"vobench-{accepted}"
 
 
+def _colors(trials: Sequence[TrialView]) -> list[str]:
+    """The names of the colours of the trials' estimators."""
+    return estimator_colors([view.position for view in trials])
+
+
 def _layout(trials: Sequence[TrialView]) -> rrb.Blueprint:
     first = trials[0]
     options = LayoutOptions(
         replayed_frames=_replayed_frames(trials),
         labels=[view.label for view in trials],
+        colors=_colors(trials),
         channels=first.truth.channels if first.truth else (),
         has_stats=any(view.stats for view in trials),
         has_costs=any(view.costs for view in trials),

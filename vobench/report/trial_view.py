@@ -42,7 +42,7 @@ class TrialView:
     scene as the estimator reconstructs it (K, 3), in the world. `stats` and `costs` have numbers (N,) by name, NaN for
     none: those that the estimator reports, and latency and exposure. `truth` is None if nothing was recorded of the
     pixels. `wrong_at` is the frame at which a failed estimate that never lost track goes wrong; `first` is the number
-    of the first frame that is shown.
+    of the first frame that is shown. `position` is that of the estimator in its run, which determines its colour.
     """
 
     title: str
@@ -64,10 +64,13 @@ class TrialView:
     scene: SceneMesh | None = None
     wrong_at: int | None = None
     first: int = 0
+    position: int = 0
 
 
-def trial_view(folder: RunFolder, trial: TrialScore, *, window: slice = slice(None)) -> TrialView:
+def trial_view(folder: RunFolder, trial: TrialScore, *, window: slice = slice(None), position: int = 0) -> TrialView:
     """Everything that is shown of a trial, or of a window of its frames.
+
+    `position` is that of its estimator in the run.
 
     Raises InputError if its sequence is no longer in the cache, or the window holds no frame.
     """
@@ -105,6 +108,7 @@ def trial_view(folder: RunFolder, trial: TrialScore, *, window: slice = slice(No
         scene=scene_mesh(folder, trial.case),
         wrong_at=None if trial.status in SURVIVED else _largest_jump(error_m),
         first=first,
+        position=position,
     )
 
 

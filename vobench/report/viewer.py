@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vobench.errors import InputError, MissingDependencyError
+from vobench.report.estimator_order import estimator_positions
 from vobench.report.rerun import PictureForm, save_trial
 from vobench.report.trial_choice import pick, ranked
 from vobench.report.trial_view import trial_view
@@ -49,10 +50,15 @@ def save_recordings(
 
     Raises InputError if a file cannot be written, and UnknownNameError for an unknown case or estimator.
     """
+    estimators = [score.estimator for score in folder.scores()]
+    positions = estimator_positions(folder.estimator_labels(), estimators)
     recordings = []
     for trials in _chosen(folder, case=case, estimator=estimator, compare=compare, worst=worst):
         path = _target(save, folder, trials, worst)
-        views = [trial_view(folder, trial, window=window) for trial in trials]
+        views = []
+        for trial in trials:
+            position = positions[trial.estimator]
+            views.append(trial_view(folder, trial, window=window, position=position))
         save_trial(path, *views, form=form)
         recordings.append(TrialRecording(path, tuple(trials)))
     return recordings
