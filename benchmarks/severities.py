@@ -117,7 +117,7 @@ def _recordings(run: Path) -> Iterator[tuple[str, str, Path]]:
 
 def _digests(folder: Path) -> dict[str, str]:
     """The hash of all messages of each topic of a recording, with their stamps."""
-    hashes: defaultdict[str, "hashlib._Hash"] = defaultdict(hashlib.sha256)
+    hashes: defaultdict[str, hashlib._Hash] = defaultdict(hashlib.sha256)
     for path in sorted(folder.glob("*.mcap")):
         with path.open("rb") as stream:
             for _, channel, message in make_reader(stream).iter_messages():

@@ -15,6 +15,7 @@ from vobench.motion.wander import Wander
 from vobench.scene.fog import Fog
 from vobench.scene.material import reflectance
 from vobench.scene.rain import Rain
+from vobench.scene.wind import Wind
 from vobench.sensor.image_sensor import CameraDifference, CameraDifferences, NoiseStreams, expose
 from vobench.sensor.imu import FLAWLESS, IMUS
 from vobench.sequence.reader import StereoFrame
@@ -39,7 +40,7 @@ BURNT = "burnt pixels"
 LOW_LIGHT = "low light"  # more light than there is can always be had
 REPEATABLE = (BURNT, LOW_LIGHT)
 # What the fixtures do not have: an IMU, weather, a generator, and a case that can be simulated.
-ABSENT = ("IMU errors", "fog", "rain")
+ABSENT = ("IMU errors", "fog", "rain", "wind")
 REMOVABLE = [nuisance for nuisance in NUISANCES if not nuisance.is_circumstance and nuisance.name not in ABSENT]
 NAMES = [nuisance.name for nuisance in REMOVABLE]
 
@@ -118,9 +119,9 @@ def test_a_removal_removes_its_nuisance_and_leaves_all_others(hard: Case, name: 
     assert removable(without(hard, [name])) == [other for other in NAMES if other != name or name in REPEATABLE]
 
 
-@pytest.mark.parametrize("name", ["fog", "rain"])
+@pytest.mark.parametrize("name", ["fog", "rain", "wind"])
 def test_weather_is_removed_from_the_scene(hard: Case, name: str) -> None:
-    weather = {"fog": Fog(visibility_m=20.0), "rain": Rain(rate_mm_per_h=5.0)}[name]
+    weather = {"fog": Fog(visibility_m=20.0), "rain": Rain(rate_mm_per_h=5.0), "wind": Wind()}[name]
     foul = replace(hard, scene=replace(hard.scene, **{name: weather}))
     assert removable(foul).count(name) == 1
     assert dict(changes(foul, without(foul, [name]))) == {f"scene.{name}": None}

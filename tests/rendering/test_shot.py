@@ -5,7 +5,7 @@ import pytest
 
 from tests.rendering.rectangles import box
 from vobench.geometry import se3
-from vobench.rendering.shot import CameraShot, at_rows, moved, of_rays, rays_in, shot_transforms, turn
+from vobench.rendering.shot import CameraShot, at_rows, moved, of_rays, rays_in, shot_transforms, spanned, turn
 from vobench.scene.scene import Mover, WaypointMotion
 
 RNG = np.random.default_rng(0)
@@ -50,6 +50,18 @@ def test_between_rows_transforms_are_interpolated_and_beyond_the_ends_constant()
     assert single.shape == (4, 4)
     np.testing.assert_array_equal(of_rays(single, np.array([1, 2])), single)
     np.testing.assert_array_equal(of_rays(table, np.array([2, 0])), table[[2, 0]])
+
+
+def test_transforms_at_rows_are_computed_for_some_rays_and_spanned_by_those_of_whole_rows() -> None:
+    shot = shot_transforms([CART], CameraShot(np.tile(POSE, (5, 1, 1)), np.arange(5) * 100_000_000))
+    rows = np.array([1.0, 2.5, 1.25])
+    at = at_rows(shot.T_world_bodies, rows)
+    rays = np.array([1, 2])
+    np.testing.assert_array_equal(at.of_rays(rays)[1], at[1][rays])
+    np.testing.assert_array_equal(at[1:][0], at[1])
+    np.testing.assert_array_equal(at.spanned(1), shot.T_world_bodies[1][1:4])
+    np.testing.assert_array_equal(spanned([POSE], 0), POSE[None])
+    assert len(at) == 2
 
 
 @pytest.mark.parametrize("many", [False, True])

@@ -20,6 +20,7 @@ from vobench.scene.fog import Fog
 from vobench.scene.material import Rgb
 from vobench.scene.rain import Rain
 from vobench.scene.scene import Scene
+from vobench.scene.wind import Wind
 from vobench.sequence import reader
 from vobench.suite.case import Case
 from vobench.suite.suite import read_plan
@@ -150,6 +151,13 @@ def test_an_engine_that_draws_no_fog_refuses_a_scene_with_fog(engine: str) -> No
 def test_an_engine_that_draws_no_rain_refuses_a_scene_with_rain(engine: str) -> None:
     scene = Scene("yard", (), {}, (), rain=Rain(rate_mm_per_h=1.0))
     with pytest.raises(InputError, match=f"yard: rain requires engine raster, but the engine is {engine}"):
+        open_renderer(scene, Rendering(engine=engine), None, white_cd_m2=50.0)
+
+
+@pytest.mark.parametrize("engine", ["path", "pyrender"])
+def test_an_engine_that_draws_no_wind_refuses_a_scene_with_wind(engine: str) -> None:
+    scene = Scene("yard", (), {}, (), wind=Wind(speed_mps=1.0))
+    with pytest.raises(InputError, match=f"yard: wind requires engine raster, but the engine is {engine}"):
         open_renderer(scene, Rendering(engine=engine), None, white_cd_m2=50.0)
 
 

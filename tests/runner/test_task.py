@@ -11,6 +11,7 @@ from vobench.runner.entry import MANIFEST, seal
 from vobench.runner.task import bake_task, is_done, missing, perform, plan, sequence_tasks
 from vobench.scene.fog import Fog
 from vobench.scene.rain import Rain
+from vobench.scene.wind import Wind
 from vobench.suite.scene_spec import LevelSpec
 
 
@@ -55,8 +56,14 @@ def test_equal_cases_of_two_names_share_a_sequence_and_are_scored_each(bench):
 
 @pytest.mark.parametrize(
     "change",
-    [{"summary": "a closet"}, {"white_cd_m2": 80.0}, {"white_cd_m2": None}, {"fog": Fog(visibility_m=30.0)}],
-    ids=["summary", "white", "no white", "fog"],
+    [
+        {"summary": "a closet"},
+        {"white_cd_m2": 80.0},
+        {"white_cd_m2": None},
+        {"fog": Fog(visibility_m=30.0)},
+        {"wind": Wind()},
+    ],
+    ids=["summary", "white", "no white", "fog", "wind"],
 )
 def test_a_change_of_a_scene_that_does_not_light_it_keeps_its_light(bench, change):
     scene = bench.plan().simulated[0].scene

@@ -46,6 +46,7 @@ CAUSE_TEXTS = {
     "drops on the lens": CauseText("drops are on the lens", "shield or wipe the lens, or mask the drops"),
     "fog": CauseText("fog lowers the contrast", "use nearby points, or sensors that see through fog"),
     "rain": CauseText("rain falls, and wet ground mirrors", "reject outliers near the camera and on wet ground"),
+    "wind": CauseText("leaves move in the wind", "reject outliers, and spread features over the picture"),
     "flare": CauseText("light strays in the lens", "shade or clean the lens"),
     "JPEG": CauseText("the images are compressed", "use a higher quality, or lossless images"),
     "calibration": CauseText("the calibration is wrong", "calibrate the cameras again"),

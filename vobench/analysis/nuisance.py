@@ -247,6 +247,10 @@ def _without_rain(case: Case) -> Case:
     return replace(case, scene=replace(case.scene, rain=None))
 
 
+def _without_wind(case: Case) -> Case:
+    return replace(case, scene=replace(case.scene, wind=None))
+
+
 def _with_materials(change: MaterialChange) -> Change:
     """A change of every material that a scene uses.
 
@@ -403,6 +407,7 @@ NUISANCES = (
     Nuisance("moving things", "a static scene", _without_movers, "moving"),
     Nuisance("fog", "clear air", _without_fog),
     Nuisance("rain", "dry air over dry ground", _without_rain),
+    Nuisance("wind", "leaves that stand still", _without_wind),
     Nuisance("low texture", "strong patterns on faint surfaces", _with_materials(_with_strong_texture)),
     Nuisance(
         "low light",

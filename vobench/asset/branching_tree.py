@@ -172,7 +172,7 @@ def _leaves(rng: Rng) -> Material:
     """Leaves cut out of a picture of a spray, in one of some tints."""
     tint = one_of(rng, *LEAF_TINTS)
     texture = spray(int(rng.integers(3)))
-    return replace(matt(tint, texture), cutout=0.5)
+    return replace(matt(tint, texture), cutout=0.5, is_foliage=True)
 
 
 @picture.painted

@@ -1,5 +1,7 @@
 """Conifers: a trunk with whorls of boughs, which are cards with a picture of twigs and needles."""
 
+from dataclasses import replace
+
 import numpy as np
 from PIL import Image, ImageDraw
 
@@ -96,4 +98,5 @@ def conifer(rng: Rng, height_m: float = 8.0, spread: float = 0.24) -> list[Part]
     boughs = cards_arrays(sizes_m, poses)
     needle_tint = one_of(rng, *NEEDLE_TINTS)
     needle_seed = int(rng.integers(2))
-    return [put(trunk, bark), Part(boughs, cut_out(needle_tint, needles(needle_seed)))]
+    foliage = replace(cut_out(needle_tint, needles(needle_seed)), is_foliage=True)
+    return [put(trunk, bark), Part(boughs, foliage)]

@@ -487,7 +487,7 @@ def foliage(seed: int = 0, px: int = 512) -> Picture:
 def _leaves(rng: Rng, colours: tuple[str, ...], seed: int) -> Material:
     """Leaves cut out of a picture of foliage, in one of the colours."""
     material = matt(one_of(rng, *colours), foliage(seed))
-    return replace(material, cutout=0.5)
+    return replace(material, cutout=0.5, is_foliage=True)
 
 
 def _facing(direction: Array, yaw_spread_deg: float, rng: Rng) -> float:

@@ -1,6 +1,7 @@
 """Ray casting by Embree: the nearest triangle along each ray, or whether a ray is blocked."""
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -107,6 +108,12 @@ def new_scene(*, robust: bool = False) -> Any:
     """An empty scene of Embree."""
     from embreex.rtcore_scene import EmbreeScene
 
-    if is_portable():
-        return EmbreeScene(portable_device(), robust=robust)
-    return EmbreeScene(robust=robust)
+    return EmbreeScene(portable_device() if is_portable() else _device(), robust=robust)
+
+
+@cache
+def _device() -> Any:
+    """The device of Embree that all scenes of a process share. Embree fails with a device for each of 1000 scenes."""
+    from embreex.rtcore import EmbreeDevice
+
+    return EmbreeDevice()

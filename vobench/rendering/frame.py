@@ -28,6 +28,8 @@ from vobench.scene.fog import Fog
 from vobench.scene.light import STEADY, Light, Steady
 from vobench.scene.material import Rgb
 from vobench.scene.rain import Rain
+from vobench.scene.scene import triangles
+from vobench.scene.swaying import in_wind
 from vobench.scene.triangles import Triangles
 
 AWAY_M = 1e6  # the depth below the scene at which movers are while the probe is drawn
@@ -41,15 +43,18 @@ class FrameRenderer:
         self._illumination = Illumination(baked)
         self._background = Background(baked.scene.lights)
         self._ambient = AmbientLight(baked)
-        self._movers = baked.scene.movers
+        swaying = in_wind(baked.scene, triangles(baked.scene))
+        faces = replace(baked.faces, mover=swaying.faces.mover[baked.parts.parent])
+        self._movers = swaying.movers
+        self._rigid_count = len(baked.scene.movers)  # the movers before the leaves in wind
         self._lights = baked.scene.lights
         self._fog = baked.scene.fog
         self._rain = baked.scene.rain
         self._streaks = RainStreaks(baked.scene, self._rain) if self._rain and self._rain.rate_mm_per_h else None
         light_map = self._illumination.at(0, 0)
-        is_shaded = bool(self._movers and self._lights)
+        is_shaded = bool(baked.scene.movers and self._lights)
         self._light = ShadedLight(baked, light_map) if is_shaded else LightTexture(light_map)
-        drawn = geometry(baked.faces, baked.light_uv, baked.scene.materials)
+        drawn = geometry(faces, baked.light_uv, baked.scene.materials)
         panoramas = {index: PanoramaTexture(shown) for index, shown in self._background.panoramas.items()}
         self._draw = BatchDraw(drawn, self._light.id, panoramas)
         self._target = cache(partial(render_target, in_colour=self._draw.mirrors_in_colour))
@@ -134,12 +139,13 @@ class FrameRenderer:
         self._light.update(light_map)
         ambient_cd_m2 = np.broadcast_to(self._ambient.cd_m2(light_map), 3)
         T_world_away = se3.transform(np.eye(3), [0, 0, -AWAY_M])
-        away = [T_world_away] * len(self._movers)
+        leaf_count = len(self._movers) - self._rigid_count
+        T_world_movers = [T_world_away] * self._rigid_count + [np.eye(4)] * leaf_count
 
         def draw(camera: Pinhole, T_world_camera: Array) -> tuple[Radiance, Radiance]:
             target = self._target(camera.width_px, camera.height_px, ROTATED_GRID, None)
             whole = target.total.whole
-            view = pinhole_view(camera, T_world_camera, away, skies, ambient_cd_m2=ambient_cd_m2)
+            view = pinhole_view(camera, T_world_camera, T_world_movers, skies, ambient_cd_m2=ambient_cd_m2)
             target.total.clear(whole)
             target.framebuffer.clear(whole)
             self._draw.draw(view, target, whole)

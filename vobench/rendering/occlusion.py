@@ -5,16 +5,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vobench.geometry import se3
 from vobench.geometry.se3 import Array
+from vobench.geometry.vector import unit
 from vobench.rendering.array_types import Floats, Mask, Rows
 from vobench.rendering.cutout import CutOuts
 from vobench.rendering.dot_product import dot
 from vobench.rendering.embree import Hits, TriangleCaster
 from vobench.rendering.front_hit import REACH_M, FrontCaster, face_planes
 from vobench.rendering.geometry import RAY_OFFSET_M
-from vobench.rendering.shot import moved, rays_in, turn
+from vobench.rendering.shot import moved, of_rays, rays_in, spanned, turn
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.swaying import in_wind
 
+CONE_MARGIN_RAD = 1e-3
+LEAST_LENGTH_M = 1e-12  # by which vectors are divided at least
 MOST_HOLES = 64  # the largest number of holes that a ray passes; then it counts as not blocked
 
 
@@ -35,6 +40,22 @@ class Body:
     centre_m: Array
     radius_m: float
 
+    def in_cone(self, T_body_camera: Array, axis: Array, angle_rad: float) -> bool:
+        """Whether the bounding sphere is partly inside a cone of rays from a camera at one of several poses (K, 4, 4).
+
+        `axis` (3,) is the cone's axis in the camera's frame, and `angle_rad` half of its opening angle.
+        """
+        centre_m = self.centre_seen_from(T_body_camera)
+        distance_m = np.maximum(np.linalg.norm(centre_m, axis=1), LEAST_LENGTH_M)
+        off_axis_rad = np.arccos(np.clip(centre_m @ axis / distance_m, -1, 1))
+        sphere_rad = np.arcsin(np.minimum(self.radius_m / distance_m, 1))
+        is_inside = (off_axis_rad <= angle_rad + sphere_rad) | (distance_m <= self.radius_m)
+        return bool(is_inside.any())
+
+    def centre_seen_from(self, T_body_frame: Array) -> Array:
+        """The centre (K, 3) of the bounding sphere in frames with the poses (K, 4, 4) in the frame of the body."""
+        return se3.apply(se3.inverse(T_body_frame), self.centre_m[None]).reshape(-1, 3)
+
     def near(
         self,
         origins_m: Array,
@@ -42,11 +63,25 @@ class Body:
         reach_m: Array | float = np.inf,
     ) -> Mask:
         """Whether rays (R, 3) with unit directions meet the bounding sphere within `reach_m` of their origins."""
-        to_centre_m = self.centre_m - origins_m
-        along_m = dot(to_centre_m, directions)
-        nearest_m = np.clip(along_m, 0, reach_m)
-        squared_m2 = dot(to_centre_m, to_centre_m) - nearest_m * (2 * along_m - nearest_m)
-        return np.asarray(squared_m2 <= self.radius_m**2)
+        return is_near_sphere(self.centre_m, self.radius_m, origins_m, directions, reach_m)
+
+
+def is_near_sphere(
+    centre_m: Array,
+    radius_m: float,
+    origins_m: Array,
+    directions: Array,
+    reach_m: Array | float,
+) -> Mask:
+    """Whether rays (R, 3) with unit directions meet a sphere within `reach_m` of their origins.
+
+    `centre_m` is one centre (3,) or (1, 3), or one for each ray (R, 3).
+    """
+    to_centre_m = centre_m - origins_m
+    along_m = dot(to_centre_m, directions)
+    nearest_m = np.clip(along_m, 0, reach_m)
+    squared_m2 = dot(to_centre_m, to_centre_m) - nearest_m * (2 * along_m - nearest_m)
+    return np.asarray(squared_m2 <= radius_m**2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,13 +95,17 @@ class Occluders:
 class Bodies:
     """The faces of a scene, each in the frame of its body. Body 0 has all stationary faces, the others are movers.
 
+    Leaves in wind are movers, too, after those of the scene.
+
     `normals` (F + 1, 3) and `offsets_m` (F + 1,) define the planes of the faces: normal · x = offset.
     `body` (F + 1,) is the body of each face. The last entries are for the face -1, which is no face.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.faces = triangles(scene)
-        self.movers = scene.movers
+        swaying = in_wind(scene, triangles(scene))
+        self.faces = swaying.faces
+        self.movers = swaying.movers
+        self.rigid_count = len(scene.movers)  # the movers before the leaves in wind
         self._planes = face_planes(self.faces)
         self.normals = self._planes.normals
         self.offsets_m = self._planes.offsets_m
@@ -83,7 +122,7 @@ class Bodies:
         self._is_solid = is_first_of_pair & ~self._is_pane
         self._has_area = self._planes.height_m[:-1] > 0
         self._is_cut_out = self._cut_outs.cutout_of_face[:-1] >= 0
-        self._bodies = [self._create_body(index) for index in range(1 + len(scene.movers))]
+        self._bodies = [self._create_body(index) for index in range(1 + len(self.movers))]
 
     def visible(self, directions: Array, T_bodies_camera: Sequence[Array]) -> Hits:
         """The first hits of rays from a camera along unit directions (R, 3) in its frame.
@@ -94,7 +133,11 @@ class Bodies:
         origins_m, stationary_directions = rays_in(T_bodies_camera[0], directions)
         hits = stationary.fronts.hits(origins_m, stationary_directions)
         stationary.fronts.close_gaps(origins_m, stationary_directions, hits)
-        for body, T_body_camera in zip(movers, T_bodies_camera[1:], strict=True):
+        axis, widest = _cone(directions)
+        for index, body in enumerate(movers, start=1):
+            if not body.in_cone(spanned(T_bodies_camera, index), axis, widest):
+                continue
+            T_body_camera = T_bodies_camera[index]
             origins_m, body_directions = rays_in(T_body_camera, directions)
             rays = np.flatnonzero(body.near(origins_m, body_directions))
             body_hits = body.fronts.hits(origins_m[rays], body_directions[rays])
@@ -145,13 +188,30 @@ class Bodies:
         """
         movers = self._bodies[1:]
         is_blocked = np.zeros(len(starts_m), bool)
-        for body, T_body_world in zip(movers, T_bodies_world[1:], strict=True):
-            body_starts_m = moved(T_body_world, starts_m.astype(float))
-            body_vectors_m = turn(T_body_world, vectors_m.astype(float))
-            length_m = np.linalg.norm(body_vectors_m, axis=1)
-            is_near = body.near(body_starts_m, body_vectors_m / length_m[:, None], length_m)
-            rays = np.flatnonzero(is_near & where & ~is_blocked & (reach > 0))
-            is_blocked[rays] = self._blocked_by_body(body, body_starts_m[rays], body_vectors_m[rays], reach[rays])
+        traced = np.flatnonzero(where & (reach > 0))
+        if not len(traced):
+            return is_blocked
+        origins_m = starts_m[traced].astype(float)
+        segments_m = vectors_m[traced].astype(float)
+        lengths_m = np.linalg.norm(segments_m, axis=1)
+        directions = segments_m / np.maximum(lengths_m, LEAST_LENGTH_M)[:, None]
+        low_m = np.minimum(origins_m, origins_m + segments_m).min(0)
+        high_m = np.maximum(origins_m, origins_m + segments_m).max(0)
+        for index, body in enumerate(movers, start=1):
+            centres_m = body.centre_seen_from(spanned(T_bodies_world, index))
+            is_above_low = centres_m.max(0) + body.radius_m >= low_m
+            is_below_high = centres_m.min(0) - body.radius_m <= high_m
+            if not (is_above_low & is_below_high).all():
+                continue
+            T_body_rays = of_rays(T_bodies_world[index], traced)
+            centre_m = body.centre_seen_from(T_body_rays)  # (1, 3), or one for each ray
+            is_near = is_near_sphere(centre_m, body.radius_m, origins_m, directions, lengths_m)
+            rays = np.flatnonzero(is_near & ~is_blocked[traced])
+            T_body_near = of_rays(T_body_rays, rays)
+            body_starts_m = moved(T_body_near, origins_m[rays])
+            body_vectors_m = turn(T_body_near, segments_m[rays])
+            of_all = traced[rays]
+            is_blocked[of_all] = self._blocked_by_body(body, body_starts_m, body_vectors_m, reach[of_all])
         return is_blocked
 
     def stationary_occluders(self) -> Occluders:
@@ -228,6 +288,17 @@ class Bodies:
             starts_m = (starts_m + step * segments_m)[continues]
             segments_m = (segments_m * (1 - step))[continues]
         return np.concatenate(blocked)
+
+
+def _cone(directions: Array) -> tuple[Array, float]:
+    """The axis (3,) of a cone around unit directions (R, 3), and half of its opening angle with a margin, in rad.
+
+    Directions that are NaN are ignored.
+    """
+    known = directions[np.isfinite(directions).all(1)]
+    axis = unit(known.sum(0))
+    least_cosine = float((known @ axis).min(initial=1.0))
+    return axis, float(np.arccos(np.clip(least_cosine, -1, 1))) + CONE_MARGIN_RAD
 
 
 def _bounding_sphere(points_m: Array) -> tuple[Array, float]:

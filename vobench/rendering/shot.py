@@ -1,7 +1,9 @@
 """The poses of the camera and of movers while a picture is taken, also row by row for a rolling shutter."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,9 +59,61 @@ def _poses(
     return T_world_bodies
 
 
-def at_rows(tables: Sequence[Array], rows: Array) -> list[Array]:
-    """The transforms of each table for rays on rows (R,): (4, 4) as it is, (H, 4, 4) as (R, 4, 4)."""
-    return [_between(T, rows) if T.ndim == 3 else T for T in tables]
+class RowTransforms(Sequence[Array]):
+    """The transforms of each table for rays on rows (R,): (4, 4) as it is, (H, 4, 4) as (R, 4, 4).
+
+    They are computed when they are asked for: with hundreds of moving leaves they would not fit into memory.
+    """
+
+    def __init__(self, tables: Sequence[Array], rows: Array) -> None:
+        self._tables = tables
+        self._rows = rows
+        self._first: Array | None = None  # that of body 0, which is asked for most often
+
+    def __len__(self) -> int:
+        return len(self._tables)
+
+    @overload
+    def __getitem__(self, index: int) -> Array: ...
+    @overload
+    def __getitem__(self, index: slice) -> "RowTransforms": ...
+    def __getitem__(self, index: int | slice) -> "Array | RowTransforms":
+        if isinstance(index, slice):
+            return RowTransforms(self._tables[index], self._rows)
+        table = self._tables[index]
+        if table.ndim == 2:
+            return table
+        if index != 0:
+            return _between(table, self._rows)
+        if self._first is None:
+            self._first = _between(table, self._rows)
+        return self._first
+
+    def of_rays(self, rays: Pixels) -> "RowTransforms":
+        """The transforms for some of the rays."""
+        return RowTransforms(self._tables, self._rows[rays])
+
+    def spanned(self, index: int) -> Array:
+        """The transforms (K, 4, 4) of a table at all of its rows on or between which rays are; one for (4, 4)."""
+        table = self._tables[index]
+        if table.ndim == 2:
+            return table[None]
+        place = np.clip(np.nan_to_num(self._rows), 0, len(table) - 1)
+        first = math.floor(place.min(initial=len(table) - 1))
+        last = math.ceil(place.max(initial=0))
+        return table[first : last + 1]
+
+
+def spanned(transforms: Sequence[Array], index: int) -> Array:
+    """Transforms (K, 4, 4) of a body between which those of all rays are, without one for each ray where possible."""
+    if isinstance(transforms, RowTransforms):
+        return transforms.spanned(index)
+    return transforms[index].reshape(-1, 4, 4)
+
+
+def at_rows(tables: Sequence[Array], rows: Array) -> RowTransforms:
+    """The transforms of each table for rays on rows (R,)."""
+    return RowTransforms(tables, rows)
 
 
 def _between(table: Array, rows: Array) -> Array:

@@ -18,7 +18,17 @@ from vobench.rendering.lamp import Lamp, LampGroup, lamp_groups, lamps_on
 from vobench.rendering.occlusion import Bodies
 from vobench.rendering.receiver_plane import large_planes
 from vobench.rendering.shadow_cells import KnownShadows
-from vobench.rendering.shot import CameraShot, ShotTransforms, at_rows, moved, of_rays, rays_in, shot_transforms, turn
+from vobench.rendering.shot import (
+    CameraShot,
+    RowTransforms,
+    ShotTransforms,
+    at_rows,
+    moved,
+    of_rays,
+    rays_in,
+    shot_transforms,
+    turn,
+)
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene
 from vobench.sensor.pixel_truth import CHANNELS, TruthFrame, TruthNames, check_channels
@@ -62,6 +72,11 @@ class TruthPicture:
     here: ShotTransforms
     there: ShotTransforms | None
     lamps: tuple[LitLamps, ...]
+
+    def lit(self, transforms: Sequence[Array]) -> list[Array]:
+        """The transforms between bodies and the world with which light is computed: leaves are lit as without wind."""
+        leaves = len(self.bodies.movers) - self.bodies.rigid_count
+        return [*transforms[: len(transforms) - leaves], *[np.eye(4)] * leaves]
 
 
 @lru_cache(maxsize=4)
@@ -138,15 +153,19 @@ class Band:
         return turned
 
     def _shadow(self) -> NDArray[np.uint16]:
-        """The number of lamps (R,) in front of the visible face that are hidden from it."""
+        """The number of lamps (R,) in front of the visible face that are hidden from it.
+
+        Leaves in wind are lit, and cast shadows, as if there were no wind.
+        """
         picture = self._picture
         here = picture.here
         rows = self._uv_px[:, 1]
-        T_bodies_world = at_rows(here.T_bodies_world, rows)
-        normals = self._normals(at_rows(here.T_world_bodies, rows))
+        T_bodies_world = at_rows(picture.lit(here.T_bodies_world), rows)
+        normals = self._normals(at_rows(picture.lit(here.T_world_bodies), rows))
+        world_m = self._lit_m()
         lift_m = self._bodies.ray_offset_m * normals
-        starts_m = (self._world_m + lift_m).astype(np.float32)
-        offsets_m = dot(self._world_m, normals) if self._movers else np.empty(0)
+        starts_m = (world_m + lift_m).astype(np.float32)
+        offsets_m = dot(world_m, normals) if self._movers else np.empty(0)
         count = np.zeros(len(self._face), np.uint16)
         for lamps in picture.lamps:
             group = lamps.group
@@ -164,6 +183,15 @@ class Band:
                     count[pixels] += self._is_hidden(lamp, starts_m, T_bodies_world, pixels, by_movers=True)
         return count
 
+    def _lit_m(self) -> Array:
+        """The seen points (R, 3) in the world, where they are lit: those on leaves as without wind."""
+        world_m = self._world_m.copy()
+        for mover, pixels in self._movers:
+            if mover > self._bodies.rigid_count:
+                T_leaves_camera = of_rays(self._T_bodies_camera[mover], pixels)
+                world_m[pixels] = moved(T_leaves_camera, self._points_m[pixels])
+        return world_m
+
     def shown(self) -> list[Rows]:
         """How many pixels show each of the planes (P,) whose shadows may be known, for each group of lamps."""
         return [lamps.known.shown(self._face) for lamps in self._picture.lamps]
@@ -172,7 +200,7 @@ class Band:
         self,
         lamp: Lamp,
         starts_m: Floats,
-        T_bodies_world: Sequence[Array],
+        T_bodies_world: RowTransforms,
         pixels: Pixels,
         *,
         by_movers: bool,
@@ -185,7 +213,7 @@ class Band:
         vectors_m = lamp.vectors_m(pixel_starts_m)
         is_lit = np.broadcast_to(lamp.shines(vectors_m), len(pixels))
         reach = np.where(is_lit, np.float32(1 - LAMP_TOLERANCE), NO_RAY)
-        T_bodies_pixels = [of_rays(T_body_world, pixels) for T_body_world in T_bodies_world]
+        T_bodies_pixels = T_bodies_world.of_rays(pixels)
         if by_movers:
             return self._bodies.blocked_by_movers(pixel_starts_m, vectors_m, T_bodies_pixels, reach, where=is_lit)
         return self._bodies.blocked(pixel_starts_m, vectors_m, T_bodies_pixels, reach)
@@ -265,7 +293,7 @@ class Band:
         )
         doubtful = np.flatnonzero(is_blocked)  # backs and places within float32's reach hide nothing
         distance_m = np.linalg.norm(next_m[doubtful], axis=1)
-        T_bodies_doubtful = [of_rays(T, doubtful) for T in T_bodies_there]
+        T_bodies_doubtful = T_bodies_there.of_rays(doubtful)
         seen = self._bodies.visible(next_m[doubtful] / distance_m[:, None], T_bodies_doubtful)
         is_hidden[doubtful] = seen.distance < distance_m * (1 - DEPTH_TOLERANCE)
         return is_hidden
@@ -286,7 +314,7 @@ class TruthCaster:
         instances = []
         for index, thing in enumerate(faces.things):
             mover = mover_of.get(index, -1)
-            instances.append(thing.name if mover < 0 else scene.movers[mover].name)
+            instances.append(thing.name if mover < 0 else self._bodies.movers[mover].name)
         material_names = [thing.material for thing in faces.things]
         self.names = TruthNames(_table(instances), _table(material_names))
 
@@ -340,7 +368,7 @@ class TruthCaster:
         values: dict[str, Any] = {}
         for name, channel in wanted.items():
             values[name] = np.empty(channel.shape(height, camera.width_px), channel.dtype)
-        movers = self._scene.movers
+        movers = self._bodies.movers
         middle_ns = int(np.mean(now.t_ns))
         picture = TruthPicture(
             bodies=self._bodies,

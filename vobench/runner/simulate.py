@@ -88,7 +88,7 @@ def open_renderer(
     for the engine pyrender, which renders 8 bits.
 
     Raises MissingDependencyError if this machine cannot render, and InputError if the engine does not draw the scene's
-    fog or rain.
+    fog, rain or wind.
     """
     if rendering.engine != "raster":
         _require_clear_air(scene, rendering.engine)
@@ -112,8 +112,8 @@ def open_renderer(
 
 
 def _require_clear_air(scene: "Scene", engine: str) -> None:
-    """Raise InputError if a scene has fog or rain, which only the engine raster draws."""
-    for weather, is_there in (("fog", scene.fog), ("rain", scene.rain)):
+    """Raise InputError if a scene has fog, rain or wind, which only the engine raster draws."""
+    for weather, is_there in (("fog", scene.fog), ("rain", scene.rain), ("wind", scene.wind)):
         if is_there:
             raise InputError(f"{scene.name}: {weather} requires engine raster, but the engine is {engine}")
 

@@ -17,6 +17,7 @@ from vobench.rendering.renderer import Radiance, Renderer, View
 from vobench.runner.motion import generator
 from vobench.scene.light import Steady
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.swaying import in_wind
 from vobench.sensor.exposure import Exposure, initial_exposures, next_exposures
 from vobench.sensor.image_sensor import CameraSettings, NoiseStreams, expose, fixed_pattern
 from vobench.sensor.lens import apply_lens, lens_maps
@@ -37,6 +38,7 @@ class Displacement:
 
     def __init__(self, scene: Scene) -> None:
         self._scene = scene
+        self._movers = in_wind(scene, triangles(scene)).movers
         self._at_rest = _faces_seen(scene, 0)
 
     def largest_px(
@@ -52,8 +54,9 @@ class Displacement:
 
         after_m = before_m.copy()
         mover_of_ray = np.where(hits.face < 0, -1, mover_of_face[hits.face])
-        for index, mover in enumerate(self._scene.movers):
-            T_end_start = mover.path.pose(end_ns) @ se3.inverse(mover.path.pose(start_ns))
+        for index in np.unique(mover_of_ray[mover_of_ray >= 0]).tolist():
+            path = self._movers[index].path
+            T_end_start = path.pose(end_ns) @ se3.inverse(path.pose(start_ns))
             is_on_mover = mover_of_ray == index
             after_m[is_on_mover] = se3.apply(T_end_start, before_m[is_on_mover])
 
@@ -64,12 +67,15 @@ class Displacement:
 
 
 def _faces_seen(scene: Scene, t_ns: int) -> tuple[RayCaster, NDArray[np.int32]]:
-    """A ray caster for the faces of a scene at an instant, without panes, and the mover of each face, -1 for none."""
+    """A ray caster for the faces of a scene at an instant, without panes, and the mover of each face, -1 for none.
+
+    Leaves in wind are where they would be without wind, which hardly changes how far they move.
+    """
     faces = triangles(scene, t_ns=t_ns)
     materials = [scene.materials.get(thing.material) for thing in faces.things]
     is_pane = np.array([material is not None and material.kind == "pane" for material in materials], bool)
     opaque_faces = np.flatnonzero(~is_pane[faces.thing])
-    return RayCaster(faces, opaque_faces), faces.mover
+    return RayCaster(faces, opaque_faces), in_wind(scene, faces).faces.mover
 
 
 @lru_cache(maxsize=8)

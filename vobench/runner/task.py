@@ -57,6 +57,7 @@ UNLIT: dict[str, Any] = {
     "sky": {"level"},
     "fog": True,
     "rain": {"rate_mm_per_h", "wind_mps"},
+    "wind": True,
 }
 # The libraries whose versions can change the light of a scene.
 BAKE_LIBRARIES = ("numpy", "scipy", "embreex", "xatlas", "pillow", "trimesh", "opencv-python-headless")

@@ -48,6 +48,7 @@ class Material:
     metal: the share of the body that is bare metal, which reflects specularly in its colour and scatters nothing.
     emission_cd_m2 (3,): luminance of each channel as white of that strength, times emission_texture.
     cutout: the opacity of the texture below which there is a hole, None where it is solid.
+    is_foliage: whether it is the leaves of a tree or bush, which wind moves.
     """
 
     kind: Literal["body", "mirror", "pane"] = "body"
@@ -60,6 +61,7 @@ class Material:
     emission_cd_m2: Rgb = (0.0, 0.0, 0.0)
     emission_texture: Texture | None = None
     cutout: float | None = None
+    is_foliage: bool = False
 
     @property
     def is_coated(self) -> bool:

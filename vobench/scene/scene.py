@@ -13,6 +13,7 @@ from vobench.scene.material import Material
 from vobench.scene.mesh import moved, quad
 from vobench.scene.rain import Rain
 from vobench.scene.triangles import Thing, Triangles, triangle_table
+from vobench.scene.wind import Wind
 from vobench.trajectory.nanoseconds import NS_PER_S
 
 
@@ -120,7 +121,7 @@ class Mover:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Stationary things, their materials by name, the lights that shine on them, movers, fog, and rain."""
+    """Stationary things, their materials by name, the lights that shine on them, movers, fog, rain and wind."""
 
     name: str
     things: tuple[Thing, ...]
@@ -129,6 +130,7 @@ class Scene:
     movers: tuple[Mover, ...] = ()
     fog: Fog | None = None
     rain: Rain | None = None
+    wind: Wind | None = None
 
     @property
     def panels(self) -> tuple[AreaLight, ...]:

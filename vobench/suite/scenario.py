@@ -11,6 +11,7 @@ from annotated_types import MaxLen, MinLen
 from vobench.errors import Mistake, SuiteError
 from vobench.scene.fog import Fog
 from vobench.scene.rain import Rain
+from vobench.scene.wind import Wind
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.setting import Name, merged_over, settings
 from vobench.suite import yaml_file
@@ -21,7 +22,7 @@ from vobench.suite.trajectory import TrajectorySpec
 MOST_SEVERE = 5
 SEVERITY_COUNT = MOST_SEVERE + 1  # with severity 0, the base
 PLACE_KEYS = ("scene", "scene_changes", "lighting", "trajectory")  # the keys of a setup that describe place and drive
-WEATHER_KEYS = ("fog", "rain")  # the changes of a scene that suit any place below the sky
+WEATHER_KEYS = ("fog", "rain", "wind")  # the changes of a scene that suit any place below the sky
 DEFAULT_CAMERA = CameraSettings()
 
 
@@ -46,6 +47,7 @@ class Weather:
 
     fog: Fog | None = None
     rain: Rain | None = None
+    wind: Wind | None = None
 
 
 @settings()

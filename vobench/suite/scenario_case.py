@@ -255,7 +255,12 @@ def _in_weather(scene: SceneFile, scenario: Scenario, severity: int) -> SceneFil
     if not scenario.suits_any_sky:
         return scene
     weather = scenario.weathers[severity]
-    return replace(scene, fog=weather.fog or scene.fog, rain=weather.rain or scene.rain)
+    return replace(
+        scene,
+        fog=weather.fog or scene.fog,
+        rain=weather.rain or scene.rain,
+        wind=weather.wind or scene.wind,
+    )
 
 
 def _replayed_poses(setup: Setup, folder: Path) -> str | None:

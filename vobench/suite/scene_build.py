@@ -96,6 +96,7 @@ def _scene(spec: SceneFile) -> Scene:
         whole.movers,
         spec.fog,
         spec.rain,
+        spec.wind,
     )
     if scene.fog and scene.fog.airlight == "sky" and not any(isinstance(light, Sky) for light in scene.lights):
         raise SuiteError(f"{scene.name}: fog with airlight 'sky' requires a sky, and the scene has none; use 'light'")

@@ -27,6 +27,7 @@ from vobench.scene.light import (
 from vobench.scene.material import LUMINANCE, WHITE, Material, Rgb
 from vobench.scene.rain import Rain
 from vobench.scene.scene import ceiling_light
+from vobench.scene.wind import Wind
 from vobench.setting import ByKind, Name, NonNegative, OneOf, Positive, Share, Triple, ValueCheck, settings
 
 
@@ -480,6 +481,7 @@ class SceneFile:
     sky: SkySpec | None = None
     fog: Fog | None = None
     rain: Rain | None = None
+    wind: Wind | None = None
     movers: tuple[MoverSpec, ...] = ()
 
     def __post_init__(self) -> None:
