@@ -39,6 +39,7 @@ YAW_DEG = 45.0
 PITCH_DEG = 8.0
 MIB = 1 << 10  # of the KiB in which Linux counts memory
 SCENARIOS = 4  # of the suite; together they have each place once
+SUITE_KINDS = 4  # of places in the suite
 SUITE = """name: many
 scenes: [{name: flat, seeds: N}, {name: office, seeds: N}, {name: street, seeds: N}, {name: warehouse, seeds: N}]
 trajectories: {tour: {kind: wander, length_m: 6}, car: {kind: wander, length_m: 30, body: car, mount: {height_m: 1.6}}}
@@ -101,8 +102,8 @@ def _text(costs_s: list[float]) -> str:
 
 def _plan(places: int) -> None:
     """Read a suite of many places, count its tasks, and print what that costs."""
-    seeds = places // len(PLACES)
-    units = seeds * len(PLACES)
+    seeds = places // SUITE_KINDS
+    units = seeds * SUITE_KINDS
     text = SUITE.replace("UNITS", str(units)).replace("EACH", str(units // SCENARIOS)).replace("N}", f"{seeds}}}")
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "many.yaml"
