@@ -87,9 +87,13 @@ class Scenario:
         return not self._changed_place_keys and not self.setups[0].lighting
 
     @property
-    def suits_any_sky(self) -> bool:
-        """Whether its severities change the weather, and nothing else of the place, the light or the drive."""
-        return bool(self.weathers) and self._changed_place_keys == ["scene_changes"]
+    def suits_named_places(self) -> bool:
+        """Whether it can be combined with scenes and trajectories that somebody chose for it.
+
+        Then its severities change the weather, or nothing of place, light and drive.
+        """
+        changed_keys = self._changed_place_keys
+        return not changed_keys or (changed_keys == ["scene_changes"] and bool(self.weathers))
 
     @property
     def _changed_place_keys(self) -> list[str]:

@@ -72,7 +72,7 @@ class ScenarioCases:
         if spread is None or name in spread.own_place:
             return False
         has_places = self._kinds_of(name) is not None
-        if has_places and not (scenario.suits_any_place or scenario.suits_any_sky):
+        if has_places and not scenario.suits_named_places:
             raise SuiteError("spread.places names it, but its severities change its own place, its lights or its drive")
         return has_places or scenario.suits_any_place
 
@@ -252,7 +252,7 @@ class ScenarioCases:
 
 def _in_weather(scene: SceneFile, scenario: Scenario, severity: int) -> SceneFile:
     """A scene of the suite in the weather of a severity, or as it is if the scenario does not change the weather."""
-    if not scenario.suits_any_sky:
+    if not scenario.weathers:
         return scene
     weather = scenario.weathers[severity]
     return replace(

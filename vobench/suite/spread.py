@@ -32,7 +32,7 @@ class Spread:
     trajectories are named as in the suite, without seeds. A scene that is not listed is combined with all trajectories.
     `own_place` names scenarios that stay in their own place, although they suit any: their difficulty depends on it.
     `places` maps a scenario to the scenes that it is spread over, such as {rain: [street, park]}. Scenarios of the
-    weather are spread only if they are listed here; others are spread over all scenes if they are not.
+    weather, or with a lighting of their own, are spread only if they are listed here.
 
     In a suite without scenarios, the combinations of the other axes are spread instead. All estimators run in the same
     units.
