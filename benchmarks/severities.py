@@ -23,7 +23,7 @@ from mcap.reader import make_reader
 from numpy.typing import NDArray
 from scipy.stats import spearmanr
 
-from vobench.runner.folder import open_run
+from vobench.runner.folder import SEQUENCE, open_run
 
 LEAST_LOSS = 1e-4  # of a trial that is perfect
 RISING = 0.9  # Spearman's correlation from which a loss counts as rising
@@ -112,7 +112,7 @@ def _recordings(run: Path) -> Iterator[tuple[str, str, Path]]:
     folder = open_run(run)
     cases = pd.read_csv(run / "trials.csv").drop_duplicates("case")
     for case, scenario in zip(cases["case"], cases["scenario"], strict=True):
-        yield scenario, _unit(case), folder.case(case)
+        yield scenario, _unit(case), folder.case(case) / SEQUENCE
 
 
 def _digests(folder: Path) -> dict[str, str]:
