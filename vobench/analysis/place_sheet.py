@@ -1,6 +1,5 @@
 """Draws the contact sheet of a generator: one picture for each seed, in light that is computed coarsely."""
 
-import gc
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -13,9 +12,9 @@ from vobench.analysis.scene_plan import CELL_HEIGHT_PX, CELL_WIDTH_PX, Rgb8, pla
 from vobench.analysis.scene_sheet import FONT_SCALE, VIEW_PITCH_DEG, VIEW_WHITE
 from vobench.analysis.scene_survey import EYE_HEIGHT_M, SceneSurvey, scene_survey
 from vobench.geometry.camera import Pinhole
+from vobench.rendering import freed_memory
 from vobench.rendering.bake import bake
 from vobench.rendering.baked_scene import BakedScene, BakeSettings
-from vobench.rendering.freed_memory import give_back
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
 from vobench.rendering.renderer import Renderer, single_instant
@@ -64,8 +63,7 @@ def save_place_sheet(
     for place in progress.track(places, f"places of {first.name}", total=seeds):
         stop.check()
         pictures.append(_picture(place))
-        gc.collect()  # meshes of trimesh refer to themselves, so they are not freed before
-        give_back()
+        freed_memory.collect()
     write_png(path, contact_sheet(pictures))
 
 

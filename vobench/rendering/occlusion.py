@@ -281,7 +281,8 @@ class Bodies:
             blocked.append(rays[(hits.face >= 0) & ~is_hole])
 
             # Those in a hole continue slightly behind it.
-            offset = RAY_OFFSET_M / np.linalg.norm(segments_m, axis=1)
+            lengths_m = np.maximum(np.linalg.norm(segments_m, axis=1), LEAST_LENGTH_M)
+            offset = RAY_OFFSET_M / lengths_m
             step = (hits.distance + offset)[:, None]
             continues = is_hole & (step[:, 0] < 1)
             rays = rays[continues]

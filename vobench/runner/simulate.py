@@ -63,6 +63,7 @@ def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
 
     Raises MissingDependencyError if this machine cannot render, before any light is computed.
     """
+    from vobench.rendering import freed_memory
     from vobench.rendering.bake import bake
     from vobench.rendering.baked_file import save_baked
     from vobench.rendering.baked_scene import BakeSettings
@@ -72,6 +73,7 @@ def bake_scene(spec: "SceneFile", folder: Path, progress: "Progress") -> None:
     from vobench.suite.white import look_around
 
     require_drawing()
+    freed_memory.collect()  # what is left of the place before
     scene = build(spec, {})
     with progress.step(f"light of {scene.name}") as tell:
         baked = bake(wetted(scene), BakeSettings(), tell)
@@ -102,12 +104,14 @@ def open_renderer(
         if white_cd_m2 is None:
             raise ValueError("the engine pyrender needs white_cd_m2")
         return PyrenderRenderer(scene, white_cd_m2=white_cd_m2)
+    from vobench.rendering import freed_memory
     from vobench.rendering.baked_file import load_baked
     from vobench.rendering.raster import RasterRenderer
     from vobench.rendering.wet_ground import wetted
 
     if light is None:
         raise ValueError("the engine raster needs the light of the scene")
+    freed_memory.collect()  # what is left of the place before
     return RasterRenderer(load_baked(light, wetted(scene)))
 
 
