@@ -15,6 +15,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image, ImageDraw, ImageFilter, ImageFont
 
+from vobench.asset.kept_pixels import KEPT
 from vobench.asset.wall import Hole
 from vobench.geometry.se3 import Array
 from vobench.scene.material import Map, Picture, Texture
@@ -147,7 +148,7 @@ WORDS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LazyTexture:
-    """A texture whose pixels are computed when they are first needed.
+    """A texture whose pixels are computed when they are needed.
 
     `pixels` computes the pixels.
     `tile_m` is the side of the tile.
@@ -173,7 +174,7 @@ def painted(paint: Callable[..., Picture]) -> Callable[..., Texture]:
         call = parameters.bind(*args, **kwargs)
         call.apply_defaults()
         tile_m = call.arguments.get("tile_m", 1.0)
-        pixels = cache(lambda: paint(*args, **kwargs).values)
+        pixels = KEPT.lazy(lambda: paint(*args, **kwargs).values)
         return LazyTexture(pixels, tile_m)
 
     return wraps(paint)(texture)
@@ -340,7 +341,7 @@ def boards(
     `rows` is the number of rows of planks in the tile.
     `joint_m` is the width of the joints; with 0, the planks have no visible joints.
     """
-    pixels = cache(lambda: _boards(tones, seed, px, tile_m, rows=rows, joint_m=joint_m))
+    pixels = KEPT.lazy(lambda: _boards(tones, seed, px, tile_m, rows=rows, joint_m=joint_m))
     if not joint_m:
         return LazyTexture(pixels, tile_m)
     cuts = _plank_cuts(np.random.default_rng(seed), rows, joint_m)
@@ -685,7 +686,7 @@ class Spines:
     sizes_m: tuple[tuple[float, float], ...]
 
 
-@cache
+@lru_cache(maxsize=32)  # each takes a few MB
 def spines(seed: int = 0, count: int = 52) -> Spines:
     """The spines of single books, series of books and ring binders. There are `count` or slightly more of them."""
     rng = np.random.default_rng(seed)
