@@ -4,8 +4,8 @@
     python benchmarks/severities.py runs/severities/latest [--channels]
 
 For each scenario and estimator, the table has the loss (1 - score) at each severity, as the geometric mean over the
-units of the scenario, Spearman's correlation of severity and mean loss, the share of units whose loss grows from the
-lowest severity to the highest, and the factor of the loss from one severity to the next.
+units of the scenario that have all its severities, Spearman's correlation of severity and mean loss, the share of units
+whose loss grows from the lowest severity to the highest, and the factor of the loss from one severity to the next.
 
 `--channels` instead compares the recordings of a scenario in each unit with that of its lowest severity, and prints the
 topics whose messages differ and those whose messages are all the same bytes.
@@ -59,13 +59,16 @@ def _print_losses(trials: pd.DataFrame) -> None:
     is_rising = defaultdict[str, list[bool]](list)
     is_even = defaultdict[str, list[bool]](list)
     for (scenario, estimator), rows in trials.groupby(["scenario", "estimator"]):
-        by_severity = rows.groupby("severity")["log_loss"].mean()
+        per_unit = rows.pivot_table(index="unit", columns="severity", values="log_loss").dropna()
+        if per_unit.empty:
+            continue
+        by_severity = per_unit.mean()
         correlation = _spearman(by_severity.index.to_numpy(), by_severity.to_numpy())
         per_step = np.exp(np.diff(by_severity.to_numpy()) / np.diff(by_severity.index.to_numpy()))
-        units, share = _rising_units(rows)
+        share = float((per_unit[per_unit.columns.max()] > per_unit[per_unit.columns.min()]).mean())
         losses = ", ".join(f"{loss:.3g}" for loss in np.exp(by_severity))
         steps = ", ".join(f"{step:.2f}" for step in per_step)
-        print(f"| {scenario} | {estimator} | {units} | {losses} | {correlation:.2f} | {share:.2f} | {steps} |")
+        print(f"| {scenario} | {estimator} | {len(per_unit)} | {losses} | {correlation:.2f} | {share:.2f} | {steps} |")
         is_rising[str(scenario)].append(correlation >= RISING)
         is_even[str(scenario)].append(bool(((per_step >= STEP_RATIOS[0]) & (per_step <= STEP_RATIOS[1])).all()))
     rising = sum(any(each) for each in is_rising.values())
@@ -78,14 +81,6 @@ def _spearman(severities: NDArray[np.int64], losses: NDArray[np.float64]) -> flo
     if np.ptp(losses) == 0:
         return 0.0
     return float(spearmanr(severities, losses).statistic)
-
-
-def _rising_units(rows: pd.DataFrame) -> tuple[int, float]:
-    """The number of units, and the share in which the loss is greater at the highest severity than at the lowest."""
-    per_unit = rows.pivot_table(index="unit", columns="severity", values="log_loss")
-    first = per_unit[per_unit.columns.min()]
-    last = per_unit[per_unit.columns.max()]
-    return len(per_unit), float((last > first).mean())
 
 
 # --- Channels ---
