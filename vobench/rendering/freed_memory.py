@@ -21,8 +21,8 @@ def give_back() -> None:
 def collect() -> None:
     """Free what refers to itself, as meshes of trimesh do, and give its memory back.
 
-    Python frees such objects by itself only after a while, in which a process that goes from place to place grows by
-    100 MB with each.
+    Python frees such objects by itself only after a while, in which a process that goes from place to place grows with
+    each of them.
     """
     gc.collect()
     give_back()
