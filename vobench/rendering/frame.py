@@ -28,7 +28,7 @@ from vobench.scene.fog import Fog
 from vobench.scene.light import STEADY, Light, Steady
 from vobench.scene.material import Rgb
 from vobench.scene.rain import Rain
-from vobench.scene.scene import triangles
+from vobench.scene.scene import Mover, triangles
 from vobench.scene.swaying import in_wind
 from vobench.scene.triangles import Triangles
 
@@ -43,9 +43,7 @@ class FrameRenderer:
         self._illumination = Illumination(baked)
         self._background = Background(baked.scene.lights)
         self._ambient = AmbientLight(baked)
-        swaying = in_wind(baked.scene, triangles(baked.scene))
-        faces = replace(baked.faces, mover=swaying.faces.mover[baked.parts.parent])
-        self._movers = swaying.movers
+        faces, self._movers = _with_leaves(baked)
         self._rigid_count = len(baked.scene.movers)  # the movers before the leaves in wind
         self._lights = baked.scene.lights
         self._fog = baked.scene.fog
@@ -263,6 +261,14 @@ class FrameRenderer:
 def _steady(light: Light) -> Light:
     """A light at level 1 if its level varies, otherwise as it is."""
     return light if isinstance(light.level, Steady) else replace(light, level=STEADY)
+
+
+def _with_leaves(baked: BakedScene) -> tuple[Triangles, tuple[Mover, ...]]:
+    """The faces that are drawn, and the movers: those of the scene, followed by the leaves that wind moves."""
+    if baked.scene.wind is None:
+        return baked.faces, baked.scene.movers
+    swaying = in_wind(baked.scene, triangles(baked.scene))
+    return replace(baked.faces, mover=swaying.faces.mover[baked.parts.parent]), swaying.movers
 
 
 def _require_tiling(camera: Camera, views: Sequence[View]) -> None:

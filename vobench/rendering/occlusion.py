@@ -133,6 +133,8 @@ class Bodies:
         origins_m, stationary_directions = rays_in(T_bodies_camera[0], directions)
         hits = stationary.fronts.hits(origins_m, stationary_directions)
         stationary.fronts.close_gaps(origins_m, stationary_directions, hits)
+        if not movers:
+            return hits
         axis, widest = _cone(directions)
         for index, body in enumerate(movers, start=1):
             if not body.in_cone(spanned(T_bodies_camera, index), axis, widest):
@@ -156,9 +158,9 @@ class Bodies:
         """Whether a pane is in front of the hit at a distance (R,), which is NaN for a ray without a hit."""
         is_behind = np.zeros(len(directions), bool)
         limit_m = np.nan_to_num(distance_m, nan=REACH_M)
-        for body, T_body_camera in zip(self._bodies, T_bodies_camera, strict=True):
+        for index, body in enumerate(self._bodies):
             if body.panes is not None:
-                origins_m, body_directions = rays_in(T_body_camera, directions)
+                origins_m, body_directions = rays_in(T_bodies_camera[index], directions)
                 is_behind |= body.panes.stops(origins_m, body_directions, limit_m)
         return is_behind
 

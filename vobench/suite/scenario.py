@@ -22,7 +22,6 @@ from vobench.suite.trajectory import TrajectorySpec
 MOST_SEVERE = 5
 SEVERITY_COUNT = MOST_SEVERE + 1  # with severity 0, the base
 PLACE_KEYS = ("scene", "scene_changes", "lighting", "trajectory")  # the keys of a setup that describe place and drive
-WEATHER_KEYS = ("fog", "rain", "wind")  # the changes of a scene that suit any place below the sky
 DEFAULT_CAMERA = CameraSettings()
 
 
@@ -48,6 +47,15 @@ class Weather:
     fog: Fog | None = None
     rain: Rain | None = None
     wind: Wind | None = None
+
+    @property
+    def changes(self) -> dict[str, Any]:
+        """The weather that there is, by its key in a scene."""
+        by_key = {key: getattr(self, key) for key in WEATHER_KEYS}
+        return {key: weather for key, weather in by_key.items() if weather is not None}
+
+
+WEATHER_KEYS = tuple(each.name for each in fields(Weather))
 
 
 @settings()

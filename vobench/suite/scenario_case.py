@@ -16,7 +16,7 @@ from vobench.suite.scenario import Scenario, Setup, read_scenario
 from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_lighting import Lighting
 from vobench.suite.scene_spec import SceneFile
-from vobench.suite.spread import UNIT_AXES, Dealer, Spread, Unit, UnitAxis, units
+from vobench.suite.spread import UNIT_AXES, Dealer, Spread, Unit, UnitAxis, kind_of, units
 from vobench.suite.suite_case import Axes, check_buildable, scene_lights, shared_settings
 from vobench.suite.suite_spec import Suite
 from vobench.suite.trajectory import TrajectorySpec, read_replayed, read_times
@@ -106,7 +106,7 @@ class ScenarioCases:
 
     def _require_scenes(self, spread: Spread) -> None:
         """Raise SuiteError if `spread.places` names scenes that the suite does not have."""
-        kinds = {scene.split(".")[0] for scene in self.axes["scene"]}
+        kinds = {kind_of(scene) for scene in self.axes["scene"]}
         for scenario, scenes in (spread.places or {}).items():
             unknown = [scene for scene in scenes if scene not in kinds]
             if unknown:
@@ -254,13 +254,7 @@ def _in_weather(scene: SceneFile, scenario: Scenario, severity: int) -> SceneFil
     """A scene of the suite in the weather of a severity, or as it is if the scenario does not change the weather."""
     if not scenario.weathers:
         return scene
-    weather = scenario.weathers[severity]
-    return replace(
-        scene,
-        fog=weather.fog or scene.fog,
-        rain=weather.rain or scene.rain,
-        wind=weather.wind or scene.wind,
-    )
+    return replace(scene, **scenario.weathers[severity].changes)
 
 
 def _replayed_poses(setup: Setup, folder: Path) -> str | None:

@@ -70,13 +70,18 @@ class Unit:
     @property
     def kind(self) -> str:
         """The name of the place without its seed."""
-        return self.place.split(".")[0]
+        return kind_of(self.place)
 
     @property
     def name(self) -> str:
         """The variants in the order of the axes, as in the names of cases."""
         variants = [self.by_axis[axis] for axis in UNIT_AXES if axis in self.by_axis]
         return "-".join(variants)
+
+
+def kind_of(place: str) -> str:
+    """The name of a place without its seed, and without the lighting that may follow it."""
+    return place.split(".", maxsplit=1)[0]
 
 
 def units(spread: Spread, variants: Mapping[str, Collection[str]]) -> list[Unit]:
