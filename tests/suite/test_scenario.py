@@ -177,13 +177,16 @@ def test_the_long_suites_have_every_stock_scenario(name):
 
 def test_daily_is_balanced_over_places_indoors_and_out_by_robot_hand_and_car():
     plan = read_plan("daily")
-    units = Counter(
-        (case.variant["scene"], case.variant["trajectory"]) for case in plan.simulated if case.scene.generated
-    )
+    units = Counter()
+    for case in plan.simulated:
+        if case.scene.generated:
+            drive, _, _ = case.variant["trajectory"].partition(".")  # without the severity of frame_rate
+            units[case.variant["scene"], drive] += 1
+    cases_of_a_scenario = 3  # at severity 1 with exact and worn calibration, and at 3
     assert len(units) >= 12
-    assert len(set(units.values())) == 1, "each unit has as many cases"
+    assert max(units.values()) - min(units.values()) <= cases_of_a_scenario, "each unit has about as many scenarios"
     assert {place.split(".")[0] for place, _ in units} == {"flat", "office", "room", "warehouse", "street", "park"}
-    assert {drive.split(".")[0] for _, drive in units} == {"robot", "hand", "car"}
+    assert {drive for _, drive in units} == {"robot", "hand", "car"}
 
     places_of = defaultdict(set)
     for case in plan.simulated:

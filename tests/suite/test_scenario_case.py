@@ -233,6 +233,63 @@ def test_the_weather_changes_in_the_places_that_the_suite_names_and_nothing_else
         assert (foggy.camera, foggy.rig, foggy.trajectory) == (clear.camera, clear.rig, clear.trajectory)
 
 
+FLASHING = """name: flash
+base: {scene: closet, rig: {pitch_deg: 90}, trajectory: {targets_m: [[0.5, 0]]}}
+severity: [{}, {lighting: {lamps: {level: {steady: 0.5}}}}, {}, {}, {}, {lighting: {lamps: {level: {steady: 0.1}}}}]
+"""
+
+SLOW = """name: slow
+base: {scene: closet, rig: {pitch_deg: 90}, trajectory: {targets_m: [[0.5, 0]], rate_hz: 8}}
+severity: [{}, {trajectory: {rate_hz: 4}}, {}, {}, {}, {trajectory: {rate_hz: 1}}]
+"""
+
+MOVED = """name: moved
+base: {scene: closet, rig: {pitch_deg: 90}, trajectory: {targets_m: [[0.5, 0]], rate_hz: 8}}
+severity: [{}, {trajectory: {rate_hz: 4}}, {trajectory: {targets_m: [[0.6, 0]]}}, {}, {}, {}]
+"""
+
+
+def cases_in_yards(weather_plan, tmp_path, name, content):
+    """The cases of a scenario at severities 0, 1 and 5 in two yards, by severity."""
+    (tmp_path / "suites" / "scenarios" / f"{name}.yaml").write_text(content)
+    plan = weather_plan(f", places: {{{name}: [yard]}}", scenarios=f"{name}: [0, 1, 5]")
+    by_severity = defaultdict(list)
+    for case in plan.simulated:
+        by_severity[case.severity].append(case)
+    assert {case.scene.name for case in plan.simulated} == {"yard"}
+    assert [len(same) for same in by_severity.values()] == [2, 2, 2]
+    return by_severity
+
+
+def test_all_lamps_of_the_places_that_the_suite_names_change_and_nothing_else(weather_plan, tmp_path):
+    cases = cases_in_yards(weather_plan, tmp_path, "flash", FLASHING)
+    levels = [[case.lighting["lamps"].level.steady for case in cases[severity]] for severity in (1, 5)]
+    assert levels == [[0.5, 0.5], [0.1, 0.1]]
+    for steady, dim in zip(cases[0], cases[5], strict=True):
+        assert steady.lighting == {}
+        assert (dim.scene, dim.camera, dim.rig, dim.trajectory) == (
+            steady.scene,
+            steady.camera,
+            steady.rig,
+            steady.trajectory,
+        )
+
+
+def test_the_rate_of_a_drive_changes_by_the_same_ratio_and_nothing_else(weather_plan, tmp_path):
+    cases = cases_in_yards(weather_plan, tmp_path, "slow", SLOW)
+    for usual, half, slow in zip(cases[0], cases[1], cases[5], strict=True):
+        assert half.trajectory.rate_hz == pytest.approx(usual.trajectory.rate_hz / 2)
+        assert slow.trajectory.rate_hz == pytest.approx(usual.trajectory.rate_hz / 8)
+        assert replace(slow.trajectory, rate_hz=usual.trajectory.rate_hz) == usual.trajectory
+        assert slow.scene == usual.scene
+        assert slow.variant["trajectory"] == f"{usual.variant['trajectory']}.slow.5"
+
+
+def test_a_scenario_with_another_drive_cannot_leave_its_place(weather_plan, tmp_path):
+    with pytest.raises(SuiteError, match="its severities change its own place, single lights or its drive"):
+        cases_in_yards(weather_plan, tmp_path, "moved", MOVED)
+
+
 def test_a_scenario_of_the_weather_stays_in_its_own_place_unless_the_suite_names_places(weather_plan):
     cases = [case for case in weather_plan("").simulated if case.scenario == "smog"]
     assert [case.scene.name for case in cases] == ["closet"] * 3

@@ -2,11 +2,12 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from vobench.errors import SuiteError
-from vobench.scene.light import Flicker, Steady
-from vobench.suite.scene_lighting import require_possible
+from vobench.scene.light import Flicker, PointLight, Sky, Steady, Sun
+from vobench.suite.scene_lighting import require_possible, with_lighting
 from vobench.suite.scene_spec import LevelSpec, LightOverride
 from vobench.suite.yaml_source import YamlFile
 
@@ -26,9 +27,36 @@ def test_a_lighting_may_let_a_light_flicker(hall):
     assert (bulb.level.mean(0, 0), bulb.level.mean(5_000_000, 5_000_000)) == (pytest.approx(1.5), pytest.approx(0.5))
 
 
+def test_lamps_are_all_lights_but_sun_and_sky(hall):
+    half = LightOverride(level=LevelSpec(steady=0.5))
+    dim = hall(lighting={"lamps": half, "bulb": LightOverride(power_lm=50)})
+    for before, after in zip(hall().lights, dim.lights, strict=True):
+        share = 1.0 if isinstance(before, Sun | Sky) else 0.5
+        if before.name == "bulb":
+            share = 0.05  # of half of its power of 500 lm
+        assert after.level.mean(0, 10**9) == pytest.approx(share * before.level.mean(0, 10**9))
+
+
+def test_a_level_of_all_lamps_multiplies_that_of_each():
+    lamp = PointLight("bulb", np.zeros(3), 500.0, level=Steady(0.4))
+    flicker = LightOverride(level=LevelSpec(flicker=Flicker(depth=0.5)))
+    (flickering,) = with_lighting([lamp], {"lamps": flicker})
+    assert flickering.level.mean(0, 0) == pytest.approx(0.4 * 1.5)
+    (dimmed,) = with_lighting([flickering], {"lamps": LightOverride(level=LevelSpec(steady=0.5))})
+    assert dimmed.level.mean(0, 0) == pytest.approx(0.4 * 1.5 * 0.5)
+    with pytest.raises(SuiteError, match="'bulb' changes over time already"):
+        with_lighting([flickering], {"lamps": flicker})
+
+
+def test_lamps_need_a_lamp():
+    with pytest.raises(SuiteError, match="there are no lamps in this scene"):
+        with_lighting([Sky("sky", 800.0)], {"lamps": LightOverride(level=LevelSpec(steady=0.5))})
+
+
 @pytest.mark.parametrize(
     ("lighting", "sentence"),
     [
+        ({"lamps": LightOverride(power_lm=1)}, "lighting: lamps have only a level in common"),
         ({"blub": LightOverride(power_lm=1)}, "lighting: no light named 'blub'. Did you mean 'bulb'?"),
         ({"bulb": LightOverride(illuminance_lx=1)}, "lighting: illuminance_lx does not belong to 'bulb'"),
         ({"sun": LightOverride(power_lm=1)}, "lighting: power_lm does not belong to 'sun'"),

@@ -194,7 +194,7 @@ WRONG = [
     ("[closet]", "[closset]", ":3: scenes.0: no scene named 'closset'. Did you mean 'closet'? Known: car_park, closet, corridor, flat, hall, office, park, ramp, room, street, warehouse"),
     ("[closet]", "[./no.yaml]", ":3: scenes.0: no scene file at no.yaml. Known by name: car_park, closet, corridor, flat, hall, office, park, ramp, room, street, warehouse"),
     ("[closet]", "[closet, closet]", ":3: scenes.1: two scenes are called 'closet'; list each once, from files with different names"),
-    ("{lamp:", "{lmp:", ":4: lightings.dim.lmp: lighting: no light named 'lmp'. Did you mean 'lamp'? Known: lamp"),
+    ("{lamp:", "{lmp:", ":4: lightings.dim.lmp: lighting: no light named 'lmp'. Did you mean 'lamp'? Known: lamp, lamps"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: x", f":5: rigs.down.lens: no lens named 'x'. Known: {LENSES}"),
     ("pitch_deg: 90", "pitch_deg: 90, lens: eurok", f":5: rigs.down.lens: no lens named 'eurok'. Did you mean 'euroc'? Known: {LENSES}"),
     ("pitch_deg: 90", "pitch_deg: 90, calibration_error: {right_yaw: 1}", ":5: rigs.down.calibration_error.right_yaw: unknown key. Did you mean 'right_yaw_deg'? Known: baseline_ratio, center_px, distortion_ratio, focal_ratio, left, level, right, right_pitch_deg, right_roll_deg, right_yaw_deg"),

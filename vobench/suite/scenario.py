@@ -1,7 +1,7 @@
 """Scenarios: simulated cases in which one difficulty for odometry increases from severity 0 to severity 5."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any
@@ -16,7 +16,7 @@ from vobench.sensor.image_sensor import CameraSettings
 from vobench.setting import Name, merged_over, settings
 from vobench.suite import yaml_file
 from vobench.suite.axis import AXES, Camera, RigSettings
-from vobench.suite.scene_lighting import Lighting
+from vobench.suite.scene_lighting import LAMPS, Lighting
 from vobench.suite.trajectory import TrajectorySpec
 
 MOST_SEVERE = 5
@@ -98,10 +98,52 @@ class Scenario:
     def suits_named_places(self) -> bool:
         """Whether it can be combined with scenes and trajectories that somebody chose for it.
 
-        Then its severities change the weather, or nothing of place, light and drive.
+        Of place, light and drive, its severities then change only what all have: the weather, the level of all lamps,
+        and the rate of the images.
         """
-        changed_keys = self._changed_place_keys
-        return not changed_keys or (changed_keys == ["scene_changes"] and bool(self.weathers))
+        is_common = {
+            "scene": False,
+            "scene_changes": bool(self.weathers),
+            "lighting": self._changes_only_lamps,
+            "trajectory": self._changes_only_rate,
+        }
+        return all(is_common[key] for key in self._changed_place_keys)
+
+    @property
+    def _changes_only_lamps(self) -> bool:
+        """Whether the lightings of all severities differ only in what they say of all lamps."""
+        base_without_lamps = _without_lamps(self.setups[0].lighting)
+        return all(_without_lamps(setup.lighting) == base_without_lamps for setup in self.setups)
+
+    @property
+    def _changes_only_rate(self) -> bool:
+        """Whether the trajectories of all severities differ only in the rate of the images."""
+        base = self.setups[0].trajectory
+        rate_hz = getattr(base, "rate_hz", None)
+        if rate_hz is None:
+            return False
+        for setup in self.setups:
+            if type(setup.trajectory) is not type(base):
+                return False
+            if replace(setup.trajectory, rate_hz=rate_hz) != base:
+                return False
+        return True
+
+    def lamps(self, severity: int) -> Lighting:
+        """What the lighting of a severity says of all lamps."""
+        lighting = self.setups[severity].lighting
+        return {LAMPS: lighting[LAMPS]} if LAMPS in lighting else {}
+
+    def in_drive(self, severity: int, name: str, trajectory: TrajectorySpec) -> tuple[str, TrajectorySpec]:
+        """A trajectory under a name with the rate of a severity, which has the same ratio to severity 0 as its own.
+
+        If the rate differs, the name has the form of `variant_names`, as in tour.frame_rate.3.
+        """
+        suffix = self._severity_suffix(severity, key="trajectory")
+        if not suffix:
+            return name, trajectory
+        ratio = self.setups[severity].trajectory.rate_hz / self.setups[0].trajectory.rate_hz
+        return f"{name}.{self.name}{suffix}", replace(trajectory, rate_hz=ratio * trajectory.rate_hz)
 
     @property
     def _changed_place_keys(self) -> list[str]:
@@ -156,6 +198,11 @@ class Scenario:
         """The end of a name: the severity, as in ".3", if it changes this key of the setup; otherwise empty."""
         is_changed = getattr(self.setups[severity], key) != getattr(self.setups[0], key)
         return f".{severity}" if is_changed else ""
+
+
+def _without_lamps(lighting: Lighting) -> Lighting:
+    """What a lighting says of single lights."""
+    return {name: override for name, override in lighting.items() if name != LAMPS}
 
 
 def read_scenario(path: Path, replaced: Mapping[str, Any] = MappingProxyType({})) -> Scenario:

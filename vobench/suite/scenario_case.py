@@ -73,7 +73,9 @@ class ScenarioCases:
             return False
         has_places = self._kinds_of(name) is not None
         if has_places and not scenario.suits_named_places:
-            raise SuiteError("spread.places names it, but its severities change its own place, its lights or its drive")
+            raise SuiteError(
+                "spread.places names it, but its severities change its own place, single lights or its drive"
+            )
         return has_places or scenario.suits_any_place
 
     def _kinds_of(self, name: str) -> Collection[str] | None:
@@ -141,15 +143,16 @@ class ScenarioCases:
                 scene_name = self._variant(unit, "scene")
                 trajectory_name = self._variant(unit, "trajectory")
                 trajectory = self.axes["trajectory"][trajectory_name]
+                drive_name, drive = scenario.in_drive(severity, trajectory_name, trajectory)
                 variant = scenario.variant_names(severity, scene_name)
                 yield from self._cases(
                     scenario,
                     severity,
                     scene=_in_weather(self.axes["scene"][scene_name], scenario, severity),
-                    lighting={},
-                    trajectory=trajectory,
+                    lighting=scenario.lamps(severity),
+                    trajectory=drive,
                     replayed=self.replayed.get(trajectory_name),
-                    variant={**variant, "scene": scene_name, "trajectory": trajectory_name},
+                    variant={**variant, "scene": scene_name, "trajectory": drive_name},
                     rig=rig.read(self._folder_of_rig(scenario)).mounted_on(trajectory),
                     unit=unit.name,
                 )

@@ -5,15 +5,16 @@ from dataclasses import replace
 from typing import Any
 
 from vobench.errors import SuiteError, unknown_name_sentence
-from vobench.scene.light import Light, Sky, Sun, scaled
+from vobench.scene.light import Light, Sky, Steady, Sun, scaled
 from vobench.suite.scene_spec import LightOverride
 from vobench.suite.yaml_source import YamlFile
 
-Lighting = dict[str, LightOverride]  # the keys are the names of lights
+Lighting = dict[str, LightOverride]  # the keys are the names of lights, or LAMPS
 
 # The names of the lights of which a scene has at most one.
 SUN = "sun"
 SKY = "sky"
+LAMPS = "lamps"  # stands for all lights of a scene except for sun and sky
 # The prefixes of the names that are generated for things without a name in the file.
 GENERATED_NAMES = ("box_", "board_", "window_", "wall_", "floor", "ceiling")
 
@@ -21,17 +22,47 @@ GENERATED_NAMES = ("box_", "board_", "window_", "wall_", "floor", "ceiling")
 def with_lighting(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, ...]:
     """The lights of a scene under a lighting.
 
+    The level of `lamps` multiplies that of every lamp. Changes of a single light are made after it.
+
     Raises SuiteError if the lighting names an unknown light, or gives a light a value that it cannot have.
     """
     names = list(dict.fromkeys(light.name for light in lights))
+    has_lamps = any(_is_lamp(light) for light in lights)
+    known_names = [*names, LAMPS] if has_lamps else names
     for name in lighting:
-        if name not in names:
-            raise SuiteError(f"lighting: {unknown_name_sentence('light', name, names)}")
+        if name == LAMPS and not has_lamps:
+            raise SuiteError("lighting: there are no lamps in this scene")
+        if name not in known_names:
+            raise SuiteError(f"lighting: {unknown_name_sentence('light', name, known_names)}")
+    of_lamps = None if LAMPS in names else lighting.get(LAMPS)
     overridden = list[Light]()
     for light in lights:
+        changed = light
+        if of_lamps is not None and _is_lamp(light):
+            changed = _with_common_level(light, of_lamps)
         override = lighting.get(light.name)
-        overridden.append(light if override is None else _override_light(light, override))
+        overridden.append(changed if override is None else _override_light(changed, override))
     return tuple(overridden)
+
+
+def _is_lamp(light: Light) -> bool:
+    """Whether a light is neither sun nor sky."""
+    return not isinstance(light, Sun | Sky)
+
+
+def _with_common_level(lamp: Light, override: LightOverride) -> Light:
+    """A lamp whose level is multiplied by that which a lighting gives all lamps.
+
+    Raises SuiteError if the lighting gives all lamps more than a level, or if both levels change over time.
+    """
+    if override.level is None or override.power_lm is not None or override.illuminance_lx is not None:
+        raise SuiteError("lighting: lamps have only a level in common; name a lamp to change its power")
+    common_level = override.level.build()
+    if isinstance(lamp.level, Steady):
+        return replace(lamp, level=scaled(common_level, lamp.level.level))
+    if isinstance(common_level, Steady):
+        return replace(lamp, level=scaled(lamp.level, common_level.level))
+    raise SuiteError(f"lighting: '{lamp.name}' changes over time already, so lamps cannot; name the lamps that should")
 
 
 def _override_light(light: Light, override: LightOverride) -> Light:
