@@ -7,7 +7,7 @@ import pytest
 from vobench.estimator.sandbox import Sandbox
 from vobench.report.cell import CaseFacts, make_cell
 from vobench.report.frame_statistics import EstimatorStatistics
-from vobench.report.leaderboard import make_board
+from vobench.report.leaderboard import make_board, make_cells
 from vobench.runner.consistency import CovarianceConsistency
 
 
@@ -21,7 +21,7 @@ NOTHING = EstimatorStatistics()
 
 
 def make(trials, answered=NOTHING):
-    return make_cell(trials, answered, CaseFacts())
+    return make_cell("down", trials, answered, CaseFacts())
 
 
 def score_of(**statistics):
@@ -41,6 +41,14 @@ def test_a_spread_leaves_out_failures_and_missing_values(scored):
 def test_status_and_reason_are_those_of_the_gravest_trial(scored):
     trials = [scored("a"), scored("a", "lost", repeat=1, reason="dark"), scored("a", repeat=2)]
     assert (make(trials).status, make(trials).reason) == ("lost", "dark")
+
+
+def test_a_cell_has_the_name_of_the_first_case_although_a_repeat_with_new_noise_failed(scored):
+    trials = [scored("a"), scored("a", "lost", case="down-repeat1", reason="dark"), scored("a", case="down-repeat2")]
+    facts = {"down": CaseFacts()}
+    facts |= {f"down-repeat{number}": CaseFacts(repeat_of="down") for number in (1, 2)}
+    (cell,) = make_cells(trials, {}, facts)
+    assert (cell.case, cell.status, cell.failures) == ("down", "lost", (False, True, False))
 
 
 def test_a_loss_is_one_minus_the_score_and_missing_for_a_stationary_trial(scored):

@@ -11,7 +11,7 @@ from vobench.report.frame_statistics import EstimatorStatistics
 
 @pytest.fixture
 def cell(scored):
-    return make_cell([scored("a")], EstimatorStatistics(), CaseFacts())
+    return make_cell("case", [scored("a")], EstimatorStatistics(), CaseFacts())
 
 
 def test_a_cell_without_peculiarities_has_no_note(cell):

@@ -118,8 +118,8 @@ def _is_equal_answer(one: TrialScore, other: TrialScore) -> bool:
     return (one.status, one.score) == (other.status, other.score)
 
 
-def make_cell(trials: Sequence[TrialScore], answered: EstimatorStatistics, facts: CaseFacts) -> Cell:
-    """The cell of the trials of one estimator on one case."""
+def make_cell(case: str, trials: Sequence[TrialScore], answered: EstimatorStatistics, facts: CaseFacts) -> Cell:
+    """The cell of the trials of one estimator on one case, of which some may be repeats under other names."""
     survivors = [trial for trial in trials if trial.status in SURVIVED]
     moving = [trial for trial in survivors if trial.drift_m is None]
     most_severe = max(trials, key=lambda trial: STATUSES.index(trial.status))
@@ -127,7 +127,7 @@ def make_cell(trials: Sequence[TrialScore], answered: EstimatorStatistics, facts
     saw = {seen_by(trial) or ONLY_ITS_OWN for trial in trials}
     consistency = _median_consistency(survivors)
     return Cell(
-        case=facts.repeat_of or most_severe.case,
+        case=case,
         estimator=most_severe.estimator,
         facts=facts,
         failures=tuple(trial.status not in SURVIVED for trial in trials),

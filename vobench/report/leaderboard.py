@@ -176,7 +176,7 @@ def make_cells(
         statistics = frame_statistics.get((case, estimator), EstimatorStatistics())
         facts_of_first_trial = facts.get(members[0].case, CaseFacts())
         case_facts = facts.get(case, facts_of_first_trial)
-        cells.append(make_cell(members, statistics, case_facts))
+        cells.append(make_cell(case, members, statistics, case_facts))
     return cells
 
 
