@@ -27,7 +27,7 @@ from vobench.estimator.isolation import FILES, NAMES, NETWORK, PROCESSES, SHARED
 from vobench.estimator.manifest import Limits
 from vobench.estimator.program import EstimatorFailure, Program, sandbox_here
 from vobench.estimator.readable_folders import READ_VARIABLE, SWITCH_VARIABLE
-from vobench.estimator.sandbox import Sandbox
+from vobench.estimator.sandbox import Sandbox, from_guard_report
 
 # ruff: noqa: E501 - one attack is one text
 
@@ -642,6 +642,12 @@ def test_a_sentence_says_what_was_seen():
         Sandbox("none", (FILES, PROCESSES)).sentence
         == "not sandboxed: it could see the user's files and other processes"
     )
+
+
+def test_an_opened_folder_is_named_as_seen_from_the_working_folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv(READ_VARIABLE, f"{tmp_path}/tools/slam:/opt/ros")
+    assert from_guard_report([], "").read == (os.path.join("tools", "slam"), "/opt/ros")
 
 
 def test_nothing_of_it_is_left_in_the_folder_of_temporary_files(run, tmp_path, monkeypatch):

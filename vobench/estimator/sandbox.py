@@ -1,7 +1,9 @@
 """The record of how well an estimator was isolated."""
 
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Literal
 
 from vobench.errors import listed
@@ -23,7 +25,8 @@ class Sandbox:
     """How well an estimator was isolated.
 
     `sees` lists what the estimator could see besides its own files and processes.
-    `read` lists the folders that the user has opened to all estimators.
+    `read` lists the folders that the user has opened to all estimators, relative to the working folder if they are in
+    it: results that are published should not show where they were made.
     `why` is the reason why there is no private mount tree: the sandbox is switched off, the system is not Linux, or the
     kernel did not allow it. It is empty if there is one.
     """
@@ -51,7 +54,16 @@ def from_guard_report(visible: Sequence[str], no_mount_tree_reason: str) -> Sand
     `visible` lists what the program can see in spite of the isolation.
     `no_mount_tree_reason` is the reason why the kernel did not allow a private mount tree; empty if it did.
     """
-    return Sandbox(_level(visible), sees=tuple(visible), read=folders_opened_by_user(), why=no_mount_tree_reason)
+    opened_folders = tuple(_shown(folder) for folder in folders_opened_by_user())
+    return Sandbox(_level(visible), sees=tuple(visible), read=opened_folders, why=no_mount_tree_reason)
+
+
+def _shown(folder: str) -> str:
+    """The path of a folder, relative to the working folder if it is in it."""
+    working_folder = Path.cwd()
+    if not Path(folder).is_relative_to(working_folder):
+        return folder
+    return os.path.relpath(folder, working_folder)
 
 
 def _level(visible: Sequence[str]) -> Level:
