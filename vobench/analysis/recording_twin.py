@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vobench.analysis.camera_fit import CameraLook, fit_camera, look_of
+from vobench.analysis.camera_fit import CameraLook, Lights, fit_camera, look_of
 from vobench.analysis.image_statistics import evenly_spaced
 from vobench.analysis.path_placement import Placement, cell_disparities, levelled, place_path
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
@@ -345,7 +345,7 @@ def fitted_camera(
     those of the left one.
     """
     from vobench.runner.simulate import open_renderer
-    from vobench.runner.stereo_camera import World, exposed_by
+    from vobench.runner.stereo_camera import World, left_lights
     from vobench.suite.white import white_of
 
     case = read_plan(str(file)).simulated[0]
@@ -355,8 +355,8 @@ def fitted_camera(
     fitted_t_ns = evenly_spaced(motion.t_ns.tolist(), FITTED_PICTURES)
     white_cd_m2 = white_of(case.scene, light)
     with closing(open_renderer(scene, case.rendering, light, white_cd_m2=white_cd_m2)) as renderer:
-        develop = exposed_by(case, World(scene, renderer, motion.motion, white_cd_m2), fitted_t_ns)
-        settings, _ = fit_camera(wanted, develop)
+        lights = left_lights(case, World(scene, renderer, motion.motion, white_cd_m2), fitted_t_ns)
+    settings, _ = fit_camera(wanted, Lights(lights, seed=case.seed), progress=progress)
     return _camera_settings(settings, gain=gain)
 
 
