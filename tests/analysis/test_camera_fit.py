@@ -1,16 +1,15 @@
 """A fitted camera's exposure, contrast, blur and noise are those that its images were made with."""
 
+from contextlib import contextmanager
+
 import numpy as np
 import pytest
 
 from vobench.analysis.camera_fit import (
     WELL_E,
     CameraLook,
-    _fit_blur_px,
-    _fit_gain,
-    _fit_gamma,
+    Lights,
     _fit_noise,
-    _Parameters,
     camera_of,
     fit_camera,
     look_of,
@@ -18,35 +17,103 @@ from vobench.analysis.camera_fit import (
 )
 from vobench.analysis.conditions import chip_noise_dn
 from vobench.analysis.image_statistics import edge_px, gradients
-from vobench.geometry.camera import Pinhole
-from vobench.sensor.image_sensor import NoiseStreams, expose
-from vobench.sensor.lens import apply_lens, lens_maps
-
-LENS = Pinhole(160, 120, 150.0, 150.0, 79.5, 59.5)
+from vobench.runner.store import SilentProgress
 
 
-def light() -> np.ndarray:
-    rng, picture = np.random.default_rng(3), np.full((120, 160), 0.4, np.float32)
+def light(seed: int = 3, shape: tuple[int, int] = (120, 160)) -> np.ndarray:
+    rng, picture = np.random.default_rng(seed), np.full(shape, 0.4, np.float32)
     for _ in range(25):
-        x, y = rng.integers(0, 150), rng.integers(0, 110)
+        x, y = rng.integers(0, shape[1] - 10), rng.integers(0, shape[0] - 10)
         picture[y : y + rng.integers(8, 40), x : x + rng.integers(8, 50)] = rng.uniform(0.05, 1.2)
     return picture
 
 
 def develop(settings):
-    maps = lens_maps(settings, LENS, np.random.default_rng(0))
-    noise = NoiseStreams(np.random.default_rng(1), np.random.default_rng(2))
-    return [expose(apply_lens(light(), maps), settings, noise)]
+    return Lights([light()]).develop(settings)
 
 
-def test_a_cameras_exposure_contrast_blur_and_noise_are_found():
-    wanted = look_of(develop(camera_of(0.8, 0.6, 0.9, 1.8)))
-    settings, look = fit_camera(wanted, develop)
-    assert look.mean_dn == pytest.approx(wanted.mean_dn, rel=0.05)
-    assert look.sd_dn == pytest.approx(wanted.sd_dn, rel=0.1)
+@pytest.mark.parametrize(
+    ("gain", "gamma", "blur_px", "noise"), [(0.8, 0.6, 0.9, 1.8), (0.3, 0.4, 0.3, 0.5), (1.5, 0.9, 1.6, 1.0)]
+)
+def test_a_cameras_exposure_contrast_blur_and_noise_are_found(gain, gamma, blur_px, noise) -> None:
+    lights = [light(seed, (120, 480)) for seed in range(4)]
+    wanted = look_of(Lights(lights, seed=1).develop(camera_of(gain, gamma, blur_px, noise)))
+    settings, look = fit_camera(wanted, Lights(lights))
+    assert look.mean_dn == pytest.approx(wanted.mean_dn, rel=0.01)
+    assert look.sd_dn == pytest.approx(wanted.sd_dn, rel=0.02)
+    assert look.edge_px == pytest.approx(wanted.edge_px, rel=0.05)
     assert look.noise_dn == pytest.approx(wanted.noise_dn, rel=0.15)
-    assert settings.chip.full_well_e == pytest.approx(WELL_E / 1.8**2, rel=0.3)
-    assert settings.blur_sigma_px == pytest.approx(0.9, abs=0.25)
+    assert settings.exposure_gain == pytest.approx(gain, rel=0.05)
+    assert settings.chip.response == pytest.approx(1 / gamma, rel=0.05)
+    assert settings.blur_sigma_px == pytest.approx(blur_px, abs=0.15)
+    assert settings.chip.full_well_e == pytest.approx(WELL_E / noise**2, rel=0.3)
+
+
+class Counter(SilentProgress):
+    """Records what is shown."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.shares: list[float] = []
+
+    @contextmanager
+    def step(self, what: str):
+        self.what = what
+        yield self.shares.append
+
+
+def test_the_fit_shows_its_developments_and_needs_some_dozens() -> None:
+    lights = Lights([light(seed, (120, 480)) for seed in range(4)])
+    progress = Counter()
+    fit_camera(look_of(lights.develop(camera_of(0.8, 0.6, 0.9, 1.8))), lights, progress=progress)
+    assert progress.what == "camera: about 80 developments of windows of pictures"
+    assert 20 < len(progress.shares) < 100
+    assert progress.shares == sorted(progress.shares)
+    assert progress.shares[0] == pytest.approx(1 / 80)
+
+
+def test_a_look_that_windows_misrepresent_is_corrected_by_whole_pictures() -> None:
+    # The only window of one picture is at its left, where it is brightest.
+    picture = light(shape=(120, 900))
+    picture[:, :150] *= 2
+    lights = Lights([picture])
+    wanted = look_of(lights.develop(camera_of(0.5, 0.6, 0.9, 0.5)))
+    assert look_of(lights.windows().develop(camera_of(0.5, 0.6, 0.9, 0.5))).mean_dn > 1.15 * wanted.mean_dn
+    settings, look = fit_camera(wanted, lights)
+    assert look.mean_dn == pytest.approx(wanted.mean_dn, rel=0.02)
+    assert settings.exposure_gain == pytest.approx(0.5, rel=0.1)
+
+
+def test_windows_are_as_high_as_the_pictures_and_cover_them_in_turn() -> None:
+    columns = np.broadcast_to(np.linspace(0, 0.9, 900, dtype=np.float32), (50, 900))
+    windows = Lights([columns] * 6).windows().develop(camera_of(1.0, 1.0, 0.0, 0.03))
+    assert [window.shape for window in windows] == [(50, 150)] * 6
+    means = [window.mean() for window in windows]
+    assert means == sorted(means)
+    np.testing.assert_allclose(np.mean(means), Lights([columns]).develop(camera_of(1, 1, 0, 0.03))[0].mean(), rtol=0.01)
+
+
+def test_windows_of_small_pictures_are_the_pictures() -> None:
+    (image,) = Lights([light(shape=(100, 90))]).windows().develop(camera_of(1.0, 0.6, 0.0, 0.1))
+    assert image.shape == (100, 90)
+
+
+def test_a_camera_takes_the_same_picture_again_and_a_blur_spreads_its_light() -> None:
+    lights = Lights([light()], seed=4)
+    settings = camera_of(0.8, 0.6, 1.2, 1.0)
+    np.testing.assert_array_equal(lights.develop(settings)[0], lights.develop(settings)[0])
+    assert (lights.develop(settings)[0] != Lights([light()], seed=5).develop(settings)[0]).any()
+    sharp = lights.develop(camera_of(0.8, 0.6, 0.0, 0.03))[0]
+    blurred = lights.develop(camera_of(0.8, 0.6, 1.2, 0.03))[0]
+    assert edge_px(blurred, gradients(blurred)) > 1.5 * edge_px(sharp, gradients(sharp))
+
+
+def test_pictures_without_edges_or_flat_parts_are_fitted_too() -> None:
+    lights = Lights([np.full((100, 90), 0.4, np.float32)])
+    wanted = CameraLook(100.0, 0.0, 0.0, 0.0, np.zeros(0))
+    settings, look = fit_camera(wanted, lights)
+    assert look.mean_dn == pytest.approx(100, rel=0.02)
+    assert settings.blur_sigma_px < 0.1
 
 
 # --- The look ---
@@ -86,15 +153,14 @@ def test_the_noise_is_that_of_20_000_electrons_and_a_read_noise_of_25_times_as_l
 
 def test_the_noise_is_solved_from_that_of_flat_parts_less_that_of_rounding() -> None:
     flat_dn = np.array([60.0, 120.0])
-    parameters = _Parameters(gain=1.0, gamma=0.6, blur_px=0.0, noise=1.0)
     for noise in (0.5, 3.0):
         chip = camera_of(1.0, 0.6, 0.0, noise).chip
         variance = np.mean([chip_noise_dn(chip, grey_dn) ** 2 for grey_dn in flat_dn])
         wanted = CameraLook(100.0, 30.0, float(np.sqrt(variance + 1 / 12)), 3.0, flat_dn)
-        assert _fit_noise(parameters, wanted) == pytest.approx(noise, rel=1e-6)
-    assert _fit_noise(parameters, CameraLook(100.0, 30.0, 0.1, 3.0, flat_dn)) == 0.03  # less than rounding makes
-    assert _fit_noise(parameters, CameraLook(100.0, 30.0, 1e4, 3.0, flat_dn)) == 30
-    assert _fit_noise(parameters, CameraLook(100.0, 30.0, 2.0, 3.0, np.zeros(0))) == 0.03
+        assert _fit_noise(0.6, wanted) == pytest.approx(noise, rel=1e-6)
+    assert _fit_noise(0.6, CameraLook(100.0, 30.0, 0.1, 3.0, flat_dn)) == 0.03  # less than rounding makes
+    assert _fit_noise(0.6, CameraLook(100.0, 30.0, 1e4, 3.0, flat_dn)) == 30
+    assert _fit_noise(0.6, CameraLook(100.0, 30.0, 2.0, 3.0, np.zeros(0))) == 0.03
 
 
 @pytest.mark.parametrize("wanted", [0.2, 1.7, 3.9])
@@ -103,36 +169,3 @@ def test_bisection_finds_the_argument_to_a_256th_of_the_range(wanted: float) -> 
     assert found == pytest.approx(wanted, abs=4 / 2**8)
     assert solve_increasing(lambda x: x, -1.0, (0.0, 4.0)) < 4 / 2**7
     assert solve_increasing(lambda x: x, 9.0, (0.0, 4.0)) > 4 - 4 / 2**7
-
-
-def test_exposure_is_solved_over_orders_of_magnitude() -> None:
-    def linear(settings):
-        return [np.full((8, 8), min(10 * settings.exposure_gain, 255.0))]
-
-    parameters = _Parameters(gain=1.0, gamma=0.6, blur_px=0.0, noise=1.0)
-    for gain in (0.05, 1.0, 20.0):
-        wanted = CameraLook(10 * gain, 0.0, 0.0, 0.0, np.zeros(0))
-        assert _fit_gain(parameters, wanted, linear) == pytest.approx(gain, rel=0.04)
-
-
-def test_contrast_is_solved_at_the_exposure_that_gives_the_mean() -> None:
-    light = np.linspace(0.02, 1.0, 4096).reshape(64, 64)
-
-    def perfect(settings):
-        response = float(settings.chip.response)
-        return [255 * np.clip(settings.exposure_gain * light, 0, 1) ** (1 / response)] * 2
-
-    def look(gain: float, gamma: float) -> CameraLook:
-        image = perfect(camera_of(gain, gamma, 0.0, 1.0))[0]
-        return CameraLook(float(image.mean()), float(image.std()), 0.0, 0.0, np.zeros(0))
-
-    start = _Parameters(gain=1.0, gamma=0.45, blur_px=0.0, noise=1.0)
-    for gain, gamma in ((0.5, 0.8), (0.9, 0.4)):
-        assert _fit_gamma(start, look(gain, gamma), perfect) == pytest.approx(gamma, abs=0.03)
-
-
-def test_blur_is_solved_from_the_width_of_edges() -> None:
-    start = _Parameters(gain=0.8, gamma=0.6, blur_px=0.0, noise=0.3)
-    for blur_px in (0.7, 1.4):
-        wanted = look_of(develop(camera_of(0.8, 0.6, blur_px, 0.3)))
-        assert _fit_blur_px(start, wanted, develop) == pytest.approx(blur_px, abs=0.15)

@@ -1,6 +1,7 @@
 """A twin repeats the path of a recording, and orders of estimators that are known are compared rightly."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,6 +24,8 @@ from vobench.suite.suite import read_plan
 from vobench.trajectory.trajectory import Trajectory
 from vobench.trajectory.tum import format_tum, parse_tum
 
+RANKED = ("stereo_pnp", "mono_vo", "stand_still")
+
 
 @pytest.fixture(scope="module")
 def recording(recorded_case: Path) -> Recording:
@@ -39,14 +42,12 @@ def suite(recorded_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     """The suite of a twin in the closet that was recorded, placed and fitted in few steps."""
     monkeypatch.setattr(path_placement, "DRAWS", 600)
     monkeypatch.setattr(path_placement, "NEAR_DRAWS", 100)
-    monkeypatch.setattr(camera_fit, "ROUNDS", 1)
-    monkeypatch.setattr(camera_fit, "HALVINGS", 2)
+    monkeypatch.setattr(camera_fit, "PASSES", 1)
+    monkeypatch.setattr(camera_fit, "MAX_TRIALS", 2)
     monkeypatch.setattr(recording_twin, "FITTED_PICTURES", 2)
     monkeypatch.setenv("VOBENCH_CACHE", str(tmp_path / "cache"))
     closet = next(recorded_case.resolve().parents[4].glob("closet.yaml"))
-    return write_twin_suite(
-        recorded_case, out=tmp_path / "twin", place=str(closet), estimators=["stereo_pnp", "mono_vo", "stand_still"]
-    )
+    return write_twin_suite(recorded_case, out=tmp_path / "twin", place=str(closet), estimators=list(RANKED))
 
 
 def test_the_suite_has_the_recording_and_its_repetition(suite: TwinSuite, recording: Recording) -> None:
@@ -63,6 +64,51 @@ def test_the_suite_has_the_recording_and_its_repetition(suite: TwinSuite, record
     assert case.rig.calibration_error.right_roll_deg == pytest.approx(0.5, abs=0.1)
     assert case.camera.exposure_gain > 0
     assert case.trajectory.rate_hz == pytest.approx(10)
+
+
+def again(suite: TwinSuite, recorded_case: Path, names: Sequence[str] = RANKED) -> TwinSuite:
+    """The suite that the same request, with these estimators, writes to the same folder."""
+    closet = next(recorded_case.resolve().parents[4].glob("closet.yaml"))
+    return write_twin_suite(recorded_case, out=suite.file.parent, place=str(closet), estimators=list(names))
+
+
+def test_an_interrupted_twin_goes_on_where_it_was(suite, recorded_case, monkeypatch) -> None:
+    assert suite.placement is not None
+    text = suite.file.read_text()
+    without_camera = {key: value for key, value in json.loads(text).items() if key != "cameras"}
+    suite.file.write_text(json.dumps(without_camera))  # as if the fit of the camera was interrupted
+    monkeypatch.setattr(recording_twin, "place_path", None)
+    resumed = again(suite, recorded_case)
+    assert resumed.file.read_text() == text
+    assert resumed.placement is not None
+    np.testing.assert_allclose(resumed.placement.T_place_world, suite.placement.T_place_world, atol=1e-12)
+    assert resumed.placement.misfit == pytest.approx(suite.placement.misfit)
+
+    # A complete suite is not written again, also where it was edited.
+    edited = json.loads(text) | {"summary": "edited"}
+    suite.file.write_text(json.dumps(edited))
+    monkeypatch.setattr(recording_twin, "fit_camera", None)
+    again(suite, recorded_case)
+    assert json.loads(suite.file.read_text()) == edited
+    with pytest.raises(InputError, match="in use for another request"):
+        again(suite, recorded_case, ["stereo_pnp", "lk_epipolar", "stand_still"])
+
+
+def test_the_suite_in_a_folder_is_read_as_it_is(suite, realism) -> None:
+    read = recording_twin.read_twin_suite(suite.file.parent)
+    assert read.file == suite.file
+    assert read.placement.as_dict() == suite.placement.as_dict()
+    assert dict(read.realism.values) == dict(realism.values)
+    other = json.loads(suite.file.read_text())
+    other["source"][0]["name"] = "else"
+    suite.file.write_text(json.dumps(other))
+    with pytest.raises(InputError, match="has the cases real and twin, and this one twin, else"):
+        recording_twin.read_twin_suite(suite.file.parent)
+
+
+def test_a_folder_without_a_suite_is_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="should be the folder of a twin, with"):
+        recording_twin.read_twin_suite(tmp_path)
 
 
 def test_the_path_of_the_twin_is_that_of_the_recording_moved_as_a_whole(suite: TwinSuite, recording: Recording) -> None:

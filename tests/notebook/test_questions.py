@@ -105,6 +105,22 @@ def test_a_twin_is_made_in_its_folder_with_reports_of_its_runs(asked, monkeypatc
     assert plans[2]["out"] == Path("twin/runs")
 
 
+def test_the_suite_of_a_twin_is_compared_as_it_is(asked, monkeypatch):
+    from vobench.errors import InputError
+    from vobench.notebook import questions
+
+    plans = []
+    monkeypatch.setattr(questions, "plan_runner", lambda **options: plans.append(options))
+    read = asked(recording_twin, "read_twin_suite")
+    compared = asked(recording_twin, "compare_twin")
+    vobench.twin(report="pair", quiet=True)
+    assert [path for ((path,), _) in read] == [Path("pair")]
+    assert plans[0]["out"] == Path("pair/runs")
+    assert len(compared) == 1
+    with pytest.raises(InputError, match="name either a recording, or the folder of a twin"):
+        vobench.twin()
+
+
 def test_drives_of_a_suite_are_those_of_its_trajectories(here):
     driven = vobench.drive("tiny", trajectory="short")
     assert [drive.name for drive in driven.drives] == ["short"]

@@ -1,7 +1,9 @@
 """Places the path of a recording into a scene so that the distances of the visible surfaces agree."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 import scipy
@@ -110,6 +112,17 @@ class Placement:
     scale: float
     misfit: float
     tried: int
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        facts = asdict(self)
+        return {**facts, "T_place_world": self.T_place_world.tolist()}
+
+    @classmethod
+    def of_dict(cls, facts: Mapping[str, Any]) -> "Placement":
+        """The placement that `as_dict` described."""
+        T_place_world = np.array(facts["T_place_world"], float)
+        return cls(**{**facts, "T_place_world": T_place_world})
 
 
 # More unusual scales come later, and are drawn less often.

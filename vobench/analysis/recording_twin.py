@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from vobench.analysis.camera_fit import CameraLook, fit_camera, look_of
+from vobench.analysis.camera_fit import CameraLook, Lights, fit_camera, look_of
 from vobench.analysis.image_statistics import evenly_spaced
 from vobench.analysis.path_placement import Placement, cell_disparities, levelled, place_path
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
@@ -17,6 +17,7 @@ from vobench.analysis.realism import Realism, residual, shots_of
 from vobench.analysis.realism_report import RealismReport, realism_of
 from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
+from vobench.analysis.twin_estimators import twin_estimators
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import stereo_pair
@@ -26,6 +27,7 @@ from vobench.runner.data_frame import data_frame
 from vobench.runner.estimate import ESTIMATE
 from vobench.runner.folder import RunFolder, TrialScore, read_tum
 from vobench.runner.frames import GROUND_TRUTH
+from vobench.runner.import_recording import read_all
 from vobench.runner.key import cache_folder
 from vobench.runner.motion import body_motion
 from vobench.runner.plan_runner import PlanRunner
@@ -53,19 +55,9 @@ TWIN = "twin"
 SUITE_FILE = "twin.yaml"
 PLACE_FILE = "place.yaml"
 PATH_FILE = "path.tum"
+PLACEMENT_FILE = "placement.json"
 REPORT_FILE = "twin.json"
 
-# Estimators that are run by default: five different ones, and two of them with other parameters.
-ESTIMATORS: tuple[str | Mapping[str, Any], ...] = (
-    "lk_epipolar",
-    {"name": "lk_epipolar", "label": "lk_epipolar_plain", "params": {"estimate_offset": 0}},
-    "stereo_pnp",
-    "feature_vo",
-    "mono_vo",
-    {"name": "stereo_pnp", "label": "stereo_pnp_wide", "params": {"window_px": 21}},
-    "stand_still",
-)
-FEWEST_RANKED = 3
 FEWEST_PICTURES = 12  # a replayed path needs as many poses
 LEAST_EXTENT_M = 0.05
 FITTED_PICTURES = 12  # that the camera is fitted to
@@ -77,11 +69,12 @@ QUANTILES = (0.1, 0.5, 0.9)
 class TwinSuite:
     """The suite of a recording and its twin, written to a folder.
 
-    `file` is the suite, `placement` the pose of the recorded path in the scene, and `realism` that of the recording.
+    `file` is the suite, `placement` the pose of the recorded path in the scene, None if that is not known, and
+    `realism` that of the recording.
     """
 
     file: Path
-    placement: Placement
+    placement: Placement | None
     realism: Realism
 
 
@@ -112,6 +105,7 @@ class TwinReport:
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, as `vobench twin --json` prints them and twin.json holds them."""
         real = self.suite.realism
+        placement = self.suite.placement
         here = self.suite.file.parent
         against_real = RealismReport(here, self.twin, here, real).rows()
         return {
@@ -120,7 +114,7 @@ class TwinReport:
             "estimators": self.rows(),
             "statistics": [row for row in against_real if row["against"] is not None],
             "also": _compared(real, self.twin),
-            "place": {"scale": self.suite.placement.scale, "misfit": self.suite.placement.misfit},
+            "place": None if placement is None else {"scale": placement.scale, "misfit": placement.misfit},
             "real": RealismReport(here, real).as_dict(),
             "twin": RealismReport(here, self.twin).as_dict(),
         }
@@ -154,12 +148,13 @@ def write_twin_suite(
 
     Args:
         recording: a recording with ground truth, or the folder of a run's case.
-        out: the folder for the suite, new or of the same request when it was interrupted.
+        out: the folder for the suite, new or of the same request when it was interrupted. The placement and the suite
+            in it are used again, also if the suite was edited.
         place: the name of the scene, or the path of its file or model.
-        estimators: names of three estimators or more, instead of the default seven.
+        estimators: three estimators or more, instead of the default seven, as in `twin_estimators`.
         form: the form of the recording, if its content does not determine it.
         options: what the recording does not state itself: calibration, ground truth, rate, topics.
-        progress: shows the computation of the scene's light, unless that is in the cache.
+        progress: shows what is being done.
 
     Raises:
         InputError: the folder is in use for something else; fewer than three estimators; or the recording has no stereo
@@ -167,8 +162,7 @@ def write_twin_suite(
             place.
         UnknownNameError: there is no such place.
     """
-    if estimators and len(estimators) < FEWEST_RANKED:
-        raise InputError(f"an order needs {FEWEST_RANKED} estimators or more, and -e names {len(estimators)}")
+    entries = twin_estimators(estimators)
     scene = read_scene(catalog.find("scene", place).path)
 
     recorded = read_recording(recording, form=form, options=options)
@@ -180,23 +174,31 @@ def write_twin_suite(
         "estimators": list(estimators),
     }
     claim(out, request)
-    realism = realism_of(recorded)
+    file = (out / SUITE_FILE).resolve()
+    with progress.step("measuring the recording"):
+        realism = realism_of(recorded)
     path = recorded_path(recorded, realism.pair)
-    pair = stereo_pair(recorded.rig, "the twin")
-    placement = place_path(build(scene, {}), path.T_world_left, pair, cell_disparities(path.fit, pair))
+    if _has_camera(file):
+        return TwinSuite(file, _read_placement(out), realism)
+
+    placement = _read_placement(out)
+    if placement is None:
+        pair = stereo_pair(recorded.rig, "the twin")
+        with progress.step(f"looking for a free path in {place}"):
+            placement = place_path(build(scene, {}), path.T_world_left, pair, cell_disparities(path.fit, pair))
+        write_json(out / PLACEMENT_FILE, placement.as_dict())
 
     write_json(out / PLACE_FILE, {**plain(scene), "scale": scene.scale * placement.scale})
     (out / PATH_FILE).write_text(format_tum(path.in_place(placement)), encoding="utf-8")
-    suite = {
+    suite: dict[str, Any] = {
         "name": "twin",
         "summary": f"A recording repeated in {place}",
         "scenes": [str((out / PLACE_FILE).resolve())],
         "rigs": {TWIN: path.rig_settings()},
         "trajectories": {TWIN: path.trajectory_settings()},
         "source": [recording_source(recording, form, options)],
-        "estimators": list(estimators or ESTIMATORS),
+        "estimators": entries,
     }
-    file = (out / SUITE_FILE).resolve()
     write_json(file, suite)
     # The camera is fitted to pictures of this suite's twin, so the suite is read without a camera first.
     wanted = look_of_recording(recorded)
@@ -205,13 +207,49 @@ def write_twin_suite(
     return TwinSuite(file, placement, realism)
 
 
-def compare_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> TwinReport:
+def _has_camera(file: Path) -> bool:
+    """Whether the suite of a twin is complete: the camera is written last."""
+    if not file.is_file():
+        return False
+    return bool(read_plan(str(file)).source.plain.get("cameras"))
+
+
+def _read_placement(out: Path) -> Placement | None:
+    """The placement that was found before; None if there is none."""
+    file = out / PLACEMENT_FILE
+    if not file.is_file():
+        return None
+    return Placement.of_dict(json.loads(file.read_text(encoding="utf-8")))
+
+
+def read_twin_suite(folder: Path, *, progress: Progress = SILENT) -> TwinSuite:
+    """The suite of a twin in a folder, as `write_twin_suite` wrote it or as it was edited since.
+
+    Raises InputError if the folder has no suite of a recording and a twin, and SuiteError if the suite is wrong.
+    """
+    file = (folder / SUITE_FILE).resolve()
+    if not file.is_file():
+        raise InputError(f"should be the folder of a twin, with {SUITE_FILE} in it: {folder}")
+    plan = read_plan(str(file))
+    names = [case.name for case in plan.cases]
+    if TWIN not in names or REAL not in names:
+        raise InputError(
+            f"the suite of a twin has the cases {REAL} and {TWIN}, and this one {', '.join(names)}: {file}"
+        )
+    recorded = read_all(plan)[REAL]
+    with progress.step("measuring the recording"):
+        realism = realism_of(recorded)
+    return TwinSuite(file, _read_placement(folder), realism)
+
+
+def compare_twin(suite: TwinSuite, *, run_plan: PlanRunner, progress: Progress = SILENT) -> TwinReport:
     """Run the estimators of a twin's suite on both cases, compare them, and write twin.json beside the suite.
 
     Raises InputError if fewer than three estimators ran on both.
     """
     folder = run_plan(read_plan(str(suite.file)))
-    twin = realism_of(read_recording(folder.case(TWIN)))
+    with progress.step("measuring the twin"):
+        twin = realism_of(read_recording(folder.case(TWIN)))
     real_errors = _errors(folder, REAL)
     twin_errors = _errors(folder, TWIN)
     orders = agreement(real_errors, twin_errors)
@@ -241,7 +279,7 @@ def make_twin(
     suite = write_twin_suite(
         recording, out=out, place=place, estimators=estimators, form=form, options=options, progress=progress
     )
-    return compare_twin(suite, run_plan=run_plan)
+    return compare_twin(suite, run_plan=run_plan, progress=progress)
 
 
 # --- The path and its placement ---
@@ -345,7 +383,7 @@ def fitted_camera(
     those of the left one.
     """
     from vobench.runner.simulate import open_renderer
-    from vobench.runner.stereo_camera import World, exposed_by
+    from vobench.runner.stereo_camera import World, left_lights
     from vobench.suite.white import white_of
 
     case = read_plan(str(file)).simulated[0]
@@ -355,8 +393,8 @@ def fitted_camera(
     fitted_t_ns = evenly_spaced(motion.t_ns.tolist(), FITTED_PICTURES)
     white_cd_m2 = white_of(case.scene, light)
     with closing(open_renderer(scene, case.rendering, light, white_cd_m2=white_cd_m2)) as renderer:
-        develop = exposed_by(case, World(scene, renderer, motion.motion, white_cd_m2), fitted_t_ns)
-        settings, _ = fit_camera(wanted, develop)
+        lights = left_lights(case, World(scene, renderer, motion.motion, white_cd_m2), fitted_t_ns)
+    settings, _ = fit_camera(wanted, Lights(lights, seed=case.seed), progress=progress)
     return _camera_settings(settings, gain=gain)
 
 

@@ -5,12 +5,13 @@ from typing import Annotated, Any
 
 import typer
 
-from vobench.analysis.recording_twin import REAL, TWIN, TwinReport, compare_twin, write_twin_suite
+from vobench.analysis.recording_twin import REAL, TWIN, TwinReport, compare_twin, read_twin_suite, write_twin_suite
 from vobench.cli import terminal
 from vobench.cli.option import Jobs, Json, with_option_groups
 from vobench.cli.plan_runner import plan_runner
 from vobench.cli.progress import Bars
 from vobench.cli.recording_option import FormCommand, RecordingOptions
+from vobench.errors import InputError
 from vobench.runner.folder import RunFolder, TrialScore
 
 COMMAND_CLASS = FormCommand
@@ -20,14 +21,24 @@ STATISTICS = {"mean": "mean", "p10": "10 %", "p50": "50 %", "p90": "90 %"}
 @with_option_groups
 def twin_command(
     path: Annotated[
-        Path, typer.Argument(metavar="RECORDING", help="A recording with ground truth, or the case of a run.")
-    ],
+        Path | None,
+        typer.Argument(metavar="RECORDING", help="A recording with ground truth, or the case of a run."),
+    ] = None,
     *,
+    report: Annotated[
+        Path | None,
+        typer.Option(help="Run the suite in the folder of a twin, such as one that was edited, and write its report."),
+    ] = None,
     place: Annotated[str, typer.Option(help="The scene or model in which the path is simulated.")] = "office",
     out: Annotated[Path, typer.Option(help="The new folder for the suite, its runs and the report.")] = Path("twin"),
     estimator: Annotated[
         list[str] | None,
-        typer.Option("--estimator", "-e", help="Run this estimator instead of the usual seven; can be repeated."),
+        typer.Option(
+            "--estimator",
+            "-e",
+            help="Run this estimator instead of the usual seven: a name, a label of these, or an entry of a suite such "
+            "as '{name: stereo_pnp, label: wide, params: {window_px: 21}}'; can be repeated.",
+        ),
     ] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Write the suite, and stop.")] = False,
     jobs: Jobs = 1,
@@ -35,23 +46,33 @@ def twin_command(
     json: Json = False,
 ) -> None:
     """Simulate a twin of a recording, run the same estimators on both, and print how well they agree."""
-    suite = write_twin_suite(
-        path,
-        out=out,
-        place=place,
-        estimators=estimator or (),
-        form=recording_options.form,
-        options=recording_options.read_options(),
-        progress=Bars(),
-    )
+    progress = Bars()
+    if report is not None:
+        if path is not None:
+            raise InputError("--report takes the folder of a twin in place of a recording; leave one of them out")
+        out = report
+        suite = read_twin_suite(report, progress=progress)
+    elif path is None:
+        raise InputError("name a recording, or with --report the folder of a twin")
+    else:
+        suite = write_twin_suite(
+            path,
+            out=out,
+            place=place,
+            estimators=estimator or (),
+            form=recording_options.form,
+            options=recording_options.read_options(),
+            progress=progress,
+        )
     if dry_run:
         print(f"Wrote the suite: {suite.file}")
         return
-    report = compare_twin(suite, run_plan=plan_runner(out=out / "runs", jobs=jobs, finish=_write_reports))
+    run_plan = plan_runner(out=out / "runs", jobs=jobs, finish=_write_reports)
+    compared = compare_twin(suite, run_plan=run_plan, progress=progress)
     if json:
-        terminal.print_json(report.as_dict())
+        terminal.print_json(compared.as_dict())
     else:
-        _print(report, out)
+        _print(compared, out)
 
 
 def _write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
@@ -79,8 +100,9 @@ def _print(report: TwinReport, out: Path) -> None:
         console.print(f"{name}: {real:.3g} in the recording, {twin:.3g} in its twin")
 
     place = facts["place"]
-    scale = f"scaled by {place['scale']:g}"
-    console.print(f"The scene is {scale}; its disparities differ from the recording's by {place['misfit']:.0%}.")
+    if place is not None:
+        scale = f"scaled by {place['scale']:g}"
+        console.print(f"The scene is {scale}; its disparities differ from the recording's by {place['misfit']:.0%}.")
     console.print(f"Everything is in {out}")
 
 

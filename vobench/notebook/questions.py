@@ -124,8 +124,9 @@ def realism(recording: Path | str, *, against: Path | str | None = None, form: s
 
 
 def twin(
-    recording: Path | str,
+    recording: Path | str | None = None,
     *,
+    report: Path | str | None = None,
     place: str = "office",
     estimators: Names | None = None,
     form: str | None = None,
@@ -135,15 +136,23 @@ def twin(
 ) -> "TwinReport":
     """Simulate a twin of a recording, run the same estimators on both, and report how well the results agree.
 
-    `out` is a new folder for the suite and its runs. Raises InputError if the recording has no stereo pair, no ground
-    truth or no motion, and UnknownNameError for the place.
+    `out` is the folder for the suite and its runs, new or of an interrupted call. With `report`, which is such a
+    folder, in place of the recording, the suite in it is run and compared as it is. `estimators` are names, labels of
+    the usual ones, or entries of a suite in YAML.
+    Raises InputError if the recording has no stereo pair, no ground truth or no motion, and UnknownNameError for the
+    place.
     """
-    from vobench.analysis.recording_twin import make_twin
+    from vobench.analysis.recording_twin import compare_twin, make_twin, read_twin_suite
 
-    folder = Path(out)
+    if (recording is None) == (report is None):
+        raise InputError("name either a recording, or the folder of a twin with report=")
+    folder = Path(out if report is None else report)
+    run_plan = _plan_runner(folder / "runs", jobs, is_quiet=quiet, with_reports=True)
+    if recording is None:
+        return compare_twin(read_twin_suite(folder), run_plan=run_plan)
     return make_twin(
         Path(recording),
-        run_plan=_plan_runner(folder / "runs", jobs, is_quiet=quiet, with_reports=True),
+        run_plan=run_plan,
         out=folder,
         place=place,
         estimators=listed(estimators),

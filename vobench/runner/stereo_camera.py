@@ -1,7 +1,7 @@
 """Simulates the stereo cameras: the light through the lens onto the chip, and the shutter while the body moves."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -241,15 +241,8 @@ class SimulatedCamera:
         return T_world_camera
 
 
-def exposed_by(case: Case, world: World, stamps: Sequence[int]) -> Callable[[CameraSettings], list[Grey]]:
-    """A function that takes the left pictures of a case with any camera settings. The light is rendered only once."""
-    displacement = Displacement(world.scene)
+def left_lights(case: Case, world: World, stamps: Sequence[int]) -> list[Radiance]:
+    """The light (H, W) at the left lens of a case at some times, at the usual exposure time."""
     plain = CameraSettings()
-    first = SimulatedCamera(replace(case, camera=plain), "left", world, displacement)
-    lights = [first.light(t_ns, plain.exposure) for t_ns in stamps]
-
-    def take(settings: CameraSettings) -> list[Grey]:
-        camera = SimulatedCamera(replace(case, camera=settings), "left", world, displacement)
-        return [camera.exposed(light, settings.exposure) for light in lights]
-
-    return take
+    camera = SimulatedCamera(replace(case, camera=plain), "left", world, Displacement(world.scene))
+    return [camera.light(t_ns, plain.exposure) for t_ns in stamps]
