@@ -1,7 +1,9 @@
 """What vobench info prints of a recording."""
 
+import numpy as np
 import pytest
 
+from tests.dataset.test_bag import Bag
 from vobench.cli import info
 
 
@@ -51,3 +53,15 @@ def test_info_prints_topics_cameras_and_truth_of_a_simulated_case(vobench, ran):
     facts = vobench("info", case / "sequence", "--json").json
     assert facts["ground_truth"]["poses"] > 1
     assert set(facts["files"]) == {"sensors.mcap", "truth.mcap"}
+
+
+def test_the_topics_of_a_bag_without_a_calibration_are_printed_before_the_error(vobench, tmp_path):
+    bag = Bag()
+    for t_ns in (0, 10**8):
+        bag.image("/fisheye/image_raw", t_ns, "optical", np.zeros((4, 6), np.uint8), "mono8")
+    path = bag.write(tmp_path / "bag")
+    told = vobench("info", path)
+    assert told.code == 1
+    assert "/fisheye/image_raw" in told.out
+    assert "sensor_msgs/msg/Image" in told.out
+    assert "no camera_info for /fisheye/image_raw" in told.err

@@ -296,6 +296,30 @@ def test_a_given_chain_takes_the_place_of_the_bag_s_calibration(scene, tmp_path,
     assert np.abs(rig.T_body_left - placed[0]).max() < 1e-12
 
 
+def with_chain(scene, tmp_path, camchain, bag: Bag):
+    chain = tmp_path / "chain.yaml"
+    chain.write_text(camchain())
+    return read(bag.write(tmp_path / "bag"), options=ReadOptions(calibration=chain))
+
+
+def test_the_truth_is_converted_to_the_body_of_a_given_chain(scene, tmp_path, camchain):
+    recording = with_chain(scene, tmp_path, camchain, whole(scene))
+    T_world_left = scene.T_world_body @ T_BASE_LEFT
+    assert np.abs(recording.truth.T_world_frame @ recording.rig.T_body_left - T_world_left).max() < 1e-12
+    assert "The truth of base_link was converted to the body by /tf_static." in recording.notes
+
+
+def test_a_truth_of_an_unknown_frame_is_said_beside_a_given_chain(scene, tmp_path, camchain):
+    bag = whole(scene)
+    bag.messages = [message for message in bag.messages if message[1] not in (TF, ODOMETRY)]
+    for t, T in zip(scene.t_ns, scene.T_world_body, strict=True):
+        bag.odometry("/odom", t, "camera_pose_frame", T)
+    recording = with_chain(scene, tmp_path, camchain, bag)
+    assert np.abs(recording.truth.T_world_frame - scene.T_world_body).max() < 1e-12
+    expected = "The truth is of camera_pose_frame, whose position is not known, and was assumed to be of the body."
+    assert expected in recording.notes
+
+
 def test_topics_of_any_name_may_be_named(scene, tmp_path):
     path = whole(scene, left="/port/image", right="/starboard/image").write(tmp_path / "bag")
     with pytest.raises(VobenchError, match=r"name the left and the right topic .* /port/image, /starboard/image"):

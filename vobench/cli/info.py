@@ -1,5 +1,6 @@
 """vobench info."""
 
+from contextlib import suppress
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -9,6 +10,7 @@ from vobench.cli.option import Json, with_option_groups
 from vobench.cli.recording_option import FormCommand, ImuFile, RecordingOptions, RecordingPath
 from vobench.dataset.layout import read
 from vobench.dataset.recording import Recording
+from vobench.errors import VobenchError
 from vobench.geometry.rig import Rig
 from vobench.sequence import has_truth, payload_hash, read_import_notes, read_provenance
 from vobench.sequence.recording import is_recording, topic_facts
@@ -31,13 +33,30 @@ def info_command(
     imu: ImuFile = None,
     json: Json = False,
 ) -> None:
-    """Print the topics, rates, duration, calibration, ground truth and hash of a recording."""
-    recording = read(path, form=recording_options.form, options=recording_options.read_options(imu))
+    """Print the topics, rates, duration, calibration, ground truth and hash of a recording.
+
+    The topics of a bag are also printed if it cannot be read, such as for want of a calibration: they are what the
+    options name.
+    """
+    try:
+        recording = read(path, form=recording_options.form, options=recording_options.read_options(imu))
+    except VobenchError:
+        if not json:
+            _print_topics_of_bag(path)
+        raise
     facts = _facts(path, recording)
     if json:
         terminal.print_json(facts)
     else:
         _print_facts(facts)
+
+
+def _print_topics_of_bag(path: Path) -> None:
+    """Print the topics of a bag; nothing for other paths, and for a bag that cannot be read at all."""
+    if not path.exists() or not is_recording(path):
+        return
+    with suppress(VobenchError):
+        _print_topics(path.name, _topics(path), terminal.console())
 
 
 def _facts(path: Path, recording: Recording) -> dict[str, Any]:
@@ -95,9 +114,13 @@ def _topics_by_file(path: Path, form: str) -> dict[str, list[dict[str, Any]]]:
     """The topics in each file of a sequence or of a bag."""
     topics_by_file = dict[str, list[dict[str, Any]]]()
     for file in _recording_files(path, form):
-        topics = topic_facts(file)
-        topics_by_file[file.name] = [{**asdict(topic), "rate_hz": topic.rate_hz} for topic in topics]
+        topics_by_file[file.name] = _topics(file)
     return topics_by_file
+
+
+def _topics(file: Path) -> list[dict[str, Any]]:
+    """The topics in a file or in the folder of a bag."""
+    return [{**asdict(topic), "rate_hz": topic.rate_hz} for topic in topic_facts(file)]
 
 
 def _recording_files(path: Path, form: str) -> list[Path]:
@@ -111,8 +134,7 @@ def _print_facts(facts: dict[str, Any]) -> None:
     console = terminal.console()
     console.print(f"{facts['path']}: form '{facts['form']}', {facts['frames']} frames in {facts['duration_s']:.3f} s")
     for name, topics in facts["files"].items():
-        rows = [_topic_row(topic) for topic in topics]
-        console.print(terminal.table(name, TOPIC_HEADINGS, rows))
+        _print_topics(name, topics, console)
     _print_calibration(facts["calibration"], console)
     console.print(f"ground truth: {_format_truth(facts['ground_truth'])}")
     for note in facts["notes"]:
@@ -121,6 +143,11 @@ def _print_facts(facts: dict[str, Any]) -> None:
         versions = ", ".join(f"{name} {version}" for name, version in facts["provenance"].items())
         console.print(f"payload SHA-256: {facts['payload_sha256']}")
         console.print(versions or "no provenance")
+
+
+def _print_topics(name: str, topics: list[dict[str, Any]], console: "Console") -> None:
+    rows = [_topic_row(topic) for topic in topics]
+    console.print(terminal.table(name, TOPIC_HEADINGS, rows))
 
 
 def _print_calibration(calibration: dict[str, Any], console: "Console") -> None:

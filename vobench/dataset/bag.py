@@ -38,13 +38,15 @@ from vobench.dataset.recording import (
     assemble,
 )
 from vobench.errors import InputError
+from vobench.geometry import se3
+from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sequence.mcap_file import MAGIC
 from vobench.sequence.message import stamp_ns
 from vobench.sequence.recording import MAGICS, METADATA, open_bag, read_first_poses
 from vobench.sequence.topic import IMU, LEFT_IMAGE, RIGHT_IMAGE, SENSORS_FILE, TF_STATIC
-from vobench.trajectory.trajectory import Stamps
+from vobench.trajectory.trajectory import Stamps, Trajectory
 
 BASE = "base_link"
 MOST_PROFILE = 256  # the number of bytes of a profile's name that are read
@@ -89,6 +91,9 @@ def read_bag(path: Path, options: ReadOptions, *, form: str) -> Recording:
     notes = [*chosen.notes, "Stamps are those in the messages' headers.", *pictures.notes]
     if options.calibration is None:
         notes += body_notes
+    elif truth is not None:
+        truth, truth_notes = _of_chain_body(truth, calibration.rig, chosen, contents)
+        notes += truth_notes
     notes += [*calibration.notes, *imu.notes]
     encoding = getattr(contents.first[chosen.left], "encoding", "")
     if encoding.lower() in MOSAICS:
@@ -303,6 +308,26 @@ def _body(chosen: SelectedTopics, contents: BagContents) -> tuple[str | None, No
         return None, (f"The body is the left camera; the truth is of {truth_frame}, whose position is not known.",)
     assumed = ", and the truth was assumed to be of it" if topic else ""
     return None, (f"The body is the left camera{assumed}.",)
+
+
+def _of_chain_body(
+    truth: Trajectory, rig: Rig, chosen: SelectedTopics, contents: BagContents
+) -> tuple[Trajectory, Notes]:
+    """The poses of the body of a camchain, from the poses of the frame that the bag gives, and a note on them.
+
+    They are converted if /tf_static connects that frame with the left camera, and otherwise taken as they are.
+    """
+    truth_frame = _truth_frame(chosen, contents)
+    if not truth_frame:
+        return truth, (f"The frame of {chosen.truth_topic} was assumed to be the body.",)
+    T_truth_left = find_transform(contents.transforms, truth_frame, contents.frame_of(chosen.left))
+    if T_truth_left is None:
+        return truth, (
+            f"The truth is of {truth_frame}, whose position is not known, and was assumed to be of the body.",
+        )
+    T_truth_body = T_truth_left @ se3.inverse(rig.T_body_left)
+    converted = replace(truth, T_world_frame=truth.T_world_frame @ T_truth_body)
+    return converted, (f"The truth of {truth_frame} was converted to the body by /tf_static.",)
 
 
 def _truth_frame(chosen: SelectedTopics, contents: BagContents) -> str:
