@@ -277,6 +277,29 @@ class Scene:
         put(folder / "groundtruth.txt", "# ground truth trajectory\n" + "\n".join(rows) + "\n")
         return folder
 
+    def kapture(self, folder: Path, *, unit_ns: int = 1) -> Path:
+        """A rig of two cameras with fisheye lenses, and the poses of the rig."""
+        sensors = folder / "sensors"
+        head = "# kapture format: 1.1\n"
+        lens = "camera, OPENCV_FISHEYE, 48, 32, 40.5, 41.25, 23.5, 15.25, -0.28, 0.07, 0.0002, 0.000015"
+        put(sensors / "sensors.txt", f"{head}starboard, , {lens}\nport, , {lens}\nantenna, , gnss, EPSG:4326\n")
+        mounts = {"starboard": T_BODY_LEFT @ T_LEFT_RIGHT, "port": T_BODY_LEFT}
+        rows = [f"ship, {name}, {pose_row(se3.inverse(T))}\n" for name, T in mounts.items()]
+        put(sensors / "rigs.txt", head + "".join(rows))
+        stamps = (self.t_ns // unit_ns).tolist()
+        lines = []
+        for name, pictures in (("port", self.left), ("starboard", self.right)):
+            for stamp, pixels in zip(stamps, pictures, strict=True):
+                lines.append(f"{stamp}, {name}, {name}/{stamp}.png\n")
+                png(sensors / "records_data" / name / f"{stamp}.png", pixels)
+        put(sensors / "records_camera.txt", head + "".join(reversed(lines)))
+        poses = zip(stamps, self.T_world_body, strict=True)
+        put(
+            sensors / "trajectories.txt",
+            head + "".join(f"{stamp}, ship, {pose_row(se3.inverse(T))}\n" for stamp, T in poses),
+        )
+        return folder
+
     def tartanair(self, folder: Path) -> Path:
         """P000 of the first TartanAir, 640 x 480 in colour."""
         for name, side, pictures in (("image_left", "left", self.left), ("image_right", "right", self.right)):
@@ -287,6 +310,12 @@ class Scene:
         rows = np.hstack([self.T_world_body[:, :3, 3], q]).tolist()
         put(folder / "pose_left.txt", "".join(" ".join(map(repr, row)) + "\n" for row in rows))
         return folder
+
+
+def pose_row(T: Array) -> str:
+    """A transform as kapture writes it: qw, qx, qy, qz, tx, ty, tz."""
+    qx, qy, qz, qw = se3.to_quaternion(T[None, :3, :3])[0].tolist()
+    return ", ".join(map(repr, [qw, qx, qy, qz, *T[:3, 3].tolist()]))
 
 
 def put(path: Path, text: str) -> None:

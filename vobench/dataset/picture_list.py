@@ -110,6 +110,15 @@ def listed_pictures(
     Raises InputError if a list is not valid, if there is no pair, or if all files are missing.
     """
     cameras = [read_list(path, folder, separator=separator, unit=unit) for path, folder in lists]
+    return paired_pictures(cameras, within_ns=within_ns)
+
+
+def paired_pictures(cameras: list[PictureList], *, within_ns: int) -> tuple[list[PictureList], Notes]:
+    """The existing pictures of one or two cameras, paired by their stamps, and notes on what was dropped.
+
+    `within_ns` is the largest difference between the stamps of a pair.
+    Raises InputError if there is no pair, or if all files are missing.
+    """
     notes = Notes()
     if len(cameras) > 1:
         left, right = cameras
