@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 import pytest
@@ -37,9 +38,11 @@ def explained(
     seed: int = 1,
     seeds: Effort = SEEDS,
     present: Sequence[Nuisance] | None = None,
+    parts: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Explanation:
-    """The explanation where a case with these nuisances left has that mean error."""
+    """The explanation where a case with these nuisances, and parts of them, left has that mean error."""
     chosen = nuisances() if present is None else present
+    names = {nuisance.name for nuisance in chosen}.union(*parts.values())
     rng = np.random.default_rng(seed)
 
     def measure(cases: Mapping[str, Case]) -> Mapping[str, Sequence[Outcome]]:
@@ -47,12 +50,12 @@ def explained(
 
     def outcome(case: Case) -> Outcome:
         of_seed = np.random.default_rng(case.seed).lognormal(0, 0.1)
-        left = {nuisance.name for nuisance in chosen} - set(case.variant["removed"].split(","))
+        left = names - set(case.variant["removed"].split(","))
         mean = error(left)
         loss = mean * of_seed * rng.lognormal(0, spread) * rng.lognormal(0, 0.3, 24)
         return Outcome("lost" if mean > 0.5 else "ok", mean <= 0.5, np.minimum(loss, 1.0))
 
-    return explain(hard, chosen, measure, seeds=seeds, remove=remove)
+    return explain(hard, chosen, measure, seeds=seeds, remove=remove, parts=parts)
 
 
 def test_the_one_cause_is_named_and_no_pair_is_tried(hard: Case) -> None:
@@ -61,6 +64,28 @@ def test_the_one_cause_is_named_and_no_pair_is_tried(hard: Case) -> None:
     assert found.singles[0].low > 0.8
     assert not found.pairs
     assert not found.alone
+
+
+PARTS = MappingProxyType({"blur": ("motion blur", "defocus"), "noise": ("shot noise", "read noise")})
+
+
+def test_of_the_one_cause_each_part_is_removed_by_itself(hard: Case) -> None:
+    def error(left: set[str]) -> float:
+        return 0.4 if left >= {"blur", "defocus"} else 0.02
+
+    found = explained(hard, error, parts=PARTS)
+    assert found.named == ("blur",)
+    assert [change.removed for change in found.parts] == [("defocus",), ("motion blur",)]
+    defocus, motion_blur = found.parts
+    assert defocus.is_sure
+    assert defocus.reduction > 0.8
+    assert abs(motion_blur.reduction) < 0.3
+    assert found.trials <= SEEDS.most_trials(len(NAMES) + len(CIRCUMSTANCES), parts=2)
+
+
+def test_parts_of_what_is_not_the_only_cause_are_left_in(hard: Case) -> None:
+    assert explained(hard, lambda left: 0.4 if left & {"blur", "noise"} else 0.02, parts=PARTS).parts == ()
+    assert explained(hard, lambda _: 0.3, parts=PARTS).parts == ()
 
 
 def test_two_causes_of_which_each_alone_is_enough_are_named_together(hard: Case) -> None:

@@ -32,7 +32,7 @@ def test_noise_is_named_and_mends_the_trial(noisy_run: NoisyRun) -> None:
     frame = found.to_frame()
     assert frame["removed"].iloc[0] == "noise"
     assert frame["removed"].iloc[-1] == " and ".join(found.explanation.everything.removed)
-    assert {"no difference", "undecided"} & set(frame["verdict"])
+    assert {"does not help", "undecided"} & set(frame["verdict"])
 
 
 @slow
@@ -149,7 +149,7 @@ def explained(
 def test_each_variant_has_its_verdict_and_everything_comes_last() -> None:
     rows = explained().rows()
     verdicts = [row["verdict"] for row in rows]
-    assert verdicts == ["fixes it", "helps", "undecided", "no difference", "harms", "undecided", "fixes it"]
+    assert verdicts == ["fixes it", "helps", "undecided", "does not help", "harms", "undecided", "fixes it"]
     assert [row["removed"] for row in rows][5:] == [PAIR.removed, EVERYTHING.removed]
     assert rows[0]["instead"] == "a short exposure and a sharp lens"
     assert rows[5]["instead"] == ""
@@ -171,7 +171,7 @@ def test_a_single_nuisance_is_listed_once() -> None:
 def test_one_cause_is_said_with_its_remedy_what_else_helps_and_what_harms() -> None:
     assert explained().sentences == (
         "mine loses track at 3.2 s because the images are blurred. With a short exposure and a sharp lens, the error "
-        "drops by 80% (95 % CI 70% to 100%) and 2 of 6 runs end well: expose shorter and focus the lens.",
+        "drops by 80% (95 % CI 70% to 100%), to 10.0%, and 2 of 6 runs end well: expose shorter and focus the lens.",
         "It also depends on noise (20% less).",
         "Diffuse surfaces would make it worse: the error grows by 20%.",
     )
@@ -189,10 +189,27 @@ def test_alternatives_and_pairs_are_said_as_such() -> None:
     together = explained(singles=singles, pairs=(change("blur", "noise", reduction=0.85),))
     assert together.sentences == (
         "mine loses track at 3.2 s because the images are blurred and the images are noisy, each by itself. Without "
-        "both, the error drops by 85% (95 % CI 75% to 100%) and 2 of 6 runs end well: expose shorter and focus the "
-        "lens, and add light, expose longer with less gain, or smooth the images.",
+        "both, the error drops by 85% (95 % CI 75% to 100%), to 10.0%, and 2 of 6 runs end well: expose shorter and "
+        "focus the lens, and add light, expose longer with less gain, or smooth the images.",
     )
     assert together.rows()[2]["verdict"] == "fixes it"
+
+
+def test_the_parts_of_a_cause_are_said_with_the_advice_for_the_one_that_matters() -> None:
+    brightness = change("unlike brightness", reduction=-0.04, is_sure=False)
+    lenses = change("unlike lenses", reduction=0.7)
+    found = explained(singles=(change("unlike eyes", reduction=0.8), FLARE))
+    found = replace(found, explanation=replace(found.explanation, parts=(lenses, brightness)))
+    assert found.sentences[1] == (
+        "With two equally sharp and clean lenses alone it drops by 70%, and with two equally bright cameras alone it "
+        "grows by 4%: focus and clean both lenses, or use the sharper camera alone."
+    )
+    assert [row["removed"] for row in found.rows()][:4] == [
+        ("unlike eyes",),
+        lenses.removed,
+        brightness.removed,
+        FLARE.removed,
+    ]
 
 
 def test_an_estimator_without_a_single_pose_does_not_lose_track_at_some_time() -> None:
@@ -214,7 +231,7 @@ def test_where_nothing_is_named_it_is_said_what_was_ruled_out_and_what_is_open()
 @pytest.mark.parametrize(
     ("status", "diverges_at_s", "symptom"),
     [
-        ("ok", 3.24, "mine has an error of 50.0% of the path, first divergence at 3.2 s,"),
+        ("ok", 3.24, "mine has an error of 50.0% of the path, which begins to grow at 3.2 s,"),
         ("partial", None, "mine has an error of 50.0% of the path,"),
         ("diverged", 0.5, "mine diverges at 0.5 s"),
         ("crashed", None, "mine crashes"),

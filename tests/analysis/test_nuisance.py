@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from vobench.analysis.conditions import conditions
-from vobench.analysis.nuisance import COATED_FINISHES, FAINT_FINISHES, NUISANCES, nuisances_of, without
+from vobench.analysis.nuisance import COATED_FINISHES, FAINT_FINISHES, NUISANCES, nuisance_named, nuisances_of, without
 from vobench.geometry import se3
 from vobench.geometry.rig import looking
 from vobench.motion.wander import Wander
@@ -112,6 +112,27 @@ CAMERA_CHANGES = {
 @pytest.mark.parametrize("name", CAMERA_CHANGES)
 def test_a_removal_sets_exactly_the_settings_of_its_nuisance(worst: Case, name: str) -> None:
     assert dict(changes(worst, without(worst, [name]))) == CAMERA_CHANGES[name]
+
+
+def unlike_eyes(case: Case, **differences: CameraDifference) -> Case:
+    return with_camera(case, unlike=CameraDifferences(**differences))
+
+
+def test_the_parts_of_unlike_eyes_are_brightness_and_lenses(hard: Case) -> None:
+    case = unlike_eyes(hard, left=CameraDifference(gain=0.9), right=CameraDifference(gain=0.5, blur_sigma_px=2.0))
+    parts = nuisance_named("unlike eyes").parts_of(case)
+    assert [part.name for part in parts] == ["unlike brightness", "unlike lenses"]
+    assert dict(changes(case, without(case, ["unlike brightness"]))) == CAMERA_CHANGES["unlike eyes"]
+    assert dict(changes(case, without(case, ["unlike lenses"]))) == {"camera.unlike.right.blur_sigma_px": None}
+    both = without(case, ["unlike brightness", "unlike lenses"])
+    assert both == without(case, ["unlike eyes"])
+
+
+def test_a_case_with_one_part_has_no_parts(hard: Case) -> None:
+    eyes = nuisance_named("unlike eyes")
+    assert eyes.parts_of(unlike_eyes(hard, right=CameraDifference(gain=0.5))) == ()
+    assert eyes.parts_of(unlike_eyes(hard, right=CameraDifference(dirt=0.1))) == ()
+    assert nuisance_named("noise").parts_of(hard) == ()
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -11,7 +11,7 @@ class CauseText:
     advice: str
 
 
-# By the names of `nuisance.NUISANCES`.
+# By the names of `nuisance.NUISANCES` and of their parts.
 CAUSE_TEXTS = {
     "mirrors": CauseText("mirrors and panes show things where they are not", "mask mirrors and panes in the images"),
     "gloss": CauseText("highlights move over glossy surfaces", "use softer light or a polarising filter"),
@@ -29,6 +29,13 @@ CAUSE_TEXTS = {
     "noise": CauseText("the images are noisy", "add light, expose longer with less gain, or smooth the images"),
     "unlike eyes": CauseText(
         "the two cameras differ", "give both cameras the same exposure and focus, or match independently of brightness"
+    ),
+    "unlike brightness": CauseText(
+        "the two cameras are not equally bright",
+        "give both cameras the same exposure, or match independently of brightness",
+    ),
+    "unlike lenses": CauseText(
+        "the lenses of the two cameras differ", "focus and clean both lenses, or use the sharper camera alone"
     ),
     "dropped frames": CauseText("frames are missing", "find out why frames are dropped, such as by a slow bus or disk"),
     "late images": CauseText(

@@ -6,6 +6,7 @@ Variants are screened with some seeds, and what is selected is confirmed with ot
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from types import MappingProxyType
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -69,12 +70,16 @@ class Effort:
         """The number of trials of the screening of some number of nuisances: as it is, each removed, and all."""
         return self.screening * (nuisances + 2)
 
-    def most_trials(self, nuisances: int) -> int:
-        """The largest number of trials: with each nuisance alone, pairs, and the confirmation of all that may be."""
+    def most_trials(self, nuisances: int, parts: int = 0) -> int:
+        """The largest number of trials: with each nuisance alone, pairs, and the confirmation of all that may be.
+
+        `parts` is the largest number of parts of a nuisance.
+        """
+        of_parts = self.confirming * parts
         if nuisances < FEWEST_IN_PAIRS:
             # Each set of them is a variant, and all variants may be confirmed.
             variants = int(2**nuisances)
-            return (self.screening + self.confirming) * variants
+            return (self.screening + self.confirming) * variants + of_parts
 
         each_alone = nuisances
         pairs = SUSPECTS * (SUSPECTS - 1) // 2
@@ -84,7 +89,8 @@ class Effort:
         best_pair_and_its_two = 3
         most_harmful = 1
         confirmed_variants = as_it_is_and_without_all + SUSPECTS + best_pair_and_its_two + most_harmful
-        return self.screening_trials(nuisances) + further_screening + self.confirming * confirmed_variants
+        confirmation = self.confirming * confirmed_variants
+        return self.screening_trials(nuisances) + further_screening + confirmation + of_parts
 
 
 def effort(repeats: int, *, is_deterministic: bool) -> Effort:
@@ -101,6 +107,7 @@ def explain(
     *,
     seeds: Effort,
     remove: Remove[C],
+    parts: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Explanation:
     """Run a case without each nuisance and without all, and run what seems to explain the failure with other seeds.
 
@@ -109,7 +116,8 @@ def explain(
     variants share, and the variants of a repeat are run one after the other.
 
     If no single nuisance explains the failure, it is run with each alone and without pairs of them. Circumstances,
-    such as speed, are changed one at a time.
+    such as speed, are changed one at a time. If a single cause consists of `parts`, by its name, each is removed by
+    itself.
     """
     removable = tuple(nuisance.name for nuisance in nuisances if not nuisance.is_circumstance)
     variants = _Variants(case, removable, measure, remove)
@@ -119,7 +127,7 @@ def explain(
     if selected:
         findings = _confirm(variants, findings, selected, seeds)
 
-    return Explanation(
+    explanation = Explanation(
         loss=_mean_loss(findings.baseline),
         status=_most_frequent_status(findings.baseline),
         repeats_differ=findings.repeats_differ,
@@ -129,6 +137,15 @@ def explain(
         pairs=_ranked(findings.pairs.values()),
         trials=findings.trials,
     )
+    if explanation.relation != "one":
+        return explanation
+    (cause,) = explanation.named
+    parts_of_cause = [(part,) for part in parts.get(cause, ())]
+    if not parts_of_cause:
+        return explanation
+    outcomes = variants.run(parts_of_cause, seeds.confirming_seeds)
+    changes = _changes({AS_IT_IS: findings.baseline, **outcomes}, is_confirmed=True)
+    return replace(explanation, parts=_ranked(changes.values()), trials=findings.trials + _count(outcomes))
 
 
 @dataclass(frozen=True, slots=True)

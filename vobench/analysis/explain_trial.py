@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 from vobench.analysis.cause_text import CAUSE_TEXTS
 from vobench.analysis.explain import effort, explain
-from vobench.analysis.explanation import MATERIAL, Change, Explanation, is_sufficient
-from vobench.analysis.nuisance import NUISANCES, Nuisance, nuisances_of, without
+from vobench.analysis.explanation import HALF, MATERIAL, Change, Explanation, is_sufficient
+from vobench.analysis.nuisance import NUISANCES, Nuisance, nuisance_named, nuisances_of, without
 from vobench.analysis.segment_loss import Outcome
 from vobench.analysis.trial_data import read_conditions, read_error_series, read_outcome, read_paths
 from vobench.analysis.trial_forecast import TrialForecast, estimator_seconds
@@ -62,11 +62,13 @@ class TrialExplanation:
         """What fails, why and what to do about it; then what else matters, what harms, and what was ruled out."""
         explanation = self.explanation
         sentences = [_cause_sentence(self.symptom, explanation)]
+        if explanation.parts:
+            sentences.append(_parts_sentence(explanation.parts))
         if explanation.contributing:
             parts = ", ".join(_with_reduction(change) for change in explanation.contributing)
             sentences.append(f"It also depends on {parts}.")
         for change in explanation.harmful:
-            instead = _nuisance(change.removed[0]).instead
+            instead = nuisance_named(change.removed[0]).instead
             sentences.append(f"{_upper(instead)} would make it worse: the error grows by {-change.reduction:.0%}.")
         if not explanation.named:
             sentences += _ruled_out_sentences(explanation)
@@ -81,11 +83,11 @@ class TrialExplanation:
         since = "" if self.diverges_at_s is None else f" at {self.diverges_at_s:.1f} s"
         if explanation.status in SYMPTOMS:
             return f"{self.estimator} {SYMPTOMS[explanation.status]}{since}"
-        first = since and f", first divergence{since}"
+        first = "" if self.diverges_at_s is None else f", which begins to grow{since}"
         return f"{self.estimator} has an error of {explanation.loss:.1%} of the path{first},"
 
     def verdict(self, change: Change) -> str:
-        """The effect of a change: "fixes it", "helps", "harms", "no difference", "unconfirmed" or "undecided".
+        """The effect of a change: "fixes it", "helps", "harms", "does not help", "unconfirmed" or "undecided".
 
         What seems to differ by the seeds of the screening, but was not run with others, is "unconfirmed".
         """
@@ -94,7 +96,7 @@ class TrialExplanation:
         if change.is_harmful:
             return "harms"
         if change.is_sure or change.is_ruled_out:
-            return "no difference"
+            return "does not help"
         seems_to_differ = change.low > 0 or change.high < 0
         return "unconfirmed" if seems_to_differ and not change.is_confirmed else "undecided"
 
@@ -107,11 +109,16 @@ class TrialExplanation:
     def rows(self) -> list[dict[str, Any]]:
         """One row per variant of the case: single nuisances removed, then pairs, then all of them.
 
-        `loss` is the error without them; `reduction` is the share by which the error decreased, and `low` and `high`
-        are its 95 % interval; `survived` of `repeats` trials ended well.
+        `before` and `loss` are the errors of the same seeds with and without them; `reduction` is the share by which
+        the error decreased, and `low` and `high` are its 95 % interval; `survived` of `repeats` trials ended well.
         """
         explanation = self.explanation
-        changes = [*explanation.singles, *explanation.pairs]
+        changes = list[Change]()
+        for change in explanation.singles:
+            changes.append(change)
+            if change.removed == self.named:
+                changes += explanation.parts
+        changes += explanation.pairs
         everything = explanation.everything
         if everything is not None and len(everything.removed) > 1 and everything not in changes:
             changes.append(everything)
@@ -120,8 +127,8 @@ class TrialExplanation:
     def _row(self, change: Change) -> dict[str, Any]:
         instead = ""
         if len(change.removed) == 1:
-            instead = _nuisance(change.removed[0]).instead
-        return {**asdict(change), "instead": instead, "verdict": self.verdict(change)}
+            instead = nuisance_named(change.removed[0]).instead
+        return {**asdict(change), "before": change.loss_before, "instead": instead, "verdict": self.verdict(change)}
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, as `vobench explain --json` prints them."""
@@ -160,7 +167,22 @@ def _cause_sentence(symptom: str, explanation: Explanation) -> str:
         remedies = "; or ".join(_advice(name) for name in names)
         return f"{symptom} because {reasons}. Either change suffices ({reductions}): {remedies}."
     (name,) = explanation.named
-    return f"{symptom} because {_because(name)}. With {_nuisance(name).instead}, {_reduction(cause)}: {_advice(name)}."
+    instead = nuisance_named(name).instead
+    return f"{symptom} because {_because(name)}. With {instead}, {_reduction(cause)}: {_advice(name)}."
+
+
+def _parts_sentence(parts: Sequence[Change]) -> str:
+    """How much of a cause is due to each of its parts."""
+    shares = [f"with {nuisance_named(change.removed[0]).instead} alone {_drop(change)}" for change in parts]
+    helping = [change.removed[0] for change in parts if change.is_sure and change.reduction >= HALF]
+    advice = f": {_advice(helping[0])}" if len(helping) == 1 else ""
+    return f"{_upper(', and '.join(shares))}{advice}."
+
+
+def _drop(change: Change) -> str:
+    if change.reduction < 0:
+        return f"it grows by {-change.reduction:.0%}"
+    return f"it drops by {change.reduction:.0%}"
 
 
 def _because(name: str) -> str:
@@ -196,7 +218,7 @@ def _reduction(change: Change) -> str:
     """By how much a change reduces the error, and how many runs end well with it."""
     interval = f"95 % CI {change.low:.0%} to {change.high:.0%}"
     ending_well = f"{change.survived} of {change.repeats} runs end well"
-    return f"the error drops by {change.reduction:.0%} ({interval}) and {ending_well}"
+    return f"the error drops by {change.reduction:.0%} ({interval}), to {change.loss:.1%}, and {ending_well}"
 
 
 def _upper(sentence: str) -> str:
@@ -230,7 +252,15 @@ def explain_trial(
     nuisances = _present_nuisances(finished)
     suite_name = f"explain_{finished.score.case.replace('-', '_')}_{finished.score.estimator}"
     seeds = effort(repeats, is_deterministic=finished.estimator_entry.manifest.deterministic)
-    forecast = TrialForecast(progress, seeds, len(nuisances), _seconds_per_trial(finished), removed="nuisances")
+    parts = {nuisance.name: _part_names(nuisance, finished.case) for nuisance in nuisances}
+    forecast = TrialForecast(
+        progress,
+        seeds,
+        len(nuisances),
+        _seconds_per_trial(finished),
+        removed="nuisances",
+        parts=max(map(len, parts.values())),
+    )
 
     def measure(cases: Mapping[str, Case]) -> dict[str, list[Outcome]]:
         with forecast.stage(len(cases)):
@@ -239,13 +269,17 @@ def explain_trial(
             _require_answers(finished.score, scores)
             return {score.case: [read_outcome(folder, score)] for score in scores}
 
-    explanation = explain(finished.case, nuisances, measure, seeds=seeds, remove=without)
+    explanation = explain(finished.case, nuisances, measure, seeds=seeds, remove=without, parts=parts)
     return TrialExplanation(
         finished.score.case,
         finished.score.estimator,
         explanation,
         diverges_at_s=_divergence_s(finished),
     )
+
+
+def _part_names(nuisance: Nuisance, case: Case) -> list[str]:
+    return [part.name for part in nuisance.parts_of(case)]
 
 
 def _divergence_s(trial: FinishedTrial) -> float | None:
@@ -294,7 +328,3 @@ def _present_nuisances(trial: FinishedTrial) -> tuple[Nuisance, ...]:
         known = ", ".join(nuisance.name for nuisance in NUISANCES)
         raise InputError(f"'{trial.case.name}' has nothing that can be removed. Known: {known}")
     return nuisances
-
-
-def _nuisance(name: str) -> Nuisance:
-    return next(nuisance for nuisance in NUISANCES if nuisance.name == name)

@@ -37,6 +37,11 @@ class Change:
     is_confirmed: bool
 
     @property
+    def loss_before(self) -> float | None:
+        """The error of the same seeds with all nuisances; None if there is none left without these."""
+        return self.loss / (1 - self.reduction) if self.reduction < 1 else None
+
+    @property
     def is_sure(self) -> bool:
         """Whether the error is significantly smaller without them."""
         return self.is_confirmed and self.p_less <= SURE_P and self.low > 0
@@ -58,7 +63,8 @@ class Explanation:
 
     `singles` and `pairs` have the largest improvement first. `everything` is the removal of all nuisances; None if the
     case has none. `alone` is the error with only that nuisance left; it is measured if no single one explains the
-    failure. `trials` is the number of trials that were run.
+    failure. `parts` are the changes by the parts of a named nuisance, such as the brightness of unlike eyes, the best
+    first; empty if it has none. `trials` is the number of trials that were run.
     """
 
     loss: float
@@ -69,6 +75,7 @@ class Explanation:
     alone: Mapping[str, float]
     pairs: tuple[Change, ...]
     trials: int
+    parts: tuple[Change, ...] = ()
 
     @property
     def sufficient(self) -> tuple[Change, ...]:

@@ -13,7 +13,7 @@ from vobench.geometry.rig import CalibrationError
 from vobench.motion.wander import Wander
 from vobench.motion.wheeled import Wheeled
 from vobench.runner.motion import body_motion, require_possible
-from vobench.sensor.image_sensor import CameraDifferences, CameraSensor
+from vobench.sensor.image_sensor import CameraDifference, CameraDifferences, CameraSensor
 from vobench.sensor.imu import FLAWLESS
 from vobench.sensor.response import FULL_SCALE_DN, linear_of_grey
 from vobench.suite.case import Case
@@ -46,7 +46,8 @@ class Nuisance:
     A case does not have the nuisance if the change has no effect on the case, or if the condition `shown_by` does not
     exceed `shown_above` in any of its frames. A circumstance, such as speed, is changed by itself: it is not among
     the nuisances that are removed together. `needs` are sensors without which an estimator does not notice it, and
-    `spoils` those that the change takes away.
+    `spoils` those that the change takes away. `parts` are what it consists of: if it is the cause, they are removed one
+    at a time.
     """
 
     name: str
@@ -57,6 +58,12 @@ class Nuisance:
     is_circumstance: bool = False
     needs: frozenset[str] = frozenset()
     spoils: frozenset[str] = frozenset()
+    parts: tuple["Nuisance", ...] = ()
+
+    def parts_of(self, case: Case) -> tuple["Nuisance", ...]:
+        """The parts that a case has; empty unless there are several."""
+        present = tuple(part for part in self.parts if _is_possible(part, case))
+        return present if len(present) > 1 else ()
 
 
 def nuisances_of(
@@ -102,9 +109,16 @@ def without(case: Case, removed: Iterable[str]) -> Case:
     """The case without these nuisances, which are removed in the order of NUISANCES."""
     names = set(removed)
     for nuisance in NUISANCES:
-        if nuisance.name in names:
-            case = nuisance.remove(case)
+        for each in (nuisance, *nuisance.parts):
+            if each.name in names:
+                case = each.remove(case)
     return case
+
+
+def nuisance_named(name: str) -> Nuisance:
+    """The nuisance with a name, or the part of one."""
+    every = [each for nuisance in NUISANCES for each in (nuisance, *nuisance.parts)]
+    return next(each for each in every if each.name == name)
 
 
 # --- Settings of the camera and its timing ---
@@ -113,6 +127,22 @@ def without(case: Case, removed: Iterable[str]) -> Case:
 def _with_camera(**settings: Any) -> Change:
     """A change of some settings of the camera."""
     return lambda case: replace(case, camera=replace(case.camera, **settings))
+
+
+def _with_equal_brightness(case: Case) -> Case:
+    """Give the chips of both cameras the same light."""
+    unlike = case.camera.unlike
+    equal = CameraDifferences(left=replace(unlike.left, gain=1.0), right=replace(unlike.right, gain=1.0))
+    return replace(case, camera=replace(case.camera, unlike=equal))
+
+
+def _with_equal_lenses(case: Case) -> Case:
+    """Give both cameras the lens of the settings, with their own brightness."""
+    unlike = case.camera.unlike
+    equal = CameraDifferences(
+        left=CameraDifference(gain=unlike.left.gain), right=CameraDifference(gain=unlike.right.gain)
+    )
+    return replace(case, camera=replace(case.camera, unlike=equal))
 
 
 def _with_timing(**settings: Any) -> Change:
@@ -421,7 +451,15 @@ NUISANCES = (
     ),
     Nuisance("blur", "a short exposure and a sharp lens", _without_blur),
     Nuisance("noise", "a chip without noise", _without_noise),
-    Nuisance("unlike eyes", "two equal cameras", _with_camera(unlike=CameraDifferences())),
+    Nuisance(
+        "unlike eyes",
+        "two equal cameras",
+        _with_camera(unlike=CameraDifferences()),
+        parts=(
+            Nuisance("unlike brightness", "two equally bright cameras", _with_equal_brightness),
+            Nuisance("unlike lenses", "two equally sharp and clean lenses", _with_equal_lenses),
+        ),
+    ),
     Nuisance("dropped frames", "every frame, once", _with_timing(drop_share=0.0, repeat_share=0.0)),
     Nuisance("late images", "both images taken at their time stamp", _with_timing(jitter_ms=0.0, right_delay_ms=0.0)),
     Nuisance("late IMU", "readings stamped when they are taken", _with_timing(imu_delay_ms=0.0)),

@@ -19,7 +19,7 @@ class TrialForecast:
     """Says how many trials an explanation runs, and how long the rest may take by the trials so far.
 
     `count` is the number of things that are removed, and `removed` what they are called. `seconds_per_trial` is an
-    estimate for the first stage; None if there is none.
+    estimate for the first stage; None if there is none. `parts` is the largest number of parts of one of them.
     """
 
     progress: Progress
@@ -27,6 +27,7 @@ class TrialForecast:
     count: int
     seconds_per_trial: float | None
     removed: str
+    parts: int = 0
     done: int = 0
     seconds: float = 0.0
 
@@ -40,7 +41,7 @@ class TrialForecast:
         self.done += trials
 
     def _sentence(self, trials: int) -> str:
-        most = self.seeds.most_trials(self.count)
+        most = self.seeds.most_trials(self.count, self.parts)
         numbers = f"trials {self.done + 1} to {self.done + trials} of at most {most}"
         if self.done == 0:
             seconds_per_trial = self.seconds_per_trial

@@ -19,8 +19,12 @@ from vobench.estimator.manifest import MANIFEST_FILE
 from vobench.runner.recording import may_be_recording
 
 COMMAND_CLASS = FormCommand
-TWIN_HEADINGS = ("without", "error", "less", "95 % interval", "survived")
-CHANGE_HEADINGS = ("change", "error", "less", "95 % interval", "survived", "verdict")
+TWIN_HEADINGS = ("without", "error", "difference", "95 % interval", "end well")
+CHANGE_HEADINGS = ("change", "error", "difference", "95 % interval", "end well", "verdict")
+LEGEND = (
+    "Error: before and after the change, of runs with the same seeds. Promising changes are run again with more "
+    "seeds, and only those decide."
+)
 
 TrialPath = Annotated[
     Path,
@@ -121,8 +125,15 @@ def _twin_row(row: dict[str, Any]) -> list[str]:
     return [
         " and ".join(row["removed"]),
         f"{row['loss']:.1%}",
-        f"{row['reduction']:.0%}",
-        f"{row['low']:.0%} to {row['high']:.0%}",
+        *_effect_cells(row),
+    ]
+
+
+def _effect_cells(row: dict[str, Any]) -> list[str]:
+    """The relative difference of the error, its interval, and the runs that end well."""
+    return [
+        f"{-row['reduction']:+.0%}",
+        f"{-row['high']:+.0%} to {-row['low']:+.0%}",
         f"{row['survived']} of {row['repeats']}",
     ]
 
@@ -132,6 +143,7 @@ def _print_explanation(result: TrialExplanation) -> None:
     explanation = result.explanation
     title = f"{result.estimator} on {result.case}: {explanation.status}, error {explanation.loss:.1%} of the path"
     console.print(terminal.table(title, CHANGE_HEADINGS, _change_rows(result)))
+    console.print(LEGEND, soft_wrap=True)
     if explanation.alone:
         by_loss = sorted(explanation.alone.items(), key=lambda item: -item[1])
         losses = ", ".join(f"{name} {loss:.1%}" for name, loss in by_loss)
@@ -152,14 +164,9 @@ def _change_row(row: dict[str, Any], everything: tuple[str, ...]) -> list[str]:
     is_everything = len(everything) > 1 and row["removed"] == everything
     removed = "all of these" if is_everything else " and ".join(row["removed"])
     change = f"{removed} → {row['instead']}" if row["instead"] else f"without {removed}"
-    return [
-        change,
-        f"{row['loss']:.1%}",
-        f"{row['reduction']:.0%}",
-        f"{row['low']:.0%} to {row['high']:.0%}",
-        f"{row['survived']} of {row['repeats']}",
-        row["verdict"],
-    ]
+    before = "–" if row["before"] is None else f"{row['before']:.1%}"
+    error = f"{before} → {row['loss']:.1%}"
+    return [change, error, *_effect_cells(row), row["verdict"]]
 
 
 @with_option_groups

@@ -34,8 +34,8 @@ NO_SCALE_SETTINGS = replace(SETTINGS, alignment="sim3", full=True)
 NO_SCALE_METRICS = tuple(metric for metric in DEFINITIONS.values() if not metric.full or metric.id == "scale_drift")
 
 # A camera is stationary if its distance and rotation from its first pose stay within these limits, which allow for the
-# jitter of a tracker and for vibration: the standing drone of EuRoC's V1_01 comes to 2.3 mm and 0.20°. The length of the
-# path is no criterion, because it sums the jitter.
+# jitter of a tracker and for vibration: the standing drone of EuRoC's V1_01 comes to 2.3 mm and 0.20°. The length of
+# the path is no criterion, because it sums the jitter.
 STILL_M = 5e-3
 STILL_RAD = np.deg2rad(0.5)
 
