@@ -200,6 +200,7 @@ def test_the_parts_of_a_cause_are_said_with_the_advice_for_the_one_that_matters(
     lenses = change("unlike lenses", reduction=0.7)
     found = explained(singles=(change("unlike eyes", reduction=0.8), FLARE))
     found = replace(found, explanation=replace(found.explanation, parts=(lenses, brightness)))
+    assert found.sentences[0].endswith("2 of 6 runs end well.")
     assert found.sentences[1] == (
         "With two equally sharp and clean lenses alone it drops by 70%, and with two equally bright cameras alone it "
         "grows by 4%: focus and clean both lenses, or use the sharper camera alone."
@@ -210,6 +211,16 @@ def test_the_parts_of_a_cause_are_said_with_the_advice_for_the_one_that_matters(
         brightness.removed,
         FLARE.removed,
     ]
+
+
+def test_parts_that_both_help_leave_the_advice_to_the_cause() -> None:
+    parts = (change("unlike lenses", reduction=0.7), change("unlike brightness", reduction=0.6))
+    found = explained(singles=(change("unlike eyes", reduction=0.8),))
+    found = replace(found, explanation=replace(found.explanation, parts=parts))
+    assert found.sentences[0].endswith(
+        "give both cameras the same exposure and focus, or match independently of brightness."
+    )
+    assert found.sentences[1].endswith("with two equally bright cameras alone it drops by 60%.")
 
 
 def test_an_estimator_without_a_single_pose_does_not_lose_track_at_some_time() -> None:

@@ -168,15 +168,22 @@ def _cause_sentence(symptom: str, explanation: Explanation) -> str:
         return f"{symptom} because {reasons}. Either change suffices ({reductions}): {remedies}."
     (name,) = explanation.named
     instead = nuisance_named(name).instead
-    return f"{symptom} because {_because(name)}. With {instead}, {_reduction(cause)}: {_advice(name)}."
+    advice = "" if _decisive_part(explanation.parts) else f": {_advice(name)}"
+    return f"{symptom} because {_because(name)}. With {instead}, {_reduction(cause)}{advice}."
 
 
 def _parts_sentence(parts: Sequence[Change]) -> str:
-    """How much of a cause is due to each of its parts."""
+    """How much of a cause is due to each of its parts, and what to do if one of them decides."""
     shares = [f"with {nuisance_named(change.removed[0]).instead} alone {_drop(change)}" for change in parts]
-    helping = [change.removed[0] for change in parts if change.is_sure and change.reduction >= HALF]
-    advice = f": {_advice(helping[0])}" if len(helping) == 1 else ""
+    decisive = _decisive_part(parts)
+    advice = f": {_advice(decisive)}" if decisive else ""
     return f"{_upper(', and '.join(shares))}{advice}."
+
+
+def _decisive_part(parts: Sequence[Change]) -> str:
+    """The only part that surely achieves half of the reduction; empty if there is none, or several."""
+    helping = [change.removed[0] for change in parts if change.is_sure and change.reduction >= HALF]
+    return helping[0] if len(helping) == 1 else ""
 
 
 def _drop(change: Change) -> str:

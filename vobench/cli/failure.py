@@ -132,10 +132,16 @@ def _twin_row(row: dict[str, Any]) -> list[str]:
 def _effect_cells(row: dict[str, Any]) -> list[str]:
     """The relative difference of the error, its interval, and the runs that end well."""
     return [
-        f"{-row['reduction']:+.0%}",
-        f"{-row['high']:+.0%} to {-row['low']:+.0%}",
+        _signed(-row["reduction"]),
+        f"{_signed(-row['high'])} to {_signed(-row['low'])}",
         f"{row['survived']} of {row['repeats']}",
     ]
+
+
+def _signed(share: float) -> str:
+    """A share in whole per cent with its sign, and 0 without."""
+    per_cent = round(100 * share)
+    return f"{per_cent:+d}%" if per_cent else "0%"
 
 
 def _print_explanation(result: TrialExplanation) -> None:
