@@ -6,8 +6,12 @@ from itertools import pairwise
 import cv2
 import numpy as np
 import pytest
+from pydantic import TypeAdapter
 
 from tests.analysis.test_image_noise import as_grey, boards
+from tests.analysis.test_stereo_fit import MOVING_SHOTS
+from tests.analysis.test_stereo_fit import RIG as PAINTED_RIG
+from tests.analysis.test_stereo_fit import shots as painted_shots
 from vobench.analysis.image_statistics import gradients, picture_statistics, spectrum, track_statistics
 from vobench.analysis.realism import (
     STATISTICS,
@@ -21,11 +25,12 @@ from vobench.analysis.realism import (
     side_effects,
     window_starts,
 )
-from vobench.analysis.stereo_fit import StereoFit, Uncertain
+from vobench.analysis.stereo_fit import StereoFit, Uncertain, fit_pair
 from vobench.analysis.stereo_matches import Matches
 from vobench.errors import InputError
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry.camera import Pinhole
-from vobench.geometry.rig import stereo_rig
+from vobench.geometry.rig import CalibrationError, CameraError, stereo_rig, true_rig
 from vobench.runner.recording import read_recording
 from vobench.sensor.image_sensor import CAMERAS, CameraSettings, NoiseStreams, expose
 
@@ -42,11 +47,11 @@ def test_runs_of_pictures_lie_apart_and_within_the_recording():
         window_starts(1)
 
 
-def test_one_eye_has_eight_statistics_and_a_sentence():
+def test_one_eye_has_no_statistics_of_a_pair_and_a_sentence():
     picture = as_grey(boards())
     found = measure([[FrameSample(picture, None)] * 3], RIG)
-    assert list(found.values) == [s.name for s in STATISTICS][1:]
-    assert found.values["tracks_home"] == 100
+    expected = [s.name for s in STATISTICS if s.name not in ("row_error_px", "tracks_home", "track_life")]
+    assert list(found.values) == expected  # the camera is at rest
     assert pair_sentences(found)[0].startswith("There is no stereo pair to judge")
 
 
@@ -80,22 +85,34 @@ def test_statistics_of_images_are_means_over_the_images_of_all_runs() -> None:
     assert found.pictures == 3
 
 
-def test_tracks_of_a_still_run_are_all_consistent_and_last_for_the_13_images_after_the_first() -> None:
+def panned(count: int) -> list[np.ndarray]:
+    """Images of a camera that turns by a pixel from image to image."""
+    texture = as_grey(boards())
+    return [np.roll(texture, -shift, axis=1) for shift in range(count)]
+
+
+def test_a_camera_at_rest_has_no_statistics_of_tracks() -> None:
     found = measure([run(*[as_grey(boards())] * WINDOW)], RIG)
-    assert found.values["tracks_home"] == 100
-    assert found.values["track_life"] == 13
+    assert "tracks_home" not in found.values
+    assert "track_life" not in found.values
     assert found.also["flow_px"] == pytest.approx(0, abs=0.01)
+    moving = measure([run(*panned(WINDOW))], RIG)
+    assert moving.values["tracks_home"] > 90
+    assert moving.values["track_life"] > 9
 
 
 def test_track_length_counts_the_images_until_the_view_is_blocked() -> None:
-    texture = as_grey(boards())
-    found = measure([run(*[texture] * 5, *[flat(128)] * (WINDOW - 5))], RIG)
-    assert found.values["track_life"] == pytest.approx(4, abs=0.3)
-    short = measure([run(*[texture] * 5)], RIG)
-    assert short.values["track_life"] == 4
-    both = measure([run(*[texture] * 5), run(*[texture] * WINDOW)], RIG)
-    assert both.values["track_life"] == pytest.approx((4 + 13) / 2)
-    assert len(both.curves["alive"]) == WINDOW
+    found = measure([run(*panned(5), *[flat(128)] * (WINDOW - 5))], RIG)
+    assert found.values["track_life"] == pytest.approx(4, abs=0.4)
+    assert len(found.curves["alive"]) == WINDOW
+    short = measure([run(*panned(5))], RIG)  # at most 4 images, where the range is for 13
+    assert "track_life" not in short.values
+    assert short.values["tracks_home"] > 90
+
+
+def test_values_at_the_rim_of_a_range_are_in_it_as_they_are_printed() -> None:
+    (unevenness,) = (statistic for statistic in STATISTICS if statistic.name == "corner_unevenness")
+    assert [unevenness.verdict(value) for value in (0.704, 0.346, 0.706, 0.344)] == ["in", "in", "high", "low"]
 
 
 def test_curves_count_every_pixel_of_every_image_once() -> None:
@@ -179,7 +196,7 @@ def fit(**changes) -> StereoFit:
         gain=1.0,
         disparity_px=(1.0, 2.0, 3.0),
         yaw_deg=nothing,
-        yaw_from="rows",
+        yaw_from="rows and motion",
     )
     return replace(perfect, **changes)
 
@@ -215,11 +232,40 @@ def test_roll_and_pitch_are_named_where_they_are_significant_and_not_tiny() -> N
     assert len(sentences(fit(roll_deg=Uncertain(0.02, 0.01)))) == 1
 
 
-def test_rows_that_no_rotation_explains_are_the_lenss_unless_they_gave_the_yaw() -> None:
-    xy_px = Uncertain(0.5, 0.01)
-    (_, sentence) = sentences(fit(xy_px=xy_px, yaw_from="motion"))
-    assert "+0.50 px × xy, which no rotation of a camera explains" in sentence
-    assert len(sentences(fit(xy_px=xy_px, yaw_from="rows and motion"))) == 1
+@pytest.fixture(scope="module")
+def lens_fit() -> StereoFit:
+    """The fit of a right lens with a tangential term and a shifted centre."""
+    error = CalibrationError(right=CameraError(tangential=(0.0, 0.01), center_px=(1.5, 0.0)), right_roll_deg=0.1)
+    found = fit_pair([painted_shots(error, MOVING_SHOTS)], stereo_pair(PAINTED_RIG, "test"))
+    assert found is not None
+    return found
+
+
+def test_rows_and_disparities_that_no_rotation_explains_are_the_lenss(lens_fit: StereoFit) -> None:
+    (sentence,) = (each for each in sentences(lens_fit) if each.startswith("No rotation of a camera explains rows"))
+    assert "px × xy" in sentence
+    assert sentence.endswith("the lens model or the rectification is wrong.")
+
+
+def test_a_rig_with_the_errors_that_were_found_has_the_rows_and_offsets_of_the_pair(lens_fit: StereoFit) -> None:
+    settings = residual(lens_fit)
+    assert set(settings) >= {"right_roll_deg", "right_pitch_deg", "right_yaw_deg", "right"}
+    error = TypeAdapter(CalibrationError).validate_python(settings)
+    true = true_rig(PAINTED_RIG, error)
+    rays = np.array([[x, y, 1.0] for x in (-0.3, 0.0, 0.3) for y in (-0.2, 0.2)])
+    R_true_nominal = true.T_body_right[:3, :3].T @ PAINTED_RIG.T_body_right[:3, :3]
+    shift_px = true.right.project(rays @ R_true_nominal.T) - PAINTED_RIG.right.project(rays)
+    x, y, _ = rays.T
+    expected_x_px = 1.5 + 300 * 0.01 * (3 * x * x + y * y) + 300 * np.deg2rad(0.1) * y
+    expected_y_px = 300 * 2 * 0.01 * x * y - 300 * np.deg2rad(0.1) * x
+    np.testing.assert_allclose(shift_px[:, 0], expected_x_px, atol=0.25)
+    np.testing.assert_allclose(shift_px[:, 1], expected_y_px, atol=0.05)
+
+
+def test_nothing_is_said_of_an_offset_that_rows_alone_suggest() -> None:
+    at_rest = fit(yaw_deg=Uncertain(0.1, 0.001), yaw_from="rows")
+    assert sentences(at_rest)[0].startswith("The offset of disparity cannot be determined")
+    assert residual(at_rest) == {}
 
 
 @pytest.mark.parametrize(("gain", "word"), [(1.06, "brighter"), (0.94, "darker"), (1.04, None), (0.96, None)])

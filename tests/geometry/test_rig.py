@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from vobench.errors import InputError, SettingError, VobenchError
 from vobench.geometry import se3
-from vobench.geometry.camera import Equirectangular, Pinhole
+from vobench.geometry.camera import BrownConrady, Equirectangular, Pinhole
 from vobench.geometry.rig import (
     LENSES,
     PIONEER_WHEELS,
@@ -32,6 +32,7 @@ from vobench.geometry.rig import (
     rectification,
     resized,
     stereo_rig,
+    true_camera,
     true_rig,
 )
 
@@ -127,6 +128,25 @@ def test_an_eyes_own_error_is_added_to_that_of_both_and_is_of_no_other_eye() -> 
     turn = Rotation.from_matrix(EUROC.T_body_left[:3, :3].T @ left.T_body_left[:3, :3])
     np.testing.assert_allclose(turn.as_rotvec(degrees=True), [0, 0, 0.3], atol=1e-12)
     np.testing.assert_array_equal(left.T_body_right, EUROC.T_body_right)
+
+
+def test_tangential_terms_are_added_and_make_a_pinhole_a_brown_conrady_lens() -> None:
+    error = CameraError(tangential=(0.002, -0.004), center_px=(1.0, 0.0))
+    true = true_camera(EUROC.right, error)
+    assert true.p1 - EUROC.right.p1 == pytest.approx(0.002)
+    assert true.p2 - EUROC.right.p2 == pytest.approx(-0.004)
+    pinhole = Pinhole(640, 480, 400.0, 410.0, 319.5, 239.5)
+    lens = true_camera(pinhole, error)
+    assert isinstance(lens, BrownConrady)
+    x, y = 0.5, -0.3
+    moved_px = lens.project([x, y, 1.0]) - pinhole.project([x, y, 1.0])
+    r_squared = x * x + y * y
+    along_x = 2 * 0.002 * x * y - 0.004 * (r_squared + 2 * x * x)
+    along_y = 0.002 * (r_squared + 2 * y * y) - 2 * 0.004 * x * y
+    np.testing.assert_allclose(moved_px, [400 * along_x + 1, 410 * along_y], atol=1e-9)
+    fisheye = PRESETS["fisheye"].right
+    with pytest.raises(VobenchError, match=r"^tangential needs a pinhole or a lens of model brown_conrady, got Kann"):
+        true_camera(fisheye, error)
 
 
 @every_rig
@@ -373,7 +393,7 @@ def test_the_errors_drawn_from_a_seed_stay_the_same() -> None:
 
 def test_a_settings_class_of_errors_is_no_error_by_default() -> None:
     numbers = [getattr(CameraError(), name) for name in CameraError.__dataclass_fields__]
-    assert numbers == [0.0, (0.0, 0.0), 0.0, 0.0, 0.0, 0.0]
+    assert numbers == [0.0, (0.0, 0.0), 0.0, (0.0, 0.0), 0.0, 0.0, 0.0]
     error = CalibrationError()
     assert (error.level, error.left, error.right) == ("none", CameraError(), CameraError())
     assert error.of_eye("left") == error.of_eye("right") == CameraError()

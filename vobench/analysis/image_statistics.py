@@ -167,11 +167,12 @@ class TrackStatistics:
 
     `consistent_share` is the share of forward–backward consistent tracks from one image to the next, and `flow_px` the
     median length of these, both as means over the run. `alive_share` (P,) is the share of the first image's corners
-    that are still tracked, by image.
+    that are still tracked, by image, and `moved_px` the largest median distance of these from their first places.
     """
 
     consistent_share: float
     flow_px: float
+    moved_px: float
     alive_share: Array
 
 
@@ -181,6 +182,8 @@ def track_statistics(pictures: Sequence[Image]) -> TrackStatistics:
     flows_px = []
     alive_shares = [1.0]
     alive = corners(pictures[0])
+    start = alive
+    moved_px = 0.0
     first_count = max(len(alive), 1)
     for picture, later in pairwise(pictures):
         points = corners(picture)
@@ -190,9 +193,12 @@ def track_statistics(pictures: Sequence[Image]) -> TrackStatistics:
 
         tracked, is_consistent = follow(picture, later, alive)
         if len(alive):
-            alive = tracked[is_consistent & inside(tracked, later, 0)]
+            is_alive = is_consistent & inside(tracked, later, 0)
+            alive = tracked[is_alive]
+            start = start[is_alive]
+            moved_px = max(moved_px, _median_length(alive - start))
         alive_shares.append(len(alive) / first_count)
-    return TrackStatistics(_mean(consistent_shares), _mean(flows_px), np.array(alive_shares))
+    return TrackStatistics(_mean(consistent_shares), _mean(flows_px), moved_px, np.array(alive_shares))
 
 
 def _median_length(vectors: Points) -> float:

@@ -6,6 +6,7 @@ The ranges are those of 14 images each of KITTI 00, 01, 06 and EuRoC V1_01. More
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,8 @@ from vobench.analysis.image_statistics import (
     spectrum,
     track_statistics,
 )
+from vobench.analysis.pair_calibration import PairCalibration
+from vobench.analysis.pair_parameter import PITCH, RIGHT_FOCAL, ROLL, YAW
 from vobench.analysis.stereo_fit import StereoFit, Uncertain, fit_pair
 from vobench.analysis.stereo_matches import PairShot
 from vobench.dataset.recording import Recording
@@ -43,10 +46,11 @@ class Statistic:
     lowered_by: str
 
     def verdict(self, value: float) -> str:
-        """Whether a value is "in" the range, too "low" or too "high"."""
-        if value < self.low:
+        """Whether a value, as it is printed, is "in" the range, too "low" or too "high"."""
+        printed = round(value, PRINTED_DIGITS)
+        if printed < round(self.low, PRINTED_DIGITS):
             return "low"
-        return "high" if value > self.high else "in"
+        return "high" if printed > round(self.high, PRINTED_DIGITS) else "in"
 
     def knob(self, value: float) -> str:
         """The settings that would bring a value into the range; empty if it is in the range."""
@@ -54,6 +58,7 @@ class Statistic:
         return settings[self.verdict(value)]
 
 
+PRINTED_DIGITS = 2
 ERRORS = "calibration_error (right_roll_deg; a pitch shifts all rows alike)"
 MORE_NOISE = "more gain_db with less exposure_gain"
 # What else the settings of the advice move, besides the statistic that they are advised for.
@@ -99,6 +104,7 @@ OFFSET_BAND_PX = (0.0, 0.9)
 class Realism:
     """The nine statistics by name, other figures of the images by name, and the fit of the stereo pair if there is one.
 
+    A camera at rest has no statistics of tracks, and runs of fewer than 14 images have no track length.
     `curves` are for plots: log10 of power by cycles per tile (K,), share of tracks alive by image (14,), counts of
     grey values (256,) and of gradients in DN (128,).
     """
@@ -129,6 +135,7 @@ class FrameSample:
 # --- Measurement ---
 
 WINDOW = 14  # successive images of a run
+MIN_MOVED_PX = 2.0  # by which tracks of a moving camera are displaced in a run
 WINDOWS = 6  # runs that are spread over a recording
 GREY_VALUES = 256
 GRADIENT_BINS = 128  # of 1 DN
@@ -153,7 +160,11 @@ def measure(runs: Sequence[Sequence[FrameSample]], rig: Rig) -> Realism:
 
     figures = _means([picture_statistics(image) for image in images])
     figures |= _track_means(tracks_of_runs)
-    figures["track_life"] = float(alive_share[1:].sum())
+    is_moving = any(tracks.moved_px > MIN_MOVED_PX for tracks in tracks_of_runs)
+    if not is_moving:
+        del figures["tracks_home"]
+    if is_moving and all(len(run) == WINDOW for run in runs):
+        figures["track_life"] = float(alive_share[1:].sum())
     figures["spectrum_slope"] = slope
     if pair:
         figures["row_error_px"] = pair.row_mad_px
@@ -267,6 +278,7 @@ def _true_pose(t_ns: int, recording: Recording) -> Array | None:
 MIN_ANGLE_DEG = 0.002
 MIN_GAIN_DIFFERENCE = 0.05
 MIN_OFFSET_PX = 0.05
+QUARTERS = (0.25, 0.75)  # of the width
 
 
 def pair_sentences(found: Realism) -> list[str]:
@@ -306,10 +318,12 @@ def _row_sentences(pair: StereoFit) -> Iterator[str]:
             f"Rows differ by {pair.row_mad_px:.2f} px, most likely from the right camera's {' and '.join(angles)}; "
             f"{pair.row_noise_px:.2f} px are left without them."
         )
-    if pair.xy_px.is_plain and "rows" not in pair.yaw_from:
+    if pair.has_lens_error:
+        left_px, right_px = pair.offsets_px(QUARTERS)
         yield (
-            f"Rows differ by {pair.xy_px.value:+.2f} px × xy, which no rotation of a camera explains: "
-            "the lens model or the rectification is wrong."
+            f"No rotation of a camera explains rows ({pair.xy_px.value:+.2f} ± {pair.xy_px.sigma:.2f} px × xy) and "
+            f"disparities (offset at the left and right quarter {left_px.value:+.2f} ± {left_px.sigma:.2f} and "
+            f"{right_px.value:+.2f} ± {right_px.sigma:.2f} px): the lens model or the rectification is wrong."
         )
 
 
@@ -317,11 +331,58 @@ def _degrees_text(angle_deg: Uncertain) -> str:
     return f"{angle_deg.value:+.3f} ± {angle_deg.sigma:.3f}°"
 
 
-def residual(pair: StereoFit) -> dict[str, float]:
-    """The significant errors of a stereo pair, as the `calibration_error` of a suite's rig."""
-    angles = {"right_yaw_deg": pair.yaw_deg, "right_roll_deg": pair.roll_deg, "right_pitch_deg": pair.pitch_deg}
-    error = {}
+SETTING_DIGITS = 6
+# Settings that are a pair of numbers, and the place in it.
+VECTOR_KEYS = {
+    "center_x_px": ("center_px", 0),
+    "center_y_px": ("center_px", 1),
+    "tangential_1": ("tangential", 0),
+    "tangential_2": ("tangential", 1),
+}
+
+
+def residual(pair: StereoFit) -> dict[str, Any]:
+    """The errors of a stereo pair as the `calibration_error` of a suite's rig: those that are significant.
+
+    If no rotation explains the pair, all errors of the right camera, as they are only right together.
+    """
+    if pair.calibrated is not None and pair.has_lens_error:
+        calibration = pair.calibrated.calibration
+        return _settings(calibration, calibration.right_names) | _settings(calibration, _significant(calibration))
+
+    angles = {YAW: None if pair.offset_px is None else pair.yaw_deg, ROLL: pair.roll_deg, PITCH: pair.pitch_deg}
+    error: dict[str, Any] = {}
     for name, angle_deg in angles.items():
         if angle_deg is not None and angle_deg.is_plain:
             error[name] = round(angle_deg.value, 4)
+    if pair.calibrated is not None and pair.calibrated.is_offset_determined:
+        calibration = pair.calibrated.calibration
+        names = [name for name in _significant(calibration) if name not in angles]
+        error |= _settings(calibration, names)
     return error
+
+
+def _significant(calibration: PairCalibration) -> list[str]:
+    """The names of significant errors of both cameras and of the right camera's focal length."""
+    names = []
+    for parameter in calibration.parameters:
+        is_chosen = parameter.is_common or parameter.name == RIGHT_FOCAL
+        if is_chosen and Uncertain(*calibration.value(parameter.name)).is_plain:
+            names.append(parameter.name)
+    return names
+
+
+def _settings(calibration: PairCalibration, names: Sequence[str]) -> dict[str, Any]:
+    """Errors as the keys of `CalibrationError`, those of the right camera's lens below `right`."""
+    values = {name: calibration.value(name)[0] for name in names}
+    right: dict[str, Any] = {}
+    error: dict[str, Any] = {}
+    for name, value in values.items():
+        eye, _, key = name.rpartition(" ")
+        keys = right if eye else error
+        vector, axis = VECTOR_KEYS.get(key, ("", 0))
+        if vector:
+            keys.setdefault(vector, [0.0, 0.0])[axis] = round(value, SETTING_DIGITS)
+        else:
+            keys[key] = round(value, SETTING_DIGITS)
+    return error | ({"right": right} if right else {})

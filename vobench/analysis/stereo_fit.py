@@ -3,6 +3,8 @@
 x, y      the position of a match in the right view divided by the focal length; fx, fy are that of both views
 rotated   by roll r to the right, pitch p upwards and yaw w to the right (the signs of `CalibrationError`), the right
           camera sees a point lower by fy (p (1 + y²) - r x - w x y) and further left by fx (w (1 + x²) - r y - p x y)
+distorted by tangential terms p1 and p2, it sees a point lower by fy (p1 (x² + 3 y²) + 2 p2 x y)
+          and further right by fx (2 p1 x y + p2 (3 x² + y²))
 """
 
 from collections.abc import Sequence
@@ -10,8 +12,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vobench.analysis.disparity_offset import fit_offset
-from vobench.analysis.stereo_matches import Matches, PairShot, all_matches, gain_of, match_shots, row_errors
+from vobench.analysis.pair_calibration import CalibratedPair, calibrate, center_px
+from vobench.analysis.pair_parameter import PITCH, ROLL, YAW
+from vobench.analysis.stereo_matches import (
+    Matches,
+    PairShot,
+    all_matches,
+    gain_of,
+    match_shots,
+    row_errors,
+    row_matches,
+)
+from vobench.analysis.tracked_motion import track_motions
 from vobench.estimator.stereo import StereoPair
 from vobench.geometry.se3 import Array
 
@@ -40,9 +52,10 @@ class StereoFit:
     """The errors of a stereo pair relative to its nominal calibration: the right camera's rotation, rows and gain.
 
     `row_mad_px` is the spread of row errors as they are, `row_noise_px` that around the fit a + b x + c y + d xy + e y²
-    with these `coefficients`. Roll follows from b, pitch from a, and `xy_px` is d. `yaw_deg` follows from rows and
-    motion if they agree, and otherwise only from `yaw_from`; it is None if neither determines it. `gain` is the ratio
-    of right and left.
+    with these `coefficients`. `roll_deg` follows from rows along x, `pitch_deg` and `yaw_deg` are the rotations that
+    shift rows and disparities at the centre of the image as observed. `yaw_deg` follows from `yaw_from`, rows and
+    motion if they agree; it is None if neither determines it. `xy_px` is the coefficient of xy in row errors, and
+    `gain` the ratio of right and left. `calibrated` has all errors that were fitted.
     """
 
     focal_px: float
@@ -58,15 +71,37 @@ class StereoFit:
     disparity_px: tuple[float, ...]
     yaw_deg: Uncertain | None
     yaw_from: str
+    calibrated: CalibratedPair | None = None
 
     @property
     def offset_px(self) -> Uncertain | None:
-        """The error of all disparities at the centre of the image that corresponds to the yaw."""
-        if self.yaw_deg is None:
+        """The error of all disparities at the centre of the image; None if the motion does not determine it."""
+        if self.yaw_deg is None or self.yaw_from == ROWS:
             return None
         yaw_rad = np.deg2rad([self.yaw_deg.value, self.yaw_deg.sigma])
         value_px, sigma_px = (self.focal_px * yaw_rad).tolist()
         return Uncertain(value_px, sigma_px)
+
+    @property
+    def has_lens_error(self) -> bool:
+        """Whether no rotation of a camera explains rows and motion."""
+        calibrated = self.calibrated
+        return calibrated is not None and calibrated.has_lens_error and calibrated.is_offset_determined
+
+    def offsets_px(self, columns: Sequence[float]) -> list[Uncertain]:
+        """The errors of disparities at columns of the right image, as shares of its width, at half of its height."""
+        assert self.calibrated is not None
+        calibration = self.calibrated.calibration
+        camera = calibration.pair.right.camera
+        places_px = np.array([[share * camera.width_px, camera.height_px / 2] for share in columns])
+        values_px, sigmas_px = calibration.disparity_error(places_px)
+        pairs = zip(values_px.tolist(), sigmas_px.tolist(), strict=True)
+        return [Uncertain(value_px, sigma_px) for value_px, sigma_px in pairs]
+
+
+ROWS = "rows"
+MOTION = "motion"
+ROWS_AND_MOTION = "rows and motion"
 
 
 def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoFit | None:
@@ -75,35 +110,59 @@ def fit_pair(windows: Sequence[Sequence[PairShot]], pair: StereoPair) -> StereoF
     matches = all_matches(matched_windows, pair)
     if len(matches.row_px) < MIN_MATCHES:
         return None
+    motions = track_motions(matched_windows, pair)
+    calibrated = calibrate(row_matches(matched_windows, pair), motions, pair)
+    if calibrated is None:
+        return None
 
-    fx = float(pair.K[0, 0])
-    fy = float(pair.K[1, 1])
-    coefficients, sigmas, row_noise_px = robust_fit(_row_terms(matches.place), matches.row_px)
-    xy_px = Uncertain(float(coefficients[3]), float(sigmas[3]))
-    roll_pitch_rad = np.array([-coefficients[1], coefficients[0]]) / fy
-
-    yaw_of_rows = _degrees(-xy_px.value, xy_px.sigma, fy)
-    offset = fit_offset(matched_windows, pair, roll_pitch_rad)
-    yaw_of_motion = None if offset is None else _degrees(offset.value_px, offset.sigma_px, fx)
-    yaw_deg, yaw_from = combined_yaw(yaw_of_rows, yaw_of_motion)
-
+    coefficients, row_noise_px = robust_fit(_row_terms(matches.place), matches.row_px)
+    roll_deg, pitch_deg = _roll_and_pitch(calibrated)
+    yaw_deg, yaw_from = _yaw(calibrated)
     rows_px = [row_errors(shot, pair) for window in windows for shot in window[::ROW_SHOT_STEP]]
     gains = [gain_of(shot) for window in matched_windows for shot in window]
     return StereoFit(
-        focal_px=fx,
+        focal_px=float(pair.K[0, 0]),
         baseline_m=pair.baseline_m,
         matches=matches,
         row_mad_px=robust_sigma(np.concatenate(rows_px)),
         row_noise_px=row_noise_px,
         coefficients=coefficients,
-        roll_deg=_degrees(-coefficients[1], sigmas[1], fy),
-        pitch_deg=_degrees(coefficients[0], sigmas[0], fy),
-        xy_px=xy_px,
+        roll_deg=roll_deg,
+        pitch_deg=pitch_deg,
+        xy_px=Uncertain(*calibrated.with_lens_terms.row_twist()),
         gain=float(np.nanmedian(gains)),
         disparity_px=tuple(np.quantile(matches.disparity_px, DISPARITY_QUANTILES).tolist()),
         yaw_deg=yaw_deg,
         yaw_from=yaw_from,
+        calibrated=calibrated,
     )
+
+
+def _roll_and_pitch(calibrated: CalibratedPair) -> tuple[Uncertain, Uncertain]:
+    """The right camera's roll, and the pitch that shifts rows at the centre of the image as observed, in degrees."""
+    calibration = calibrated.calibration
+    roll_deg = Uncertain(*calibration.value(ROLL))
+    if not calibrated.has_lens_error:
+        return roll_deg, Uncertain(*calibration.value(PITCH))
+    pair = calibration.pair
+    (shift_px,), (sigma_px,) = calibration.row_error(center_px(pair))
+    return roll_deg, _degrees(shift_px, sigma_px, float(pair.K[1, 1]))
+
+
+def _yaw(calibrated: CalibratedPair) -> tuple[Uncertain | None, str]:
+    """The right camera's yaw in degrees, and what it follows from: "rows", "motion" or "rows and motion".
+
+    If no rotation explains rows and motion, it is the yaw that shifts disparities at the centre as the motion shows.
+    """
+    calibration = calibrated.calibration
+    if not calibrated.is_offset_determined:
+        yaw_deg = Uncertain(*calibration.value(YAW))
+        return (yaw_deg, ROWS) if abs(yaw_deg.value) < MAX_YAW_FROM_ROWS_DEG else (None, "")
+    if not calibrated.has_lens_error:
+        return Uncertain(*calibration.value(YAW)), ROWS_AND_MOTION
+    pair = calibration.pair
+    (offset_px,), (sigma_px,) = calibration.disparity_error(center_px(pair))
+    return _degrees(offset_px, sigma_px, float(pair.K[0, 0])), MOTION
 
 
 def _degrees(value_px: float, sigma_px: float, focal_px: float) -> Uncertain:
@@ -113,32 +172,12 @@ def _degrees(value_px: float, sigma_px: float, focal_px: float) -> Uncertain:
     return Uncertain(value_deg, sigma_deg)
 
 
-def combined_yaw(of_rows: Uncertain, of_motion: Uncertain | None) -> tuple[Uncertain | None, str]:
-    """The right camera's yaw in degrees, and what it follows from: "rows", "motion" or "rows and motion".
-
-    If row errors and motion agree, they are combined by inverse-variance weighting. Otherwise the row errors are
-    attributed to the lens, and only the motion is used.
-    """
-    if of_motion is None:
-        return (of_rows, "rows") if abs(of_rows.value) < MAX_YAW_FROM_ROWS_DEG else (None, "")
-    difference_deg = abs(of_rows.value - of_motion.value)
-    if difference_deg > PLAIN_SIGMAS * np.hypot(of_rows.sigma, of_motion.sigma):
-        return of_motion, "motion"
-
-    weight_of_rows = of_rows.sigma**-2
-    weight_of_motion = of_motion.sigma**-2
-    total_weight = weight_of_rows + weight_of_motion
-    mean_deg = (weight_of_rows * of_rows.value + weight_of_motion * of_motion.value) / total_weight
-    return Uncertain(mean_deg, total_weight**-0.5), "rows and motion"
-
-
 # --- Row errors ---
 
 MAD_TO_SIGMA = 1.4826  # of a normal distribution
 FIT_STEPS = 20
 FIT_CONVERGED_PX = 1e-6
 CAUCHY_WIDTH = 2.4  # standard deviations at which a residual has half its weight
-CORRELATED_MATCHES = 8.0  # neighbouring matches have similar errors: so many count as one
 MIN_NOISE_PX = 1e-3
 
 
@@ -154,8 +193,8 @@ def row_error(coefficients: Array, place: Array) -> Array:
     return error
 
 
-def robust_fit(terms: Array, values: Array) -> tuple[Array, Array, float]:
-    """Fit coefficients (K,) of terms (N, K) with Cauchy weights; return them, their standard deviations, and the noise.
+def robust_fit(terms: Array, values: Array) -> tuple[Array, float]:
+    """Fit coefficients (K,) of terms (N, K) with Cauchy weights; return them and the noise.
 
     Source: Holland and Welsch (1977).
     """
@@ -171,9 +210,7 @@ def robust_fit(terms: Array, values: Array) -> tuple[Array, Array, float]:
         coefficients = coefficients + step
         if np.abs(step).max() < FIT_CONVERGED_PX:
             break
-    variances = CORRELATED_MATCHES * np.diag(np.linalg.inv(information))
-    sigmas = noise * np.sqrt(variances)
-    return coefficients, sigmas, noise
+    return coefficients, noise
 
 
 def robust_sigma(values: Array) -> float:

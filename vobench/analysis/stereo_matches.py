@@ -54,6 +54,16 @@ class Matches:
     window: NDArray[np.int64]
 
 
+@dataclass(frozen=True, slots=True)
+class RowMatches:
+    """Stereo matches: pixels (N, 2) of both images, row errors (N,) in px, and the runs (N,) that they belong to."""
+
+    left_px: Array
+    right_px: Array
+    row_px: Array
+    window: NDArray[np.int64]
+
+
 def match_shots(shots: Sequence[PairShot], pair: StereoPair) -> list[MatchedShot]:
     """Match the left and right images of shots."""
     return [_match_shot(shot, pair) for shot in shots]
@@ -91,16 +101,20 @@ def _dither(count: int) -> Array:
 
 def all_matches(windows: Sequence[Sequence[MatchedShot]], pair: StereoPair) -> Matches:
     """Join the matches of all shots in runs of images."""
+    rows = row_matches(windows, pair)
+    disparity_px = np.concatenate([shot.disparity_px for window in windows for shot in window])
+    places = pair.right.rays(rows.right_px)[:, :2]
+    return Matches(places, rows.row_px, disparity_px, rows.window)
+
+
+def row_matches(windows: Sequence[Sequence[MatchedShot]], pair: StereoPair) -> RowMatches:
+    """Join the pixels and row errors of the matches of all shots in runs of images."""
     shots = [shot for window in windows for shot in window]
     left_px = np.concatenate([shot.left_px for shot in shots])
     right_px = np.concatenate([shot.right_px for shot in shots])
-    disparity_px = np.concatenate([shot.disparity_px for shot in shots])
-
     counts = [_match_count(window) for window in windows]
     window_of_match = np.repeat(np.arange(len(windows)), counts)
-    row_px = _row_differences(left_px, right_px, pair)
-    places = pair.right.rays(right_px)[:, :2]
-    return Matches(places, row_px, disparity_px, window_of_match)
+    return RowMatches(left_px, right_px, _row_differences(left_px, right_px, pair), window_of_match)
 
 
 def _match_count(window: Sequence[MatchedShot]) -> int:

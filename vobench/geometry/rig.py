@@ -454,15 +454,20 @@ def custom_stereo_pair(rig: Rig) -> CustomStereoPair:
 
 Ratio = Annotated[float, Gt(-1), Lt(1)]
 Angle = Annotated[float, Ge(-10), Le(10)]
+Tangential = Annotated[float, Ge(-0.1), Le(0.1)]
 
 
 @settings()
 class CameraError:
-    """The true parameters of one camera minus the nominal ones; turns are those of CalibrationError."""
+    """The true parameters of one camera minus the nominal ones; turns are those of CalibrationError.
+
+    `tangential` is added to p1 and p2 of a Brown–Conrady lens; a pinhole becomes one.
+    """
 
     focal_ratio: Ratio = 0.0
     center_px: tuple[float, float] = (0.0, 0.0)
     distortion_ratio: Ratio = 0.0
+    tangential: tuple[Tangential, Tangential] = (0.0, 0.0)
     roll_deg: Angle = 0.0
     pitch_deg: Angle = 0.0
     yaw_deg: Angle = 0.0
@@ -502,6 +507,7 @@ class CalibrationError:
             focal_ratio=self.focal_ratio + single.focal_ratio,
             center_px=(center_x_px, center_y_px),
             distortion_ratio=self.distortion_ratio + single.distortion_ratio,
+            tangential=single.tangential,
             roll_deg=roll_deg + single.roll_deg,
             pitch_deg=pitch_deg + single.pitch_deg,
             yaw_deg=yaw_deg + single.yaw_deg,
@@ -600,9 +606,14 @@ def true_rig(nominal: Rig, error: CalibrationError) -> Rig:
         nominal,
         left=true_camera(nominal.left, left_error),
         right=true_camera(nominal.camera("right"), right_error),
-        T_body_left=_turned(nominal.T_body_left, left_error),
-        T_body_right=_turned(T_body_right, right_error),
+        T_body_left=turned(nominal.T_body_left, left_error),
+        T_body_right=turned(T_body_right, right_error),
     )
+
+
+def has_tangential(camera: Camera) -> bool:
+    """Whether a camera can have an error of `tangential`."""
+    return isinstance(camera, (Pinhole, BrownConrady))
 
 
 def true_camera(nominal: Camera, error: CameraError) -> Camera:
@@ -610,12 +621,14 @@ def true_camera(nominal: Camera, error: CameraError) -> Camera:
     coefficients = {name: getattr(nominal, name) for name in nominal.coefficients}
     if error.distortion_ratio and not any(coefficients.values()):
         raise VobenchError(f"distortion_ratio {error.distortion_ratio:g} needs a lens with distortion, got {nominal}")
+    if any(error.tangential) and not has_tangential(nominal):
+        raise VobenchError(f"tangential needs a pinhole or a lens of model brown_conrady, got {nominal}")
     if not isinstance(nominal, Focal):
         if error.focal_ratio or any(error.center_px):
             raise VobenchError(f"focal_ratio and center_px need a camera with a focal length, got {nominal}")
         return nominal
     distortion = {name: value * (1 + error.distortion_ratio) for name, value in coefficients.items()}
-    return replace(
+    camera = replace(
         nominal,
         fx_px=nominal.fx_px * (1 + error.focal_ratio),
         fy_px=nominal.fy_px * (1 + error.focal_ratio),
@@ -623,9 +636,29 @@ def true_camera(nominal: Camera, error: CameraError) -> Camera:
         cy_px=nominal.cy_px + error.center_px[1],
         **distortion,
     )
+    return _with_tangential(camera, error.tangential) if any(error.tangential) else camera
 
 
-def _turned(T_body_camera: Array, error: CameraError) -> Array:
+def _with_tangential(camera: Focal, tangential: tuple[float, float]) -> BrownConrady:
+    """The camera with these numbers added to p1 and p2."""
+    p1, p2 = tangential
+    if isinstance(camera, BrownConrady):
+        return replace(camera, p1=camera.p1 + p1, p2=camera.p2 + p2)
+    return BrownConrady(
+        width_px=camera.width_px,
+        height_px=camera.height_px,
+        fx_px=camera.fx_px,
+        fy_px=camera.fy_px,
+        cx_px=camera.cx_px,
+        cy_px=camera.cy_px,
+        k1=0.0,
+        k2=0.0,
+        p1=p1,
+        p2=p2,
+    )
+
+
+def turned(T_body_camera: Array, error: CameraError) -> Array:
     """The camera's pose after its turns."""
     angles_deg = [error.roll_deg, error.pitch_deg, error.yaw_deg]
     if not any(angles_deg):
