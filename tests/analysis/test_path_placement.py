@@ -1,19 +1,29 @@
 """A path is placed where it is free and where the disparities along it agree."""
 
+import json
+
 import numpy as np
 import pytest
 
 from vobench.analysis import path_placement
 from vobench.analysis.path_placement import (
+    ANY_SCALE,
     CELLS,
     RAYS_PER_CELL,
+    TENTHS,
+    Placement,
+    PlacementLimits,
+    WantedDisparities,
     _Start,
     _Surroundings,
     _view_rays,
+    _weighted_tenths,
     cell_disparities,
     levelled,
+    nearness_of,
     place_path,
     segment_disparities,
+    wanted_disparities,
 )
 from vobench.analysis.stereo_fit import StereoFit, Uncertain
 from vobench.analysis.stereo_matches import Matches
@@ -34,8 +44,7 @@ PAIR = stereo_pair(stereo_rig(LENS, pitch_deg=0, baseline_m=0.2), "test")
 
 @pytest.fixture(autouse=True)
 def few_draws(monkeypatch):
-    monkeypatch.setattr(path_placement, "DRAWS", 600)
-    monkeypatch.setattr(path_placement, "NEAR_DRAWS", 200)
+    monkeypatch.setattr(path_placement, "LANES", 20)
 
 
 def hall(*, pillar: bool = False) -> Scene:
@@ -77,29 +86,116 @@ def straight(length_m: float, count: int = 20) -> np.ndarray:
     return se3.transform(np.eye(3), way) @ looking(pitch_deg=0, position_m=(0, 0, 0))
 
 
+def of_wall(distance_m: float) -> WantedDisparities:
+    """The disparities of a wall that fills the view."""
+    return WantedDisparities.of_cells(np.full((1, 3, 3), 150 * 0.2 / distance_m))
+
+
 def test_a_path_lies_free_and_its_disparities_agree():
-    wanted = np.full((1, 3, 3), 150 * 0.2 / 2.5)
-    found = place_path(hall(), straight(1.5), PAIR, wanted)
+    (found,) = place_path(hall(), straight(1.5), PAIR, of_wall(2.5))
     places = (found.T_place_world @ straight(1.5))[:, :3, 3] / found.scale
     assert (np.abs(places) < [3.9, 2.9, 3.0]).all()
     assert found.misfit < 0.5
-    assert place_path(hall(), straight(1.5), PAIR, wanted / 20).scale > 1.5  # a hall of 8 m has nothing so far away
+    assert 0.8 <= found.scale <= 1.2
+
+
+def test_a_place_is_enlarged_only_where_that_is_allowed_and_its_own_size_does_not_fit():
+    far = of_wall(50.0)  # a hall of 8 m has nothing so far away
+    assert 0.8 <= place_path(hall(), straight(1.5), PAIR, far)[0].scale <= 1.2
+    long = straight(12.0)
+    with pytest.raises(InputError, match=r"no free path of 12.0 m .*it fits nowhere at scales of 0.8 to 1.2"):
+        place_path(hall(), long, PAIR, far)
+    (enlarged,) = place_path(hall(), long, PAIR, far, limits=ANY_SCALE)
+    assert enlarged.scale == 1.4  # along the diagonal
+    in_place_m = (enlarged.T_place_world @ long)[:, :3, 3]
+    low_m, high_m = np.array([-4, -3, 0]) * enlarged.scale, np.array([4, 3, 3]) * enlarged.scale
+    assert ((in_place_m > low_m + 0.29) & (in_place_m < high_m - 0.29)).all()
+
+
+def seen(path: np.ndarray, *, nearer: float = 1.0) -> WantedDisparities:
+    """The disparities of a path in the hall, multiplied by a factor."""
+    caster = RayCaster(triangles(hall(), t_ns=0))
+    cells_px = nearer * segment_disparities(caster, path, PAIR, 1.0, 4)
+    tenths_px = np.quantile(cells_px.reshape(4, -1), TENTHS, axis=1).T
+    return WantedDisparities(cells_px, np.ones((4, 3, 3)), tenths_px)
 
 
 def test_where_a_path_was_is_found_by_its_disparities_along_the_way():
     scene = hall()
     there = se3.transform(se3.rotation_z(0.4), (-2.5, 0.6, 1.2)) @ straight(4.0)
-    wanted = segment_disparities(RayCaster(triangles(scene, t_ns=0)), there, PAIR, 1.0, 4)
-    found = place_path(scene, straight(4.0), PAIR, wanted)
+    at_its_scale = PlacementLimits(((1.0,),), 1.5)
+    (found,) = place_path(scene, straight(4.0), PAIR, seen(there), limits=at_its_scale)
     ends = (found.T_place_world @ straight(4.0))[[0, -1], :2, 3] / found.scale
     assert found.misfit < 0.05
+    assert found.nearness < 1.5
     # The hall is its own image when it is turned by half.
     assert min(np.abs(sign * ends - there[[0, -1], :2, 3]).max() for sign in (1, -1)) < 0.25
 
 
+def test_a_place_whose_surfaces_are_nearer_than_in_the_recording_is_refused():
+    there = se3.transform(np.eye(3), (-2.5, 0.0, 1.2)) @ straight(4.0)
+    with pytest.raises(InputError, match=r"free lanes, surfaces are \d+\.\d times as near as in the recording or more"):
+        place_path(hall(), straight(4.0), PAIR, seen(there, nearer=0.1))
+    assert place_path(hall(), straight(4.0), PAIR, seen(there, nearer=0.1), limits=ANY_SCALE)
+
+
+def test_several_placements_are_different_and_the_best_one_is_first():
+    found = place_path(hall(), straight(1.5), PAIR, of_wall(2.5), most=3)
+    assert len(found) == 3
+    costs = [each.misfit + 0.05 * abs(np.log(each.scale)) for each in found]
+    assert costs == sorted(costs)
+    for index, one in enumerate(found):
+        for other in found[:index]:
+            (there, here) = (each.T_place_world @ straight(1.5) for each in (one, other))
+            middle_m = np.linalg.norm(there[10, :2, 3] / one.scale - here[10, :2, 3] / other.scale)
+            turn = se3.rotation_angle(np.linalg.inv(there[0, :3, :3]) @ here[0, :3, :3])
+            assert middle_m > 0.2 or turn > np.deg2rad(15)  # draws near a candidate move it a little
+
+
+def test_the_nearness_is_that_of_the_nearest_picture():
+    caster = RayCaster(triangles(hall(), t_ns=0))
+    path = straight(4.0)
+    path[:, :3, 3] += [-1.0, 0.0, 1.5]
+    whole = seen(path)
+    assert nearness_of(caster, path, PAIR, 1.0, whole) == pytest.approx(1.0, abs=0.6)
+    to_the_wall = straight(5.5)
+    to_the_wall[:, :3, 3] += [-2.0, 0.0, 1.5]
+    # At 0.5 m from the wall it fills the picture: 60 px, where the recording has a tenth below some 6 px.
+    lowest_px = whole.tenths_px[-1, 0]
+    assert nearness_of(caster, to_the_wall, PAIR, 1.0, whole) == pytest.approx(60 / lowest_px, rel=0.02)
+    unknown = WantedDisparities.of_cells(whole.cells_px)
+    assert nearness_of(caster, to_the_wall, PAIR, 1.0, unknown) == 0
+
+
+def test_rays_count_where_the_recording_has_matches() -> None:
+    disparity_px = np.full((3, 3, 4), 10.0)
+    disparity_px[0, 0] = 100.0
+    disparity_px[2, 2] = np.nan
+    counts = np.zeros((3, 3))
+    counts[0, 0] = 1
+    counts[1, 1] = 3
+    counts[2, 2] = 50
+    assert _weighted_tenths(disparity_px, counts).tolist() == [10, 100]
+    counts[0, 0] = 0.1
+    assert _weighted_tenths(disparity_px, counts).tolist() == [10, 10]
+    assert _weighted_tenths(np.full((3, 3, 4), np.nan), counts).tolist() == [0, 0]
+
+
 def test_a_place_without_a_free_space_is_refused():
-    with pytest.raises(InputError, match=r"no free path of 60.0 m was found in 'hall'; take fewer images"):
-        place_path(hall(pillar=True), straight(60.0), PAIR, np.full((1, 3, 3), 10.0))
+    with pytest.raises(InputError, match=r"no free path of 60.0 m was found in 'hall' .*; take fewer images"):
+        place_path(hall(pillar=True), straight(60.0), PAIR, of_wall(3.0))
+
+
+def test_a_placement_is_read_as_it_was_written() -> None:
+    (found,) = place_path(hall(), straight(1.5), PAIR, of_wall(2.5))
+    read = Placement.of_dict(json.loads(json.dumps(found.as_dict())))
+    np.testing.assert_array_equal(read.T_place_world, found.T_place_world)
+    assert (read.scale, read.misfit, read.nearness, read.tried) == (
+        found.scale,
+        found.misfit,
+        found.nearness,
+        found.tried,
+    )
 
 
 def test_a_tilted_world_is_levelled():
@@ -165,6 +261,16 @@ def test_a_significant_offset_is_taken_off_and_far_points_are_at_a_third_of_a_pi
     assert cells((20, 20), 12.0, yaw_deg=Uncertain(yaw_deg, yaw_deg / 10))[0, 0, 0] == pytest.approx(11.5)
     assert cells((20, 20), 12.0, yaw_deg=Uncertain(yaw_deg, yaw_deg))[0, 0, 0] == pytest.approx(12)
     assert cells((20, 20), 0.1)[0, 0, 0] == 0.3
+
+
+def test_the_tenths_are_quantiles_of_all_matches_of_a_segment_and_cells_have_counts() -> None:
+    px = np.linspace(5, 15, 101)
+    places = [((20 - d) / 150 - 79.5 / 150, (20 - 59.5) / 150) for d in px]
+    wanted = wanted_disparities(fit_of([*places, *places[:9]], [*px, *px[:9]], [1] * 101 + [2] * 9), PAIR)
+    np.testing.assert_allclose(wanted.tenths_px[1], [6, 14])
+    assert np.isnan(wanted.tenths_px[[0, 2]]).all()
+    assert wanted.counts[:, 0, 0].tolist() == [0, 101, 9]
+    assert wanted.counts.sum() == 110
 
 
 def test_a_cell_has_the_median_of_its_matches() -> None:
@@ -308,23 +414,6 @@ def test_inside_of_an_object_nothing_is_free() -> None:
     assert blocked._is_free(np.array([[-3.4, 0.0, 1.0], [-3.4, 0.5, 1.0]]), 0.3)
 
 
-def test_the_extent_is_that_of_the_walls_and_starts_are_drawn_all_over_it(place: _Surroundings) -> None:
-    np.testing.assert_allclose([place.low_m, place.high_m], [[-4, -3, 0], [4, 3, 3]], atol=1e-9)
-    rng = np.random.default_rng(0)
-    starts = [place.any_start(rng) for _ in range(3000)]
-    xy_m = np.array([each.xy_m for each in starts])
-    np.testing.assert_allclose([xy_m.min(0), xy_m.max(0)], [[-4, -3], [4, 3]], atol=0.05)
-    assert {each.height_m for each in starts} == {0.3, 0.5, 0.8, 1.2, 1.65, 2.2}
-    headings = [each.heading_rad for each in starts]
-    assert (min(headings), max(headings)) == (pytest.approx(0, abs=0.02), pytest.approx(2 * np.pi, abs=0.02))
-    scales = [each.scale for each in starts]
-    shares = [scales.count(scale) / 3000 for scale in path_placement.SCALES]
-    # An exponential of mean 2.5, in steps of one; the last has all of the rest.
-    expected = [np.exp(-n / 2.5) * (1 - np.exp(-1 / 2.5)) for n in range(8)]
-    assert shares[:8] == pytest.approx(expected, abs=0.03)
-    assert shares[8] == pytest.approx(np.exp(-8 / 2.5), abs=0.02)
-
-
 def test_starts_near_another_are_spread_by_the_share_of_a_metre_and_0_3_rad() -> None:
     rng = np.random.default_rng(0)
     for share in (1.0, 0.1):
@@ -334,27 +423,6 @@ def test_starts_near_another_are_spread_by_the_share_of_a_metre_and_0_3_rad() ->
         assert np.std([each.heading_rad for each in near]) == pytest.approx(0.3 * share, rel=0.06)
         assert np.std(np.log([each.height_m / 1.2 for each in near])) == pytest.approx(0.3 * share, rel=0.06)
         assert {each.scale for each in near} == {1.0}
-
-
-def test_the_scale_costs_a_twentieth_of_its_logarithm(monkeypatch) -> None:
-    wanted = np.full((1, 3, 3), 150 * 0.2 / 2.5)
-    found = place_path(hall(), straight(1.5), PAIR, wanted)
-    assert found.tried > 50
-    # With scales that cost nothing another place may fit better, but never by more than the scale costs.
-    monkeypatch.setattr(path_placement, "SCALE_COST", 0.0)
-    free = place_path(hall(), straight(1.5), PAIR, wanted)
-    assert free.misfit <= found.misfit + 1e-9
-    monkeypatch.setattr(path_placement, "SCALE_COST", 100.0)
-    assert place_path(hall(), straight(1.5), PAIR, wanted).scale == 1
-
-
-def test_the_placement_is_in_the_scale_of_the_recording() -> None:
-    wanted = np.full((1, 3, 3), 0.9)
-    found = place_path(hall(), straight(1.5), PAIR, wanted)
-    assert found.scale > 1
-    in_place_m = (found.T_place_world @ straight(1.5))[:, :3, 3]
-    low_m, high_m = np.array([-4, -3, 0]) * found.scale, np.array([4, 3, 3]) * found.scale
-    assert ((in_place_m > low_m + 0.29) & (in_place_m < high_m - 0.29)).all()
 
 
 def test_a_path_may_come_as_close_as_the_clearance_and_no_closer(place: _Surroundings) -> None:

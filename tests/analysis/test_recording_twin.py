@@ -13,6 +13,7 @@ from vobench.analysis.path_placement import Placement
 from vobench.analysis.realism import Realism
 from vobench.analysis.realism_report import realism_of
 from vobench.analysis.recording_twin import REAL, TWIN, TwinSuite, compare_twin, write_twin_suite
+from vobench.analysis.twin_places import PlacedPath
 from vobench.dataset.recording import Recording
 from vobench.errors import InputError, UnknownNameError
 from vobench.geometry import se3
@@ -20,6 +21,7 @@ from vobench.geometry.rig import looking
 from vobench.runner.folder import RunFolder, read_tum
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.recording import read_recording
+from vobench.suite.plan import Plan
 from vobench.suite.suite import read_plan
 from vobench.trajectory.trajectory import Trajectory
 from vobench.trajectory.tum import format_tum, parse_tum
@@ -40,8 +42,7 @@ def realism(recording: Recording) -> Realism:
 @pytest.fixture
 def suite(recorded_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> TwinSuite:
     """The suite of a twin in the closet that was recorded, placed and fitted in few steps."""
-    monkeypatch.setattr(path_placement, "DRAWS", 600)
-    monkeypatch.setattr(path_placement, "NEAR_DRAWS", 100)
+    monkeypatch.setattr(path_placement, "NEAR_DRAWS", 20)
     monkeypatch.setattr(camera_fit, "PASSES", 1)
     monkeypatch.setattr(camera_fit, "MAX_TRIALS", 2)
     monkeypatch.setattr(recording_twin, "FITTED_PICTURES", 2)
@@ -73,16 +74,14 @@ def again(suite: TwinSuite, recorded_case: Path, names: Sequence[str] = RANKED) 
 
 
 def test_an_interrupted_twin_goes_on_where_it_was(suite, recorded_case, monkeypatch) -> None:
-    assert suite.placement is not None
+    assert len(suite.placed) == 1
     text = suite.file.read_text()
     without_camera = {key: value for key, value in json.loads(text).items() if key != "cameras"}
     suite.file.write_text(json.dumps(without_camera))  # as if the fit of the camera was interrupted
-    monkeypatch.setattr(recording_twin, "place_path", None)
+    monkeypatch.setattr(recording_twin, "find_places", None)
     resumed = again(suite, recorded_case)
     assert resumed.file.read_text() == text
-    assert resumed.placement is not None
-    np.testing.assert_allclose(resumed.placement.T_place_world, suite.placement.T_place_world, atol=1e-12)
-    assert resumed.placement.misfit == pytest.approx(suite.placement.misfit)
+    assert [placed.as_dict() for placed in resumed.placed] == [placed.as_dict() for placed in suite.placed]
 
     # A complete suite is not written again, also where it was edited.
     edited = json.loads(text) | {"summary": "edited"}
@@ -97,7 +96,7 @@ def test_an_interrupted_twin_goes_on_where_it_was(suite, recorded_case, monkeypa
 def test_the_suite_in_a_folder_is_read_as_it_is(suite, realism) -> None:
     read = recording_twin.read_twin_suite(suite.file.parent)
     assert read.file == suite.file
-    assert read.placement.as_dict() == suite.placement.as_dict()
+    assert [placed.as_dict() for placed in read.placed] == [placed.as_dict() for placed in suite.placed]
     assert dict(read.realism.values) == dict(realism.values)
     other = json.loads(suite.file.read_text())
     other["source"][0]["name"] = "else"
@@ -184,7 +183,7 @@ def lay_out(root: Path, recorded_case: Path, noise_m: dict[str, dict[str, float]
 
 
 @pytest.fixture
-def known(recorded_case: Path, realism: Realism, tmp_path: Path):
+def known(recorded_case: Path, realism: Realism, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Compares a recording with itself as its twin, with these noises of estimators on both."""
 
     def compare(real, twin):
@@ -192,8 +191,11 @@ def known(recorded_case: Path, realism: Realism, tmp_path: Path):
         (tmp_path / "twin.yaml").write_text(
             json.dumps({"name": "twin", "source": [source], "estimators": ["stand_still"]})
         )
-        suite = TwinSuite(tmp_path / "twin.yaml", Placement(np.eye(4), 1.4, 0.1, 1), realism)
-        return compare_twin(suite, run_plan=lambda plan, /: lay_out(tmp_path, recorded_case, {REAL: real, TWIN: twin}))
+        placed = PlacedPath("closet", None, Placement(np.eye(4), 1.1, 0.1, 1.3, 1))
+        suite = TwinSuite(tmp_path / "twin.yaml", (placed,), realism)
+        folder = lay_out(tmp_path, recorded_case, {REAL: real, TWIN: twin})
+        monkeypatch.setattr(Plan, "only", lambda plan, cases, scenes: plan)
+        return compare_twin(suite, run_plan=lambda plan, /: folder)
 
     return compare
 
@@ -206,7 +208,11 @@ def test_a_recording_agrees_with_itself_in_order_errors_and_pictures(known, tmp_
     assert all(row[REAL] == row[TWIN] for row in report.rows())
     assert {row["is"] for row in facts["statistics"]} == {"in"}
     assert all(real == twin for real, twin in facts["also"].values())
-    assert facts["place"] == {"scale": 1.4, "misfit": 0.1}
+    assert facts["places"] == [{"place": "closet", "scale": 1.1, "misfit": 0.1, "nearness": 1.3}]
+    predicted = facts["prediction"]["estimators"]
+    assert [row["estimator"] for row in predicted] == ["good", "fair", "bad"]
+    assert [row["error"] for row in predicted] == pytest.approx([row[TWIN]["mean"] for row in report.rows()])
+    assert facts["prediction"]["in_intervals"] == [0, 0]  # of a single place
     assert json.loads((tmp_path / "twin.json").read_text()) == json.loads(json.dumps(facts))
 
 
@@ -237,7 +243,7 @@ def test_the_replay_has_the_rate_of_the_recording_and_half_as_many_knots(recordi
 def test_the_path_in_the_place_is_the_bodys_from_time_0_on(recording, realism) -> None:
     path = recording_twin.recorded_path(recording, realism.pair)
     T_place_world = se3.transform(se3.rotation_z(0.4), (1.0, 2.0, 3.0))
-    placed = path.in_place(Placement(T_place_world, 1.0, 0.0, 1))
+    placed = path.in_place(Placement(T_place_world, 1.0, 0.0, 1.0, 1))
     assert placed.t_ns[0] == 0
     np.testing.assert_array_equal(np.diff(placed.t_ns), np.diff(path.t_ns))
     T_body_left = path.rig.build().T_body_left

@@ -13,7 +13,7 @@ from vobench.analysis.explanation import Removal
 from vobench.analysis.frame_failure import FrameRange, coincidence, failing_loss, frame_losses, worst_window
 from vobench.analysis.image_statistics import evenly_spaced
 from vobench.analysis.nuisance import Nuisance
-from vobench.analysis.path_placement import Placement, cell_disparities, place_path
+from vobench.analysis.path_placement import ANY_SCALE, Placement, place_path, wanted_disparities
 from vobench.analysis.picture_change import INSTEAD
 from vobench.analysis.picture_evidence import CHUNK_FRAMES, ImageEvidence, RecordingPart, find_changes
 from vobench.analysis.recording_explanation import FailingFrames, RecordingExplanation, TwinTrials
@@ -292,7 +292,8 @@ def _simulate_twin(
     shot_runs = [part.shots[first : first + CHUNK_FRAMES] for first in range(0, len(part), CHUNK_FRAMES)]
     fit = fit_pair(shot_runs, pair) or evidence.fit
     path = recorded_path(replace(recorded, t_ns=t_ns), fit)
-    placement = place_path(build(scene, {}), path.T_world_left, pair, cell_disparities(path.fit, pair))
+    wanted = wanted_disparities(path.fit, pair)
+    (placement,) = place_path(build(scene, {}), path.T_world_left, pair, wanted, limits=ANY_SCALE)
 
     write_json(out / PLACE_FILE, {**plain(scene), "scale": scene.scale * placement.scale})
     (out / PATH_FILE).write_text(format_tum(path.in_place(placement)), encoding="utf-8")

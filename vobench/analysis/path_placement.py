@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
+from vobench.analysis.free_lanes import Lane, free_lanes
 from vobench.analysis.stereo_fit import StereoFit
 from vobench.errors import InputError
 from vobench.estimator.stereo import StereoPair
@@ -15,12 +17,17 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.scene import Scene, triangles
+from vobench.scene.triangles import Triangles
+from vobench.suite.free_space import FloorMap, floor_map
 
 # --- Disparities of a recording ---
 
 CELLS = 3  # rows and columns of the left view in which disparities are compared
 MIN_MATCHES_IN_CELL = 30
 MIN_DISPARITY_PX = 0.3  # points that are further away count as infinitely far
+TENTHS = (0.1, 0.9)  # quantiles of the disparities of a picture
+
+Cells = NDArray[np.int64]
 
 
 def cell_disparities(fit: StereoFit, pair: StereoPair) -> Array:
@@ -29,20 +36,8 @@ def cell_disparities(fit: StereoFit, pair: StereoPair) -> Array:
     V is the number of segments of the path in which matches were found. NaN for a cell with too few matches.
     """
     matches = fit.matches
-    offset_px = 0.0
-    if fit.offset_px and fit.offset_px.is_plain:
-        offset_px = fit.offset_px.value
-    camera = pair.left.camera
-
-    # Matches have normalised coordinates in the right view. Rectified views show a point in the same row, and the left
-    # view shows it further right by the disparity.
-    homogeneous = np.c_[matches.place, np.ones(len(matches.place))]
-    right_px = homogeneous @ pair.K.T
-    left_column_px = right_px[:, 0] + matches.disparity_px
-    column = _cell(left_column_px, camera.width_px)
-    row = _cell(right_px[:, 1], camera.height_px)
-
-    segment_of_match = matches.window
+    segment_of_match, row, column = _cells_of_matches(fit, pair)
+    offset_px = _offset_px(fit)
     segments = int(segment_of_match.max()) + 1
     medians_px = np.full((segments, CELLS, CELLS), np.nan)
     for segment, cell_row, cell_column in np.ndindex(medians_px.shape):
@@ -53,10 +48,68 @@ def cell_disparities(fit: StereoFit, pair: StereoPair) -> Array:
     return np.asarray(np.maximum(medians_px, MIN_DISPARITY_PX), float)
 
 
-def _cell(pixel: Array, size_px: int) -> Array:
+@dataclass(frozen=True, slots=True)
+class WantedDisparities:
+    """The disparities of a recording in V segments of its path.
+
+    `cells_px` (V, 3, 3) are medians by rows and columns of the left view, NaN for unknown ones. `counts` (V, 3, 3) are
+    the numbers of matches. `tenths_px` (V, 2) are the disparities above which 90 % and 10 % of the matches are, NaN if
+    there are too few.
+    """
+
+    cells_px: Array
+    counts: Array
+    tenths_px: Array
+
+    @classmethod
+    def of_cells(cls, cells_px: Array) -> "WantedDisparities":
+        """Disparities of which only the medians of cells are known."""
+        segments = len(cells_px)
+        return cls(cells_px, np.ones((segments, CELLS, CELLS)), np.full((segments, len(TENTHS)), np.nan))
+
+
+def wanted_disparities(fit: StereoFit, pair: StereoPair) -> WantedDisparities:
+    """The disparities of a recording's matches, without the offset that the pair has."""
+    cells_px = cell_disparities(fit, pair)
+    segments = len(cells_px)
+    segment, row, column = _cells_of_matches(fit, pair)
+    counts = np.zeros(cells_px.shape)
+    np.add.at(counts, (segment, row, column), 1.0)
+
+    tenths_px = np.full((segments, len(TENTHS)), np.nan)
+    disparity_px = fit.matches.disparity_px - _offset_px(fit)
+    for index in range(segments):
+        of_segment_px = disparity_px[segment == index]
+        if len(of_segment_px) >= MIN_MATCHES_IN_CELL:
+            tenths_px[index] = np.quantile(of_segment_px, TENTHS)
+    return WantedDisparities(cells_px, counts, tenths_px)
+
+
+def _offset_px(fit: StereoFit) -> float:
+    """The offset of disparities, 0 if none is significant."""
+    if fit.offset_px and fit.offset_px.is_plain:
+        return fit.offset_px.value
+    return 0.0
+
+
+def _cells_of_matches(fit: StereoFit, pair: StereoPair) -> tuple[Cells, Cells, Cells]:
+    """The segment of each match (N,), and its row and column in the left view."""
+    matches = fit.matches
+    camera = pair.left.camera
+    # Matches have normalised coordinates in the right view. Rectified views show a point in the same row, and the left
+    # view shows it further right by the disparity.
+    homogeneous = np.c_[matches.place, np.ones(len(matches.place))]
+    right_px = homogeneous @ pair.K.T
+    left_column_px = right_px[:, 0] + matches.disparity_px
+    row = _cell(right_px[:, 1], camera.height_px)
+    column = _cell(left_column_px, camera.width_px)
+    return matches.window, row, column
+
+
+def _cell(pixel: Array, size_px: int) -> Cells:
     """The index of the cell (N,) of pixels (N,) along one axis."""
-    number = (pixel * CELLS / size_px).astype(int)
-    return np.asarray(np.clip(number, 0, CELLS - 1))
+    number = (pixel * CELLS / size_px).astype(np.int64)
+    return np.clip(number, 0, CELLS - 1)
 
 
 # --- The path ---
@@ -103,14 +156,17 @@ def _scaled_up(T: Array, scale: float) -> Array:
 
 @dataclass(frozen=True, slots=True)
 class Placement:
-    """The pose of a path in a place, the scale of the place, and the mean error of log disparities.
+    """The pose of a path in a place, the scale of the place, and how well the disparities agree.
 
-    `scale` is the factor by which the place is enlarged. `tried` is the number of free paths that were compared.
+    `scale` is the factor by which the place is enlarged. `misfit` is the mean error of log disparities. `nearness` is
+    the largest ratio of a tenth of a picture's disparities to that of the recording. `tried` is the number of free
+    paths that were compared.
     """
 
     T_place_world: Array
     scale: float
     misfit: float
+    nearness: float
     tried: int
 
     def as_dict(self) -> dict[str, Any]:
@@ -125,28 +181,43 @@ class Placement:
         return cls(**{**facts, "T_place_world": T_place_world})
 
 
-# More unusual scales come later, and are drawn less often.
-SCALES = (1.0, 0.7, 1.4, 0.5, 2.0, 0.35, 2.8, 4.0, 5.6)
-MEAN_SCALE_INDEX = 2.5
+@dataclass(frozen=True, slots=True)
+class PlacementLimits:
+    """The scales of a place that are tried, group by group until one fits, and the largest nearness."""
+
+    scales: tuple[tuple[float, ...], ...]
+    nearness: float
+
+
+# A twin needs the recording's own scale, and nothing nearer than in the recording.
+OWN_SCALE = PlacementLimits(((1.0, 0.9, 1.1, 0.8, 1.2),), 1.5)
+ANY_SCALE = PlacementLimits(((1.0, 0.85, 1.2), (0.7, 1.4), (0.5, 2.0), (0.35, 2.8), (4.0, 5.6)), np.inf)
+
 HEIGHTS_M = (0.3, 0.5, 0.8, 1.2, 1.65, 2.2)
 CLEARANCE_M = 0.3
+BODIES_M = (0.6, 0.9, 1.2, 1.5, 2.0, 2.5)  # heights up to which the floor along a path may have to be free
 WAYPOINTS = 40
+LANES = 40  # that are tried at each scale
+MAX_LAYERS = 4  # faces below a point that are examined
 EXTENT_QUANTILE = 0.01  # of the corners of faces: a few far ones do not extend the place
 
 UP = np.array([[0.0, 0.0, 1.0]])
 DOWN = -UP
 LEVEL_COSINE = 0.9  # a face is level if the cosine of the angle between its normal and the vertical is larger
-MAX_LAYERS = 4  # faces below a point that are examined
 BEYOND_FACE_M = 1e-3
 ABOVE_PLACE_M = 1.0
 
-# The numbers of draws anywhere in the place, and then closer and closer to the best one.
-DRAWS = 6000
-NEAR_DRAWS = 1500
+# The draws closer and closer to a candidate.
+NEAR_DRAWS = 120
+MORE_IMPROVED = 4  # candidates, besides as many as are wanted
 NEAR_M = 1.0
 NEAR_RAD = 0.3  # of the heading, and of the logarithm of the height
 LAST_SHARE = 0.05  # of these distances, at the last draw
 SCALE_COST = 0.05  # misfit that is worth a factor e of the scale
+NEARNESS_COST = 3.0  # misfit that is worth a factor e of the nearness beyond the limit
+# Two placements differ if the middle of the path moves by this share of its extent, or if it turns by this angle.
+DISTINCT_SHARE = 0.25
+DISTINCT_RAD = np.deg2rad(30)
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,61 +244,128 @@ class _Start:
 
 
 @dataclass(frozen=True, slots=True)
-class _Best:
-    """The best candidate so far."""
+class _Candidate:
+    """A start at which a path is free, its placement, and the position (2,) of the middle of the path there."""
 
     cost: float
     start: _Start
     placement: Placement
+    middle_m: Array
+
+    def differs_from(self, other: "_Candidate", extent_m: float) -> bool:
+        """Whether two candidates are different placements of a path."""
+        turn_rad = abs(np.angle(np.exp(1j * (self.start.heading_rad - other.start.heading_rad))))
+        moved_m = float(np.linalg.norm(self.middle_m - other.middle_m))
+        return moved_m > DISTINCT_SHARE * extent_m or turn_rad > DISTINCT_RAD
 
 
 def place_path(
     scene: Scene,
     T_world_left: Array,
     pair: StereoPair,
-    wanted_px: Array,
+    wanted: WantedDisparities,
     *,
+    limits: PlacementLimits = OWN_SCALE,
+    most: int = 1,
     seed: int = 0,
-) -> Placement:
-    """Place a path (N, 4, 4) of the left camera into a scene so that disparities agree and the path is free.
+) -> list[Placement]:
+    """The best different placements of a path (N, 4, 4) of the left camera in a scene, the best one first.
 
-    `wanted_px` (V, 3, 3) are the disparities in V segments of the path. Raises InputError if no free path is found.
+    The path is free there, its disparities agree, and nothing is nearer than the limits allow.
+    Raises InputError, with the reason, if there is none.
     """
-    surroundings = _Surroundings.of(scene)
-    path = _thinned(T_world_left, WAYPOINTS)
-    rng = np.random.default_rng(seed)
-    best: _Best | None = None
-    tried = 0
-    for draw in range(DRAWS + NEAR_DRAWS):
-        start = _draw_start(draw, surroundings, best, rng)
-        T_scene_world = surroundings.free_pose(path, start)
+    search = _Search(_Surroundings.of(scene), _thinned(T_world_left, WAYPOINTS), pair, wanted, limits)
+    reason = ""
+    for scales in limits.scales:
+        candidates = search.along_lanes(scales)
+        found = search.best_of(candidates, most, np.random.default_rng(seed))
+        if found:
+            return [replace(each.placement, tried=len(candidates)) for each in found]
+        reason = search.reason(candidates, scales)
+    steps_m = np.diff(T_world_left[:, :3, 3], axis=0)
+    length_m = float(np.linalg.norm(steps_m, axis=1).sum())
+    raise InputError(
+        f"no free path of {length_m:.1f} m was found in '{scene.name}' ({reason}); take fewer images or another place"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """The search for placements of a path (W, 4, 4) in a scene."""
+
+    surroundings: "_Surroundings"
+    path: Array
+    pair: StereoPair
+    wanted: WantedDisparities
+    limits: PlacementLimits
+
+    def along_lanes(self, scales: tuple[float, ...]) -> list[_Candidate]:
+        """The candidates on free lanes of the floor, at some scales and at all heights."""
+        candidates = []
+        for scale, height_m in product(scales, HEIGHTS_M):
+            for lane in self._lanes(scale, height_m):
+                candidate = self.judged(_Start(scale, height_m, lane.heading_rad, lane.xy_m))
+                if candidate is not None:
+                    candidates.append(candidate)
+        return candidates
+
+    def _lanes(self, scale: float, height_m: float) -> list[Lane]:
+        """The free lanes of the floor for a height of the path."""
+        floor = self.surroundings.floor((height_m + CLEARANCE_M) / scale)
+        if floor is None:
+            return []
+        return free_lanes(floor, self.path[:, :2, 3] / scale, clearance_m=CLEARANCE_M / scale, most=LANES)
+
+    def judged(self, start: _Start) -> _Candidate | None:
+        """The candidate at a start; None if the path is not free there."""
+        T_scene_world = self.surroundings.free_pose(self.path, start)
         if T_scene_world is None:
-            continue
-        tried += 1
+            return None
+        path_in_scene = T_scene_world @ _scaled_down(self.path, start.scale)
+        caster = self.surroundings.caster
+        segments = len(self.wanted.cells_px)
+        seen_px = segment_disparities(caster, path_in_scene, self.pair, start.scale, segments)
+        misfit = float(np.nanmean(np.abs(np.log(seen_px / self.wanted.cells_px))))
+        nearness = nearness_of(caster, path_in_scene, self.pair, start.scale, self.wanted)
+        excess = np.log(max(nearness / self.limits.nearness, 1.0))
+        cost = misfit + SCALE_COST * abs(np.log(start.scale)) + NEARNESS_COST * excess
+        T_place_world = _scaled_up(T_scene_world, start.scale)
+        placement = Placement(T_place_world, start.scale, misfit, nearness, tried=0)
+        return _Candidate(cost, start, placement, path_in_scene[len(path_in_scene) // 2, :2, 3])
 
-        path_in_scene = T_scene_world @ _scaled_down(path, start.scale)
-        seen_px = segment_disparities(surroundings.caster, path_in_scene, pair, start.scale, len(wanted_px))
-        misfit = float(np.nanmean(np.abs(np.log(seen_px / wanted_px))))
-        cost = misfit + SCALE_COST * abs(np.log(start.scale))
-        if best is None or cost < best.cost:
-            T_place_world = _scaled_up(T_scene_world, start.scale)
-            best = _Best(cost, start, Placement(T_place_world, start.scale, misfit, tried=0))
+    def best_of(self, candidates: list[_Candidate], most: int, rng: np.random.Generator) -> list[_Candidate]:
+        """The best different candidates within the limits, improved by draws near them."""
+        improved = [self._improved(candidate, rng) for candidate in self._different(candidates, most + MORE_IMPROVED)]
+        within = [each for each in improved if each.placement.nearness <= self.limits.nearness]
+        return self._different(within, most)
 
-    if best is None:
-        steps_m = np.diff(T_world_left[:, :3, 3], axis=0)
-        length_m = float(np.linalg.norm(steps_m, axis=1).sum())
-        raise InputError(
-            f"no free path of {length_m:.1f} m was found in '{scene.name}'; take fewer images or another place"
-        )
-    return replace(best.placement, tried=tried)
+    def _different(self, candidates: list[_Candidate], most: int) -> list[_Candidate]:
+        """The best candidates that differ from each other, at most so many, the best one first."""
+        extent_m = float(np.linalg.norm(np.ptp(self.path[:, :2, 3], axis=0)))
+        chosen = list[_Candidate]()
+        for candidate in sorted(candidates, key=lambda each: each.cost):
+            if len(chosen) == most:
+                break
+            if all(candidate.differs_from(other, extent_m / candidate.start.scale) for other in chosen):
+                chosen.append(candidate)
+        return chosen
 
+    def _improved(self, best: _Candidate, rng: np.random.Generator) -> _Candidate:
+        """The best of draws at a decreasing distance from a candidate."""
+        for draw in range(NEAR_DRAWS):
+            share = LAST_SHARE ** (draw / NEAR_DRAWS)
+            near = self.judged(best.start.near(share, rng))
+            if near is not None and near.cost < best.cost:
+                best = near
+        return best
 
-def _draw_start(draw: int, surroundings: "_Surroundings", best: _Best | None, rng: np.random.Generator) -> _Start:
-    """The candidate of a draw: first anywhere, then at a decreasing distance from the best one."""
-    if draw < DRAWS or best is None:
-        return surroundings.any_start(rng)
-    progress = (draw - DRAWS) / NEAR_DRAWS
-    return best.start.near(LAST_SHARE**progress, rng)
+    def reason(self, candidates: list[_Candidate], scales: tuple[float, ...]) -> str:
+        """Why there is no placement at some scales."""
+        span = f"{min(scales):g} to {max(scales):g}"
+        if not candidates:
+            return f"it fits nowhere at scales of {span}"
+        nearness = min(candidate.placement.nearness for candidate in candidates)
+        return f"on {len(candidates)} free lanes, surfaces are {nearness:.1f} times as near as in the recording or more"
 
 
 def _directions_around() -> Array:
@@ -244,30 +382,26 @@ DIRECTIONS_AROUND = _directions_around()
 
 @dataclass(frozen=True, slots=True)
 class _Surroundings:
-    """The scene that a path is placed into: its ray caster, normals of faces (F, 3), and extent (3,)."""
+    """The scene that a path is placed into: its faces, ray caster, upper end, and maps of the floor by height."""
 
+    faces: Triangles
     caster: RayCaster
-    normals: Array
-    low_m: Array
-    high_m: Array
+    top_m: float
+    floors: dict[float, FloorMap | None]
 
     @classmethod
     def of(cls, scene: Scene) -> "_Surroundings":
         faces = triangles(scene, t_ns=0)
-        corners_m = faces.corners_m.reshape(-1, 3)
-        low_m = np.quantile(corners_m, EXTENT_QUANTILE, axis=0)
-        high_m = np.quantile(corners_m, 1 - EXTENT_QUANTILE, axis=0)
-        return cls(RayCaster(faces), faces.plane, low_m, high_m)
+        heights_m = faces.corners_m[..., 2]
+        top_m = float(np.quantile(heights_m, 1 - EXTENT_QUANTILE))
+        return cls(faces, RayCaster(faces), top_m, {})
 
-    def any_start(self, rng: np.random.Generator) -> _Start:
-        """Draw a start anywhere in the place."""
-        scale_index = min(int(rng.exponential(MEAN_SCALE_INDEX)), len(SCALES) - 1)
-        return _Start(
-            scale=SCALES[scale_index],
-            height_m=float(rng.choice(HEIGHTS_M)),
-            heading_rad=float(rng.uniform(0, 2 * np.pi)),
-            xy_m=rng.uniform(self.low_m[:2], self.high_m[:2]),
-        )
+    def floor(self, height_m: float) -> FloorMap | None:
+        """The map of where the floor is free up to a height or a little more; None if there is no floor."""
+        body_m = next((body_m for body_m in BODIES_M if body_m >= height_m), BODIES_M[-1])
+        if body_m not in self.floors:
+            self.floors[body_m] = floor_map(self.faces, self.caster, body_m=body_m)
+        return self.floors[body_m]
 
     def free_pose(self, path: Array, start: _Start) -> Array | None:
         """The pose T_scene_world (4, 4) that moves a path, scaled down, to a start; None if it is not free there."""
@@ -292,7 +426,7 @@ class _Surroundings:
 
     def _ground_m(self, xy_m: Array) -> float | None:
         """The height of the lowest level face below a position; None if there is none."""
-        z_m = self.high_m[2] + ABOVE_PLACE_M
+        z_m = self.top_m + ABOVE_PLACE_M
         ground_m = None
         for _ in range(MAX_LAYERS):
             hits = self.caster.hits(np.array([[*xy_m, z_m]]), DOWN)
@@ -300,7 +434,7 @@ class _Surroundings:
             if face < 0:
                 return ground_m
             z_m -= float(hits.distance[0])
-            if self.normals[face, 2] > LEVEL_COSINE:
+            if self.faces.plane[face, 2] > LEVEL_COSINE:
                 ground_m = z_m
             z_m -= BEYOND_FACE_M
         return ground_m
@@ -327,14 +461,16 @@ class _Surroundings:
             return False
 
         # Inside of an object, the back of the face above is visible.
-        is_behind = np.einsum("ij,ij->i", self.normals[hits.face], directions) > 0
+        is_behind = np.einsum("ij,ij->i", self.faces.plane[hits.face], directions) > 0
         is_upward = directions[:, 2] > LEVEL_COSINE
         return not np.any(is_hit & is_behind & is_upward)
 
 
 # --- Disparities in a scene ---
 
-RAYS_PER_CELL = 7  # along each axis
+RAYS_PER_CELL = 5  # along each axis
+NEARNESS_VIEWS = 12
+NEAREST_COMPARED_PX = 1.0  # smaller disparities of a recording count as this one
 
 
 def segment_disparities(
@@ -349,17 +485,57 @@ def segment_disparities(
     `T_scene_left` (N, 4, 4) is the path in the scene, and `scale` multiplies the distances in it.
     """
     middles = (np.arange(segments) + 0.5) * len(T_scene_left) / segments
-    views = T_scene_left[middles.astype(int)]
-    rays = _view_rays(pair)  # (R, 3), in the axes of the left camera
+    disparity_px = _ray_disparities(caster, T_scene_left[middles.astype(int)], pair, scale)
+    median_px = np.median(np.nan_to_num(disparity_px, nan=0.0), axis=-1)
+    return np.asarray(np.maximum(median_px, MIN_DISPARITY_PX))
+
+
+def nearness_of(
+    caster: RayCaster,
+    T_scene_left: Array,
+    pair: StereoPair,
+    scale: float,
+    wanted: WantedDisparities,
+) -> float:
+    """The largest ratio of a tenth of a view's disparities to that of the recording, over views along a path (N, 4, 4).
+
+    Rays count as often as the recording has matches in their cell, and not at all if they meet no surface. 0 if the
+    tenths are unknown.
+    """
+    views = np.linspace(0, len(T_scene_left) - 1, NEARNESS_VIEWS).astype(int)
+    disparity_px = _ray_disparities(caster, T_scene_left[views], pair, scale)
+    segments = len(wanted.tenths_px)
+    ratios = [0.0]
+    for index, of_view_px in enumerate(disparity_px):
+        segment = index * segments // NEARNESS_VIEWS
+        tenths_px = _weighted_tenths(of_view_px, wanted.counts[segment])
+        ratios += (tenths_px / np.maximum(wanted.tenths_px[segment], NEAREST_COMPARED_PX)).tolist()
+    return float(np.nanmax(ratios))
+
+
+def _weighted_tenths(disparity_px: Array, counts: Array) -> Array:
+    """The TENTHS (2,) of the disparities (3, 3, R) of a view, of which each cell counts by its `counts` (3, 3)."""
+    is_hit = np.isfinite(disparity_px)
+    hits = is_hit.sum(-1)
+    weights = np.broadcast_to((counts / np.maximum(hits, 1))[..., None], disparity_px.shape)[is_hit]
+    values_px = disparity_px[is_hit]
+    if not weights.sum():
+        return np.zeros(len(TENTHS))
+    order = np.argsort(values_px)
+    share = np.cumsum(weights[order]) / weights.sum()
+    rows = np.minimum(np.searchsorted(share, TENTHS), len(order) - 1)
+    return np.asarray(values_px[order][rows])
+
+
+def _ray_disparities(caster: RayCaster, views: Array, pair: StereoPair, scale: float) -> Array:
+    """The disparities (V, 3, 3, R) of rays in each cell of views (V, 4, 4) in a scene; NaN where they meet nothing."""
+    rays = _view_rays(pair)  # in the axes of the left camera
     origins_m = np.repeat(views[:, :3, 3], len(rays), axis=0)
     directions = np.concatenate([rays @ T[:3, :3].T for T in views])
-
     hits = caster.hits(origins_m, directions)
-    depth_m = np.where(hits.face >= 0, hits.distance * scale, np.inf)
-    disparity_px = pair.focal_baseline / depth_m
-    by_cell_px = disparity_px.reshape(len(views), CELLS, RAYS_PER_CELL, CELLS, RAYS_PER_CELL)
-    median_px = np.median(by_cell_px, axis=(2, 4))
-    return np.asarray(np.maximum(median_px, MIN_DISPARITY_PX))
+    depth_m = np.where(hits.face >= 0, hits.distance * scale, np.nan)
+    by_cell_px = (pair.focal_baseline / depth_m).reshape(len(views), CELLS, RAYS_PER_CELL, CELLS, RAYS_PER_CELL)
+    return np.moveaxis(by_cell_px, 2, 3).reshape(len(views), CELLS, CELLS, RAYS_PER_CELL**2)
 
 
 def _view_rays(pair: StereoPair) -> Array:

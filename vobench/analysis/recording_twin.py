@@ -11,13 +11,15 @@ import numpy as np
 
 from vobench.analysis.camera_fit import CameraLook, Lights, fit_camera, look_of
 from vobench.analysis.image_statistics import evenly_spaced
-from vobench.analysis.path_placement import Placement, cell_disparities, levelled, place_path
+from vobench.analysis.path_placement import Placement, levelled, wanted_disparities
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
 from vobench.analysis.realism import Realism, residual, shots_of
 from vobench.analysis.realism_report import RealismReport, realism_of
 from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
 from vobench.analysis.twin_estimators import twin_estimators
+from vobench.analysis.twin_places import PlacedPath, find_places
+from vobench.analysis.twin_prediction import TwinPrediction, predict
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import stereo_pair
@@ -38,8 +40,6 @@ from vobench.runner.task import bake_task, perform
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.suite import catalog
 from vobench.suite.axis import RigSettings
-from vobench.suite.scene_build import build
-from vobench.suite.scene_file import read_scene
 from vobench.suite.suite import read_plan
 from vobench.suite.yaml_file import plain
 from vobench.trajectory.nanoseconds import NS_PER_S
@@ -58,6 +58,8 @@ PATH_FILE = "path.tum"
 PLACEMENT_FILE = "placement.json"
 REPORT_FILE = "twin.json"
 
+PLACEMENTS = 3  # in different places, if there are so many
+MOST_PLACEMENTS = 20
 FEWEST_PICTURES = 12  # a replayed path needs as many poses
 LEAST_EXTENT_M = 0.05
 FITTED_PICTURES = 12  # that the camera is fitted to
@@ -69,13 +71,14 @@ QUANTILES = (0.1, 0.5, 0.9)
 class TwinSuite:
     """The suite of a recording and its twin, written to a folder.
 
-    `file` is the suite, `placement` the pose of the recorded path in the scene, None if that is not known, and
-    `realism` that of the recording.
+    `file` is the suite, and `more` are those of further places, in which only the twin is. `placed` are the placements
+    of the path in the places of all suites, none if they are not known. `realism` is that of the recording.
     """
 
     file: Path
-    placement: Placement | None
+    placed: tuple[PlacedPath, ...]
     realism: Realism
+    more: tuple[Path, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,6 +94,7 @@ class TwinReport:
     agreement: Agreement
     errors: Mapping[str, Mapping[str, Array]]
     twin: Realism
+    prediction: TwinPrediction
 
     def rows(self) -> list[dict[str, Any]]:
         """One row per estimator, by error on the recording, with mean and quantiles of errors on both cases."""
@@ -105,7 +109,8 @@ class TwinReport:
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values, as `vobench twin --json` prints them and twin.json holds them."""
         real = self.suite.realism
-        placement = self.suite.placement
+        real_means = {name: means[0] for name, means in self.agreement.errors.items()}
+        covered, counted = self.prediction.covered(real_means)
         here = self.suite.file.parent
         against_real = RealismReport(here, self.twin, here, real).rows()
         return {
@@ -114,7 +119,8 @@ class TwinReport:
             "estimators": self.rows(),
             "statistics": [row for row in against_real if row["against"] is not None],
             "also": _compared(real, self.twin),
-            "place": None if placement is None else {"scale": placement.scale, "misfit": placement.misfit},
+            "prediction": {**self.prediction.as_dict(), "in_intervals": [covered, counted]},
+            "places": [_place_facts(placed) for placed in self.suite.placed],
             "real": RealismReport(here, real).as_dict(),
             "twin": RealismReport(here, self.twin).as_dict(),
         }
@@ -131,11 +137,22 @@ class TwinReport:
         return data_frame(flat)
 
 
+def _place_facts(placed: PlacedPath) -> dict[str, Any]:
+    placement = placed.placement
+    return {
+        "place": placed.title,
+        "scale": placement.scale,
+        "misfit": placement.misfit,
+        "nearness": placement.nearness,
+    }
+
+
 def write_twin_suite(
     recording: Path,
     *,
     out: Path = Path("twin"),
     place: str = "office",
+    placements: int = PLACEMENTS,
     estimators: Sequence[str] = (),
     form: str | None = None,
     options: ReadOptions = DEFAULT_OPTIONS,
@@ -143,14 +160,15 @@ def write_twin_suite(
 ) -> TwinSuite:
     """Write the suite of a recording and of its repetition in a simulated place.
 
-    The recorded path is placed where disparities agree best and the path is free. The rig gets the calibration errors
-    of the recording, and the camera gets its exposure, contrast, blur and noise.
+    The recorded path is placed at its own scale where it is free and disparities agree best, in several places. The rig
+    gets the calibration errors of the recording, and the camera gets its exposure, contrast, blur and noise.
 
     Args:
         recording: a recording with ground truth, or the folder of a run's case.
         out: the folder for the suite, new or of the same request when it was interrupted. The placement and the suite
             in it are used again, also if the suite was edited.
-        place: the name of the scene, or the path of its file or model.
+        place: the name of the first scene that is tried, or the path of its file or model.
+        placements: the largest number of places, as in `find_places`.
         estimators: three estimators or more, instead of the default seven, as in `twin_estimators`.
         form: the form of the recording, if its content does not determine it.
         options: what the recording does not state itself: calibration, ground truth, rate, topics.
@@ -163,7 +181,7 @@ def write_twin_suite(
         UnknownNameError: there is no such place.
     """
     entries = twin_estimators(estimators)
-    scene = read_scene(catalog.find("scene", place).path)
+    catalog.find("scene", place)
 
     recorded = read_recording(recording, form=form, options=options)
     request = {
@@ -171,40 +189,58 @@ def write_twin_suite(
         "form": form,
         "options": str(options),
         "place": place,
+        "placements": placements,
         "estimators": list(estimators),
     }
     claim(out, request)
-    file = (out / SUITE_FILE).resolve()
     with progress.step("measuring the recording"):
         realism = realism_of(recorded)
     path = recorded_path(recorded, realism.pair)
-    if _has_camera(file):
-        return TwinSuite(file, _read_placement(out), realism)
-
-    placement = _read_placement(out)
-    if placement is None:
+    placed = _read_placements(out)
+    if not placed:
         pair = stereo_pair(recorded.rig, "the twin")
-        with progress.step(f"looking for a free path in {place}"):
-            placement = place_path(build(scene, {}), path.T_world_left, pair, cell_disparities(path.fit, pair))
-        write_json(out / PLACEMENT_FILE, placement.as_dict())
+        wanted_px = wanted_disparities(path.fit, pair)
+        placed = tuple(find_places(place, path.T_world_left, pair, wanted_px, most=placements, progress=progress))
+        write_json(out / PLACEMENT_FILE, [each.as_dict() for each in placed])
 
-    write_json(out / PLACE_FILE, {**plain(scene), "scale": scene.scale * placement.scale})
-    (out / PATH_FILE).write_text(format_tum(path.in_place(placement)), encoding="utf-8")
-    suite: dict[str, Any] = {
-        "name": "twin",
-        "summary": f"A recording repeated in {place}",
-        "scenes": [str((out / PLACE_FILE).resolve())],
-        "rigs": {TWIN: path.rig_settings()},
-        "trajectories": {TWIN: path.trajectory_settings()},
-        "source": [recording_source(recording, form, options)],
-        "estimators": entries,
-    }
-    write_json(file, suite)
-    # The camera is fitted to pictures of this suite's twin, so the suite is read without a camera first.
     wanted = look_of_recording(recorded)
-    suite["cameras"] = {TWIN: fitted_camera(file, wanted, gain=path.fit.gain, progress=progress)}
-    write_json(file, suite)
-    return TwinSuite(file, placement, realism)
+    source = recording_source(recording, form, options)
+    files = []
+    for index, each in enumerate(placed):
+        file = _numbered(out / SUITE_FILE, index).resolve()
+        files.append(file)
+        if _has_camera(file):
+            continue
+        suite = _suite_of_place(out, path, each, index=index)
+        suite["estimators"] = entries
+        if index == 0:
+            suite["source"] = [source]
+        write_json(file, suite)
+        # The camera is fitted to pictures of this suite's twin, so the suite is read without a camera first.
+        suite["cameras"] = {TWIN: fitted_camera(file, wanted, gain=path.fit.gain, progress=progress)}
+        write_json(file, suite)
+    return TwinSuite(files[0], placed, realism, tuple(files[1:]))
+
+
+def _suite_of_place(out: Path, path: "RecordedPath", placed: PlacedPath, *, index: int) -> dict[str, Any]:
+    """The suite of the twin in one place, without estimators and camera; its place and path are written."""
+    place_file = _numbered(out / PLACE_FILE, index)
+    path_file = _numbered(out / PATH_FILE, index)
+    write_json(place_file, plain(placed.scene()))
+    path_file.write_text(format_tum(path.in_place(placed.placement)), encoding="utf-8")
+    return {
+        "name": "twin",
+        "summary": f"A recording repeated in {placed.title}",
+        "seed": index,
+        "scenes": [str(place_file.resolve())],
+        "rigs": {TWIN: path.rig_settings()},
+        "trajectories": {TWIN: {**path.trajectory_settings(), "file": path_file.name}},
+    }
+
+
+def _numbered(file: Path, index: int) -> Path:
+    """The file of the place with an index: the first one has no number, the others have 2, 3 and so on."""
+    return file if index == 0 else file.with_stem(f"{file.stem}-{index + 1}")
 
 
 def _has_camera(file: Path) -> bool:
@@ -214,12 +250,12 @@ def _has_camera(file: Path) -> bool:
     return bool(read_plan(str(file)).source.plain.get("cameras"))
 
 
-def _read_placement(out: Path) -> Placement | None:
-    """The placement that was found before; None if there is none."""
+def _read_placements(out: Path) -> tuple[PlacedPath, ...]:
+    """The placements that were found before."""
     file = out / PLACEMENT_FILE
     if not file.is_file():
-        return None
-    return Placement.of_dict(json.loads(file.read_text(encoding="utf-8")))
+        return ()
+    return tuple(PlacedPath.of_dict(facts) for facts in json.loads(file.read_text(encoding="utf-8")))
 
 
 def read_twin_suite(folder: Path, *, progress: Progress = SILENT) -> TwinSuite:
@@ -239,26 +275,79 @@ def read_twin_suite(folder: Path, *, progress: Progress = SILENT) -> TwinSuite:
     recorded = read_all(plan)[REAL]
     with progress.step("measuring the recording"):
         realism = realism_of(recorded)
-    return TwinSuite(file, _read_placement(folder), realism)
+    more = []
+    for index in range(1, MOST_PLACEMENTS):
+        further = _numbered(file, index)
+        if not further.is_file():
+            break
+        more.append(further)
+    return TwinSuite(file, _read_placements(folder), realism, tuple(more))
 
 
-def compare_twin(suite: TwinSuite, *, run_plan: PlanRunner, progress: Progress = SILENT) -> TwinReport:
+def compare_twin(
+    suite: TwinSuite,
+    *,
+    run_plan: PlanRunner,
+    prediction: "PredictedTwin | None" = None,
+    progress: Progress = SILENT,
+) -> TwinReport:
     """Run the estimators of a twin's suite on both cases, compare them, and write twin.json beside the suite.
+
+    `prediction` is that of `predict_twin`, which is called if it is not given.
 
     Raises InputError if fewer than three estimators ran on both.
     """
+    prediction = predict_twin(suite, run_plan=run_plan) if prediction is None else prediction
     folder = run_plan(read_plan(str(suite.file)))
     with progress.step("measuring the twin"):
         twin = realism_of(read_recording(folder.case(TWIN)))
     real_errors = _errors(folder, REAL)
-    twin_errors = _errors(folder, TWIN)
+    twin_errors = prediction.twin_errors()
     orders = agreement(real_errors, twin_errors)
     errors = {}
     for name in orders.errors:
         errors[name] = {REAL: real_errors[name], TWIN: twin_errors[name]}
-    report = TwinReport(suite, folder, orders, errors, twin)
+    report = TwinReport(suite, folder, orders, errors, twin, prediction.prediction)
     write_json(suite.file.parent / REPORT_FILE, report.as_dict())
     return report
+
+
+@dataclass(frozen=True, slots=True)
+class PredictedTwin:
+    """The prediction of a twin, and the errors of segments (8, N) by estimator in each place."""
+
+    prediction: TwinPrediction
+    errors: tuple[Mapping[str, Array], ...]
+
+    def twin_errors(self) -> dict[str, Array]:
+        """The errors of segments in all places, side by side, of the estimators that ran in all of them."""
+        names = [name for name in self.errors[0] if all(name in errors for errors in self.errors)]
+        side_by_side = {}
+        for name in names:
+            side_by_side[name] = np.concatenate([errors[name] for errors in self.errors], axis=1)
+        return side_by_side
+
+
+def predict_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> PredictedTwin:
+    """Run the estimators on the twin in all places, and predict their errors and order on the recording from that.
+
+    The estimators do not run on the recording, whose errors are therefore not used.
+    """
+    errors = []
+    for file in (suite.file, *suite.more):
+        folder = run_plan(read_plan(str(file)).only([TWIN], []))
+        errors.append(_errors(folder, TWIN))
+    return PredictedTwin(predict(errors, basis=_basis(suite)), tuple(errors))
+
+
+def _basis(suite: TwinSuite) -> str:
+    """On what a prediction rests."""
+    titles = ", ".join(each.title for each in suite.placed)
+    places = f"its path in {titles}" if titles else "its path in a place"
+    return (
+        f"The prediction rests on {places}, on a camera and a calibration error that were fitted to its pictures, and "
+        "on that path being true. Intervals cover other places and noise, not what a simulation lacks."
+    )
 
 
 def make_twin(
@@ -267,6 +356,7 @@ def make_twin(
     run_plan: PlanRunner,
     out: Path = Path("twin"),
     place: str = "office",
+    placements: int = PLACEMENTS,
     estimators: Sequence[str] = (),
     form: str | None = None,
     options: ReadOptions = DEFAULT_OPTIONS,
@@ -277,7 +367,14 @@ def make_twin(
     It calls `write_twin_suite` and `compare_twin`. See them for the arguments and errors.
     """
     suite = write_twin_suite(
-        recording, out=out, place=place, estimators=estimators, form=form, options=options, progress=progress
+        recording,
+        out=out,
+        place=place,
+        placements=placements,
+        estimators=estimators,
+        form=form,
+        options=options,
+        progress=progress,
     )
     return compare_twin(suite, run_plan=run_plan, progress=progress)
 
@@ -319,7 +416,8 @@ def recorded_path(recording: Recording, fit: StereoFit | None) -> RecordedPath:
     truth = recording.truth
     if truth is None:
         raise InputError(
-            "a twin needs a path, and this recording has none; give one, such as an estimate, with --truth"
+            "a twin needs a path, and this recording has none; give an estimate with --truth, and add --predict, so "
+            "that nothing is compared with it"
         )
 
     has_pose = (recording.t_ns >= truth.t_ns[0]) & (recording.t_ns <= truth.t_ns[-1])

@@ -5,7 +5,18 @@ from typing import Annotated, Any
 
 import typer
 
-from vobench.analysis.recording_twin import REAL, TWIN, TwinReport, compare_twin, read_twin_suite, write_twin_suite
+from vobench.analysis.recording_twin import (
+    MOST_PLACEMENTS,
+    PLACEMENTS,
+    REAL,
+    TWIN,
+    TwinReport,
+    compare_twin,
+    predict_twin,
+    read_twin_suite,
+    write_twin_suite,
+)
+from vobench.analysis.twin_prediction import TwinPrediction
 from vobench.cli import terminal
 from vobench.cli.option import Jobs, Json, with_option_groups
 from vobench.cli.plan_runner import plan_runner
@@ -29,7 +40,10 @@ def twin_command(
         Path | None,
         typer.Option(help="Run the suite in the folder of a twin, such as one that was edited, and write its report."),
     ] = None,
-    place: Annotated[str, typer.Option(help="The scene or model in which the path is simulated.")] = "office",
+    place: Annotated[str, typer.Option(help="The first scene or model in which the path is tried.")] = "office",
+    placements: Annotated[
+        int, typer.Option(min=1, max=MOST_PLACEMENTS, help="The largest number of places in which it is simulated.")
+    ] = PLACEMENTS,
     out: Annotated[Path, typer.Option(help="The new folder for the suite, its runs and the report.")] = Path("twin"),
     estimator: Annotated[
         list[str] | None,
@@ -40,6 +54,9 @@ def twin_command(
             "as '{name: stereo_pnp, label: wide, params: {window_px: 21}}'; can be repeated.",
         ),
     ] = None,
+    predict: Annotated[
+        bool, typer.Option("--predict", help="Print the prediction, without running estimators on the recording.")
+    ] = False,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Write the suite, and stop.")] = False,
     jobs: Jobs = 1,
     recording_options: RecordingOptions,
@@ -59,6 +76,7 @@ def twin_command(
             path,
             out=out,
             place=place,
+            placements=placements,
             estimators=estimator or (),
             form=recording_options.form,
             options=recording_options.read_options(),
@@ -68,7 +86,14 @@ def twin_command(
         print(f"Wrote the suite: {suite.file}")
         return
     run_plan = plan_runner(out=out / "runs", jobs=jobs, finish=_write_reports)
-    compared = compare_twin(suite, run_plan=run_plan, progress=progress)
+    predicted = predict_twin(suite, run_plan=run_plan)
+    if not json:
+        _print_prediction(predicted.prediction)
+    if predict:
+        if json:
+            terminal.print_json(predicted.prediction.as_dict())
+        return
+    compared = compare_twin(suite, run_plan=run_plan, prediction=predicted, progress=progress)
     if json:
         terminal.print_json(compared.as_dict())
     else:
@@ -79,6 +104,19 @@ def _write_reports(folder: RunFolder, scores: list[TrialScore]) -> None:
     from vobench.report import page
 
     page.write_reports(folder, scores)
+
+
+def _print_prediction(prediction: TwinPrediction) -> None:
+    """Print the expected errors, the expected order first to last, and on what they rest."""
+    console = terminal.console()
+    rows = []
+    for predicted in prediction.errors:
+        low, high = predicted.interval or (None, None)
+        interval = "" if low is None else f"{low:.3g} … {high:.3g}"
+        rows.append([predicted.estimator, f"{predicted.error:.3g}", interval])
+    console.print(terminal.table("predicted segment errors, % of length", ["estimator", "mean", "95 %"], rows))
+    for sentence in prediction.sentences():
+        console.print(sentence)
 
 
 def _print(report: TwinReport, out: Path) -> None:
@@ -94,15 +132,20 @@ def _print(report: TwinReport, out: Path) -> None:
     low, high = facts["interval"]
     console.print(f"Kendall's tau between both rankings: {facts['tau']:.2f} (95 % CI {low:.2f} … {high:.2f})")
 
+    covered, counted = facts["prediction"]["in_intervals"]
+    if counted:
+        console.print(f"{covered} of {counted} errors on the recording are in the intervals that were predicted.")
+
     rows = [_statistic_row(row) for row in facts["statistics"]]
     console.print(terminal.table("statistics", ["statistic", REAL, TWIN, "unit", "verdict"], rows))
     for name, (real, twin) in facts["also"].items():
         console.print(f"{name}: {real:.3g} in the recording, {twin:.3g} in its twin")
 
-    place = facts["place"]
-    if place is not None:
-        scale = f"scaled by {place['scale']:g}"
-        console.print(f"The scene is {scale}; its disparities differ from the recording's by {place['misfit']:.0%}.")
+    for place in facts["places"]:
+        console.print(
+            f"{place['place']} is scaled by {place['scale']:g}; its disparities differ from the recording's by "
+            f"{place['misfit']:.0%}, and a tenth of a picture's are {place['nearness']:.2f} times as large at most."
+        )
     console.print(f"Everything is in {out}")
 
 

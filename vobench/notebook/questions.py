@@ -128,6 +128,7 @@ def twin(
     *,
     report: Path | str | None = None,
     place: str = "office",
+    placements: int = 3,
     estimators: Names | None = None,
     form: str | None = None,
     out: Path | str = Path("twin"),
@@ -138,7 +139,7 @@ def twin(
 
     `out` is the folder for the suite and its runs, new or of an interrupted call. With `report`, which is such a
     folder, in place of the recording, the suite in it is run and compared as it is. `estimators` are names, labels of
-    the usual ones, or entries of a suite in YAML.
+    the usual ones, or entries of a suite in YAML. `placements` is the largest number of places.
     Raises InputError if the recording has no stereo pair, no ground truth or no motion, and UnknownNameError for the
     place.
     """
@@ -155,6 +156,7 @@ def twin(
         run_plan=run_plan,
         out=folder,
         place=place,
+        placements=placements,
         estimators=listed(estimators),
         form=form,
     )

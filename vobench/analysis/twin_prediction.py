@@ -1,0 +1,125 @@
+"""Predicts the errors of estimators on a recording, and their order, from their errors in placements of its twin."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import scipy
+
+from vobench.geometry.se3 import Array
+
+COVERAGE = 0.95  # of the intervals
+LEAST_ERROR_PERCENT = 1e-3  # smaller errors count as this one
+
+
+@dataclass(frozen=True, slots=True)
+class PredictedError:
+    """The expected error of an estimator in percent of length; the interval is None with a single placement."""
+
+    estimator: str
+    error: float
+    interval: tuple[float, float] | None
+
+
+@dataclass(frozen=True, slots=True)
+class TwinPrediction:
+    """The expected errors of estimators, the best one first, from their errors in placements of a twin.
+
+    `taus` are Kendall's tau between the orders in each two placements. `basis` says on what the prediction rests.
+    """
+
+    errors: tuple[PredictedError, ...]
+    taus: tuple[float, ...]
+    placements: int
+    basis: str = ""
+
+    def sentences(self) -> list[str]:
+        """On what the prediction rests, and how far its order is to be trusted."""
+        sentences = [self.basis] if self.basis else []
+        if self.taus:
+            mean = float(np.mean(self.taus))
+            sentences.append(
+                f"The orders in {self.placements} placements agree by a tau of {mean:.2f} "
+                f"({min(self.taus):.2f} … {max(self.taus):.2f})."
+            )
+        else:
+            sentences.append("With a single placement there are no intervals.")
+        return sentences
+
+    def covered(self, errors: Mapping[str, float]) -> tuple[int, int]:
+        """How many of these errors are in their intervals, and how many have one."""
+        are_covered = []
+        for predicted in self.errors:
+            if predicted.interval and predicted.estimator in errors:
+                low, high = predicted.interval
+                are_covered.append(low <= errors[predicted.estimator] <= high)
+        return sum(are_covered), len(are_covered)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain JSON values."""
+        rows = []
+        for predicted in self.errors:
+            interval = None if predicted.interval is None else list(predicted.interval)
+            rows.append({"estimator": predicted.estimator, "error": predicted.error, "interval": interval})
+        return {"estimators": rows, "taus": list(self.taus), "placements": self.placements, "says": self.sentences()}
+
+
+def predict(placements: Sequence[Mapping[str, Array]], *, basis: str = "") -> TwinPrediction:
+    """The prediction from the errors of segments, by estimator, in each placement of a twin.
+
+    Only estimators that ran in all placements are predicted. The logarithm of a mean error is taken to be the sum of
+    the effects of the estimator, of the placement, and of both together. The interval is that of an error in a further
+    placement.
+    """
+    names = [name for name in placements[0] if all(name in errors for errors in placements)]
+    means = np.array([_means(errors, names) for errors in placements])  # (placements, names)
+    logs = np.log(np.maximum(means, LEAST_ERROR_PERCENT))
+    half_width = _half_width(logs)
+    rows = []
+    for name, log in zip(names, logs.mean(0).tolist(), strict=True):
+        interval = None
+        if half_width is not None:
+            interval = (float(np.exp(log - half_width)), float(np.exp(log + half_width)))
+        rows.append(PredictedError(name, float(np.exp(log)), interval))
+    rows.sort(key=lambda row: row.error)
+    return TwinPrediction(tuple(rows), _taus(means), len(placements), basis)
+
+
+def _means(errors: Mapping[str, Array], names: Sequence[str]) -> list[float]:
+    """The mean errors of some estimators."""
+    return [float(np.nanmean(errors[name])) for name in names]
+
+
+def _half_width(logs: Array) -> float | None:
+    """Half of the width of the prediction interval of a logarithm; None if there are too few (placements, names)."""
+    placements, names = logs.shape
+    if placements < 2 or names < 2:
+        return None
+    of_placements = logs.mean(1) - logs.mean()
+    remaining = logs - logs.mean(0) - of_placements[:, None]
+    placement_freedom = placements - 1
+    remaining_freedom = placement_freedom * (names - 1)
+    # The two parts of the variance of one logarithm around the mean of its estimator.
+    placement_part = float((of_placements**2).sum()) / placement_freedom
+    remaining_part = float((remaining**2).sum()) / remaining_freedom * (1 - 1 / names)
+    # Each part has its own quantile: a common one would be too small where two placements are alike by chance.
+    of_placements_part = _squared_quantile(placement_freedom) * placement_part
+    of_remaining_part = _squared_quantile(remaining_freedom) * remaining_part
+    return float(np.sqrt((of_placements_part + of_remaining_part) * (1 + 1 / placements)))
+
+
+def _squared_quantile(freedom: int) -> float:
+    """The square of the quantile of Student's t for COVERAGE."""
+    return float(scipy.stats.t.ppf((1 + COVERAGE) / 2, freedom)) ** 2
+
+
+def _taus(means: Array) -> tuple[float, ...]:
+    """Kendall's tau between each two rows of mean errors (placements, names); undefined ones are left out."""
+    taus = []
+    for one, other in combinations(means, 2):
+        tau = float(scipy.stats.kendalltau(one, other).statistic)
+        if np.isfinite(tau):
+            taus.append(tau)
+    return tuple(taus)
