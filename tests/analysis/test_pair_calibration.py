@@ -60,7 +60,7 @@ def test_an_error_of_the_lens_is_told_from_rotations_by_rows_and_motion() -> Non
     assert found.has_lens_error
     assert found.is_offset_determined
     places_px = np.array([[0.25, 0.5], [0.5, 0.5], [0.75, 0.5]]) * [620, 188]
-    truth_px = -simulation.true_right_shift_px(error, PAIR, places_px)[:, 0]
+    truth_px = -simulation.true_right_shift_px(error, places_px)[:, 0]
     assert truth_px[0] - truth_px[1] > 0.9
     offsets_px, sigmas_px = found.calibration.disparity_error(places_px)
     assert (np.abs(offsets_px - truth_px) < 3 * sigmas_px).all()
