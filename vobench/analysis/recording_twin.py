@@ -343,9 +343,9 @@ def predict_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> PredictedTwin:
 def _basis(suite: TwinSuite) -> str:
     """On what a prediction rests."""
     titles = ", ".join(each.title for each in suite.placed)
-    places = f"its path in {titles}" if titles else "its path in a place"
+    places = f"the recording's path in {titles}" if titles else "the recording's path in a place"
     return (
-        f"The prediction rests on {places}, on a camera and a calibration error that were fitted to its pictures, and "
+        f"The prediction rests on {places}, on a camera and a calibration error that were fitted to the recording, and "
         "on that path being true. Intervals cover other places and noise, not what a simulation lacks."
     )
 
