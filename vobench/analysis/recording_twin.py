@@ -184,6 +184,7 @@ def write_twin_suite(
     catalog.find("scene", place)
 
     recorded = read_recording(recording, form=form, options=options)
+    _required_truth(recorded)  # before the folder is claimed, since a request with --truth is another one
     request = {
         "twin": str(recording.resolve()),
         "form": form,
@@ -409,17 +410,21 @@ class RecordedPath:
         return {"kind": "replay", "file": PATH_FILE, "rate_hz": rate_hz, "knot_hz": rate_hz * KNOTS_PER_PICTURE}
 
 
-def recorded_path(recording: Recording, fit: StereoFit | None) -> RecordedPath:
-    """The path of a recording's images that have a true pose. Raises InputError if it cannot be repeated."""
-    if fit is None:
-        raise InputError("a twin needs a stereo pair that can be rectified and matched, and this recording has none")
-    truth = recording.truth
-    if truth is None:
+def _required_truth(recording: Recording) -> Trajectory:
+    """The ground truth of a recording. Raises InputError if it has none."""
+    if recording.truth is None:
         raise InputError(
             "a twin needs a path, and this recording has none; give an estimate with --truth, and add --predict, so "
             "that nothing is compared with it"
         )
+    return recording.truth
 
+
+def recorded_path(recording: Recording, fit: StereoFit | None) -> RecordedPath:
+    """The path of a recording's images that have a true pose. Raises InputError if it cannot be repeated."""
+    if fit is None:
+        raise InputError("a twin needs a stereo pair that can be rectified and matched, and this recording has none")
+    truth = _required_truth(recording)
     has_pose = (recording.t_ns >= truth.t_ns[0]) & (recording.t_ns <= truth.t_ns[-1])
     t_ns = recording.t_ns[has_pose]
     if len(t_ns) < FEWEST_PICTURES:
