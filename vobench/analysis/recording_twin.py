@@ -345,10 +345,13 @@ def _basis(suite: TwinSuite) -> str:
     """On what a prediction rests."""
     titles = ", ".join(each.title for each in suite.placed)
     places = f"the recording's path in {titles}" if titles else "the recording's path in a place"
-    return (
+    basis = (
         f"The prediction rests on {places}, on a camera and a calibration error that were fitted to the recording, and "
         "on that path being true. Intervals cover other places and noise, not what a simulation lacks."
     )
+    if suite.realism.pair is None or suite.realism.pair.offset_px is None:
+        basis += " The offset of disparity could not be determined and is 0 in the twin, so errors may be far larger."
+    return basis
 
 
 def make_twin(
