@@ -303,3 +303,12 @@ def test_figures_of_the_pair_are_compared_where_both_are_known(realism: Realism)
     assert "yaw of the right eye,°" not in recording_twin._compared(realism, unknown)
     assert "offset of the right eye, px" not in recording_twin._compared(unknown, realism)
     assert len(recording_twin._compared(realism, replace(realism, pair=None))) == 4
+
+
+def test_a_prediction_says_that_the_offset_is_not_known(realism: Realism, tmp_path: Path) -> None:
+    assert realism.pair is not None
+    unknown = TwinSuite(tmp_path / "twin.yaml", (), replace(realism, pair=replace(realism.pair, yaw_deg=None)))
+    known_yaw = replace(realism.pair, yaw_deg=realism.pair.roll_deg)
+    known = TwinSuite(tmp_path / "twin.yaml", (), replace(realism, pair=known_yaw))
+    assert "offset of disparity could not be determined" in recording_twin._basis(unknown)
+    assert "offset" not in recording_twin._basis(known)

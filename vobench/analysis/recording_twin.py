@@ -184,6 +184,7 @@ def write_twin_suite(
     catalog.find("scene", place)
 
     recorded = read_recording(recording, form=form, options=options)
+    _required_truth(recorded)  # before the folder is claimed, since a request with --truth is another one
     request = {
         "twin": str(recording.resolve()),
         "form": form,
@@ -343,11 +344,14 @@ def predict_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> PredictedTwin:
 def _basis(suite: TwinSuite) -> str:
     """On what a prediction rests."""
     titles = ", ".join(each.title for each in suite.placed)
-    places = f"its path in {titles}" if titles else "its path in a place"
-    return (
-        f"The prediction rests on {places}, on a camera and a calibration error that were fitted to its pictures, and "
+    places = f"the recording's path in {titles}" if titles else "the recording's path in a place"
+    basis = (
+        f"The prediction rests on {places}, on a camera and a calibration error that were fitted to the recording, and "
         "on that path being true. Intervals cover other places and noise, not what a simulation lacks."
     )
+    if suite.realism.pair is None or suite.realism.pair.offset_px is None:
+        basis += " The offset of disparity could not be determined and is 0 in the twin, so errors may be far larger."
+    return basis
 
 
 def make_twin(
@@ -409,17 +413,21 @@ class RecordedPath:
         return {"kind": "replay", "file": PATH_FILE, "rate_hz": rate_hz, "knot_hz": rate_hz * KNOTS_PER_PICTURE}
 
 
-def recorded_path(recording: Recording, fit: StereoFit | None) -> RecordedPath:
-    """The path of a recording's images that have a true pose. Raises InputError if it cannot be repeated."""
-    if fit is None:
-        raise InputError("a twin needs a stereo pair that can be rectified and matched, and this recording has none")
-    truth = recording.truth
-    if truth is None:
+def _required_truth(recording: Recording) -> Trajectory:
+    """The ground truth of a recording. Raises InputError if it has none."""
+    if recording.truth is None:
         raise InputError(
             "a twin needs a path, and this recording has none; give an estimate with --truth, and add --predict, so "
             "that nothing is compared with it"
         )
+    return recording.truth
 
+
+def recorded_path(recording: Recording, fit: StereoFit | None) -> RecordedPath:
+    """The path of a recording's images that have a true pose. Raises InputError if it cannot be repeated."""
+    if fit is None:
+        raise InputError("a twin needs a stereo pair that can be rectified and matched, and this recording has none")
+    truth = _required_truth(recording)
     has_pose = (recording.t_ns >= truth.t_ns[0]) & (recording.t_ns <= truth.t_ns[-1])
     t_ns = recording.t_ns[has_pose]
     if len(t_ns) < FEWEST_PICTURES:
