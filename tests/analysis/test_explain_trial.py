@@ -239,6 +239,15 @@ def test_where_nothing_is_named_it_is_said_what_was_ruled_out_and_what_is_open()
     )
 
 
+def test_a_change_that_lets_runs_end_well_but_leaves_their_error_is_said() -> None:
+    nothing = change("blur", "flare", reduction=0.02, is_sure=False, high=0.2)
+    surviving = replace(change("flare", reduction=0.05, is_sure=False, high=0.1), survived=6, loss=0.8)
+    assert explained(nothing, (surviving, JPEG), ()).sentences[1] == (
+        "With a lens without stray light, all 6 runs end well, but their error is still 80.0% of the path."
+    )
+    assert len(explained(nothing, (surviving, JPEG), (), status="ok").sentences) == 4
+
+
 @pytest.mark.parametrize(
     ("status", "diverges_at_s", "symptom"),
     [

@@ -46,6 +46,13 @@ def test_errors_that_differ_too_much_are_on_a_logarithmic_axis(ratio, scale):
     assert position_axes.get_yscale() == scale
 
 
+def test_an_error_that_is_only_rounding_does_not_stretch_the_axis():
+    with new_figure(3, 3) as figure:
+        axes = figure.subplots()
+        scale_errors_axis(axes, [np.array([1.8e-45]), np.array([4.0, 5.0, 6.0]), np.array([0.0])])
+        assert axes.get_yscale() == "linear"
+
+
 def test_a_logarithmic_axis_does_not_follow_an_error_near_zero():
     with new_figure(3, 3) as figure:
         axes = figure.subplots()

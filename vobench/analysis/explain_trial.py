@@ -71,6 +71,7 @@ class TrialExplanation:
             instead = nuisance_named(change.removed[0]).instead
             sentences.append(f"{_upper(instead)} would make it worse: the error grows by {-change.reduction:.0%}.")
         if not explanation.named:
+            sentences += _survival_sentences(explanation)
             sentences += _ruled_out_sentences(explanation)
         return tuple(sentences)
 
@@ -198,6 +199,20 @@ def _because(name: str) -> str:
 
 def _advice(name: str) -> str:
     return CAUSE_TEXTS[name].advice
+
+
+def _survival_sentences(explanation: Explanation) -> list[str]:
+    """Which changes let all runs end well that did not, although their errors remain."""
+    if explanation.status not in SYMPTOMS:
+        return []
+    surviving = [change for change in explanation.singles if change.survived == change.repeats]
+    sentences = []
+    for change in surviving:
+        instead = _upper(f"with {nuisance_named(change.removed[0]).instead}")
+        sentences.append(
+            f"{instead}, all {change.repeats} runs end well, but their error is still {change.loss:.1%} of the path."
+        )
+    return sentences
 
 
 def _ruled_out_sentences(explanation: Explanation) -> list[str]:

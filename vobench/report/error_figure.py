@@ -17,6 +17,7 @@ from vobench.trajectory.nanoseconds import NS_PER_S
 LABELS = {"time": "time (s)", "path": "path length (m)"}
 ROW_HEIGHT = 0.42  # of one of the two rows, relative to the width of the figure
 LOGARITHMIC_FROM = 20.0  # ratio of the largest to the smallest median error above which the axis is logarithmic
+LARGEST_RATIO = 1e6  # of the errors that an axis shows
 DECADE = 10.0  # below the smallest median, a logarithmic axis ends
 HEADROOM = 1.3  # of a logarithmic axis above the largest error
 MM_PER_M = 1e3
@@ -80,10 +81,12 @@ def _length_unit(errors_m: Sequence[Array]) -> tuple[float, str]:
 def scale_errors_axis(axes: Axes, errors: Sequence[Array]) -> None:
     """Make the vertical axis linear from zero, or logarithmic if the errors (N,) of estimators differ widely.
 
-    They do if the largest median exceeds LOGARITHMIC_FROM times the smallest one above 0.
+    They do if the largest median exceeds LOGARITHMIC_FROM times the smallest one. Medians of 0, and such as rounding
+    leaves of a single pose, do not count.
     """
     medians = [float(np.median(error)) for error in errors]
-    positive = [median for median in medians if median > 0]
+    rounding = max(medians, default=0.0) / LARGEST_RATIO
+    positive = [median for median in medians if median > rounding]
     if not positive or max(positive) <= LOGARITHMIC_FROM * min(positive):
         axes.set_ylim(bottom=0)
         return
