@@ -139,6 +139,21 @@ def test_without_a_fault_nothing_is_found_however_bad_the_estimate(drive) -> Non
 # --- Another frame of the same body ---
 
 
+def bend(seed: int, drift_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """A bend of 0.7 m, and an estimate with its rotations, whose positions drift by so much a step at random."""
+    angles_rad = np.linspace(0.0, 0.5, 31)
+    positions_m = 1.35 * np.stack([np.sin(angles_rad), 1 - np.cos(angles_rad), 0 * angles_rad], 1)
+    rotations = np.stack([np.asarray(se3.rotation_z(angle_rad))[:3, :3] for angle_rad in angles_rad])
+    steps_m = np.random.default_rng(seed).normal(0, drift_m, positions_m.shape)
+    return se3.transform(rotations, positions_m), se3.transform(rotations, positions_m + np.cumsum(steps_m, 0))
+
+
+@pytest.mark.parametrize("drift_m", [0.01, 0.024, 0.05])
+def test_positions_that_drift_turn_the_alignment_and_not_the_body(drift_m: float) -> None:
+    kinds = [mismatch and mismatch.kind for mismatch in (found(*bend(seed, drift_m)) for seed in range(40))]
+    assert "body_frame_offset" not in kinds
+
+
 @pytest.mark.parametrize("T_body_other", [CAMERA, TILT, se3.transform(se3.rotation_z(0.5), (0, 0, 0))])
 def test_another_frame_of_the_body_is_found_with_its_rotation_and_lever(drive, T_body_other) -> None:
     T_gt, T_est = drive

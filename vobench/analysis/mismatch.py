@@ -25,6 +25,9 @@ MAX_SHARE_LEFT = 0.6  # of the misfit, after a correction that counts
 MIN_REDUCTION = 0.03  # of the misfit: rad, or share of the extent
 MIN_LEVER_REDUCTION = 0.002  # a lever of 1 m on KITTI 00 reduces the misfit by 0.003
 MAX_MISFIT = 0.5  # rad and share of the extent; frames cannot be told from a worse estimate
+# Errors of positions turn the alignment by about their share of the extent, in rad: then all rotations differ alike. A
+# rotation of the body that is not this many times as large could be due to them.
+MIN_ROTATION_OVER_MISFIT = 3.0
 AS_GOOD = 1.6  # a discrete correction is preferred to a fitted one up to this ratio of misfits
 
 INVERSE: dict[MoveKind, Kind] = {"inverse": "inverse_poses", "rotations": "inverse_rotations"}
@@ -204,7 +207,10 @@ def find_mismatch(
     assert fitted.move is not None
     lever = find_lever(T_gt, T_est, fitted.move.matrix[:3, :3])
     if not lever.is_plain:
-        return Mismatch("body_frame_offset", fitted, before, None) if fitted.reduces(before) else None
+        rotation_rad = float(se3.rotation_angle(fitted.move.matrix[:3, :3]))
+        is_beyond_alignment = rotation_rad > MIN_ROTATION_OVER_MISFIT * before.trans
+        is_offset = is_beyond_alignment and fitted.reduces(before)
+        return Mismatch("body_frame_offset", fitted, before, None) if is_offset else None
     if fitted.reduces(before) or fitted.reduces_by_lever(before):
         return Mismatch("body_frame_offset", fitted, before, lever)
     return None
