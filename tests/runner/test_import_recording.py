@@ -126,7 +126,7 @@ def test_a_recording_that_stands_still_has_a_drift_and_no_error_among_others(ben
 
 
 @pytest.mark.parametrize(
-    ("moved_m", "turned_deg", "still"), [(1.9e-3, 0.19, True), (2.1e-3, 0, False), (0, 0.21, False)]
+    ("moved_m", "turned_deg", "still"), [(4.9e-3, 0.49, True), (5.1e-3, 0, False), (0, 0.51, False)]
 )
 def test_a_path_stands_still_by_how_far_it_strays_and_not_by_its_length(moved_m, turned_deg, still):
     there = np.arange(1000) % 2
