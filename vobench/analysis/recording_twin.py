@@ -19,7 +19,7 @@ from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
 from vobench.analysis.twin_estimators import twin_estimators
 from vobench.analysis.twin_places import PlacedPath, find_places
-from vobench.analysis.twin_prediction import TwinPrediction, predict
+from vobench.analysis.twin_prediction import TwinPrediction, common_names, predict
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import stereo_pair
@@ -322,9 +322,8 @@ class PredictedTwin:
 
     def twin_errors(self) -> dict[str, Array]:
         """The errors of segments in all places, side by side, of the estimators that ran in all of them."""
-        names = [name for name in self.errors[0] if all(name in errors for errors in self.errors)]
         side_by_side = {}
-        for name in names:
+        for name in common_names(self.errors):
             side_by_side[name] = np.concatenate([errors[name] for errors in self.errors], axis=1)
         return side_by_side
 

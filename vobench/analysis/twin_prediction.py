@@ -73,7 +73,7 @@ def predict(placements: Sequence[Mapping[str, Array]], *, basis: str = "") -> Tw
     the effects of the estimator, of the placement, and of both together. The interval is that of an error in a further
     placement.
     """
-    names = [name for name in placements[0] if all(name in errors for errors in placements)]
+    names = common_names(placements)
     means = np.array([_means(errors, names) for errors in placements])  # (placements, names)
     logs = np.log(np.maximum(means, LEAST_ERROR_PERCENT))
     half_width = _half_width(logs)
@@ -85,6 +85,15 @@ def predict(placements: Sequence[Mapping[str, Array]], *, basis: str = "") -> Tw
         rows.append(PredictedError(name, float(np.exp(log)), interval))
     rows.sort(key=lambda row: row.error)
     return TwinPrediction(tuple(rows), _taus(means), len(placements), basis)
+
+
+def common_names(placements: Sequence[Mapping[str, Array]]) -> list[str]:
+    """The estimators that ran in all placements."""
+    first, *others = placements
+    names = list(first)
+    for errors in others:
+        names = [name for name in names if name in errors]
+    return names
 
 
 def _means(errors: Mapping[str, Array], names: Sequence[str]) -> list[float]:

@@ -32,6 +32,8 @@ PICTURES = "records_camera.txt"
 DATA = "records_data"
 CAMERA = "camera"
 UNKNOWN = "UNKNOWN_CAMERA"
+# The units of times since 1970 and their length in ns, by the number of digits of a time between 2001 and 2286.
+UNITS = {19: (1.0, "nanoseconds"), 16: (1e3, "microseconds"), 13: (1e6, "milliseconds")}
 UNIT_TOLERANCE = 1e-3  # the largest difference of a quaternion's norm from 1
 MOST_RATE_HZ = 10_000.0
 MOST_NAMES_SHOWN = 8
@@ -306,14 +308,14 @@ class _Clock:
                 raise InputError(f"rate_hz should be above 0 and at most {MOST_RATE_HZ:g}, got {rate_hz:g}")
             note = f"The stamps were taken for numbers of images, which were taken at {rate_hz:g} Hz from 0."
             return cls(stamps[0], NS_PER_S / rate_hz, note)
-        unit_ns = {19: 1.0, 16: 1e3, 13: 1e6}.get(len(str(stamps[0])))  # digits of a time between 2001 and 2286
-        if unit_ns is None:
+        unit = UNITS.get(len(str(stamps[0])))
+        if unit is None:
             raise InputError(
                 f"the stamps are no times since 1970 in ns, µs or ms (the first is {stamps[0]}): "
                 f"give the rate of the images (--rate): {path}"
             )
-        unit = {1.0: "nanoseconds", 1e3: "microseconds", 1e6: "milliseconds"}[unit_ns]
-        return cls(0, unit_ns, f"The stamps were taken for {unit}, by their size.")
+        unit_ns, name = unit
+        return cls(0, unit_ns, f"The stamps were taken for {name}, by their size.")
 
     def t_ns(self, stamps: Sequence[int]) -> Stamps:
         """The times (N,) of stamps."""

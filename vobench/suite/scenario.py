@@ -119,15 +119,7 @@ class Scenario:
     def _changes_only_rate(self) -> bool:
         """Whether the trajectories of all severities differ only in the rate of the images."""
         base = self.setups[0].trajectory
-        rate_hz = getattr(base, "rate_hz", None)
-        if rate_hz is None:
-            return False
-        for setup in self.setups:
-            if type(setup.trajectory) is not type(base):
-                return False
-            if replace(setup.trajectory, rate_hz=rate_hz) != base:
-                return False
-        return True
+        return all(replace(setup.trajectory, rate_hz=base.rate_hz) == base for setup in self.setups)
 
     def lamps(self, severity: int) -> Lighting:
         """What the lighting of a severity says of all lamps."""

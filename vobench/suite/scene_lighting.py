@@ -26,14 +26,8 @@ def with_lighting(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, .
 
     Raises SuiteError if the lighting names an unknown light, or gives a light a value that it cannot have.
     """
-    names = list(dict.fromkeys(light.name for light in lights))
-    has_lamps = any(_is_lamp(light) for light in lights)
-    known_names = [*names, LAMPS] if has_lamps else names
-    for name in lighting:
-        if name == LAMPS and not has_lamps:
-            raise SuiteError("lighting: there are no lamps in this scene")
-        if name not in known_names:
-            raise SuiteError(f"lighting: {unknown_name_sentence('light', name, known_names)}")
+    _require_known(lighting, lights)
+    names = {light.name for light in lights}
     of_lamps = None if LAMPS in names else lighting.get(LAMPS)
     overridden = list[Light]()
     for light in lights:
@@ -43,6 +37,19 @@ def with_lighting(lights: Sequence[Light], lighting: Lighting) -> tuple[Light, .
         override = lighting.get(light.name)
         overridden.append(changed if override is None else _override_light(changed, override))
     return tuple(overridden)
+
+
+def _require_known(lighting: Lighting, lights: Sequence[Light]) -> None:
+    """Raise SuiteError if the lighting names a light that is not there, or lamps where there are none."""
+    known_names = list(dict.fromkeys(light.name for light in lights))
+    if any(_is_lamp(light) for light in lights):
+        known_names.append(LAMPS)
+    for name in lighting:
+        if name in known_names:
+            continue
+        if name == LAMPS:
+            raise SuiteError("lighting: there are no lamps in this scene")
+        raise SuiteError(f"lighting: {unknown_name_sentence('light', name, known_names)}")
 
 
 def _is_lamp(light: Light) -> bool:
