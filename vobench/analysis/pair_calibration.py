@@ -21,9 +21,9 @@ from vobench.analysis.pair_parameter import (
     pair_derivatives,
     parameters_of,
 )
+from vobench.analysis.robust_sigma import robust_sigma
 from vobench.analysis.stereo_matches import RowMatches
 from vobench.analysis.tracked_motion import (
-    CAUCHY_WIDTH,
     CORRELATED_POINTS,
     MOTION,
     SHARED,
@@ -33,12 +33,12 @@ from vobench.analysis.tracked_motion import (
     TrackedPoints,
     moved,
 )
+from vobench.estimator.pose import cauchy_weights
 from vobench.estimator.stereo import MIN_DISPARITY_PX, StereoPair, shifted_left
 from vobench.geometry.se3 import Array
 
 FIT_STEPS = 8
 CONVERGED = 1e-4  # of the standard deviations of priors
-MAD_TO_SIGMA = 1.4826  # of a normal distribution
 MIN_ROW_NOISE_PX = 0.03
 REGION_COLUMNS = 6  # of the image
 REGION_ROWS = 4
@@ -242,9 +242,8 @@ class _JointFit:
     def _row_residuals(self) -> tuple[Array, Array, float]:
         """The residuals (N,) of row errors in px, their Cauchy weights, and their variance in px²."""
         residual_px = self._row_px - self._row_by @ self._errors
-        deviation_px = np.abs(residual_px - np.median(residual_px))
-        noise_px = max(MAD_TO_SIGMA * float(np.median(deviation_px)), MIN_ROW_NOISE_PX)
-        weight = 1 / (1 + (residual_px / (CAUCHY_WIDTH * noise_px)) ** 2)
+        noise_px = max(robust_sigma(residual_px), MIN_ROW_NOISE_PX)
+        weight = cauchy_weights(residual_px, noise_px)
         return residual_px, weight, CORRELATED_POINTS * noise_px**2
 
     def _row_equations(self) -> tuple[Array, Array]:

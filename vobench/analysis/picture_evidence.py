@@ -24,7 +24,8 @@ from vobench.analysis.picture_change import (
     TurnedCamera,
     blurred,
 )
-from vobench.analysis.stereo_fit import StereoFit, Uncertain, fit_pair, robust_sigma
+from vobench.analysis.robust_sigma import robust_sigma
+from vobench.analysis.stereo_fit import StereoFit, Uncertain, fit_pair
 from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.stereo import StereoPair
 from vobench.geometry import se3

@@ -14,6 +14,7 @@ import numpy as np
 
 from vobench.analysis.pair_calibration import CalibratedPair, calibrate, center_px
 from vobench.analysis.pair_parameter import PITCH, ROLL, YAW
+from vobench.analysis.robust_sigma import robust_sigma
 from vobench.analysis.stereo_matches import (
     Matches,
     PairShot,
@@ -24,6 +25,7 @@ from vobench.analysis.stereo_matches import (
     row_matches,
 )
 from vobench.analysis.tracked_motion import track_motions
+from vobench.estimator.pose import cauchy_weights
 from vobench.estimator.stereo import StereoPair
 from vobench.geometry.se3 import Array
 
@@ -174,10 +176,8 @@ def _degrees(value_px: float, sigma_px: float, focal_px: float) -> Uncertain:
 
 # --- Row errors ---
 
-MAD_TO_SIGMA = 1.4826  # of a normal distribution
 FIT_STEPS = 20
 FIT_CONVERGED_PX = 1e-6
-CAUCHY_WIDTH = 2.4  # standard deviations at which a residual has half its weight
 MIN_NOISE_PX = 1e-3
 
 
@@ -204,16 +204,10 @@ def robust_fit(terms: Array, values: Array) -> tuple[Array, float]:
     for _ in range(FIT_STEPS):
         residuals = values - terms @ coefficients
         noise = max(robust_sigma(residuals), MIN_NOISE_PX)
-        weight = 1 / (1 + (residuals / (CAUCHY_WIDTH * noise)) ** 2)
+        weight = cauchy_weights(residuals, noise)
         information = terms.T @ (weight[:, None] * terms) + damping
         step = np.linalg.solve(information, terms.T @ (weight * residuals))
         coefficients = coefficients + step
         if np.abs(step).max() < FIT_CONVERGED_PX:
             break
     return coefficients, noise
-
-
-def robust_sigma(values: Array) -> float:
-    """The standard deviation of a normal distribution with the median absolute deviation of values."""
-    deviations = np.abs(values - np.median(values))
-    return MAD_TO_SIGMA * float(np.median(deviations))

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from vobench.analysis.patch_refinement import AFFINE, refined
 from vobench.analysis.stereo_matches import MARGIN_PX, WINDOW_PX, MatchedShot, PairShot
-from vobench.estimator.pose import cross_matrix, pose_from_points, twist
+from vobench.estimator.pose import cauchy_weights, cross_matrix, pose_from_points, twist
 from vobench.estimator.stereo import StereoPair
 from vobench.estimator.tracking import Points, comparable, follow, inside
 from vobench.geometry import se3
@@ -125,7 +125,6 @@ SHARED = slice(6, None)
 DEPTH_STEPS = 2
 MEDIAN_LENGTH = 1.1774  # of two normal numbers
 MIN_NOISE_PX = 0.03
-CAUCHY_WIDTH = 2.4  # standard deviations at which a residual has half its weight
 CORRELATED_POINTS = 8.0  # neighbouring points have similar errors: so many count as one
 DAMPING = 1e-9
 
@@ -248,8 +247,7 @@ class Linearization:
     def cauchy(self, noise_px: float) -> Array:
         """The Cauchy weights (N,) of residuals relative to their noise: 1 for a residual of 0."""
         length_px = np.linalg.norm(self.residual_px, axis=1)
-        weights: Array = 1 / (1 + (length_px / (CAUCHY_WIDTH * noise_px)) ** 2)
-        return weights
+        return cauchy_weights(length_px, noise_px)
 
     def normal_equations(self, weight: Array, information: Array, correction: Array) -> "NormalEquations":
         """The normal equations with weights (N,) in 1/px².
