@@ -20,7 +20,7 @@ from vobench.geometry.rig import ImuCalibration, Rig, WheelGeometry, mounted_rig
 from vobench.geometry.se3 import Array
 from vobench.sensor.imu import ImuReadings
 from vobench.sensor.pixel_truth import TruthFrame
-from vobench.sequence import SequenceWriter
+from vobench.sequence import Sequence, SequenceWriter, read_truth
 
 START_NS = 1_403_636_579_763_555_584  # EuRoC's first stamp: float64 would round it
 IMU = ImuCalibration(
@@ -310,6 +310,17 @@ class Scene:
         rows = np.hstack([self.T_world_body[:, :3, 3], q]).tolist()
         put(folder / "pose_left.txt", "".join(" ".join(map(repr, row)) + "\n" for row in rows))
         return folder
+
+
+def with_everything_of(scene: Scene, folder: Path) -> Sequence:
+    """The sequence in a folder, after a check that it has the pictures, stamps and true poses of a scene."""
+    sequence, truth = Sequence.open(folder), read_truth(folder)
+    assert sequence.frame_stamps().tolist() == scene.t_ns.tolist() == truth.t_ns.tolist()
+    for frame, left, right in zip(sequence.frames(), scene.left, scene.right, strict=True):
+        assert np.array_equal(frame.left, left)
+        assert np.array_equal(frame.right, right)
+    assert np.abs(truth.T_world_frame - scene.T_world_body).max() < 1e-9
+    return sequence
 
 
 def pose_row(T: Array) -> str:

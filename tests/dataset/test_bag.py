@@ -15,12 +15,13 @@ from rosbags.rosbag2 import Writer as Writer2
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from scipy.spatial.transform import Rotation
 
+from tests.dataset.conftest import with_everything_of
 from vobench.dataset.layout import read, sniff
 from vobench.dataset.recording import ReadOptions, Topics
 from vobench.errors import VobenchError
 from vobench.geometry import se3
 from vobench.geometry.camera import BrownConrady, KannalaBrandt, Pinhole
-from vobench.sequence import Sequence, read_truth
+from vobench.sequence import Sequence
 
 IMAGE, COMPRESSED, INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage", "sensor_msgs/msg/CameraInfo"
 ODOMETRY, POSE, IMU, TF = (
@@ -147,12 +148,7 @@ def test_everything_of_a_bag_arrives(scene, tmp_path, imported, kind):
         "accelerometer_noise_density: 2.0e-3\naccelerometer_random_walk: 3.0e-3\n"
     )
     folder = imported(path, imu=noise)
-    sequence, truth = Sequence.open(folder), read_truth(folder)
-    assert sequence.frame_stamps().tolist() == scene.t_ns.tolist() == truth.t_ns.tolist()
-    for frame, left, right in zip(sequence.frames(), scene.left, scene.right, strict=True):
-        assert np.array_equal(frame.left, left)
-        assert np.array_equal(frame.right, right)
-    assert np.abs(truth.T_world_frame - scene.T_world_body).max() < 1e-9
+    sequence = with_everything_of(scene, folder)
     assert np.abs(sequence.rig.T_body_left - T_BASE_LEFT).max() < 1e-9
     assert np.abs(sequence.rig.T_left_right - T_LEFT_RIGHT).max() < 1e-9
     assert np.abs(sequence.rig.imu.T_body_imu - T_BASE_IMU).max() < 1e-9

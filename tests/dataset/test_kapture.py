@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 
-from tests.dataset.conftest import T_BODY_LEFT, T_LEFT_RIGHT, chain_yaml
+from tests.dataset.conftest import T_BODY_LEFT, T_LEFT_RIGHT, chain_yaml, with_everything_of
 from vobench.dataset.layout import read, sniff
 from vobench.dataset.recording import ReadOptions
 from vobench.errors import VobenchError
 from vobench.geometry.camera import BrownConrady, KannalaBrandt, Pinhole
-from vobench.sequence import Sequence, read_truth
 
 
 def replaced(folder, name, old, new):
@@ -24,12 +23,7 @@ def test_everything_of_a_recording_arrives(scene, tmp_path, imported):
     path = scene.kapture(tmp_path / "in")
     assert sniff(path) == "kapture"
     folder = imported(path)
-    sequence, truth = Sequence.open(folder), read_truth(folder)
-    assert sequence.frame_stamps().tolist() == scene.t_ns.tolist() == truth.t_ns.tolist()
-    for frame, left, right in zip(sequence.frames(), scene.left, scene.right, strict=True):
-        assert np.array_equal(frame.left, left)
-        assert np.array_equal(frame.right, right)
-    assert np.abs(truth.T_world_frame - scene.T_world_body).max() < 1e-9
+    sequence = with_everything_of(scene, folder)
     assert np.abs(sequence.rig.T_body_left - T_BODY_LEFT).max() < 1e-9
     assert np.abs(sequence.rig.T_left_right - T_LEFT_RIGHT).max() < 1e-9
     assert sequence.rig.left == KannalaBrandt(48, 32, 40.5, 41.25, 23.5, 15.25, -0.28, 0.07, 2e-4, 1.5e-5)
