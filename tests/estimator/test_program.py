@@ -124,10 +124,22 @@ def test_a_program_that_is_not_there_is_refused_by_its_name(tmp_path):
 
 def test_a_log_without_end_is_cut_and_says_so(tmp_path):
     log_bytes = program.LOG_BYTES
-    run(tmp_path, f"print('x' * {3 * log_bytes}, flush=True); import time; time.sleep(0.5)")
+    code = f"print('x' * {3 * log_bytes}, flush=True)"
+    with Program([sys.executable, "-c", code], log=tmp_path / "log", limits=Limits()) as running:
+        running.process.wait()  # without a look, which cuts the log and can do so in the middle of the line
     text = (tmp_path / "log").read_text()
     assert len(text) < log_bytes + 200
     assert f"the estimator printed at least {3 * log_bytes + 1} bytes" in text
+
+
+def test_a_log_is_cut_while_its_program_runs(tmp_path):
+    log_bytes = program.LOG_BYTES
+    code = f"print('x' * {3 * log_bytes}, flush=True); import time; time.sleep(60)"
+    with Program([sys.executable, "-c", code], log=tmp_path / "log", limits=Limits()) as running:
+        while (tmp_path / "log").stat().st_size <= 3 * log_bytes:
+            time.sleep(0.01)
+        running.look(at_once=True)
+        assert (tmp_path / "log").stat().st_size == log_bytes
 
 
 def test_open_files_without_a_name_are_counted_and_others_are_not(tmp_path):

@@ -1,6 +1,8 @@
 """Every face has a place of its own in the map of light, and what is read there is its own light."""
 
 import sys
+import time
+import weakref
 
 import numpy as np
 import pytest
@@ -142,10 +144,44 @@ def test_a_map_too_large_for_memory_is_refused_with_what_would_do() -> None:
         unwrap(FACES, np.full(len(FACES), 2e-4), LIT)
 
 
-def test_an_atlas_of_xatlas_is_never_destroyed():
-    """Its destructor may wait for ever."""
-    xatlas = pytest.importorskip("xatlas")
-    atlas = xatlas.Atlas()
+class Stand:
+    """Stands in for an atlas of xatlas."""
+
+
+def test_an_atlas_of_xatlas_is_destroyed_once_its_threads_are_idle(monkeypatch):
+    """Earlier its destructor may wait forever."""
+    idle_atlases = unwrapping._IdleAtlases()
+    now_s = 100.0
+    monkeypatch.setattr(unwrapping.time, "monotonic", lambda: now_s)
+    atlas = Stand()
+    is_there = weakref.ref(atlas)
+    idle_atlases.keep(atlas)
+    del atlas
+
+    now_s += unwrapping.IDLE_S
+    idle_atlases.keep(Stand())
+    assert is_there()
+    now_s += 0.1
+    idle_atlases.keep(Stand())
+    assert is_there() is None
+
+
+def test_an_atlas_of_xatlas_outlives_the_end_of_the_process():
+    atlas = Stand()
     before = sys.getrefcount(atlas)
-    unwrapping._never_destroy(atlas)
+    idle_atlases = unwrapping._IdleAtlases()
+    idle_atlases.keep(atlas)
+    del idle_atlases
     assert sys.getrefcount(atlas) == before + 1
+
+
+def test_a_process_that_unwraps_many_scenes_keeps_the_atlas_of_one(monkeypatch):
+    pytest.importorskip("xatlas")
+    monkeypatch.setattr(unwrapping, "IDLE_S", 0.5)
+    spacing_m = np.full(len(FACES), 0.05)
+    kept_counts = []
+    for _ in range(3):
+        unwrap(FACES, spacing_m, LIT)
+        time.sleep(0.6)
+        kept_counts.append(len(unwrapping._IDLE_ATLASES._kept))
+    assert kept_counts[1:] == [1, 1]

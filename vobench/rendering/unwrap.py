@@ -1,6 +1,7 @@
 """Unwrapping: the faces of a scene are flattened to charts, which are packed side by side on the light map."""
 
 import ctypes
+import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,6 +24,7 @@ STEPS_PER_TEXEL = 4096  # places are rounded to these steps, so that the middle 
 PADDING_PX = 1  # empty texels around a chart, besides those that interpolation within the chart reads
 BLOCK_PX = 3  # the side of the block of texels that all faces of one lamp share
 MIN_AREA_PX2 = 1e-6  # of a face that gets a place in an axis chart
+IDLE_S = 5.0  # after that time, the threads of xatlas are idle
 MIN_XATLAS_AREA_PX2 = 1e-9  # of a place from xatlas, twice its area; smaller ones are not used
 
 # The coordinates that remain if one looks along the first, the second or the third axis.
@@ -91,16 +93,25 @@ def _xatlas_charts(corners_px: Array, spacing_m: Array, parts: Sequence[Rows]) -
 
     Faces that are too thin, and those that xatlas leaves out, have no place. Without xatlas no face has one.
     """
-    face_count = len(corners_px)
-    places_px = np.zeros((face_count, 3, 2))
-    chart = np.full(face_count, -1, np.int32)
     try:
         import xatlas
     except ImportError:  # there is no xatlas for Python 3.14 yet
-        return _Charts(places_px, chart, width=0, height=0)
+        no_chart = np.full(len(corners_px), -1, np.int32)
+        return _Charts(np.zeros((len(corners_px), 3, 2)), no_chart, width=0, height=0)
 
     atlas = xatlas.Atlas()
-    _never_destroy(atlas)
+    try:
+        return _generated_charts(atlas, corners_px, spacing_m, parts)
+    finally:
+        _IDLE_ATLASES.keep(atlas)
+
+
+def _generated_charts(atlas: Any, corners_px: Array, spacing_m: Array, parts: Sequence[Rows]) -> _Charts:
+    """The charts that an empty atlas of xatlas creates for parts of the faces, whose corners are (F, 3, 3)."""
+    import xatlas
+
+    places_px = np.zeros((len(corners_px), 3, 2))
+    chart = np.full(len(corners_px), -1, np.int32)
     added_parts = list[Rows]()
     for part in parts:
         vertices_px, vertex = _indexed_mesh(corners_px[part], spacing_m[part])
@@ -144,14 +155,34 @@ def _packing(xatlas: Any) -> Any:
     return options
 
 
-def _never_destroy(atlas: object) -> None:
-    """Keep an atlas of xatlas in memory until the process ends, because its destructor can wait forever.
+class _IdleAtlases:
+    """Keeps atlases of xatlas until their threads are idle, because earlier their destructor can wait forever.
 
     The scheduler of xatlas sets a flag and notifies its threads without holding their lock. A thread that has just read
     the flag misses both, and the scheduler then waits for that thread forever. This happened once, in a run of all
-    tests. The cost is the memory of one unwrapped scene and some idle threads. A bake has a process of its own.
+    tests. A thread that has been idle for some time waits for the notification already.
+    An atlas of a place takes tens of megabytes, so a process that bakes many places cannot keep them all. Those that
+    are kept at the end of the process are never destroyed.
     """
-    ctypes.pythonapi.Py_IncRef(ctypes.py_object(atlas))
+
+    def __init__(self) -> None:
+        self._kept: list[tuple[float, Any]] = []  # when each atlas was kept, and the atlas
+
+    def keep(self, atlas: Any) -> None:
+        """Keep an atlas that has been generated, and destroy those that were kept IDLE_S ago."""
+        now_s = time.monotonic()
+        is_idle = [now_s > since_s + IDLE_S for since_s, _ in self._kept]
+        idle = [kept for kept, idle in zip(self._kept, is_idle, strict=True) if idle]
+        self._kept = [kept for kept, idle in zip(self._kept, is_idle, strict=True) if not idle]
+        for _, old in idle:
+            ctypes.pythonapi.Py_DecRef(ctypes.py_object(old))
+
+        # A reference that is not Python's, so that the end of the process does not destroy it.
+        ctypes.pythonapi.Py_IncRef(ctypes.py_object(atlas))
+        self._kept.append((now_s, atlas))
+
+
+_IDLE_ATLASES = _IdleAtlases()
 
 
 # Axis charts: projections of flat or nearly flat surfaces.
