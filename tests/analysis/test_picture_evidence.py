@@ -60,12 +60,14 @@ def test_blur_is_found_in_its_frames_with_its_size() -> None:
     assert blur.sigma_px[CHANGED] == pytest.approx(2.0, abs=0.7)
 
 
+@pytest.mark.slow
 def test_blur_of_one_eye_is_found_in_that_eye() -> None:
     blur = only(found(lambda image, _: cv2.GaussianBlur(image, (0, 0), 2.0), only_right=True), BLUR)
     assert not blur.sigma_px[:, 0].any()
     assert "in the right image of 18 of 40 frames" in blur.evidence
 
 
+@pytest.mark.slow
 def test_noise_is_found_in_its_frames_with_its_size() -> None:
     def noisy(image: np.ndarray, index: int) -> np.ndarray:
         values = image + np.random.default_rng(index).normal(0, 8, image.shape)
@@ -76,6 +78,7 @@ def test_noise_is_found_in_its_frames_with_its_size() -> None:
     assert noise.sigma_dn[CHANGED] == pytest.approx(8, rel=0.25)
 
 
+@pytest.mark.slow
 def test_exposure_jumps_are_found_with_their_stops() -> None:
     jumps = only(found(lambda image, index: (image * (0.25 if index % 4 < 2 else 1.0)).astype(np.uint8)), EXPOSURE)
     is_dark = np.zeros(COUNT, bool)
@@ -89,6 +92,7 @@ def test_missing_frames_are_counted_by_their_stamps() -> None:
     assert missing.evidence.startswith("4 of 40 frames are missing")
 
 
+@pytest.mark.slow
 def test_dirt_is_found_with_what_it_lets_through() -> None:
     rng = np.random.default_rng(3)
     loss = np.zeros((HEIGHT_PX, WIDTH_PX))
@@ -105,6 +109,7 @@ def test_dirt_is_found_with_what_it_lets_through() -> None:
     assert dirt.transmission[:, is_clear].mean() > 0.85
 
 
+@pytest.mark.slow
 def test_a_turned_camera_is_found_with_its_angles() -> None:
     angles_deg = np.array([0.0, 0.2, 0.0])
 
@@ -134,6 +139,7 @@ def test_the_ends_of_a_turned_stretch_are_finer_than_the_chunks_that_measure_it(
     assert angle_deg == pytest.approx([0, 0, 0.05], abs=0.003)
 
 
+@pytest.mark.slow
 def test_a_camera_that_stands_still_is_not_taken_for_dirt() -> None:
     standing = part(100, 1)
     shots = tuple(replace(standing.shots[0]) for _ in range(COUNT))

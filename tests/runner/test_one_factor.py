@@ -158,6 +158,7 @@ def test_fog_changes_pictures_but_no_truth_of_pixels(cache, tmp_path):
     assert {topic for topic in clear if clear[topic] != foggy[topic]} == PICTURES
 
 
+@pytest.mark.slow
 def test_rain_changes_pictures_but_no_truth_of_pixels(cache, tmp_path):
     """In the open, where the ground is wet, and drops fall; truth is that of the solid ground."""
     sky = "sky: {illuminance_lx: 300}\n"

@@ -73,7 +73,7 @@ def test_the_points_of_the_aperture_cover_a_disc_evenly() -> None:
     assert (points_m**2).sum(1).mean() == pytest.approx((APERTURE_M / 2) ** 2 / 2, rel=1e-3)
 
 
-@pytest.mark.parametrize("share", [0.05, 0.3])
+@pytest.mark.parametrize("share", [0.05, pytest.param(0.3, marks=pytest.mark.slow)])
 def test_drops_cover_the_share_of_the_glass_on_average(share: float) -> None:
     covered = []
     for seed in range(40):
