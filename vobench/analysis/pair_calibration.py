@@ -87,6 +87,10 @@ class PairCalibration:
                 return parameter.sigma * float(self.errors[index]), parameter.sigma * sigma
         return 0.0, 0.0
 
+    def drawn(self, rng: np.random.Generator) -> "PairCalibration":
+        """The calibration with errors that are drawn from the distribution of the fitted ones."""
+        return replace(self, errors=rng.multivariate_normal(self.errors, self.covariance))
+
     def disparity_error(self, right_px: Array) -> tuple[Array, Array]:
         """The errors (N,) of disparities that the right camera causes at its pixels (N, 2), and their deviations."""
         return self._field(right_px, axis=0, sign=-1.0)

@@ -362,6 +362,17 @@ def residual(pair: StereoFit) -> dict[str, Any]:
     return error
 
 
+def drawn_residual(pair: StereoFit, rng: np.random.Generator) -> dict[str, Any]:
+    """Errors as of `residual`, drawn from the distribution of all fitted ones, significant or not.
+
+    They are those of `residual` if motion does not determine the offset of disparities: then most errors are unknown.
+    """
+    if pair.calibrated is None or not pair.calibrated.is_offset_determined:
+        return residual(pair)
+    drawn = pair.calibrated.calibration.drawn(rng)
+    return _settings(drawn, [parameter.name for parameter in drawn.parameters])
+
+
 def _significant(calibration: PairCalibration) -> list[str]:
     """The names of significant errors of both cameras and of the right camera's focal length."""
     names = []
