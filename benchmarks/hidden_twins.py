@@ -64,11 +64,12 @@ CAR_RIG = {
     "own": {
         "left": {"size_px": [613, 185], "focal_px": [353.5, 353.5], "center_px": [300.5, 91.5]},
         "right_at_m": [0.537, 0, 0],
-    }
+    },
+    "pitch_deg": 0,
 }
 HAND_RIGS = {
-    "kitti": {"lens": "paper_blender", "picture_scale": 0.5},
-    "euroc": {"lens": "euroc", "picture_scale": 0.5},
+    "kitti": {"lens": "paper_blender", "picture_scale": 0.5, "pitch_deg": 0},
+    "euroc": {"lens": "euroc", "picture_scale": 0.5, "pitch_deg": 0},
 }
 DOMAINS = {
     "car": Domain(
