@@ -42,7 +42,7 @@ from vobench.suite.yaml_file import plain
 COVERED_SIGMAS = 1.96
 WITHIN = 1.5  # the factor by which a predicted error may differ
 NEAREST = 1.5  # times the disparities of the recording
-ESTIMATORS = ("lk_epipolar", "lk_epipolar_plain", "stereo_pnp", "feature_vo", "mono_vo")
+ESTIMATORS = ("lk_epipolar", "stereo_pnp", "stereo_pnp_wide", "feature_vo", "mono_vo")
 FIRST_PLACE_SEED = 100  # of generated places, none of which a twin tries
 
 

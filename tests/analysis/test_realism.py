@@ -19,7 +19,7 @@ from vobench.analysis.realism import (
     WINDOW,
     FrameSample,
     Realism,
-    drawn_residual,
+    all_errors,
     measure,
     pair_sentences,
     residual,
@@ -268,16 +268,17 @@ def test_drawn_errors_spread_about_the_fitted_ones_by_their_uncertainty(lens_fit
     assert lens_fit.calibrated is not None
     value, sigma = lens_fit.calibrated.calibration.value(ROLL)
     rng = np.random.default_rng(3)
-    drawn = np.array([drawn_residual(lens_fit, rng)[ROLL] for _ in range(200)])
+    drawn = np.array([all_errors(lens_fit, rng)[ROLL] for _ in range(200)])
     assert drawn.mean() == pytest.approx(value, abs=0.3 * sigma)
     assert drawn.std() == pytest.approx(sigma, rel=0.2)
-    assert set(drawn_residual(lens_fit, rng)) >= set(residual(lens_fit))
+    assert all_errors(lens_fit)[ROLL] == pytest.approx(value, abs=1e-6)
+    assert set(all_errors(lens_fit)) >= set(residual(lens_fit))
 
 
 def test_errors_are_not_drawn_if_motion_does_not_determine_the_offset(lens_fit: StereoFit) -> None:
     assert lens_fit.calibrated is not None
     at_rest = replace(lens_fit, calibrated=replace(lens_fit.calibrated, is_offset_determined=False))
-    assert drawn_residual(at_rest, np.random.default_rng(3)) == residual(at_rest)
+    assert all_errors(at_rest, np.random.default_rng(3)) == residual(at_rest)
 
 
 def test_nothing_is_said_of_an_offset_that_rows_alone_suggest() -> None:

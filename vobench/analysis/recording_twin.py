@@ -13,7 +13,7 @@ from vobench.analysis.camera_fit import CameraLook, Lights, fit_camera, look_of
 from vobench.analysis.image_statistics import evenly_spaced
 from vobench.analysis.path_placement import Placement, levelled, wanted_disparities
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
-from vobench.analysis.realism import Realism, drawn_residual, shots_of
+from vobench.analysis.realism import Realism, all_errors, shots_of
 from vobench.analysis.realism_report import RealismReport, realism_of
 from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
@@ -64,7 +64,7 @@ FEWEST_PICTURES = 12  # a replayed path needs as many poses
 LEAST_EXTENT_M = 0.05
 FITTED_PICTURES = 12  # that the camera is fitted to
 KNOTS_PER_PICTURE = 0.5  # of the smoothed path
-CALIBRATION_SEED = 0  # of the calibration errors that are drawn for each place
+CALIBRATION_SEED = 0  # of the calibration errors that are drawn for places after the first
 QUANTILES = (0.1, 0.5, 0.9)
 
 
@@ -402,14 +402,15 @@ class RecordedPath:
         return Trajectory(self.t_ns - self.t_ns[0], T_place_body)
 
     def rig_settings(self, index: int = 0) -> dict[str, Any]:
-        """The rig for the suite of a place, with calibration errors as uncertain as those that were found.
+        """The rig for the suite of a place, with the calibration errors that were found.
 
-        They are drawn for each place, so that errors in several places differ by the uncertainty of the calibration.
+        In places after the first, errors are drawn from the distribution of those that were found, so that predictions
+        from several places differ by the uncertainty of the calibration too.
         """
         settings: Any = plain(self.rig)
         stated = {key: settings[key] for key in ("own", "pitch_deg", "forward_m", "height_m")}
-        rng = np.random.default_rng([CALIBRATION_SEED, index])
-        return {**stated, "calibration_error": drawn_residual(self.fit, rng)}
+        rng = np.random.default_rng([CALIBRATION_SEED, index]) if index else None
+        return {**stated, "calibration_error": all_errors(self.fit, rng)}
 
     def trajectory_settings(self) -> dict[str, Any]:
         """The replay of this path for a suite."""
