@@ -116,7 +116,7 @@ def test_a_place_that_cannot_have_the_wanted_look_compromises_on_saturated_pixel
     assert 0.02 < look.saturated_share < 0.6
     more_saturated = replace(look, saturated_share=look.saturated_share + 0.2)
     _, found = fit_camera(more_saturated, lights)
-    assert found.saturated_share > look.saturated_share + 0.02
+    assert found.saturated_share > look.saturated_share + 0.01
     assert found.mean_dn == pytest.approx(look.mean_dn, rel=0.1)
 
 
