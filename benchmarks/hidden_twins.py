@@ -1,6 +1,6 @@
 """How well `vobench twin` predicts the errors of estimators on recordings whose properties were drawn by chance.
 
-    python benchmarks/hidden_twins.py OUT [--recordings 8] [--seed 1] [--images 40] [--placements 2]
+    python benchmarks/hidden_twins.py OUT [--recordings 8] [--seed 1] [--images 40] [--placements 2] [--again]
 
 Recordings alternate between a car in generated streets and a hand in generated flats and offices. The errors of the
 pair, the camera, its noise and the path are drawn by chance. Each is exported as KITTI or as EuRoC, and given to
@@ -33,9 +33,13 @@ from vobench.analysis.pair_parameter import (
     RIGHT_TANGENTIAL_1,
     RIGHT_TANGENTIAL_2,
 )
+from vobench.analysis.rank_agreement import agreement
 from vobench.analysis.realism_report import realism_of
+from vobench.analysis.recording_twin import case_errors
+from vobench.analysis.twin_estimators import twin_estimators
 from vobench.dataset.export import export
 from vobench.geometry.rig import CalibrationError, CameraError
+from vobench.runner.folder import open_run
 from vobench.runner.recording import read_recording
 from vobench.suite.yaml_file import plain
 
@@ -235,6 +239,18 @@ def examine(hidden: Hidden, out: Path, placements: int) -> Found:
     return found
 
 
+def same_world_tau(hidden: Hidden, out: Path) -> float:
+    """Kendall's tau of two simulations of a recording that differ by noise: the most that a twin can reach."""
+    suite = {**hidden.suite, "estimators": twin_estimators(ESTIMATORS), "repeats": 2}
+    file = out / hidden.name / "again.yaml"
+    file.write_text(json.dumps(suite, indent=1), encoding="utf-8")
+    run = vobench.run(str(file), out=out / hidden.name / "again", jobs=1, quiet=True)
+    folder = open_run(run.path)
+    case_names = sorted({score.case for score in folder.scores()})
+    first, second = (case_errors(folder, name) for name in case_names)
+    return agreement(first, second).tau
+
+
 def _exported(hidden: Hidden, folder: Path) -> Path:
     """The folder of the recording in its form."""
     recording = folder / hidden.form
@@ -335,7 +351,13 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--images", type=int, default=40)
     parser.add_argument("--placements", type=int, default=2)
+    parser.add_argument("--again", action="store_true", help="print tau of two simulations of each recording instead")
     options = parser.parse_args()
+    if options.again:
+        for index in range(options.recordings):
+            hidden = draw_recording(index, options.seed, options.images)
+            print(f"{hidden.name}: tau of two simulations {same_world_tau(hidden, options.out):.2f}", flush=True)
+        return
     all_found = []
     for index in range(options.recordings):
         hidden = draw_recording(index, options.seed, options.images)

@@ -303,7 +303,7 @@ def compare_twin(
     folder = run_plan(read_plan(str(suite.file)))
     with progress.step("measuring the twin"):
         twin = realism_of(read_recording(folder.case(TWIN)))
-    real_errors = _errors(folder, REAL)
+    real_errors = case_errors(folder, REAL)
     twin_errors = prediction.twin_errors()
     orders = agreement(real_errors, twin_errors)
     errors = {}
@@ -337,7 +337,7 @@ def predict_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> PredictedTwin:
     errors = []
     for file in (suite.file, *suite.more):
         folder = run_plan(read_plan(str(file)).only([TWIN], []))
-        errors.append(_errors(folder, TWIN))
+        errors.append(case_errors(folder, TWIN))
     return PredictedTwin(predict(errors, basis=_basis(suite)), tuple(errors))
 
 
@@ -347,7 +347,8 @@ def _basis(suite: TwinSuite) -> str:
     places = f"the recording's path in {titles}" if titles else "the recording's path in a place"
     basis = (
         f"The prediction rests on {places}, on a camera and a calibration error that were fitted to the recording, and "
-        "on that path being true. Intervals cover other places and noise, not what a simulation lacks."
+        "on that path being true. Intervals cover other places, noise and the uncertainty of the calibration, not "
+        "what a simulation lacks."
     )
     if suite.realism.pair is None or suite.realism.pair.offset_px is None:
         basis += " The offset of disparity could not be determined and is 0 in the twin, so errors may be far larger."
@@ -536,7 +537,7 @@ def _camera_settings(settings: CameraSettings, *, gain: float) -> dict[str, Any]
 # --- The comparison ---
 
 
-def _errors(folder: RunFolder, case: str) -> dict[str, Array]:
+def case_errors(folder: RunFolder, case: str) -> dict[str, Array]:
     """The errors (8, N) of segments of each estimator on a case."""
     gt = read_tum(folder.case(case) / GROUND_TRUTH)
     errors = {}
