@@ -538,11 +538,11 @@ def _camera_settings(settings: CameraSettings, *, gain: float) -> dict[str, Any]
 
 
 def case_errors(folder: RunFolder, case: str) -> dict[str, Array]:
-    """The errors (8, N) of segments of each estimator on a case."""
+    """The errors (8, N) of segments of each estimator on a case, in its first trial there."""
     gt = read_tum(folder.case(case) / GROUND_TRUTH)
-    errors = {}
+    errors = dict[str, Array]()
     for score in folder.scores():
-        if score.case == case and score.repeat == 0:
+        if score.case == case and score.estimator not in errors:
             errors[score.estimator] = _trial_errors(folder, gt, score)
     return errors
 
