@@ -1,6 +1,7 @@
 """A fitted camera's exposure, contrast, blur and noise are those that its images were made with."""
 
 from contextlib import contextmanager
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -41,6 +42,7 @@ def test_a_cameras_exposure_contrast_blur_and_noise_are_found(gain, gamma, blur_
     settings, look = fit_camera(wanted, Lights(lights))
     assert look.mean_dn == pytest.approx(wanted.mean_dn, rel=0.01)
     assert look.sd_dn == pytest.approx(wanted.sd_dn, rel=0.02)
+    assert look.saturated_share == pytest.approx(wanted.saturated_share, abs=0.01)
     assert look.edge_px == pytest.approx(wanted.edge_px, rel=0.05)
     assert look.noise_dn == pytest.approx(wanted.noise_dn, rel=0.15)
     assert settings.exposure_gain == pytest.approx(gain, rel=0.05)
@@ -108,6 +110,16 @@ def test_a_camera_takes_the_same_picture_again_and_a_blur_spreads_its_light() ->
     assert edge_px(blurred, gradients(blurred)) > 1.5 * edge_px(sharp, gradients(sharp))
 
 
+def test_a_place_that_cannot_have_the_wanted_look_compromises_on_saturated_pixels_too() -> None:
+    lights = Lights([light(seed, (120, 480)) for seed in range(4)])
+    look = look_of(lights.develop(camera_of(1.8, 0.8, 0.9, 1.0)))
+    assert 0.02 < look.saturated_share < 0.6
+    more_saturated = replace(look, saturated_share=look.saturated_share + 0.2)
+    _, found = fit_camera(more_saturated, lights)
+    assert found.saturated_share > look.saturated_share + 0.01
+    assert found.mean_dn == pytest.approx(look.mean_dn, rel=0.1)
+
+
 def test_pictures_without_edges_or_flat_parts_are_fitted_too() -> None:
     lights = Lights([np.full((100, 90), 0.4, np.float32)])
     wanted = CameraLook(100.0, 0.0, 0.0, 0.0, np.zeros(0))
@@ -122,7 +134,12 @@ def test_pictures_without_edges_or_flat_parts_are_fitted_too() -> None:
 def test_the_look_is_the_mean_of_those_of_the_images() -> None:
     images = [np.full((120, 160), value, np.uint8) for value in (80, 120)]
     images[1][:, 80:] = 160
+    images[0][0, :80] = 254
     look = look_of(images)
+    images[0][0, :80] = 80
+    assert look.saturated_share == pytest.approx(80 / (2 * 120 * 160))
+    look = look_of(images)
+    assert look.saturated_share == 0
     assert look.mean_dn == pytest.approx((80 + 140) / 2)
     assert look.sd_dn == pytest.approx((0 + 20) / 2)
     assert look.edge_px == pytest.approx(edge_px(images[1], gradients(images[1])) / 2)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 from vobench.analysis import path_placement
+from vobench.analysis.pair_calibration import CalibratedPair, PairCalibration
+from vobench.analysis.pair_parameter import BASELINE, PARAMETERS, YAW
 from vobench.analysis.path_placement import (
     ANY_SCALE,
     CELLS,
@@ -210,7 +212,16 @@ def test_a_tilted_world_is_levelled():
 # --- Disparities by cells ---
 
 
-def fit_of(places, disparity_px, window, *, yaw_deg=None) -> StereoFit:
+def calibrated_with(offset_px: float, *, is_offset_determined: bool) -> CalibratedPair:
+    """A calibration with a yaw that shifts disparities at the centre by an offset."""
+    parameters = tuple(parameter for parameter in PARAMETERS if parameter.name in (BASELINE, YAW))
+    yaw_deg = np.rad2deg(offset_px / 150)
+    errors = np.array([0.0, yaw_deg / parameters[1].sigma])
+    calibration = PairCalibration(parameters, errors, np.eye(2), PAIR)
+    return CalibratedPair(calibration, calibration, False, is_offset_determined)
+
+
+def fit_of(places, disparity_px, window, *, calibrated=None) -> StereoFit:
     matches = Matches(
         np.array(places, float), np.zeros(len(places)), np.array(disparity_px, float), np.array(window, np.int64)
     )
@@ -227,16 +238,18 @@ def fit_of(places, disparity_px, window, *, yaw_deg=None) -> StereoFit:
         xy_px=nothing,
         gain=1.0,
         disparity_px=(0.0, 0.0, 0.0),
-        yaw_deg=yaw_deg,
+        yaw_deg=None,
         yaw_from="",
+        calibrated=calibrated,
     )
 
 
-def cells(left_px, disparity_px, *, count=30, window=0, yaw_deg=None) -> np.ndarray:
+def cells(left_px, disparity_px, *, count=30, window=0, calibrated=None) -> np.ndarray:
     """Disparities by cell where `count` matches have one left pixel and disparity."""
     right_px = np.array(left_px) - [disparity_px, 0]
     place = (right_px - [79.5, 59.5]) / 150
-    return cell_disparities(fit_of([place] * count, [disparity_px] * count, [window] * count, yaw_deg=yaw_deg), PAIR)
+    fit = fit_of([place] * count, [disparity_px] * count, [window] * count, calibrated=calibrated)
+    return cell_disparities(fit, PAIR)
 
 
 @pytest.mark.parametrize("row", range(3))
@@ -256,10 +269,19 @@ def test_cells_of_fewer_than_30_matches_are_unknown_and_stretches_are_counted_fr
     assert later[2, 0, 0] == pytest.approx(12)
 
 
-def test_a_significant_offset_is_taken_off_and_far_points_are_at_a_third_of_a_pixel() -> None:
-    yaw_deg = float(np.rad2deg(0.5 / 150))
-    assert cells((20, 20), 12.0, yaw_deg=Uncertain(yaw_deg, yaw_deg / 10))[0, 0, 0] == pytest.approx(11.5)
-    assert cells((20, 20), 12.0, yaw_deg=Uncertain(yaw_deg, yaw_deg))[0, 0, 0] == pytest.approx(12)
+def test_what_the_right_camera_adds_to_disparities_is_taken_off_at_the_place_of_each_match() -> None:
+    known = calibrated_with(0.5, is_offset_determined=True)
+    center = (79.5, 59.5)
+    at_center_px = cells(center, 12.0, calibrated=known)[0, 1, 1]
+    assert at_center_px == pytest.approx(11.5, abs=0.01)
+    # A yaw shifts pixels by 1 + x² of what it shifts at the centre; x is that of the right pixel, 12 px further left.
+    slope = (150 - 12 - 79.5) / 150
+    assert cells((150, 59.5), 12.0, calibrated=known)[0, 1, 2] == pytest.approx(12 - 0.5 * (1 + slope**2), abs=0.01)
+    unknown = calibrated_with(0.5, is_offset_determined=False)
+    assert cells(center, 12.0, calibrated=unknown)[0, 1, 1] == 12
+
+
+def test_far_points_are_at_a_third_of_a_pixel() -> None:
     assert cells((20, 20), 0.1)[0, 0, 0] == 0.3
 
 

@@ -13,11 +13,13 @@ from tests.analysis.test_stereo_fit import MOVING_SHOTS
 from tests.analysis.test_stereo_fit import RIG as PAINTED_RIG
 from tests.analysis.test_stereo_fit import shots as painted_shots
 from vobench.analysis.image_statistics import gradients, picture_statistics, spectrum, track_statistics
+from vobench.analysis.pair_parameter import ROLL
 from vobench.analysis.realism import (
     STATISTICS,
     WINDOW,
     FrameSample,
     Realism,
+    all_errors,
     measure,
     pair_sentences,
     residual,
@@ -260,6 +262,23 @@ def test_a_rig_with_the_errors_that_were_found_has_the_rows_and_offsets_of_the_p
     expected_y_px = 300 * 2 * 0.01 * x * y - 300 * np.deg2rad(0.1) * x
     np.testing.assert_allclose(shift_px[:, 0], expected_x_px, atol=0.25)
     np.testing.assert_allclose(shift_px[:, 1], expected_y_px, atol=0.05)
+
+
+def test_drawn_errors_spread_about_the_fitted_ones_by_their_uncertainty(lens_fit: StereoFit) -> None:
+    assert lens_fit.calibrated is not None
+    value, sigma = lens_fit.calibrated.calibration.value(ROLL)
+    rng = np.random.default_rng(3)
+    drawn = np.array([all_errors(lens_fit, rng)[ROLL] for _ in range(200)])
+    assert drawn.mean() == pytest.approx(value, abs=0.3 * sigma)
+    assert drawn.std() == pytest.approx(sigma, rel=0.2)
+    assert all_errors(lens_fit)[ROLL] == pytest.approx(value, abs=1e-6)
+    assert set(all_errors(lens_fit)) >= set(residual(lens_fit))
+
+
+def test_errors_are_not_drawn_if_motion_does_not_determine_the_offset(lens_fit: StereoFit) -> None:
+    assert lens_fit.calibrated is not None
+    at_rest = replace(lens_fit, calibrated=replace(lens_fit.calibrated, is_offset_determined=False))
+    assert all_errors(at_rest, np.random.default_rng(3)) == residual(at_rest)
 
 
 def test_nothing_is_said_of_an_offset_that_rows_alone_suggest() -> None:

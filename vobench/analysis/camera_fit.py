@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from vobench.analysis.conditions import chip_noise_dn
-from vobench.analysis.image_noise import noise_dn
+from vobench.analysis.image_noise import SATURATED_DN, noise_dn
 from vobench.analysis.image_statistics import edge_px, gradients
 from vobench.geometry.se3 import Array
 from vobench.runner.store import SILENT, Progress
@@ -23,6 +23,7 @@ class CameraLook:
     """The properties of images that a camera is fitted to: mean and standard deviation of grey values, noise, edges.
 
     Noise is measured in flat parts, whose grey values are `flat_dn` (N,). Edges are measured by their width.
+    `saturated_share` is the share of saturated pixels.
     """
 
     mean_dn: float
@@ -30,6 +31,7 @@ class CameraLook:
     noise_dn: float
     edge_px: float
     flat_dn: Array
+    saturated_share: float = 0.0
 
 
 def look_of(pictures: Sequence[Image]) -> CameraLook:
@@ -39,10 +41,14 @@ def look_of(pictures: Sequence[Image]) -> CameraLook:
     for picture in pictures:
         sigma_dn, flat_values_dn = noise_dn(picture)
         width_px = edge_px(picture, gradients(picture))
-        rows.append((picture.mean(), picture.std(), sigma_dn, width_px))
+        rows.append((picture.mean(), picture.std(), sigma_dn, width_px, _saturated_share(picture)))
         flat_dn.append(flat_values_dn)
-    mean_dn, sd_dn, mean_sigma_dn, mean_width_px = np.mean(rows, axis=0).tolist()
-    return CameraLook(mean_dn, sd_dn, mean_sigma_dn, mean_width_px, np.concatenate(flat_dn))
+    mean_dn, sd_dn, mean_sigma_dn, mean_width_px, saturated_share = np.mean(rows, axis=0).tolist()
+    return CameraLook(mean_dn, sd_dn, mean_sigma_dn, mean_width_px, np.concatenate(flat_dn), saturated_share)
+
+
+def _saturated_share(picture: Image) -> float:
+    return float((picture >= SATURATED_DN).mean())
 
 
 # --- The pictures of a camera ---
@@ -137,9 +143,10 @@ NOISE_BOUNDS = (0.03, 30.0)
 START_GAMMA = 0.45
 START_BLUR_PX = 0.5
 HALVINGS = 7  # for the gain at the start
-# Relative errors of mean, standard deviation and width of edges that count alike. If a place cannot have them all,
-# edges give way first.
+# Relative errors of mean, standard deviation and width of edges that count alike, and errors of the share of saturated
+# pixels. If a place cannot have them all, edges give way first.
 TOLERANCES = np.array([0.01, 0.02, 0.1])
+SATURATED_TOLERANCE = 0.03
 # Steps of the logarithms of gain and gamma, and of the squared blur, for derivatives. They are large compared with the
 # steps that rounded grey values cause.
 STEPS = np.array([0.05, 0.05, 0.2])
@@ -175,6 +182,7 @@ def fit_camera(
                 mean_dn=wanted.mean_dn * _ratio(of_windows.mean_dn, look.mean_dn),
                 sd_dn=wanted.sd_dn * _ratio(of_windows.sd_dn, look.sd_dn),
                 edge_px=wanted.edge_px * _ratio(of_windows.edge_px, look.edge_px),
+                saturated_share=wanted.saturated_share + of_windows.saturated_share - look.saturated_share,
             )
     return settings, look
 
@@ -264,15 +272,20 @@ def _bounds() -> tuple[Array, Array]:
 
 
 def _residuals(images: Sequence[Image], target: CameraLook) -> Array:
-    """The relative differences (3,) of mean, standard deviation and edges to the target's, in units of TOLERANCES."""
-    rows = [(image.mean(), image.std(), edge_px(image, gradients(image))) for image in images]
-    mean_dn, sd_dn, width_px = np.mean(rows, axis=0).tolist()
+    """The differences (4,) to a target's mean, standard deviation, edges and saturated share, in units of tolerances.
+
+    Those of mean, standard deviation and edges are relative.
+    """
+    rows = [(image.mean(), image.std(), edge_px(image, gradients(image)), _saturated_share(image)) for image in images]
+    mean_dn, sd_dn, width_px, saturated_share = np.mean(rows, axis=0).tolist()
     ratios = np.array([
         mean_dn / max(target.mean_dn, 1.0),
         sd_dn / max(target.sd_dn, 1.0),
         width_px / target.edge_px if target.edge_px > 0 else 1.0,
     ])  # fmt: skip
-    return np.asarray(np.log(np.maximum(ratios, 1e-3)) / TOLERANCES, float)
+    relative = np.log(np.maximum(ratios, 1e-3)) / TOLERANCES
+    saturated = (saturated_share - target.saturated_share) / SATURATED_TOLERANCE
+    return np.asarray([*relative, saturated], float)
 
 
 def _fit_noise(gamma: float, wanted: CameraLook) -> float:

@@ -87,6 +87,10 @@ class PairCalibration:
                 return parameter.sigma * float(self.errors[index]), parameter.sigma * sigma
         return 0.0, 0.0
 
+    def drawn(self, rng: np.random.Generator) -> "PairCalibration":
+        """The calibration with errors that are drawn from the distribution of the fitted ones."""
+        return replace(self, errors=rng.multivariate_normal(self.errors, self.covariance))
+
     def disparity_error(self, right_px: Array) -> tuple[Array, Array]:
         """The errors (N,) of disparities that the right camera causes at its pixels (N, 2), and their deviations."""
         return self._field(right_px, axis=0, sign=-1.0)
@@ -272,12 +276,13 @@ class _JointFit:
             of_truth += motion_by_shared.T @ model.information @ motion_by_shared
 
         by_run = sums.reshape(run_count, REGIONS, size)
-        spread = np.einsum("wip,ij,wjq->pq", by_run, _region_correlation(), by_run) + prior + of_truth
-        inverse_curvature = np.linalg.inv(curvature)
-        covariance = inverse_curvature @ spread @ inverse_curvature.T
+        of_scores = np.einsum("wip,ij,wjq->pq", by_run, _region_correlation(), by_run)
         freedom = max(run_count, MIN_FREEDOM)
+        # Few runs make the variance of scores uncertain, but not that of the prior and of the true motions.
         few_runs = stats.t.ppf(COVERED, freedom) / stats.norm.ppf(COVERED)
-        total: Array = covariance * few_runs**2 + self._bias_covariance()
+        spread = of_scores * few_runs**2 + prior + of_truth
+        inverse_curvature = np.linalg.inv(curvature)
+        total: Array = inverse_curvature @ spread @ inverse_curvature.T + self._bias_covariance()
         return total
 
     def _row_curvature_and_scores(self) -> tuple[Array, Array]:

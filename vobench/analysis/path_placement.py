@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vobench.analysis.free_lanes import Lane, free_lanes
 from vobench.analysis.stereo_fit import StereoFit
+from vobench.analysis.stereo_matches import Matches
 from vobench.errors import InputError
 from vobench.estimator.stereo import StereoPair
 from vobench.geometry import se3
@@ -35,16 +36,14 @@ def cell_disparities(fit: StereoFit, pair: StereoPair) -> Array:
 
     V is the number of segments of the path in which matches were found. NaN for a cell with too few matches.
     """
-    matches = fit.matches
     segment_of_match, row, column = _cells_of_matches(fit, pair)
-    offset_px = _offset_px(fit)
+    disparity_px = _corrected_disparities(fit)
     segments = int(segment_of_match.max()) + 1
     medians_px = np.full((segments, CELLS, CELLS), np.nan)
     for segment, cell_row, cell_column in np.ndindex(medians_px.shape):
         is_in_cell = (segment_of_match == segment) & (row == cell_row) & (column == cell_column)
         if is_in_cell.sum() >= MIN_MATCHES_IN_CELL:
-            median_px = np.median(matches.disparity_px[is_in_cell])
-            medians_px[segment, cell_row, cell_column] = median_px - offset_px
+            medians_px[segment, cell_row, cell_column] = np.median(disparity_px[is_in_cell])
     return np.asarray(np.maximum(medians_px, MIN_DISPARITY_PX), float)
 
 
@@ -77,7 +76,7 @@ def wanted_disparities(fit: StereoFit, pair: StereoPair) -> WantedDisparities:
     np.add.at(counts, (segment, row, column), 1.0)
 
     tenths_px = np.full((segments, len(TENTHS)), np.nan)
-    disparity_px = fit.matches.disparity_px - _offset_px(fit)
+    disparity_px = _corrected_disparities(fit)
     for index in range(segments):
         of_segment_px = disparity_px[segment == index]
         if len(of_segment_px) >= MIN_MATCHES_IN_CELL:
@@ -85,21 +84,35 @@ def wanted_disparities(fit: StereoFit, pair: StereoPair) -> WantedDisparities:
     return WantedDisparities(cells_px, counts, tenths_px)
 
 
-def _offset_px(fit: StereoFit) -> float:
-    """The offset of disparities, 0 if none is significant."""
-    if fit.offset_px and fit.offset_px.is_plain:
-        return fit.offset_px.value
-    return 0.0
+def _corrected_disparities(fit: StereoFit) -> Array:
+    """The disparities (N,) in px of matches, without the errors that the right camera causes if these are known."""
+    matches = fit.matches
+    calibrated = fit.calibrated
+    if calibrated is None or not calibrated.is_offset_determined:
+        return matches.disparity_px
+    error_px, _ = calibrated.calibration.disparity_error(_right_px(matches, calibrated.calibration.pair))
+    corrected_px: Array = matches.disparity_px - error_px
+    return corrected_px
+
+
+def _right_px(matches: Matches, pair: StereoPair) -> Array:
+    """The pixels (N, 2) of matches in the right image."""
+    return pair.right.from_view(_right_view_px(matches, pair))
+
+
+def _right_view_px(matches: Matches, pair: StereoPair) -> Array:
+    """The pixels (N, 2) of matches in the right view, in which they have normalised coordinates."""
+    homogeneous = np.c_[matches.place, np.ones(len(matches.place))]
+    view_px: Array = (homogeneous @ pair.K.T)[:, :2]
+    return view_px
 
 
 def _cells_of_matches(fit: StereoFit, pair: StereoPair) -> tuple[Cells, Cells, Cells]:
     """The segment of each match (N,), and its row and column in the left view."""
     matches = fit.matches
     camera = pair.left.camera
-    # Matches have normalised coordinates in the right view. Rectified views show a point in the same row, and the left
-    # view shows it further right by the disparity.
-    homogeneous = np.c_[matches.place, np.ones(len(matches.place))]
-    right_px = homogeneous @ pair.K.T
+    # Rectified views show a point in the same row, and the left view shows it further right by the disparity.
+    right_px = _right_view_px(matches, pair)
     left_column_px = right_px[:, 0] + matches.disparity_px
     row = _cell(right_px[:, 1], camera.height_px)
     column = _cell(left_column_px, camera.width_px)

@@ -362,6 +362,18 @@ def residual(pair: StereoFit) -> dict[str, Any]:
     return error
 
 
+def all_errors(pair: StereoFit, rng: np.random.Generator | None = None) -> dict[str, Any]:
+    """All fitted errors in the form of `residual`, significant or not; with `rng`, drawn from their distribution.
+
+    They are those of `residual` if motion does not determine the offset of disparities: then most errors are unknown.
+    """
+    if pair.calibrated is None or not pair.calibrated.is_offset_determined:
+        return residual(pair)
+    fitted = pair.calibrated.calibration
+    calibration = fitted if rng is None else fitted.drawn(rng)
+    return _settings(calibration, [parameter.name for parameter in calibration.parameters])
+
+
 def _significant(calibration: PairCalibration) -> list[str]:
     """The names of significant errors of both cameras and of the right camera's focal length."""
     names = []

@@ -13,7 +13,7 @@ from vobench.analysis.camera_fit import CameraLook, Lights, fit_camera, look_of
 from vobench.analysis.image_statistics import evenly_spaced
 from vobench.analysis.path_placement import Placement, levelled, wanted_disparities
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
-from vobench.analysis.realism import Realism, residual, shots_of
+from vobench.analysis.realism import Realism, all_errors, shots_of
 from vobench.analysis.realism_report import RealismReport, realism_of
 from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
@@ -64,6 +64,7 @@ FEWEST_PICTURES = 12  # a replayed path needs as many poses
 LEAST_EXTENT_M = 0.05
 FITTED_PICTURES = 12  # that the camera is fitted to
 KNOTS_PER_PICTURE = 0.5  # of the smoothed path
+CALIBRATION_SEED = 0  # of the calibration errors that are drawn for places after the first
 QUANTILES = (0.1, 0.5, 0.9)
 
 
@@ -234,7 +235,7 @@ def _suite_of_place(out: Path, path: "RecordedPath", placed: PlacedPath, *, inde
         "summary": f"A recording repeated in {placed.title}",
         "seed": index,
         "scenes": [str(place_file.resolve())],
-        "rigs": {TWIN: path.rig_settings()},
+        "rigs": {TWIN: path.rig_settings(index)},
         "trajectories": {TWIN: {**path.trajectory_settings(), "file": path_file.name}},
     }
 
@@ -302,7 +303,7 @@ def compare_twin(
     folder = run_plan(read_plan(str(suite.file)))
     with progress.step("measuring the twin"):
         twin = realism_of(read_recording(folder.case(TWIN)))
-    real_errors = _errors(folder, REAL)
+    real_errors = case_errors(folder, REAL)
     twin_errors = prediction.twin_errors()
     orders = agreement(real_errors, twin_errors)
     errors = {}
@@ -336,7 +337,7 @@ def predict_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> PredictedTwin:
     errors = []
     for file in (suite.file, *suite.more):
         folder = run_plan(read_plan(str(file)).only([TWIN], []))
-        errors.append(_errors(folder, TWIN))
+        errors.append(case_errors(folder, TWIN))
     return PredictedTwin(predict(errors, basis=_basis(suite)), tuple(errors))
 
 
@@ -346,7 +347,8 @@ def _basis(suite: TwinSuite) -> str:
     places = f"the recording's path in {titles}" if titles else "the recording's path in a place"
     basis = (
         f"The prediction rests on {places}, on a camera and a calibration error that were fitted to the recording, and "
-        "on that path being true. Intervals cover other places and noise, not what a simulation lacks."
+        "on that path being true. Intervals cover other places, noise and the uncertainty of the calibration, not "
+        "what a simulation lacks."
     )
     if suite.realism.pair is None or suite.realism.pair.offset_px is None:
         basis += " The offset of disparity could not be determined and is 0 in the twin, so errors may be far larger."
@@ -400,11 +402,16 @@ class RecordedPath:
         T_place_body = placement.T_place_world @ self.T_world_left @ inverse(T_body_left)
         return Trajectory(self.t_ns - self.t_ns[0], T_place_body)
 
-    def rig_settings(self) -> dict[str, Any]:
-        """The rig for a suite, with the calibration errors that were found."""
+    def rig_settings(self, index: int = 0) -> dict[str, Any]:
+        """The rig for the suite of a place, with the calibration errors that were found.
+
+        In places after the first, errors are drawn from the distribution of those that were found, so that predictions
+        from several places differ by the uncertainty of the calibration too.
+        """
         settings: Any = plain(self.rig)
         stated = {key: settings[key] for key in ("own", "pitch_deg", "forward_m", "height_m")}
-        return {**stated, "calibration_error": residual(self.fit)}
+        rng = np.random.default_rng([CALIBRATION_SEED, index]) if index else None
+        return {**stated, "calibration_error": all_errors(self.fit, rng)}
 
     def trajectory_settings(self) -> dict[str, Any]:
         """The replay of this path for a suite."""
@@ -530,12 +537,12 @@ def _camera_settings(settings: CameraSettings, *, gain: float) -> dict[str, Any]
 # --- The comparison ---
 
 
-def _errors(folder: RunFolder, case: str) -> dict[str, Array]:
-    """The errors (8, N) of segments of each estimator on a case."""
+def case_errors(folder: RunFolder, case: str) -> dict[str, Array]:
+    """The errors (8, N) of segments of each estimator on a case, in its first trial there."""
     gt = read_tum(folder.case(case) / GROUND_TRUTH)
-    errors = {}
+    errors = dict[str, Array]()
     for score in folder.scores():
-        if score.case == case and score.repeat == 0:
+        if score.case == case and score.estimator not in errors:
             errors[score.estimator] = _trial_errors(folder, gt, score)
     return errors
 
