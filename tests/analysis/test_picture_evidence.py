@@ -12,6 +12,7 @@ from vobench.analysis.picture_change import BLUR, DIRT, DROPPED, EXPOSURE, NOISE
 from vobench.analysis.picture_evidence import (
     ImageEvidence,
     RecordingPart,
+    _turned_axes,
     _turned_stretch,
     _TurnedChunk,
     find_changes,
@@ -134,9 +135,37 @@ def test_the_ends_of_a_turned_stretch_are_finer_than_the_chunks_that_measure_it(
         measured_deg = np.array([0.0, 0.0, 0.05 * turned_frames / 10]) + rng.normal(0, sigma_deg, 3)
         chunks.append(_TurnedChunk(chunk_first, chunk_end, measured_deg, np.full(3, sigma_deg)))
     is_yaw = np.array([False, False, True])
-    found_first, found_end, angle_deg = _turned_stretch(chunks, is_yaw, 50)
-    assert (found_first, found_end) == (pytest.approx(first, abs=1), pytest.approx(end, abs=1))
-    assert angle_deg == pytest.approx([0, 0, 0.05], abs=0.003)
+    stretch = _turned_stretch(chunks, is_yaw, 50)
+    assert (stretch.first, stretch.end) == (pytest.approx(first, abs=1), pytest.approx(end, abs=1))
+    assert stretch.angle_deg == pytest.approx([0, 0, 0.05], abs=0.003)
+
+
+def measured_chunks(yaw_deg: float, seed: int, sigma_deg: float = 0.015) -> list[_TurnedChunk]:
+    """Overlapping chunks of 50 frames, rotated by a yaw from frame 10 to 40, with the noise of their frames."""
+    rng = np.random.default_rng(seed)
+    by_frame_deg = rng.normal(0, sigma_deg * np.sqrt(10), (50, 3))
+    by_frame_deg[10:40, 2] += yaw_deg
+    chunks = []
+    for first in range(0, 41, 5):
+        difference_deg = by_frame_deg[first : first + 10].mean(0)
+        chunks.append(_TurnedChunk(first, first + 10, difference_deg, np.full(3, sigma_deg)))
+    return chunks
+
+
+def test_a_yaw_within_the_uncertainty_of_each_chunk_is_found_in_all_of_them_together() -> None:
+    right = 0
+    for seed in range(50):
+        chunks = measured_chunks(0.07, seed)
+        right += _turned_axes(chunks, 50).tolist() == [False, False, True]
+    assert right >= 40
+    alike = [_TurnedChunk(chunk.first, chunk.end, chunk.sigma_deg * 3, chunk.sigma_deg) for chunk in chunks]
+    assert not any(chunk.significant.any() for chunk in alike)
+    assert _turned_axes(alike, 50).all()
+
+
+def test_no_axis_is_found_turned_in_noise_alone() -> None:
+    for seed in range(50):
+        assert not _turned_axes(measured_chunks(0.0, seed), 50).any()
 
 
 @pytest.mark.slow

@@ -376,6 +376,7 @@ def _smoothed(values: Array) -> Array:
 
 CHUNK_FRAMES = 10  # to which the pair is fitted
 CHUNK_STEP = 5
+CHUNKS_PER_FRAME = CHUNK_FRAMES / CHUNK_STEP  # chunks overlap, so that each frame's matches count so many times
 MIN_ANGLE_DEG = 0.015
 AXES = ("roll", "pitch", "yaw")
 
@@ -409,11 +410,14 @@ def _turned_camera(
     if reference is None or len(part) < CHUNK_FRAMES:
         return None
     chunks = _turned_chunks(part, pair, reference, is_unchanged)
-    if not any(chunk.significant.any() for chunk in chunks):
+    axes = _turned_axes(chunks, len(part))
+    if not axes.any():
         return None
 
-    axes = np.any([chunk.significant for chunk in chunks], axis=0)
-    first, end, angle_deg = _turned_stretch(chunks, axes, len(part))
+    stretch = _turned_stretch(chunks, axes, len(part))
+    first = stretch.first
+    end = stretch.end
+    angle_deg = stretch.angle_deg
     angles_deg = np.zeros((len(part), len(AXES)))
     angles_deg[first:end] = angle_deg
     named_axes = zip(AXES, angle_deg.tolist(), strict=True)
@@ -451,8 +455,35 @@ def _difference(angle: Uncertain | None, usual: Uncertain | None) -> Uncertain:
     return Uncertain(angle.value - usual.value, float(np.hypot(angle.sigma, usual.sigma)))
 
 
-def _turned_stretch(chunks: Sequence[_TurnedChunk], axes: Frames, frame_count: int) -> tuple[int, int, Array]:
-    """The first frame of a rotated stretch, the one after its last, and its rotation (3,) about some axes in degrees.
+@dataclass(frozen=True, slots=True)
+class _TurnedStretch:
+    """Successive frames in which the right camera is rotated by angles (3,) in degrees, with standard deviations."""
+
+    first: int
+    end: int
+    angle_deg: Array
+    sigma_deg: Array
+
+
+def _turned_axes(chunks: Sequence[_TurnedChunk], frame_count: int) -> Frames:
+    """The axes (3,) about which the rotation of a chunk or of a stretch of chunks is significant.
+
+    A small rotation that is within the uncertainty of each chunk can be significant in all of them together.
+    """
+    is_turned = np.zeros(len(AXES), bool)
+    if not chunks:
+        return is_turned
+    is_turned |= np.any([chunk.significant for chunk in chunks], axis=0)
+    for axis in range(len(AXES)):
+        only_axis = np.arange(len(AXES)) == axis
+        stretch = _turned_stretch(chunks, only_axis, frame_count)
+        limit_deg = max(MIN_ANGLE_DEG, SIGMAS * float(stretch.sigma_deg[axis]))
+        is_turned[axis] |= abs(stretch.angle_deg[axis]) > limit_deg
+    return is_turned
+
+
+def _turned_stretch(chunks: Sequence[_TurnedChunk], axes: Frames, frame_count: int) -> _TurnedStretch:
+    """The stretch of frames that is rotated about some axes.
 
     A chunk that is rotated in part of its frames measures that share of the rotation. The stretch and its constant
     rotation fit the chunks best in the sense of weighted least squares, so that its ends are finer than the chunks.
@@ -463,7 +494,7 @@ def _turned_stretch(chunks: Sequence[_TurnedChunk], axes: Frames, frame_count: i
     weights = np.array([chunk.sigma_deg for chunk in chunks]) ** -2.0 * axes
 
     best_gain = -np.inf
-    best = (0, frame_count, np.zeros(len(AXES)))
+    best = _TurnedStretch(0, frame_count, np.zeros(len(AXES)), np.full(len(AXES), np.inf))
     for first, last in combinations_with_replacement(range(frame_count), 2):
         end = last + 1
         overlap_frames = np.clip(np.minimum(ends, end) - np.maximum(firsts, first), 0, None)
@@ -478,5 +509,6 @@ def _turned_stretch(chunks: Sequence[_TurnedChunk], axes: Frames, frame_count: i
         gain = float((angle_deg * projection).sum())
         if gain > best_gain:
             best_gain = gain
-            best = (first, end, angle_deg)
+            variance = np.divide(CHUNKS_PER_FRAME, information, out=np.full(len(AXES), np.inf), where=information > 0)
+            best = _TurnedStretch(first, end, angle_deg, np.sqrt(variance))
     return best
