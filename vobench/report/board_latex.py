@@ -32,7 +32,9 @@ ESCAPED = {
     **{letter: f"\\{letter}" for letter in "&%$#_{}"},
 }
 UNDECIDED = r"$^{\sim}$"  # beside an error that is not significantly worse than the best
-MOST_UPRIGHT_COLUMNS = 6  # that fit a page with names that are not rotated
+COLUMN_LETTERS = 58  # of \footnotesize text fit in one of a paper's two columns (252 pt)
+SEPARATION_LETTERS = 2  # about as wide as the space between two columns of the table
+COMMAND = re.compile(r"\\[a-z]+|[\\{}$^]")
 MOST_RANGED_COLUMNS = 3  # that fit a page with the range of each cell
 
 Row = list[str]
@@ -41,7 +43,8 @@ Row = list[str]
 def latex(board: Board, metric: str = DEFAULT_METRIC) -> str:
     """The matrix and the totals as a table with booktabs' rules: the best in bold, numbers right-aligned.
 
-    The columns are the cases or the estimators, whichever are fewer.
+    The columns are the cases or the estimators, whichever are fewer. Their names are rotated if the table would be
+    wider than one of a paper's two columns.
     """
     has_ranges = min(len(board.estimators), len(board.cases)) <= MOST_RANGED_COLUMNS
     head, body, foot = _rows(board, metric, has_ranges=has_ranges)
@@ -49,7 +52,7 @@ def latex(board: Board, metric: str = DEFAULT_METRIC) -> str:
         head, *body = _transposed([head, *body, *foot])
         foot = []
     columns = len(head) - 1
-    is_wide = columns > MOST_UPRIGHT_COLUMNS
+    is_wide = _width_letters([head, *body, *foot]) > COLUMN_LETTERS
     if is_wide:
         head = [head[0], *(rf"\rotatebox{{60}}{{{name}}}" for name in head[1:])]
 
@@ -95,6 +98,12 @@ def _names(board: Board) -> Row:
     """The estimators with their claims."""
     claims_of = {cell.estimator: cell.claims for cell in board.cells}
     return [_escaped(named(name, claims_of[name])) for name in board.estimators]
+
+
+def _width_letters(table: Sequence[Row]) -> int:
+    """The approximate width of a table, in letters."""
+    widths = [max(len(COMMAND.sub("", cell)) for cell in column) for column in _transposed(table)]
+    return sum(widths) + SEPARATION_LETTERS * len(widths)
 
 
 def _transposed(table: Sequence[Row]) -> list[Row]:
