@@ -14,8 +14,8 @@ COVERAGE = 0.95  # of the intervals
 LEAST_ERROR_PERCENT = 1e-3  # smaller errors count as this one
 
 # The usual standard deviations of the logarithm of an error between places, and of what remains for one estimator, and
-# the degrees of freedom that they count as: two places alone say little of how places differ. By the differences
-# between eight simulated recordings and their twins, which benchmarks/hidden_twins.py prints.
+# the degrees of freedom that they count as: two places alone say little of how places differ. Chosen by the
+# differences between eight simulated recordings and their twins (benchmarks/hidden_twins.py, seed 1).
 USUAL_PLACE_SD = 0.35
 USUAL_REMAINING_SD = 0.3
 USUAL_FREEDOM = 4
