@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 from numpy.random import Generator
 from pair_calibration import true_parameters
+from realism import CAR_RIG, COVERED_SIGMAS
 
 import vobench
 from vobench.analysis.pair_parameter import (
@@ -43,7 +44,6 @@ from vobench.runner.folder import open_run
 from vobench.runner.recording import read_recording
 from vobench.suite.yaml_file import plain
 
-COVERED_SIGMAS = 1.96
 WITHIN = 1.5  # the factor by which a predicted error may differ
 NEAREST = 1.5  # times the disparities of the recording
 ESTIMATORS = ("lk_epipolar", "stereo_pnp", "stereo_pnp_wide", "feature_vo", "mono_vo")
@@ -64,13 +64,6 @@ class Domain:
     angle_px: tuple[float, float, float]  # usual errors by yaw and pitch at the centre, and by roll at the edges
 
 
-CAR_RIG = {
-    "own": {
-        "left": {"size_px": [613, 185], "focal_px": [353.5, 353.5], "center_px": [300.5, 91.5]},
-        "right_at_m": [0.537, 0, 0],
-    },
-    "pitch_deg": 0,
-}
 HAND_RIGS = {
     "kitti": {"lens": "paper_blender", "picture_scale": 0.5, "pitch_deg": 0},
     "euroc": {"lens": "euroc", "picture_scale": 0.5, "pitch_deg": 0},
