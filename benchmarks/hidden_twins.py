@@ -61,7 +61,6 @@ class Domain:
     rigs: Mapping[str, Mapping[str, Any]]
     trajectory: Mapping[str, Any]
     twin_place: str
-    angle_px: tuple[float, float, float]  # usual errors by yaw and pitch at the centre, and by roll at the edges
 
 
 HAND_RIGS = {
@@ -80,7 +79,6 @@ DOMAINS = {
             "mount": {"pitch_deg": 0, "forward_m": 1.5, "height_m": 1.6},
         },
         twin_place="street",
-        angle_px=(0.3, 0.2, 0.4),
     ),
     "hand": Domain(
         scenes=("flat", "office"),
@@ -93,10 +91,10 @@ DOMAINS = {
             "mount": {"pitch_deg": 0, "forward_m": 0, "height_m": 0},
         },
         twin_place="office",
-        angle_px=(0.3, 0.2, 0.4),
     ),
 }
 FORMS = ("kitti", "euroc")
+ANGLE_PX = (0.3, 0.2, 0.4)  # usual errors by yaw and pitch at the centre, and by roll at the edges
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +114,7 @@ def draw_recording(index: int, seed: int, images: int) -> Hidden:
     kind = list(DOMAINS)[index % len(DOMAINS)]
     domain = DOMAINS[kind]
     form = FORMS[index // len(DOMAINS) % len(FORMS)]
-    error = _draw_error(domain, rng)
+    error = _draw_error(rng)
     scene = domain.scenes[rng.integers(len(domain.scenes))]
     suite = {
         "name": "hidden",
@@ -131,9 +129,9 @@ def draw_recording(index: int, seed: int, images: int) -> Hidden:
     return Hidden(f"{index}-{kind}-{form}", domain, form, suite, error)
 
 
-def _draw_error(domain: Domain, rng: Generator) -> CalibrationError:
+def _draw_error(rng: Generator) -> CalibrationError:
     """The errors of a pair. Half of the pairs have errors of the right lens too."""
-    yaw_px, pitch_px, roll_px = domain.angle_px * rng.standard_normal(3)
+    yaw_px, pitch_px, roll_px = ANGLE_PX * rng.standard_normal(3)
     focal_px = 340.0
     half_width_px = 200.0
     has_lens_error = rng.random() < 0.5

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from vobench.analysis.conditions import chip_noise_dn
-from vobench.analysis.image_noise import SATURATED_DN, noise_dn
+from vobench.analysis.image_noise import noise_dn, saturated_share
 from vobench.analysis.image_statistics import edge_px, gradients
 from vobench.geometry.se3 import Array
 from vobench.runner.store import SILENT, Progress
@@ -41,14 +41,10 @@ def look_of(pictures: Sequence[Image]) -> CameraLook:
     for picture in pictures:
         sigma_dn, flat_values_dn = noise_dn(picture)
         width_px = edge_px(picture, gradients(picture))
-        rows.append((picture.mean(), picture.std(), sigma_dn, width_px, _saturated_share(picture)))
+        rows.append((picture.mean(), picture.std(), sigma_dn, width_px, saturated_share(picture)))
         flat_dn.append(flat_values_dn)
-    mean_dn, sd_dn, mean_sigma_dn, mean_width_px, saturated_share = np.mean(rows, axis=0).tolist()
-    return CameraLook(mean_dn, sd_dn, mean_sigma_dn, mean_width_px, np.concatenate(flat_dn), saturated_share)
-
-
-def _saturated_share(picture: Image) -> float:
-    return float((picture >= SATURATED_DN).mean())
+    mean_dn, sd_dn, mean_sigma_dn, mean_width_px, share = np.mean(rows, axis=0).tolist()
+    return CameraLook(mean_dn, sd_dn, mean_sigma_dn, mean_width_px, np.concatenate(flat_dn), share)
 
 
 # --- The pictures of a camera ---
@@ -276,15 +272,15 @@ def _residuals(images: Sequence[Image], target: CameraLook) -> Array:
 
     Those of mean, standard deviation and edges are relative.
     """
-    rows = [(image.mean(), image.std(), edge_px(image, gradients(image)), _saturated_share(image)) for image in images]
-    mean_dn, sd_dn, width_px, saturated_share = np.mean(rows, axis=0).tolist()
+    rows = [(image.mean(), image.std(), edge_px(image, gradients(image)), saturated_share(image)) for image in images]
+    mean_dn, sd_dn, width_px, share = np.mean(rows, axis=0).tolist()
     ratios = np.array([
         mean_dn / max(target.mean_dn, 1.0),
         sd_dn / max(target.sd_dn, 1.0),
         width_px / target.edge_px if target.edge_px > 0 else 1.0,
     ])  # fmt: skip
     relative = np.log(np.maximum(ratios, 1e-3)) / TOLERANCES
-    saturated = (saturated_share - target.saturated_share) / SATURATED_TOLERANCE
+    saturated = (share - target.saturated_share) / SATURATED_TOLERANCE
     return np.asarray([*relative, saturated], float)
 
 

@@ -22,6 +22,11 @@ TEXTURE_QUANTILE = 0.999  # one patch of pure noise in a thousand is taken for t
 Patches = NDArray[np.float32]  # (N, PATCH_PX²)
 
 
+def saturated_share(picture: Image) -> float:
+    """The share of saturated pixels of a grey image (H, W)."""
+    return float((picture >= SATURATED_DN).mean())
+
+
 def noise_dn(picture: Image) -> tuple[float, Array]:
     """The standard deviation of the noise in the flat parts of an image, and ten quantiles of the grey values there.
 

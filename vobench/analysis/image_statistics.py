@@ -8,7 +8,7 @@ from typing import TypeVar
 import cv2
 import numpy as np
 
-from vobench.analysis.image_noise import BLACK_DN, SATURATED_DN, noise_dn
+from vobench.analysis.image_noise import BLACK_DN, SATURATED_DN, noise_dn, saturated_share
 from vobench.estimator.tracking import Points, follow, inside
 from vobench.geometry.se3 import Array
 from vobench.sequence.picture import Image
@@ -36,7 +36,7 @@ def picture_statistics(picture: Image) -> dict[str, float]:
         "gradient_kurtosis": _kurtosis(gradient),
         "corner_unevenness": _unevenness(points, picture),
         "grey_sd": float(picture.std()),
-        "burnt": 100 * float((picture >= SATURATED_DN).mean()),
+        "burnt": 100 * saturated_share(picture),
         "grey_mean": float(picture.mean()),
         "noise_dn": noise_dn(picture)[0],
         "edge_px": edge_px(picture, gradient),

@@ -24,8 +24,8 @@ STEPS_PER_TEXEL = 4096  # places are rounded to these steps, so that the middle 
 PADDING_PX = 1  # empty texels around a chart, besides those that interpolation within the chart reads
 BLOCK_PX = 3  # the side of the block of texels that all faces of one lamp share
 MIN_AREA_PX2 = 1e-6  # of a face that gets a place in an axis chart
-IDLE_S = 5.0  # after that time, the threads of xatlas are idle
 MIN_XATLAS_AREA_PX2 = 1e-9  # of a place from xatlas, twice its area; smaller ones are not used
+IDLE_S = 5.0  # after that time, the threads of xatlas are idle
 
 # The coordinates that remain if one looks along the first, the second or the third axis.
 PLANE_AXES = np.array([[1, 2], [0, 2], [0, 1]])
@@ -171,11 +171,10 @@ class _IdleAtlases:
     def keep(self, atlas: Any) -> None:
         """Keep an atlas that has been generated, and destroy those that were kept IDLE_S ago."""
         now_s = time.monotonic()
-        is_idle = [now_s > since_s + IDLE_S for since_s, _ in self._kept]
-        idle = [kept for kept, idle in zip(self._kept, is_idle, strict=True) if idle]
-        self._kept = [kept for kept, idle in zip(self._kept, is_idle, strict=True) if not idle]
-        for _, old in idle:
-            ctypes.pythonapi.Py_DecRef(ctypes.py_object(old))
+        for since_s, old in self._kept:
+            if now_s > since_s + IDLE_S:
+                ctypes.pythonapi.Py_DecRef(ctypes.py_object(old))
+        self._kept = [kept for kept in self._kept if now_s <= kept[0] + IDLE_S]
 
         # A reference that is not Python's, so that the end of the process does not destroy it.
         ctypes.pythonapi.Py_IncRef(ctypes.py_object(atlas))

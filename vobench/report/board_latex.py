@@ -102,8 +102,11 @@ def _names(board: Board) -> Row:
 
 def _width_letters(table: Sequence[Row]) -> int:
     """The approximate width of a table, in letters."""
-    widths = [max(len(COMMAND.sub("", cell)) for cell in column) for column in _transposed(table)]
-    return sum(widths) + SEPARATION_LETTERS * len(widths)
+    width = 0
+    for column in _transposed(table):
+        widest = max(len(COMMAND.sub("", cell)) for cell in column)
+        width += widest + SEPARATION_LETTERS
+    return width
 
 
 def _transposed(table: Sequence[Row]) -> list[Row]:
