@@ -182,7 +182,7 @@ def test_daily_is_balanced_over_places_indoors_and_out_by_robot_hand_and_car():
         if case.scene.generated:
             drive, _, _ = case.variant["trajectory"].partition(".")  # without the severity of frame_rate
             units[case.variant["scene"], drive] += 1
-    cases_of_a_scenario = 3  # at severity 1 with exact and worn calibration, and at 3
+    cases_of_a_scenario = 2  # at severities 1 and 3
     assert len(units) >= 12
     assert max(units.values()) - min(units.values()) <= cases_of_a_scenario, "each unit has about as many scenarios"
     assert {place.split(".")[0] for place, _ in units} == {"flat", "office", "room", "warehouse", "street", "park"}
