@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.generated import SUITE, write_cell
+from tests.generated import GENERATOR, SUITE, write_cell
 from vobench.errors import MotionError
+from vobench.geometry.rig import CalibrationError
 from vobench.runner import wander
 from vobench.runner.motion import body_motion
 from vobench.runner.wander import clearance_of, wander_motion
@@ -68,3 +69,31 @@ def test_a_place_without_a_floor_is_refused_in_one_line(cases, monkeypatch):
     monkeypatch.setattr(wander, "floor_map", lambda *_, **__: None)
     with pytest.raises(MotionError, match="'cell' has no level floor to wander on; is another axis up\\?"):
         clearance_of(cases["cell.1", "tour.1"].scene, 0.6)
+
+
+SHELF_FROM_X_M = 0.3  # where a board begins that hangs 0.9 m above part of the cell
+WITH_SHELF = GENERATOR.replace(
+    "    lamp = ",
+    '    things.append(Thing("shelf", block((1.2, 4.0, 0.02), transform=at(0.9, 0.0, 0.91)), "plaster"))\n    lamp = ',
+)
+
+
+@pytest.mark.parametrize(("camera_m", "is_kept_clear"), [(0.4, False), (1.1, True)])
+def test_a_robot_drives_under_things_only_if_its_cameras_fit_below(tmp_path, monkeypatch, camera_m, is_kept_clear):
+    write_cell(tmp_path / "scenes" / "cell", WITH_SHELF)
+    suite = SUITE.replace("pitch_deg: 90", f"pitch_deg: 90, height_m: {camera_m}").replace("rate_hz: 4, seeds: 2", "rate_hz: 4, seeds: 12")
+    (tmp_path / "cells.yaml").write_text(suite.replace("units: 4", "units: 24"), encoding="utf-8")
+    monkeypatch.setattr(wander, "_clearances", type(wander._clearances)())
+    monkeypatch.setattr(wander, "_drives", type(wander._drives)())
+
+    plan = read_plan(str(tmp_path / "cells.yaml"))
+    paths_m = np.concatenate([positions_m(case) for case in plan.simulated])
+    is_below_shelf = paths_m[:, 0] > SHELF_FROM_X_M - RADIUS_M
+    assert is_below_shelf.any() != is_kept_clear
+
+
+def test_the_baseline_and_the_calibration_do_not_change_a_drive(cases):
+    case = cases["cell.1", "tour.1"]
+    drive = wander_motion(case, case.trajectory)
+    wider = replace(case, rig=replace(case.rig, baseline_m=0.3, calibration_error=CalibrationError(right_roll_deg=1)))
+    assert wander_motion(wider, case.trajectory) is drive
