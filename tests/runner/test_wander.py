@@ -81,8 +81,9 @@ WITH_SHELF = GENERATOR.replace(
 @pytest.mark.parametrize(("camera_m", "is_kept_clear"), [(0.4, False), (1.1, True)])
 def test_a_robot_drives_under_things_only_if_its_cameras_fit_below(tmp_path, monkeypatch, camera_m, is_kept_clear):
     write_cell(tmp_path / "scenes" / "cell", WITH_SHELF)
-    suite = SUITE.replace("pitch_deg: 90", f"pitch_deg: 90, height_m: {camera_m}").replace("rate_hz: 4, seeds: 2", "rate_hz: 4, seeds: 12")
-    (tmp_path / "cells.yaml").write_text(suite.replace("units: 4", "units: 24"), encoding="utf-8")
+    tall = SUITE.replace("pitch_deg: 90", f"pitch_deg: 90, height_m: {camera_m}")
+    many = tall.replace("rate_hz: 4, seeds: 2", "rate_hz: 4, seeds: 12").replace("units: 4", "units: 24")
+    (tmp_path / "cells.yaml").write_text(many, encoding="utf-8")
     monkeypatch.setattr(wander, "_clearances", type(wander._clearances)())
     monkeypatch.setattr(wander, "_drives", type(wander._drives)())
 
