@@ -1,7 +1,8 @@
 """A twin repeats the path of a recording, and orders of estimators that are known are compared rightly."""
 
 import json
-from collections.abc import Sequence
+import shutil
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -39,16 +40,35 @@ def realism(recording: Recording) -> Realism:
     return realism_of(recording)
 
 
-@pytest.fixture
-def suite(recorded_case: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> TwinSuite:
+def fit_in_few_steps(patch: pytest.MonkeyPatch, cache: Path) -> None:
+    """Place paths and fit cameras in few steps, with light from this cache."""
+    patch.setattr(path_placement, "NEAR_DRAWS", 20)
+    patch.setattr(camera_fit, "PASSES", 1)
+    patch.setattr(camera_fit, "MAX_TRIALS", 2)
+    patch.setattr(recording_twin, "FITTED_PICTURES", 2)
+    patch.setenv("VOBENCH_CACHE", str(cache))
+
+
+@pytest.fixture(scope="module")
+def written(recorded_case: Path, tmp_path_factory: pytest.TempPathFactory) -> TwinSuite:
     """The suite of a twin in the closet that was recorded, placed and fitted in few steps."""
-    monkeypatch.setattr(path_placement, "NEAR_DRAWS", 20)
-    monkeypatch.setattr(camera_fit, "PASSES", 1)
-    monkeypatch.setattr(camera_fit, "MAX_TRIALS", 2)
-    monkeypatch.setattr(recording_twin, "FITTED_PICTURES", 2)
-    monkeypatch.setenv("VOBENCH_CACHE", str(tmp_path / "cache"))
+    root = tmp_path_factory.mktemp("written")
     closet = next(recorded_case.resolve().parents[4].glob("closet.yaml"))
-    return write_twin_suite(recorded_case, out=tmp_path / "twin", place=str(closet), estimators=list(RANKED))
+    with pytest.MonkeyPatch.context() as patch:
+        fit_in_few_steps(patch, root / "cache")
+        suite = write_twin_suite(recorded_case, out=root / "twin", place=str(closet), estimators=list(RANKED))
+    shutil.copytree(root / "twin", root / "pristine")
+    return suite
+
+
+@pytest.fixture
+def suite(written: TwinSuite, monkeypatch: pytest.MonkeyPatch) -> TwinSuite:
+    """The suite with its folder as it was written, whatever tests have done to it."""
+    folder = written.file.parent
+    fit_in_few_steps(monkeypatch, folder.parent / "cache")
+    shutil.rmtree(folder)
+    shutil.copytree(folder.parent / "pristine", folder)
+    return written
 
 
 def test_the_suite_has_the_recording_and_its_repetition(suite: TwinSuite, recording: Recording) -> None:
@@ -182,8 +202,27 @@ def lay_out(root: Path, recorded_case: Path, noise_m: dict[str, dict[str, float]
     return folder
 
 
+@pytest.fixture(scope="module")
+def measure_once() -> Callable[[Recording], Realism]:
+    """The statistics of the first recording that it is called with, for twins whose images are the same."""
+    measured: list[Realism] = []
+
+    def realism(recording: Recording) -> Realism:
+        if not measured:
+            measured.append(realism_of(recording))
+        return measured[0]
+
+    return realism
+
+
 @pytest.fixture
-def known(recorded_case: Path, realism: Realism, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def known(
+    recorded_case: Path,
+    realism: Realism,
+    measure_once: Callable[[Recording], Realism],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+):
     """Compares a recording with itself as its twin, with these noises of estimators on both."""
 
     def compare(real, twin):
@@ -195,6 +234,7 @@ def known(recorded_case: Path, realism: Realism, tmp_path: Path, monkeypatch: py
         suite = TwinSuite(tmp_path / "twin.yaml", (placed,), realism)
         folder = lay_out(tmp_path, recorded_case, {REAL: real, TWIN: twin})
         monkeypatch.setattr(Plan, "only", lambda plan, cases, scenes: plan)
+        monkeypatch.setattr(recording_twin, "realism_of", measure_once)
         return compare_twin(suite, run_plan=lambda plan, /: folder)
 
     return compare
