@@ -57,14 +57,41 @@ def test_a_rule_parts_cases_from_totals_where_the_totals_are_rows(scored):
     assert latex(make_board(several(scored, 3, 2), {})).count(r"\midrule") == 1
 
 
-@pytest.mark.parametrize(("columns", "is_rotated"), [(3, False), (4, True)])
-def test_names_are_rotated_in_a_table_that_is_wider_than_a_column_of_a_paper(scored, columns, is_rotated):
-    names = [f"constant_model{number}" for number in range(columns)]
-    trials = [scored(name, case=f"c{case}") for name in names for case in range(columns)]
+@pytest.mark.parametrize(
+    ("columns", "name", "is_rotated", "environment"),
+    [
+        (3, "constant_model", False, "table"),
+        (4, "constant_model", True, "table"),
+        (8, "model", False, "table*"),
+        (8, "constant_model", True, "table*"),
+    ],
+)
+def test_names_are_rotated_and_a_table_spans_the_page_where_a_column_of_a_paper_is_too_narrow(
+    scored, columns, name, is_rotated, environment
+):
+    names = [f"{name}{number}" for number in range(columns)]
+    trials = [scored(estimator, case=f"c{case}", path_m=0.01) for estimator in names for case in range(columns)]
     text = latex(make_board(trials, {}))
-    assert (r"\rotatebox{60}{constant\_model0}" in text) == (r"\usepackage{graphicx}" in text) == is_rotated
-    assert text.splitlines()[0].endswith(".")
+    assert text.count(r"\rotatebox{90}{") == (columns if is_rotated else 0)
+    assert rf"\begin{{{environment}}}" in text
+    assert rf"\end{{{environment}}}" in text
     assert r"\begin{tabular}{l" + "r" * columns + "}" in text
+
+
+def test_latex_shrinks_a_table_that_is_too_wide_for_its_column(scored):
+    lines = latex(make_board([scored("a")], {})).splitlines()
+    assert lines[0] == r"% Needs \usepackage{booktabs} and \usepackage{graphicx}."
+    box = lines.index(r"\sbox0{%")
+    assert lines[box + 1].startswith(r"\begin{tabular}")
+    end = lines.index(r"\end{tabular}}%")
+    assert lines[end + 1] == r"\ifdim\wd0>\linewidth\resizebox{\linewidth}{!}{\usebox0}\else\usebox0\fi"
+
+
+def test_a_table_without_ranges_still_tells_how_many_trials_failed(scored):
+    trials = several(scored, 4, 4)
+    failures = [scored("e0", "lost", case="c0", repeat=1, ate_m=0.3), scored("e1", case="c1", repeat=1, ate_m=0.2)]
+    text = latex(make_board([*trials, *failures], {}))
+    assert text.count(r"{\tiny") == text.count(r"{\tiny 1/2 lost}") == 1
 
 
 @pytest.mark.parametrize(("columns", "has_range"), [(3, True), (4, False)])

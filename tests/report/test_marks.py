@@ -57,8 +57,24 @@ def test_a_copy_of_the_truth_is_not_the_best_of_a_case(scored):
     assert marks(made, "ate") == {("down", "a"): "*"}
 
 
+def test_the_only_survivor_of_several_is_the_best_of_a_case(scored):
+    assert marks(make_board([scored("a"), scored("b", "lost")], {}), "ate") == {("down", "a"): "*"}
+    survivor = repeated(scored, "a", [0.01, 0.02, 0.03, 0.04])
+    lost = repeated(scored, "b", [0.1, 0.2, 0.3, 0.4], status="lost")
+    assert marks(make_board([*survivor, *lost], {}), "ate") == {("down", "a"): "*"}
+
+
+def test_where_all_fail_none_is_the_best(scored):
+    assert marks(make_board([scored("a", "crashed"), scored("b", "lost")], {}), "ate") == {}
+
+
+def test_an_estimator_without_its_sensors_does_not_make_another_the_best(scored):
+    board = make_board([scored("a"), scored("b", "not_applicable", ate_m=None)], {})
+    assert marks(board, "ate") == {}
+
+
 def test_one_estimator_alone_and_costs_have_no_mark(scored):
-    assert marks(make_board([scored("a"), scored("b", "lost")], {}), "ate") == {}
+    assert marks(make_board([scored("a")], {}), "ate") == {}
     answered = {("down", name): EstimatorStatistics(cost) for name, cost in (("a", 1.0), ("b", 2.0))}
     assert marks(make_board([scored("a"), scored("b")], answered), "cpu_ms") == {}
 

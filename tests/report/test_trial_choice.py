@@ -34,6 +34,14 @@ def test_the_gravest_failure_comes_first(scored, trials):
     assert order[:2] == [("good", "dark"), ("good", "far")]
 
 
+def test_of_equal_failures_the_one_with_the_lowest_score_comes_first(scored, trials):
+    longer = scored("good", "lost", case="a_late_loss", ate_m=0.01)
+    shorter = scored("good", "lost", case="early_loss", ate_m=0.05)
+    everything = [*trials, longer, shorter]
+    assert names([pick(everything, case=None, estimator=None)]) == [("good", "early_loss")]
+    assert names(ranked(everything, case=None, estimator=None))[:2] == [("good", "early_loss"), ("good", "a_late_loss")]
+
+
 def test_an_estimator_that_sees_is_preferred_to_one_that_does_not_and_both_to_a_baseline(scored):
     baseline = scored("still", "lost", claims=("baseline",))
     wheels = scored("wheels", "diverged", sensors=("encoders",))

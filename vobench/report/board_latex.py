@@ -33,9 +33,12 @@ ESCAPED = {
 }
 UNDECIDED = r"$^{\sim}$"  # beside an error that is not significantly worse than the best
 COLUMN_LETTERS = 58  # of \footnotesize text fit in one of a paper's two columns (252 pt)
+PAGE_LETTERS = 119  # fit in both (516 pt)
+READABLE_SHRINKAGE = 1.1  # a table may be this many times as wide as a column, and is shrunk
 SEPARATION_LETTERS = 2  # about as wide as the space between two columns of the table
 COMMAND = re.compile(r"\\[a-z]+|[\\{}$^]")
 MOST_RANGED_COLUMNS = 3  # that fit a page with the range of each cell
+SHRUNK_BOX = r"\ifdim\wd0>\linewidth\resizebox{\linewidth}{!}{\usebox0}\else\usebox0\fi"
 
 Row = list[str]
 
@@ -44,7 +47,8 @@ def latex(board: Board, metric: str = DEFAULT_METRIC) -> str:
     """The matrix and the totals as a table with booktabs' rules: the best in bold, numbers right-aligned.
 
     The columns are the cases or the estimators, whichever are fewer. Their names are rotated if the table would be
-    wider than one of a paper's two columns.
+    wider than one of a paper's two columns otherwise. A table that is wider even then spans both columns. LaTeX shrinks
+    it if it does not fit after all, since the widths here are estimates and papers differ.
     """
     has_ranges = min(len(board.estimators), len(board.cases)) <= MOST_RANGED_COLUMNS
     head, body, foot = _rows(board, metric, has_ranges=has_ranges)
@@ -52,17 +56,23 @@ def latex(board: Board, metric: str = DEFAULT_METRIC) -> str:
         head, *body = _transposed([head, *body, *foot])
         foot = []
     columns = len(head) - 1
-    is_wide = _width_letters([head, *body, *foot]) > COLUMN_LETTERS
-    if is_wide:
-        head = [head[0], *(rf"\rotatebox{{60}}{{{name}}}" for name in head[1:])]
+    upright_letters = _width_letters([head, *body, *foot])
+    rotated_letters = _width_letters([*body, *foot])
+    spans_page = rotated_letters > READABLE_SHRINKAGE * COLUMN_LETTERS
+    width_letters = PAGE_LETTERS if spans_page else COLUMN_LETTERS
+    if upright_letters > width_letters:
+        head = [head[0], *(rf"\rotatebox{{90}}{{{name}}}" for name in head[1:])]
 
+    environment = "table*" if spans_page else "table"
     lines = [
-        r"% Needs \usepackage{booktabs}" + (r" and \usepackage{graphicx}." if is_wide else "."),
-        r"\begin{table}",
+        r"% Needs \usepackage{booktabs} and \usepackage{graphicx}.",
+        rf"\begin{{{environment}}}",
         r"\centering",
+        r"\setlength{\belowcaptionskip}{4pt}",
         rf"\caption{{{_caption(board, metric, body, has_ranges=has_ranges)}}}",
         rf"\label{{tab:{_label(board.title)}}}",
         r"\footnotesize\setlength{\tabcolsep}{4pt}",
+        r"\sbox0{%",
         r"\begin{tabular}{l" + "r" * columns + "}",
         r"\toprule",
         _line(head),
@@ -71,7 +81,7 @@ def latex(board: Board, metric: str = DEFAULT_METRIC) -> str:
     ]
     if foot:
         lines += [r"\midrule", *(_line(row) for row in foot)]
-    lines += [r"\bottomrule", r"\end{tabular}", r"\end{table}"]
+    lines += [r"\bottomrule", r"\end{tabular}}%", SHRUNK_BOX, rf"\end{{{environment}}}"]
     if board.visible:
         lines.append(f"% {_escaped(board.visible)}")
     if origin(board):
@@ -139,8 +149,9 @@ def _cell(shown: ShownCell, *, has_range: bool) -> str:
         text = rf"\textit{{{text}}}"
     if "~" in shown.mark:
         text += UNDECIDED
-    if shown.range and (has_range or shown.failed):
-        text += rf" {{\tiny {_escaped(shown.range)}}}"
+    remark = shown.range if has_range else shown.failures
+    if remark:
+        text += rf" {{\tiny {_escaped(remark)}}}"
     return text
 
 

@@ -49,12 +49,14 @@ class ShownCell:
     and no trial failed.
     `mark` is `*`, `~` or empty. LEGEND explains the marks.
     `failed` is whether any trial failed, although its recording had all sensors that the estimator needs.
+    `failures` is the number of failed trials, in words, if some trials failed and others did not.
     """
 
     text: str
     range: str = ""
     mark: str = ""
     failed: bool = False
+    failures: str = ""
 
     def __str__(self) -> str:
         spread = f" ({self.range})" if self.range else ""
@@ -97,7 +99,13 @@ def _shown(cell: Cell, metric: str, mark: str) -> ShownCell:
         remarks_in_brackets.append(f"{lowest}–{highest}")
     if cell.failed:
         remarks_in_brackets.append(failures)
-    return ShownCell(median, ", ".join(remarks_in_brackets), mark, failed=cell.failed > 0)
+    return ShownCell(
+        median,
+        ", ".join(remarks_in_brackets),
+        mark,
+        failed=cell.failed > 0,
+        failures=failures if cell.failed else "",
+    )
 
 
 def _score_text(value: float) -> str:

@@ -11,7 +11,7 @@ from vobench.metric.repeat_test import MIN_TRIALS, worse_than_best
 from vobench.report.board_metric import COSTS, METRICS
 from vobench.report.cell import Cell
 from vobench.report.leaderboard import Board
-from vobench.runner.folder import TRUTH_COPY
+from vobench.runner.folder import NOT_APPLICABLE, TRUTH_COPY
 
 BEST = "*"
 NOT_DECIDED = "~"
@@ -20,9 +20,9 @@ NOT_DECIDED = "~"
 def marks(board: Board, metric: str) -> dict[tuple[str, str], str]:
     """The marks of a metric by case and estimator.
 
-    The best estimator of a case has `*`. Each estimator that is not decided against the best has `~`, and so has the
-    best one then; with fewer than MIN_TRIALS trials nothing is tested, and none has it. A failed trial counts as the
-    worst of all. Costs are not marked.
+    The best estimator of a case has `*`, also where all others fail. An estimator without any other has no mark. Each
+    estimator that is not decided against the best has `~`, and so has the best one then; with fewer than MIN_TRIALS
+    trials nothing is tested, and none has it. A failed trial counts as the worst of all. Costs are not marked.
     """
     if metric in COSTS:
         return {}
@@ -41,7 +41,8 @@ def _marks_of_case(cells: Sequence[Cell], metric: str) -> dict[str, str]:
         middle = np.median(values)
         if middle < inf:
             medians[name] = float(middle)
-    if len(medians) < 2:
+    is_alone = len(losses) < 2
+    if is_alone or not medians:
         return {}
 
     best = min(medians, key=lambda name: (medians[name], name))
@@ -60,13 +61,14 @@ def _marks_of_case(cells: Sequence[Cell], metric: str) -> dict[str, str]:
 def _losses_by_estimator(cells: Sequence[Cell], metric: str) -> dict[str, Array]:
     """The values of trials (N,) by estimator, lower is better.
 
-    Stationary cells, truth copies and cells without a value are left out.
+    Left out are stationary cells, truth copies, cells without a value, and cases without a sensor that the estimator
+    needs.
     """
     sign = -1.0 if METRICS[metric].higher_is_better else 1.0
     losses = {}
     for cell in cells:
         values = [sign * value for value in cell.values[metric] if value is not None]
-        is_compared = cell.drift_mm is None and TRUTH_COPY not in cell.claims
+        is_compared = cell.drift_mm is None and TRUTH_COPY not in cell.claims and cell.status != NOT_APPLICABLE
         if values and is_compared:
             losses[cell.estimator] = np.array(values)
     return losses

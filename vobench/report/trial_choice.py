@@ -5,6 +5,7 @@ from math import inf
 from statistics import fmean
 
 from vobench.errors import InputError, UnknownNameError
+from vobench.report.board_metric import lost_aware
 from vobench.report.cell import CaseFacts
 from vobench.report.division import is_ranked
 from vobench.runner.folder import NOT_APPLICABLE, STATUSES, SURVIVED, TrialScore, with_sequence
@@ -21,7 +22,7 @@ DEEDS = {
 
 
 def ranked(scores: Sequence[TrialScore], *, case: str | None, estimator: str | None) -> list[TrialScore]:
-    """The trials of a case and an estimator, the gravest failure first, then by error.
+    """The trials of a case and an estimator, the gravest failure first, then by score and error.
 
     Without a case or an estimator, those of all. Raises UnknownNameError if no trial is of that case or estimator,
     and InputError if its case has no sequence.
@@ -32,6 +33,7 @@ def ranked(scores: Sequence[TrialScore], *, case: str | None, estimator: str | N
 def pick(scores: Sequence[TrialScore], *, case: str | None, estimator: str | None) -> TrialScore:
     """The trial most worth a look: the gravest failure, or else the worst case of the best estimator.
 
+    Of failures with the same status, the one with the lowest lost-aware score is chosen; of those, the first.
     Without a case or an estimator, of all trials; without an estimator those that see are preferred to others, and all
     to baselines and oracles. Raises as `ranked`.
     """
@@ -41,7 +43,7 @@ def pick(scores: Sequence[TrialScore], *, case: str | None, estimator: str | Non
     selected = _applicable(selected)
     failed = [score for score in selected if score.status not in SURVIVED]
     if failed:
-        return max(failed, key=lambda score: STATUSES.index(score.status))
+        return min(failed, key=_gravest_first)
     by_estimator: dict[str, list[TrialScore]] = {}
     for score in sorted(selected, key=lambda score: score.estimator):
         by_estimator.setdefault(score.estimator, []).append(score)
@@ -85,8 +87,11 @@ def _require_known(kind: str, name: str | None, known: set[str]) -> None:
         raise UnknownNameError(f"no {kind} '{name}' in this run. Known: {', '.join(sorted(known))}")
 
 
-def _gravest_first(score: TrialScore) -> tuple[bool, int, float]:
-    return score.status in SURVIVED, -STATUSES.index(score.status), -_error_m(score)
+def _gravest_first(score: TrialScore) -> tuple[bool, int, float, float]:
+    """A key that sorts failures by status, then by the lost-aware score, and trials without failure by error."""
+    is_failure = score.status not in SURVIVED
+    quality = lost_aware(score) if is_failure else None
+    return not is_failure, -STATUSES.index(score.status), quality or 0.0, -_error_m(score)
 
 
 def _error_m(score: TrialScore) -> float:
