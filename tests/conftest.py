@@ -1,14 +1,12 @@
 """Every run tries the same examples, so that a test that failed fails again. Makers that tests write may run.
 
 Many tests start processes with an empty cache. They share the machine code of compiled functions, since compiling takes
-a second or more of each process. They share bytecode too, also where PYTHONDONTWRITEBYTECODE is set: each process would
-compile what it imports again. Each process computes in one thread, since there are as many processes as cores, and
+a second or more of each process. Each process computes in one thread, since there are as many processes as cores, and
 threads that share a core spend much of their time on waiting for each other.
 """
 
 import gc
 import os
-import sys
 from pathlib import Path
 
 import pytest
@@ -19,8 +17,6 @@ from vobench import trust
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 for _name in THREADS:
     os.environ.setdefault(_name, "1")  # before numpy and OpenCV are loaded
-os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-sys.dont_write_bytecode = False
 os.environ.setdefault("NUMBA_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "kernels"))
 gc.disable()  # it is enabled again after collection, during which it would find nothing
 settings.register_profile("steady", derandomize=True, max_examples=40, deadline=None)
