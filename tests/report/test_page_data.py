@@ -41,7 +41,7 @@ def test_a_metric_has_the_text_and_the_number_of_each_cell(scored, write_run, tm
     data = data_of(folder, trials, metrics=("ate", "score", "cpu_ms"), answered=costs)
     assert (data["cases"], data["estimators"]) == (["ahead", "down"], ["a", "b"])
     ate = data["metrics"]["ate"]
-    assert ate["text"] == [[["3.00", "", "", 0], ["", "", "", 0]], [["2.00", "", "", 0], ["lost", "", "", 1]]]
+    assert ate["text"] == [[["3.00", "", "", 0], ["", "", "", 0]], [["2.00", "", "*", 0], ["lost", "", "", 1]]]
     assert ate["value"] == [[pytest.approx(3.0), None], [pytest.approx(2.0), None]]
     assert (ate["higher"], ate["cost"]) == (False, False)
     assert data["metrics"]["score"]["higher"] is True
