@@ -27,6 +27,8 @@ All          se3 Array adjoint cross_matrix twist unit: rigid motions
              Trajectory Stamps: stamped poses
              VobenchError InputError SequenceError SettingError: errors that are reported in one sentence
 
+`python -m pydoc vobench.plugin.StereoPair` describes one of them.
+
 A name is imported from its module on first use, so an estimator does not load the modules for scenes.
 `tests/plugin_surface.txt` freezes names and signatures. A name that is removed works for one more release with a
 DeprecationWarning (`vobench/retired.py`). Everything else in vobench may change at any time.

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tests.report.paths import T_S, case_of, line_of, path, without
+from tests.report.paths import T_S, case_of, labels, line_of, path, without
 from vobench.report.error_figure import error_figure, scale_errors_axis
 from vobench.report.inline_figure import new_figure
 
@@ -38,6 +38,12 @@ def test_errors_are_drawn_over_seconds_or_over_the_length_of_the_true_path():
 def test_a_gap_in_an_estimate_interrupts_its_errors():
     position_axes, _ = error_figure(case_of(without(path(0.02), [20, 21])), 3.5).axes
     assert np.isnan(line_of(position_axes, "e0").get_ydata()).sum() == 1
+
+
+def test_an_estimate_without_a_pose_is_in_the_legend_with_its_status():
+    position_axes, rotation_axes = error_figure(case_of(path(0.02), None, statuses=["ok", "crashed"]), 3.5).axes
+    assert labels(position_axes) == ["e0", "e1 (crashed)"]
+    assert labels(rotation_axes) == ["e0"]
 
 
 @pytest.mark.parametrize(("ratio", "scale"), [(10.0, "linear"), (60.0, "log")])

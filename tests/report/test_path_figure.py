@@ -9,9 +9,10 @@ from vobench.trajectory.trajectory import Trajectory
 
 
 def test_the_ground_truth_and_each_estimate_are_drawn_with_their_names():
-    (axes,) = path_figure(case_of(path(0.01), path(0.02)), 3.5).axes
+    figure = path_figure(case_of(path(0.01), path(0.02)), 3.5)
+    (axes,) = figure.axes
     assert labels(axes) == ["ground truth", "start", "e0", "e1"]
-    assert axes.get_title() == "bend"
+    assert figure.get_suptitle() == "bend"
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (m)", "y (m)")
 
 

@@ -20,6 +20,7 @@ LEAST_PANEL_INCHES = 1.6  # the smallest width of the panel of a scenario
 PANEL_HEIGHT_INCHES = 1.35
 MOST_COLUMNS = 5
 BAND_ALPHA = 0.15
+SCORE_LIMITS = (-0.05, 1.05)  # of the axis, so that a marker at 0 or 1 is not cut
 
 Scenario = tuple[str, str]  # the group of the cases, and the scenario
 
@@ -67,7 +68,7 @@ def _draw_panel(
     axes.axhline(BREAKDOWN_SCORE, color=NEUTRAL, lw=0.8, ls=":")
     title = ", ".join(filter(None, scenario))
     axes.set_title(title, fontsize=8)
-    axes.set_ylim(0, 1.03)
+    axes.set_ylim(*SCORE_LIMITS)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
 
 

@@ -39,13 +39,19 @@ def error_figure(case: ScoredCase, width_inches: float, *, over: Abscissa = "tim
 
 
 def draw_position_errors(axes: Axes, case: ScoredCase, *, over: Abscissa = "time") -> None:
-    """Draw the position errors of all estimates, in mm or m by their size."""
+    """Draw the position errors of all estimates, in mm or m by their size.
+
+    An estimate without a score appears only in the legend, without a line.
+    """
     errors_m = [score.ate_trans_m for _, score in case.scores]
     scale, unit = _length_unit(errors_m)
     for estimate, score in case.scores:
         x = _abscissa(case, score, over)
         y = with_gaps(scale * score.ate_trans_m, score.gt_frames)
         axes.plot(x, y, lw=LINE_WIDTH, label=estimate.label, **line_style(estimate.index))
+    for estimate in case.estimates:
+        if estimate.score is None:
+            axes.plot([], [], ls="none", label=estimate.label)
     axes.set(xlabel=LABELS[over], ylabel=f"position error ({unit})")
     scale_errors_axis(axes, [scale * error_m for error_m in errors_m])
 

@@ -129,4 +129,5 @@ def _write_status(axes: Axes, cell: Cell | None, column: int, row: int) -> Text:
     hatched = Rectangle((column - 0.5, row - 0.5), 1, 1, facecolor="none", hatch="////", edgecolor=NEUTRAL, lw=0)
     axes.add_patch(hatched)
     status = cell.status if cell else ""
-    return axes.text(column, row, status, color="black", **TEXT_STYLE)
+    background = {"facecolor": "white", "edgecolor": "none", "pad": 1}  # the hatching would cross the letters
+    return axes.text(column, row, status, color="black", bbox=background, **TEXT_STYLE)

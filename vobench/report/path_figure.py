@@ -28,7 +28,7 @@ def path_figure(case: ScoredCase, width_inches: float) -> Figure:
     with new_figure(width_inches, width_inches + LEGEND_INCHES) as figure:
         axes = figure.subplots()
         draw_paths(axes, case)
-        axes.set_title(case.name)
+        figure.suptitle(case.name)
         figure.legend(loc="outside lower center", ncols=2)
     return figure
 

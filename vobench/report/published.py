@@ -310,7 +310,10 @@ def boards_text(published: PublishedBoards, format_name: str, metric: str) -> st
         return "\n".join(parts)
     if len(published.boards) != 1:
         names = ", ".join(shown.suite for shown in published.boards) or "none"
-        raise InputError(f"the format {format_name} has one board, and these are {len(published.boards)}: {names}")
+        count = len(published.boards)
+        raise InputError(
+            f"the format {format_name} has one board, and these are {count}: {names}; name one suite, or use md or json"
+        )
     (shown,) = published.boards
     if format_name == "html":
         return page.board_page(shown.folder, list(shown.scores), shown.with_sources, None)

@@ -125,7 +125,8 @@ def _draw_errors(axes: Axes, rows: Sequence[FrameRow], shown: Sequence[int], ind
         axes.axvline(time_s[row_index], color=NEUTRAL, lw=0.6, ls=":")
     axes.set_xlim(time_s[0], time_s[-1] or 1.0)
     if np.isnan(errors_m).all():
-        axes.text(0.5, 0.5, "no pose in any frame", transform=axes.transAxes, ha="center", va="center")
+        background = {"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 2}
+        axes.text(0.5, 0.5, "no pose in any frame", transform=axes.transAxes, ha="center", va="center", bbox=background)
         axes.set_yticks([])
     else:
         axes.set_ylim(bottom=0)
