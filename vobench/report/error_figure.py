@@ -30,6 +30,9 @@ def error_figure(case: ScoredCase, width_inches: float, *, over: Abscissa = "tim
         position_axes, rotation_axes = figure.subplots(2, 1, sharex=True)
         draw_position_errors(position_axes, case, over=over)
         draw_rotation_errors(rotation_axes, case, over=over)
+        for estimate in case.estimates:
+            if estimate.score is None:  # such an estimate is only named, in the legend
+                position_axes.plot([], [], ls="none", label=estimate.label)
         position_axes.set_xlabel("")
         figure.suptitle(case.name)
         handles, labels = position_axes.get_legend_handles_labels()
@@ -39,19 +42,13 @@ def error_figure(case: ScoredCase, width_inches: float, *, over: Abscissa = "tim
 
 
 def draw_position_errors(axes: Axes, case: ScoredCase, *, over: Abscissa = "time") -> None:
-    """Draw the position errors of all estimates, in mm or m by their size.
-
-    An estimate without a score appears only in the legend, without a line.
-    """
+    """Draw the position errors of all estimates, in mm or m by their size."""
     errors_m = [score.ate_trans_m for _, score in case.scores]
     scale, unit = _length_unit(errors_m)
     for estimate, score in case.scores:
         x = _abscissa(case, score, over)
         y = with_gaps(scale * score.ate_trans_m, score.gt_frames)
         axes.plot(x, y, lw=LINE_WIDTH, label=estimate.label, **line_style(estimate.index))
-    for estimate in case.estimates:
-        if estimate.score is None:
-            axes.plot([], [], ls="none", label=estimate.label)
     axes.set(xlabel=LABELS[over], ylabel=f"position error ({unit})")
     scale_errors_axis(axes, [scale * error_m for error_m in errors_m])
 
