@@ -83,3 +83,14 @@ def test_a_missing_cell_is_left_blank_and_a_matrix_without_values_is_an_error(sc
     assert len(texts_of(matrix_figure(make_board(trials, {}), "ate", 3.5))) == 3
     with pytest.raises(InputError, match="no cell of this run has a value of ate"):
         matrix_figure(make_board([scored("a", "crashed", ate_m=None)], {}), "ate", 3.5)
+
+
+@pytest.mark.parametrize("count", [2, 100])
+def test_the_colour_bar_is_near_the_matrix_and_its_label_whole_however_many_cases_there_are(scored, count):
+    trials = [scored("a", case=f"case_{number}", ate_m=0.01) for number in range(count)]
+    figure = matrix_figure(make_board(trials, {}), "ate", 7.0)
+    figure.draw_without_rendering()
+    cells, bar = figure.axes
+    gap_inches = (cells.get_window_extent().y0 - bar.get_window_extent().y1) / figure.dpi
+    assert 0 < gap_inches < 0.2
+    assert bar.xaxis.label.get_window_extent().y0 > 0

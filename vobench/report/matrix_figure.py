@@ -22,6 +22,7 @@ from vobench.runner.folder import NOT_APPLICABLE
 
 ROW_INCHES = 0.19
 BAR_INCHES = 0.75  # the height of the colour bar with its label
+BAR_GAP_INCHES = 0.08  # above the colour bar
 CHARACTER_INCHES = 0.065  # the width of a character of a name
 COLOURS_NAME = "cividis"  # even in lightness, also for colour-blind readers
 DARK_BELOW = 0.5  # of the range of colours, on which text is white
@@ -71,7 +72,9 @@ def matrix_figure(board: Board, metric: str, width_inches: float) -> Figure:
         axes.set_yticks(range(len(cases)), cases)
         axes.tick_params(length=0)
         axes.grid(visible=False)
-        bar = figure.colorbar(image, ax=axes, location="bottom", label=METRICS[metric].heading, shrink=0.6, aspect=40)
+        gap = BAR_GAP_INCHES / height_inches
+        bar = figure.colorbar(image, ax=axes, location="bottom", pad=gap, shrink=0.6, aspect=40)
+        bar.set_label(METRICS[metric].heading)
         label_plainly(bar.ax.xaxis)
 
         figure.draw_without_rendering()  # computes the widths of cells and texts
