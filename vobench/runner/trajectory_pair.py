@@ -158,7 +158,7 @@ def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: 
     if times:
         file = _stamped(file, times)
     if file.parsed.t_ns is None:
-        raise InputError(f"no stamps in {source.path}; name the file that has them as `times`")
+        raise InputError(f"no stamps in {source.path}; name the file that has them with --times")
     return _reading(file)
 
 
