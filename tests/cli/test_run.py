@@ -143,7 +143,7 @@ def test_the_pictures_may_be_missing_for_a_reason_that_doctor_knows(vobench, her
         ("b.html", "<!doctype html>"),
         ("b.csv", "case,"),
         ("b.json", "{"),
-        ("b.tex", "% Needs \\usepackage{booktabs}.\n\\begin{table}"),
+        ("b.tex", "% Needs \\usepackage{booktabs} and \\usepackage{graphicx}.\n\\begin{table}"),
     ],
 )
 def test_a_files_ending_says_its_form(vobench, ran, here, name, begin):
