@@ -14,6 +14,7 @@ from hypothesis import settings
 
 from vobench import trust
 
+# Those of vobench.estimator.program, which cannot be imported here, since it loads numpy.
 THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OPENCV_FOR_THREADS_NUM")
 for _name in THREADS:
     os.environ.setdefault(_name, "1")  # before numpy and OpenCV are loaded
