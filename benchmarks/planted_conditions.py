@@ -1,6 +1,6 @@
 """How often `causes` is right, on weaknesses that are drawn by seed and whose condition is known, without pictures.
 
-    python benchmarks/planted_conditions.py [--draws 20] [--drives 1 3] [--without darkness]
+    python benchmarks/planted_conditions.py [--draws 20] [--first 1000] [--drives 1 3] [--without darkness]
 
 The conditions of twelve cases are drawn with what they have in reality: those of the drive, such as flow, turn and
 depth, are the same in all cases on it, those of the camera, such as calibration and noise, differ between cases, and
@@ -212,6 +212,7 @@ def main() -> None:
     """Print, for each weakness, how often it is found and how often something false is named."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--draws", type=int, default=20)
+    parser.add_argument("--first", type=int, default=0, help="the seed of the first draw")
     parser.add_argument("--drives", type=int, nargs="+", default=[1, 3])
     parser.add_argument("--without", default="", help="a condition that is left out")
     parser.add_argument("--only", nargs="*", help="some of the weaknesses")
@@ -219,7 +220,7 @@ def main() -> None:
     for drives in arguments.drives:
         for weakness in arguments.only or TRUE_CONDITIONS:
             verdicts = []
-            for seed in range(arguments.draws):
+            for seed in range(arguments.first, arguments.first + arguments.draws):
                 found = attribute_weakness(weakness, seed, drives=drives, without=arguments.without)
                 verdicts.append(judge(weakness, found))
             found_count = sum(verdict.is_found for verdict in verdicts)

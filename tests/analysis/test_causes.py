@@ -316,6 +316,51 @@ def test_a_condition_that_causes_failures_is_named(kind: str, condition: str) ->
         assert named <= {condition}
 
 
+def bright_spells(*spells: tuple[int, int], frames: int = 121) -> Array:
+    """A condition (N,) that is 1 in some ranges of frames, and nearly 0 elsewhere."""
+    values = 0.01 + 0.01 * np.random.default_rng(1).random(frames)
+    for first, end in spells:
+        values[first:end] = 1.0
+    return values
+
+
+def drive_with(condition: Array, *, name: str = "glare", drives: tuple[str, ...] = ("round",)) -> Cause:
+    """What is found of a condition of the drive where the error is 30 times as large."""
+    rng = np.random.default_rng(2)
+    series = []
+    for number in range(6):
+        conditions = {name: condition, "texture": rng.uniform(1, 4, len(condition))}
+        loss = 0.005 * (1 + 30 * (condition > 0.5)) * rng.uniform(0.9, 1.1, len(condition))
+        drive = drives[number % len(drives)]
+        series.append(ErrorSeries(f"case_{number}", 0, conditions, loss, place="hall", drive=drive))
+    found = attribute(series)
+    assert found is not None
+    (cause,) = (cause for cause in found.causes if name in cause.conditions)
+    return cause
+
+
+def test_a_condition_that_agrees_with_the_error_once_on_a_single_drive_is_not_sure() -> None:
+    once = bright_spells((21, 41))
+    in_each_half = bright_spells((21, 31), (81, 91))
+    assert drive_with(once).factor > 10
+    assert not drive_with(once).recurs
+    assert not drive_with(once).is_sure
+    assert drive_with(in_each_half).recurs
+
+
+def test_a_condition_need_not_recur_on_several_drives_nor_if_it_is_time_itself() -> None:
+    once = bright_spells((21, 41))
+    assert drive_with(once, drives=("round", "straight")).recurs
+    late = bright_spells((61, 121))
+    assert not drive_with(late).recurs
+    assert drive_with(late, name="since_start").recurs
+
+
+def test_a_condition_that_differs_between_cases_on_a_drive_need_not_recur() -> None:
+    found = attributed("blur", 0)
+    assert all(cause.recurs for cause in found.causes if "blur" in cause.conditions)
+
+
 def attributed(kind: str, seed: int) -> Attribution:
     """The causes of twelve cases on one drive, with a condition of time, one of cases and one of both."""
     rng = np.random.default_rng([seed, 5])

@@ -8,8 +8,10 @@ from vobench.cli import causes as cli_causes
 from vobench.cli import terminal
 
 
-def cause(*conditions, factor=2.0, is_sure=True):
-    return SimpleNamespace(conditions=conditions, factor=factor, low=1.5, high=2.5, is_sure=is_sure)
+def cause(*conditions, factor=2.0, is_sure=True, recurs=True):
+    return SimpleNamespace(
+        conditions=conditions, factor=factor, low=1.5, high=2.5, is_sure=is_sure and recurs, recurs=recurs
+    )
 
 
 def attribution(*causes, constant=(), segments=()):
@@ -28,6 +30,7 @@ def attribution(*causes, constant=(), segments=()):
 def test_a_cause_that_is_not_significant_says_so():
     assert cli_causes._cause_row(cause("speed", "turn")) == ["speed + turn", "2", "1.5 to 2.5", "significant"]
     assert cli_causes._cause_row(cause("speed", is_sure=False))[-1] == "not significant"
+    assert cli_causes._cause_row(cause("speed", recurs=False))[-1] == "not in each half"
 
 
 @pytest.mark.parametrize(

@@ -22,6 +22,11 @@ LARGEST_EFFECT = 50.0  # on the logarithm of the error
 PERMUTATIONS = 499
 SURE_P = 0.05  # the largest corrected p-value of a sure cause
 INTERVAL_PERCENT = 95.0
+# On a single drive, a condition of the drive can agree with the errors once by chance. So it has to recur: its slope in
+# each half of the drive must be at least this share of its slope on the whole drive.
+MIN_RECURRING_SHARE = 1 / 3
+MAX_CASE_SHARE = 0.1  # a condition belongs to the drive if cases differ in at most this share of its variance
+TIME = "since_start"  # the condition that cannot recur
 MIN_EXPLAINED = 0.4  # where the conditions explain less of the error, most of it has a cause outside of the list
 USUAL_RANGE_PERCENT = (5.0, 95.0)  # from a low to a high value of a condition
 
@@ -60,6 +65,7 @@ class Cause:
 
     The factor compares the 95th with the 5th percentile of the condition over all segments. `low` and `high` are its
     95 % confidence interval. `p` is the p-value, corrected for the number of conditions by `corrected_p_values`.
+    `recurs` is false if all cases are on one drive, and the conditions agree with the errors in one half of it only.
     """
 
     conditions: tuple[str, ...]
@@ -67,11 +73,12 @@ class Cause:
     low: float
     high: float
     p: float
+    recurs: bool = True
 
     @property
     def is_sure(self) -> bool:
-        """Whether the error is significantly related to the conditions, given all others."""
-        return self.p <= SURE_P
+        """Whether the error is significantly related to the conditions, given all others, and that more than once."""
+        return self.recurs and self.p <= SURE_P
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,6 +133,11 @@ class _Window:
     def end(self) -> int:
         return min(self.first + SEGMENT_FRAMES, len(self.trial.loss))
 
+    @property
+    def is_in_first_half(self) -> bool:
+        """Whether its middle is in the first half of the trial."""
+        return self.first + self.end < len(self.trial.loss)
+
     def mean(self, values: Array) -> float:
         """The mean over the segment of values (N,) of all frames."""
         return float(values[self.first : self.end].mean())
@@ -174,6 +186,7 @@ def attribute(trials: Sequence[ErrorSeries]) -> Attribution | None:
     slopes = fit.slopes[0]  # (K,)
     half_widths = np.percentile(null.t, INTERVAL_PERCENT, axis=0) * fit.standard_errors[0]
     p_values = corrected_p_values(fit.t[0], null.t)
+    recurs = _recurs(windows, predictors, slopes, log_losses)
 
     ranges = _usual_ranges(predictors)
     causes = []
@@ -181,7 +194,8 @@ def attribute(trials: Sequence[ErrorSeries]) -> Attribution | None:
         slope_and_interval = np.array([slopes[k], slopes[k] - half_widths[k], slopes[k] + half_widths[k]])
         effects = slope_and_interval * ranges[k]
         factor, low, high = np.exp(effects.clip(-LARGEST_EFFECT, LARGEST_EFFECT)).tolist()
-        causes.append(Cause(group, factor, low, high, float(p_values[k])))
+        is_time = group == (TIME,)
+        causes.append(Cause(group, factor, low, high, float(p_values[k]), bool(is_time or recurs[k])))
 
     contributions = (predictors - np.median(predictors, axis=0)) * slopes  # (M, K), to the logarithm of the error
     return Attribution(
@@ -245,6 +259,51 @@ def corrected_p_values(observed: Array, null: Array) -> Array:
     largest = null.max(1)  # (R,)
     exceeding = (largest[:, None] >= observed).sum(0)
     return np.asarray((exceeding + 1) / (len(null) + 1))
+
+
+def _recurs(
+    windows: Sequence[_Window],
+    predictors: Array,
+    slopes: Array,
+    log_losses: Array,
+) -> NDArray[np.bool_]:
+    """Which predictors (M, K) agree with the errors more than once.
+
+    With several drives, that is every predictor. With one drive, it is those that differ between cases, and those that
+    raise the error, or lower it, in each half of the drive.
+    """
+    drives = {window.trial.drive or window.trial.case for window in windows}
+    if len(drives) > 1:
+        return np.ones(len(slopes), bool)
+
+    centred = predictors - predictors.mean(0)
+    is_of_drive = _case_shares(windows, centred) <= MAX_CASE_SHARE
+    explained_by_cases = centred[:, ~is_of_drive] @ slopes[~is_of_drive]
+    rest = log_losses - log_losses.mean() - explained_by_cases  # (M,)
+    is_early = np.array([window.is_in_first_half for window in windows])
+    recurs = []
+    for values, slope, belongs_to_drive in zip(centred.T, slopes, is_of_drive, strict=True):
+        slopes_of_halves = np.array([_slope(values[half], rest[half]) for half in (is_early, ~is_early)])
+        agrees = slopes_of_halves * np.sign(slope) >= MIN_RECURRING_SHARE * abs(slope)
+        recurs.append(not belongs_to_drive or bool(agrees.all()))
+    return np.array(recurs)
+
+
+def _case_shares(windows: Sequence[_Window], centred: Array) -> Array:
+    """The share (K,) of the variance of predictors (M, K) that is between segments at the same time on the drive."""
+    firsts = np.array([window.first for window in windows])
+    within_time = centred.copy()
+    for first in np.unique(firsts):
+        is_then = firsts == first
+        within_time[is_then] -= centred[is_then].mean(0)
+    return np.asarray((within_time**2).sum(0) / (centred**2).sum(0))
+
+
+def _slope(predictor: Array, values: Array) -> float:
+    """The slope of the line through values (N,) over a predictor (N,); 0 if the predictor does not vary."""
+    deviations = predictor - predictor.mean()
+    variance = float((deviations**2).sum())
+    return float(deviations @ values) / variance if variance > 0 else 0.0
 
 
 def _windows(trials: Sequence[ErrorSeries]) -> Iterator[_Window]:

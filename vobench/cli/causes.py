@@ -51,8 +51,8 @@ def _print_causes(causes: EstimatorCauses, *, worst: int) -> None:
         console.print(f"Symptom, besides these: {factor}.", soft_wrap=True)
     if causes.has_one_drive:
         console.print(
-            "All cases follow one trajectory: a condition that recurs on it is significant only if the errors fit no "
-            "other time as well.",
+            "All cases follow one trajectory: a condition that is the same in all of them is significant only if it "
+            "agrees with the errors in each half of the trajectory.",
             soft_wrap=True,
         )
     console.print()
@@ -90,8 +90,15 @@ def _answer(attribution: Attribution) -> str:
 
 def _cause_row(cause: Cause) -> list[str]:
     conditions = " + ".join(cause.conditions)
-    verdict = "significant" if cause.is_sure else "not significant"
-    return [conditions, _two_digits(cause.factor), _interval(cause), verdict]
+    return [conditions, _two_digits(cause.factor), _interval(cause), _verdict(cause)]
+
+
+def _verdict(cause: Cause) -> str:
+    if cause.is_sure:
+        return "significant"
+    if not cause.recurs:
+        return "not in each half"
+    return "not significant"
 
 
 def _trial_rows(causes: EstimatorCauses, attribution: Attribution) -> list[list[str]]:
