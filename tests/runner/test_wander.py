@@ -8,8 +8,9 @@ import pytest
 from tests.generated import GENERATOR, SUITE, write_cell
 from vobench.errors import MotionError
 from vobench.geometry.rig import CalibrationError
+from vobench.motion.course import Circle
 from vobench.runner import wander
-from vobench.runner.motion import body_motion
+from vobench.runner.motion import body_motion, motion_name
 from vobench.runner.wander import clearance_of, wander_motion
 from vobench.suite.suite import read_plan
 
@@ -98,3 +99,27 @@ def test_the_baseline_and_the_calibration_do_not_change_a_drive(cases):
     drive = wander_motion(case, case.trajectory)
     wider = replace(case, rig=replace(case.rig, baseline_m=0.3, calibration_error=CalibrationError(right_roll_deg=1)))
     assert wander_motion(wider, case.trajectory) is drive
+
+
+# --- Paths from a free start ---
+
+
+def test_a_path_from_a_free_start_keeps_clear_of_the_crate_of_its_place(cases):
+    ring = Circle(radius_m=0.4, mover="unicycle", rate_hz=8, start_seed=1)
+    for case in cases.values():
+        path_m = positions_m(replace(case, trajectory=ring))
+        things = {thing.name: thing.mesh.bounds for thing in wander.build(case.scene, {}).things}
+        low_m, high_m = things["crate"]
+        outside_m = np.maximum(np.maximum(low_m - path_m, path_m - high_m), 0)[:, :2]
+        assert np.linalg.norm(outside_m, axis=1).min() > RADIUS_M
+        assert np.abs(path_m[:, 0]).max() < things["wall_0"][0][0] - RADIUS_M
+
+
+def test_starts_differ_between_places_so_motions_are_named_by_both(cases):
+    ring = Circle(radius_m=0.4, mover="unicycle", rate_hz=8, start_seed=1)
+    in_first = replace(cases["cell.1", "tour.1"], trajectory=ring)
+    in_second = replace(cases["cell.2", "tour.1"], trajectory=ring)
+    assert (positions_m(in_first)[0] != positions_m(in_second)[0]).any()
+    assert motion_name(in_first) != motion_name(in_second)
+    given = replace(ring, start_seed=None)
+    assert motion_name(replace(in_first, trajectory=given)) == motion_name(replace(in_second, trajectory=given))

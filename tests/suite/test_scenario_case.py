@@ -290,6 +290,48 @@ def test_a_scenario_with_another_drive_cannot_leave_its_place(weather_plan, tmp_
         cases_in_yards(weather_plan, tmp_path, "moved", MOVED)
 
 
+RING = """name: ring
+base:
+  scene: closet
+  rig: {pitch_deg: 90}
+  trajectory: {kind: circle, radius_m: 0.3, mover: unicycle, rate_hz: 8}
+  camera: {exposure_ms: 1, exposure_gain: 5}
+severity: [{}, {trajectory: {speed_mps: 0.4}}, {}, {}, {}, {trajectory: {speed_mps: 0.8}}]
+"""
+
+
+def test_a_scenario_that_keeps_its_trajectory_has_a_free_start_in_each_unit(weather_plan, tmp_path):
+    (tmp_path / "suites" / "scenarios" / "ring.yaml").write_text(RING)
+    plan = weather_plan(", keep: {ring: [trajectory, camera]}", scenarios="ring: [0, 5], mist: [1]")
+    cases = [case for case in plan.simulated if case.scenario == "ring"]
+    usual, fast = cases[:2], cases[2:]
+    assert [case.trajectory.speed_mps for case in cases] == [0.3, 0.3, 0.8, 0.8]
+    assert [unit(case)[0] for case in usual] == [unit(case)[0] for case in fast]
+    assert {case.scene.name for case in cases} <= {"cell", "yard"}
+    assert len({case.trajectory.start_seed for case in usual}) == 2
+    for slow_case, fast_case in zip(usual, fast, strict=True):
+        assert replace(fast_case.trajectory, speed_mps=0.3) == slow_case.trajectory
+        assert slow_case.name.endswith(f"{unit(slow_case)[0]}-start.{slow_case.trajectory.start_seed}")
+    for case in cases:
+        assert (case.camera.exposure_ms, case.camera.exposure_gain) == (1, 1)
+    assert any(case.trajectory.kind == "wander" for case in plan.simulated if case.scenario == "mist")
+
+
+@pytest.mark.parametrize(
+    ("keep", "message"),
+    [
+        ("{moved: [trajectory]}", "it keeps its trajectory, which has no free start"),
+        ("{dusk: [trajectory]}", "it keeps its trajectory, which has no free start"),
+        ("{ringg: [trajectory]}", "keep names scenarios that the suite does not have: ringg"),
+        ("{mist: [place]}", "keep"),
+    ],
+)
+def test_what_a_scenario_cannot_keep_is_refused(weather_plan, tmp_path, keep, message):
+    (tmp_path / "suites" / "scenarios" / "moved.yaml").write_text(MOVED)
+    with pytest.raises(SuiteError, match=message):
+        weather_plan(f", keep: {keep}", scenarios="moved: [1], mist: [1], dusk: [0]")
+
+
 def test_a_scenario_of_the_weather_stays_in_its_own_place_unless_the_suite_names_places(weather_plan):
     cases = [case for case in weather_plan("").simulated if case.scenario == "smog"]
     assert [case.scene.name for case in cases] == ["closet"] * 3

@@ -259,7 +259,18 @@ Laps = Annotated[int, Ge(1), Le(1000)]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Circle(Wheeled):
+class Planned(Wheeled):
+    """A path of a given shape.
+
+    With `start_seed`, it starts at a random pose from which the robot keeps clear of everything in its place (module
+    `free_start`), in place of `start_m` and `start_heading_deg`.
+    """
+
+    start_seed: Annotated[int, Ge(0), Le(2**31 - 1)] | None = None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Circle(Planned):
     """A circle to the left, or clockwise to the right; laps need not be whole."""
 
     kind: Literal["circle"] = "circle"
@@ -279,7 +290,7 @@ class Circle(Wheeled):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Square(Wheeled):
+class Square(Planned):
     """A square from one end of a side: it turns on the spot at each corner, or rounds it on two clothoids.
 
     The clothoids meet at the smallest radius, corner_radius_m.
@@ -315,7 +326,7 @@ class Square(Wheeled):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Figure8(Wheeled):
+class Figure8(Planned):
     """A figure of eight (Gerono's) from its crossing; half as wide as long without a width."""
 
     kind: Literal["figure_8"] = "figure_8"
@@ -335,7 +346,7 @@ class Figure8(Wheeled):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Lissajous(Wheeled):
+class Lissajous(Planned):
     """The closed curve x = A sin(a φ + phase), y = B sin(b φ) from φ = 0, of length 2A and width 2B, ratio [a, b]."""
 
     kind: Literal["lissajous"] = "lissajous"
@@ -364,7 +375,7 @@ class Lissajous(Wheeled):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class StopAndGo(Wheeled):
+class StopAndGo(Planned):
     """Straight ahead by each length in turn, with a pause between them."""
 
     kind: Literal["stop_and_go"] = "stop_and_go"
@@ -385,7 +396,7 @@ class StopAndGo(Wheeled):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class PureRotation(Wheeled):
+class PureRotation(Planned):
     """A turn on the spot about the middle of the axle, to the left; to the right for a negative angle.
 
     The Pioneer does it without feedback: its controller holds the point h, not the axle.
@@ -413,7 +424,7 @@ class PureRotation(Wheeled):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Reverse(Wheeled):
+class Reverse(Planned):
     """Ahead and back to the start, straight or on an arc to the left (radius_m < 0: to the right).
 
     The Pioneer does it without feedback: led backwards by a point ahead of its axle it would turn round.

@@ -413,7 +413,7 @@ class _Steps:
         next_bends = next_bends[np.abs(next_bends - bend) <= sharpest + 1e-9]
         paths = _step_poses(pose, bend, next_bends, self.step_m)  # (B, SAMPLES, 3)
         needed_m = self.habits.radius_m + self.habits.margin_m
-        clear_m = _body_clearance_m(self.clearance, paths, self.habits).min(1)
+        clear_m = body_clearance_m(self.clearance, paths, self.habits).min(1)
         is_clear = clear_m >= needed_m
         if not is_clear.any():
             return None
@@ -446,7 +446,7 @@ def _step_poses(pose: Array, bend: float, next_bends: Array, step_m: float) -> A
     return np.stack([x_m, y_m, pose[2] + local[..., 2]], -1)
 
 
-def _body_clearance_m(clearance: Clearance, poses: Array, habits: BodyHabits) -> Array:
+def body_clearance_m(clearance: Clearance, poses: Array, habits: BodyHabits) -> Array:
     """The least distance (...) from the middles of the discs of a body at poses (..., 3) to what is not free."""
     ahead = np.stack([np.cos(poses[..., 2]), np.sin(poses[..., 2])], -1)
     by_disc = [clearance.at(poses[..., :2] + disc_m * ahead) for disc_m in habits.discs_m]
@@ -458,9 +458,14 @@ def least_clearance_m(motion: Motion, clearance: Clearance, habits: BodyHabits) 
     """The least distance between a moving body and what is not free; negative if it runs into that."""
     fastest_mps = habits.speed_mps[1]
     count = int((motion.end_ns - motion.start_ns) / NS_PER_S * fastest_mps * CHECKS_PER_M) + 2
+    poses = planar_poses(motion, count)
+    return float(body_clearance_m(clearance, poses, habits).min() - habits.radius_m)
+
+
+def planar_poses(motion: Motion, count: int) -> Array:
+    """The poses (count, 3) of a moving body, as x and y in m and heading in rad, at evenly spaced times."""
     T = motion.at(np.linspace(motion.start_ns, motion.end_ns, count)).T_world_body
-    poses = np.stack([T[:, 0, 3], T[:, 1, 3], np.arctan2(T[:, 1, 0], T[:, 0, 0])], -1)
-    return float(_body_clearance_m(clearance, poses, habits).min() - habits.radius_m)
+    return np.stack([T[:, 0, 3], T[:, 1, 3], np.arctan2(T[:, 1, 0], T[:, 0, 0])], -1)
 
 
 # Motion along a path

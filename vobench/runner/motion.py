@@ -17,7 +17,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS, ackermann
 from vobench.motion.controller import MOST_FRAMES, ControllerSettings
-from vobench.motion.course import Planar, Unled, rolled
+from vobench.motion.course import Planar, Planned, Unled, rolled
 from vobench.motion.disturbance import DISTURBANCE_STREAMS, Generators
 from vobench.motion.drive import Drive, Waypoints, follow, led_by, options
 from vobench.motion.handheld import Handheld
@@ -26,12 +26,12 @@ from vobench.motion.replay import Replay
 from vobench.motion.wander import Wander
 from vobench.motion.wheeled import Wheeled
 from vobench.rendering.geometry import RayCaster
-from vobench.runner.wander import wander_motion
+from vobench.runner.wander import at_free_start, wander_motion
 from vobench.scene.scene import Scene
 from vobench.scene.triangles import Thing, Triangles, triangle_table
 from vobench.suite.case import Case
 from vobench.suite.plan import Plan
-from vobench.suite.trajectory import TrajectorySpec
+from vobench.suite.trajectory import TrajectorySpec, depends_on_place
 from vobench.suite.yaml_file import checked
 from vobench.suite.yaml_source import Mistakes
 from vobench.trajectory.kinematics import Kinematics, Motion
@@ -82,7 +82,9 @@ class BodyMotion:
 
 
 def body_motion(case: Case) -> BodyMotion:
-    """The motion of the body of a case. It does not depend on rig and camera, and only a wander depends on the scene.
+    """The motion of the body of a case.
+
+    It depends on the scene, and on the height of the cameras, only if a path or a start is found in the free space.
 
     Raises MotionError.
     """
@@ -100,6 +102,9 @@ def body_motion(case: Case) -> BodyMotion:
 
 def _whole_motion(case: Case) -> BodyMotion:
     spec = case.trajectory
+    if isinstance(spec, Planned) and spec.start_seed is not None:
+        assert isinstance(spec, Planar)
+        spec = at_free_start(case, spec)
     if isinstance(spec, Wheeled):
         if not isinstance(spec, Waypoints) and spec.mover != "pioneer":
             return _rolling(spec)
@@ -145,6 +150,8 @@ def recorded_drive(folder: Path) -> Drive:
         spec: Waypoints | Planar = checked(TrajectorySpec, case["trajectory"])  # type: ignore[arg-type]
     except ValidationError:
         raise InputError(f"recorded by another vobench, whose trajectories this one cannot read: {folder}") from None
+    if isinstance(spec, Planned) and spec.start_seed is not None:
+        raise InputError(f"the drive starts where its place is free, so it cannot be repeated without that: {folder}")
     return _driven(spec, case["seed"])
 
 
@@ -218,9 +225,9 @@ def _rolling(spec: Planar) -> BodyMotion:
 
 
 def motion_name(case: Case) -> str:
-    """The name of the motion of a case: that of its trajectory, with the scene if it wanders there."""
+    """The name of the motion of a case: that of its trajectory, with the scene if it depends on that."""
     trajectory = case.variant["trajectory"]
-    if isinstance(case.trajectory, Wander):
+    if depends_on_place(case.trajectory):
         return f"{trajectory} in {case.variant['scene']}"
     return trajectory
 

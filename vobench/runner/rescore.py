@@ -14,7 +14,6 @@ from pydantic import ValidationError
 from vobench import stop
 from vobench.errors import InputError, MotionError, VobenchError
 from vobench.metric.score import Score
-from vobench.motion.wander import Wander
 from vobench.regular_file import read_regular
 from vobench.runner.consistency import COVARIANCE, CovarianceConsistency, trial_consistency
 from vobench.runner.estimate import DROPPED, ESTIMATE, FINISHED, EstimatorOutcome
@@ -34,6 +33,7 @@ from vobench.runner.score import (
 )
 from vobench.runner.simulate import frames_of
 from vobench.suite.case import Case
+from vobench.suite.trajectory import depends_on_place
 from vobench.suite.yaml_file import checked
 from vobench.trajectory.trajectory import Trajectory
 from vobench.trajectory.tum import format_tum, parse_tum
@@ -263,7 +263,7 @@ def brief_value(value: Any) -> str:
 def wrong_truths(folder: RunFolder) -> dict[str, str]:
     """The simulated cases of a run whose ground truth does not follow from their settings, and the reasons, by name.
 
-    Nothing is rendered, and no code of a scene is executed. The truth of recordings, of bodies that wander through
+    Nothing is rendered, and no code of a scene is executed. The truth of recordings, of paths that depend on
     their scene, and of cases that another version of vobench wrote, cannot be checked.
     """
     truth_check = _TruthCheck()
@@ -291,8 +291,8 @@ class _TruthCheck:
             return _one_line(error)
         if case is None or not truth.is_file():
             return None
-        if isinstance(case.trajectory, Wander):
-            return None  # its path depends on the scene, whose code is not executed
+        if depends_on_place(case.trajectory):
+            return None  # the code of the scene is not executed
         try:
             stated = read_tum(truth)
         except VobenchError as error:

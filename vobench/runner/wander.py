@@ -1,4 +1,4 @@
-"""Finds the drives of cases that wander through the free space of their place."""
+"""Finds drives in the free space of places: of bodies that wander, and on paths from a free start."""
 
 import json
 from collections import OrderedDict
@@ -6,7 +6,9 @@ from collections import OrderedDict
 import numpy as np
 
 from vobench.errors import MotionError
-from vobench.motion.wander import WHEELED_BODIES, Clearance, Wander, WanderMotion
+from vobench.motion.course import Planar
+from vobench.motion.free_start import from_free_start, habits_of
+from vobench.motion.wander import WHEELED_BODIES, BodyHabits, Clearance, Wander, WanderMotion
 from vobench.rendering.geometry import RayCaster
 from vobench.scene.scene import triangles
 from vobench.suite.case import Case
@@ -25,28 +27,44 @@ _clearances: OrderedDict[str, Clearance] = OrderedDict()
 
 def wander_motion(case: Case, spec: Wander) -> WanderMotion:
     """The drive of a case through its place, which is built. Raises MotionError if there is no room for it."""
-    place = json.dumps(scene_content(case.scene), sort_keys=True)
-    column_m = _column_m(case, spec)
-    key = f"{place} {json.dumps(plain(spec), sort_keys=True)} {column_m:.3f}"
+    column_m = spec.habits.column_m
+    if spec.body in WHEELED_BODIES:
+        column_m = _column_on_wheels_m(case, spec.habits)
+    key = f"{_place_key(case, column_m)} {json.dumps(plain(spec), sort_keys=True)}"
     if key not in _drives:
-        place_key = f"{place} {column_m:.3f}"
-        if place_key not in _clearances:
-            _clearances[place_key] = clearance_of(case.scene, column_m)
-        _drives[key] = spec.motion(_clearances[place_key])
+        _drives[key] = spec.motion(_clearance(case, column_m))
     while len(_drives) > CACHED_DRIVES:
         _drives.popitem(last=False)
-    while len(_clearances) > CACHED_PLACES:
-        _clearances.popitem(last=False)
     return _drives[key]
 
 
-def _column_m(case: Case, spec: Wander) -> float:
-    """The height above the floor that has to be free: that of the body and, on wheels, of the cameras on its mast."""
-    if spec.body not in WHEELED_BODIES:
-        return spec.habits.column_m
+def at_free_start(case: Case, spec: Planar) -> Planar:
+    """The path of a case from a start in the free space of its place. Raises MotionError if there is none."""
+    column_m = _column_on_wheels_m(case, habits_of(spec))
+    return from_free_start(spec, _clearance(case, column_m))
+
+
+def _column_on_wheels_m(case: Case, habits: BodyHabits) -> float:
+    """The height above the floor that has to be free: that of the body and of the cameras on its mast."""
     rig = case.build_rig()
     highest_camera_m = max(float(rig.T_body_camera(side)[2, 3]) for side in rig.sides)
-    return max(spec.habits.column_m, highest_camera_m + ABOVE_CAMERA_M)
+    return max(habits.column_m, highest_camera_m + ABOVE_CAMERA_M)
+
+
+def _place_key(case: Case, column_m: float) -> str:
+    """The settings on which the free space of a case's place depends."""
+    place = json.dumps(scene_content(case.scene), sort_keys=True)
+    return f"{place} {column_m:.3f}"
+
+
+def _clearance(case: Case, column_m: float) -> Clearance:
+    """The free space of a case's place, found once."""
+    key = _place_key(case, column_m)
+    if key not in _clearances:
+        _clearances[key] = clearance_of(case.scene, column_m)
+    while len(_clearances) > CACHED_PLACES:
+        _clearances.popitem(last=False)
+    return _clearances[key]
 
 
 def clearance_of(scene: SceneFile, column_m: float) -> Clearance:

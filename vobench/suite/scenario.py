@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from annotated_types import MaxLen, MinLen
 
 from vobench.errors import Mistake, SuiteError
+from vobench.motion.course import Planned
 from vobench.scene.fog import Fog
 from vobench.scene.rain import Rain
 from vobench.scene.wind import Wind
@@ -101,13 +102,17 @@ class Scenario:
         Of place, light and drive, its severities then change only what all have: the weather, the level of all lamps,
         and the rate of the images.
         """
+        return all(self._changes_what_places_have(key) for key in self._changed_place_keys)
+
+    def _changes_what_places_have(self, key: str) -> bool:
+        """Whether severities change a key of place and drive only in what all places and drives have."""
         is_common = {
             "scene": False,
             "scene_changes": bool(self.weathers),
             "lighting": self._changes_only_lamps,
             "trajectory": self._changes_only_rate,
         }
-        return all(is_common[key] for key in self._changed_place_keys)
+        return is_common[key]
 
     @property
     def _changes_only_lamps(self) -> bool:
@@ -120,6 +125,17 @@ class Scenario:
         """Whether the trajectories of all severities differ only in the rate of the images."""
         base = self.setups[0].trajectory
         return all(replace(setup.trajectory, rate_hz=base.rate_hz) == base for setup in self.setups)
+
+    @property
+    def suits_places_with_its_drive(self) -> bool:
+        """Whether it can be driven on its own trajectory in other places.
+
+        The trajectory is then one of given shape on wheels, whose start is drawn, and of place and light its severities
+        change only what all places have.
+        """
+        is_planned = all(isinstance(setup.trajectory, Planned) for setup in self.setups)
+        other_keys = [key for key in self._changed_place_keys if key != "trajectory"]
+        return is_planned and all(self._changes_what_places_have(key) for key in other_keys)
 
     def lamps(self, severity: int) -> Lighting:
         """What the lighting of a severity says of all lamps."""

@@ -7,12 +7,13 @@ from typing import Any
 
 from vobench.errors import SuiteError
 from vobench.geometry.rig import Level
+from vobench.motion.course import Planned
 from vobench.motion.replay import Replay
 from vobench.suite import scene_file, scene_lighting
 from vobench.suite.axis import RigSettings
 from vobench.suite.case import Case
 from vobench.suite.lookup import Lookup
-from vobench.suite.scenario import Scenario, Setup, read_scenario
+from vobench.suite.scenario import DEFAULT_CAMERA, Scenario, Setup, read_scenario
 from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_lighting import Lighting
 from vobench.suite.scene_spec import SceneFile
@@ -57,7 +58,10 @@ class ScenarioCases:
         if scenario.name in (self.suite.trajectories or {}):
             raise SuiteError("a trajectory of the suite has this name, too; rename it")
         if dealer and self._is_spread(name, scenario):
-            with_base_of_suite = read_scenario(path, self._base())
+            kept = self._kept_by(name)
+            with_base_of_suite = read_scenario(path, self._base(kept))
+            if "camera" in kept:
+                with_base_of_suite = _exposed_for_any_place(with_base_of_suite)
             yield from self._in_units(with_base_of_suite, severities, dealer, self._kinds_of(name))
             return
         for severity in severities:
@@ -71,6 +75,13 @@ class ScenarioCases:
         spread = self.suite.spread
         if spread is None or name in spread.own_place:
             return False
+        if "trajectory" in self._kept_by(name):
+            if not scenario.suits_places_with_its_drive:
+                raise SuiteError(
+                    "spread.keep says that it keeps its trajectory, which has no free start, or its severities change "
+                    "its own place or single lights"
+                )
+            return True
         has_places = self._kinds_of(name) is not None
         if has_places and not scenario.suits_named_places:
             raise SuiteError(
@@ -85,6 +96,13 @@ class ScenarioCases:
             return None
         return spread.places.get(name)
 
+    def _kept_by(self, name: str) -> Collection[str]:
+        """What a scenario keeps of its own where it is spread."""
+        spread = self.suite.spread
+        if spread is None or spread.keep is None:
+            return ()
+        return spread.keep.get(name, ())
+
     def _dealer(self) -> Dealer | None:
         """The dealer that assigns units to scenarios; None if the suite does not spread them, or has mistakes."""
         spread = self.suite.spread
@@ -93,6 +111,7 @@ class ScenarioCases:
         with self.mistakes.at("spread"):
             self._require_scenarios("own_place", spread.own_place)
             self._require_scenarios("places", spread.places or ())
+            self._require_scenarios("keep", spread.keep or ())
             self._require_scenes(spread)
             for axis in UNIT_AXES:
                 if axis not in spread.over and len(self.axes[axis]) > 1:
@@ -114,13 +133,14 @@ class ScenarioCases:
             if unknown:
                 raise SuiteError(f"places.{scenario} names scenes that the suite does not have: {', '.join(unknown)}")
 
-    def _base(self) -> dict[str, Any]:
-        """The rig and the camera in the file of the suite, which replace those of a scenario's base."""
+    def _base(self, kept: Collection[str]) -> dict[str, Any]:
+        """The rig and the camera in the file of the suite, which replace those of a base except for what is `kept`."""
         content = self.mistakes.source.plain
         base = dict[str, Any]()
         for section, key in (("rigs", "rig"), ("cameras", "camera")):
             for variant in (content.get(section) or {}).values():
-                base[key] = variant
+                if key not in kept:
+                    base[key] = variant
         return base
 
     def _in_units(
@@ -136,6 +156,10 @@ class ScenarioCases:
         """
         runs = sum(len(self._calibration_levels(severity)) for severity in severities)
         chosen = dealer.deal(runs, kinds)
+        kept = self._kept_by(scenario.name)
+        if "trajectory" in kept:
+            yield from self._from_free_starts(scenario, severities, dealer, chosen)
+            return
         self._require_free_mounts(scenario, chosen)
         for severity in severities:
             rig = scenario.setups[severity].rig
@@ -157,6 +181,35 @@ class ScenarioCases:
                     unit=unit.name,
                 )
 
+    def _from_free_starts(
+        self,
+        scenario: Scenario,
+        severities: Sequence[int],
+        dealer: Dealer,
+        chosen: Sequence[Unit],
+    ) -> Iterator[Case]:
+        """The cases of a scenario on its own trajectory in the places of units, with a start for each unit."""
+        for severity in severities:
+            setup = scenario.setups[severity]
+            trajectory = setup.trajectory
+            assert isinstance(trajectory, Planned)
+            for unit in chosen:
+                start_seed = self.suite.base_seed + 1 + dealer.units.index(unit)
+                scene_name = self._variant(unit, "scene")
+                variant = scenario.variant_names(severity, scene_name)
+                drive_name = f"{variant['trajectory']}.start.{start_seed}"
+                yield from self._cases(
+                    scenario,
+                    severity,
+                    scene=_in_weather(self.axes["scene"][scene_name], scenario, severity),
+                    lighting=scenario.lamps(severity),
+                    trajectory=replace(trajectory, start_seed=start_seed),
+                    replayed=None,
+                    variant={**variant, "scene": scene_name, "trajectory": drive_name},
+                    rig=setup.rig.read(self._folder_of_rig(scenario)),
+                    unit=f"{scene_name}-start.{start_seed}",
+                )
+
     def _variant(self, unit: Unit, axis: UnitAxis) -> str:
         """The variant of a unit on an axis. An axis over which nothing is spread has only one."""
         return unit.by_axis.get(axis) or next(iter(self.axes[axis]))
@@ -176,8 +229,9 @@ class ScenarioCases:
                 )
 
     def _folder_of_rig(self, scenario: Scenario) -> Path:
-        """The folder at which the paths in a rig start: that of the suite if it has a rig, or of the scenario."""
-        return self.mistakes.source.path.parent if self.suite.rigs else scenario.path.parent
+        """The folder at which the paths in a rig start: that of the suite if the rig is from there."""
+        has_rig_of_suite = self.suite.rigs and "rig" not in self._kept_by(scenario.name)
+        return self.mistakes.source.path.parent if has_rig_of_suite else scenario.path.parent
 
     def _at_severity(self, scenario: Scenario, severity: int) -> Iterator[Case]:
         """The cases of a scenario in its own place, one for each calibration level. Raises VobenchError."""
@@ -251,6 +305,15 @@ class ScenarioCases:
             scene_mistakes.require_none()
             self.scenes[key] = described_scene(scene)
         return self.scenes[key]
+
+
+def _exposed_for_any_place(scenario: Scenario) -> Scenario:
+    """A scenario whose camera is exposed by the brightness of the place where it is, and no longer of its own."""
+    setups = []
+    for setup in scenario.setups:
+        camera = replace(setup.camera, exposure_gain=DEFAULT_CAMERA.exposure_gain)
+        setups.append(replace(setup, camera=camera))
+    return replace(scenario, setups=tuple(setups))
 
 
 def _in_weather(scene: SceneFile, scenario: Scenario, severity: int) -> SceneFile:

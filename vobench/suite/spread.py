@@ -14,6 +14,7 @@ from vobench.errors import SettingError, SuiteError
 from vobench.setting import settings
 
 UnitAxis = Literal["scene", "trajectory"]
+KeptKey = Literal["rig", "camera", "trajectory"]
 UNIT_AXES: tuple[UnitAxis, ...] = ("scene", "trajectory")
 SPREAD_STREAM = 2_917  # separates the draw of units from the other random streams of a seed
 MOST_UNITS = 10_000
@@ -33,6 +34,8 @@ class Spread:
     `own_place` names scenarios that stay in their own place, although they suit any: their difficulty depends on it.
     `places` maps a scenario to the scenes that it is spread over, such as {rain: [street, park]}. Scenarios of the
     weather, or with a lighting of their own, are spread only if they are listed here.
+    `keep` maps a scenario to what it keeps of its own, such as {spin_in_place: [trajectory, camera]}, where the suite's
+    replaces that of other scenarios. A trajectory that is kept starts where the place is free.
 
     In a suite without scenarios, the combinations of the other axes are spread instead. All estimators run in the same
     units.
@@ -44,6 +47,7 @@ class Spread:
     pairs: dict[str, tuple[str, ...]] | None = None
     own_place: tuple[str, ...] = ()
     places: dict[str, tuple[str, ...]] | None = None
+    keep: dict[str, tuple[KeptKey, ...]] | None = None
 
     def __post_init__(self) -> None:
         if self.places and "scene" not in self.over:

@@ -8,7 +8,7 @@ from pydantic import ValidatorFunctionWrapHandler, WrapSerializer, WrapValidator
 
 from vobench.errors import SettingError, SuiteError, TrajectoryError
 from vobench.geometry import se3
-from vobench.motion.course import Planar
+from vobench.motion.course import Planar, Planned
 from vobench.motion.drive import Waypoints
 from vobench.motion.handheld import Handheld
 from vobench.motion.quadrotor import Quadrotor
@@ -38,6 +38,11 @@ def _kind(trajectory_class: type) -> str:
 KINDS = {_kind(trajectory_class): trajectory_class for trajectory_class in get_args(AnyTrajectory)}
 # The keys of wheeled trajectories that only some movers have.
 MOVER_SPECIFIC_KEYS = set[str]().union(*MOVER_KEYS.values())
+
+
+def depends_on_place(spec: AnyTrajectory) -> bool:
+    """Whether the motion depends on the place, because a free path or a free start is looked for there."""
+    return isinstance(spec, Wander) or (isinstance(spec, Planned) and spec.start_seed is not None)
 
 
 def known_keys(spec: Wheeled) -> set[str]:
