@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vobench.errors import TrajectoryError
+from vobench.errors import InputError, TrajectoryError
 from vobench.runner.convert_trajectory import TrajectoryEdit, convert_trajectories
 from vobench.runner.trajectory_pair import TrajectorySource, read_one
 from vobench.trajectory.nanoseconds import NS_PER_S
@@ -40,3 +40,42 @@ def test_the_stamps_of_a_form_without_stamps_are_a_second_file(source, tmp_path)
         "6 poses left out, whose stamps an earlier file has, too.",
         "Poses in this format have no stamps; the stamps are in out.times.txt.",
     )
+
+
+KITTI_ROWS = "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 1 0 1 0 0 0 0 1 0\n1 0 0 2 0 1 0 0 0 0 1 0\n"
+
+
+@pytest.fixture
+def unstamped(tmp_path):
+    """A file of three poses without stamps."""
+    (tmp_path / "00.txt").write_text(KITTI_ROWS)
+    return TrajectorySource(tmp_path / "00.txt", words=("axes:z,-x,-y",))
+
+
+@pytest.mark.parametrize("form", ["kitti", "tartanair"])
+def test_between_formats_without_stamps_none_are_needed_and_none_are_written(unstamped, tmp_path, form):
+    converted = convert_trajectories([unstamped], tmp_path / "out.txt", form, edit=TrajectoryEdit(count=2))
+    assert converted.files == (tmp_path / "out.txt",)
+    assert converted.notes == ()
+    assert converted.pose_count == 2
+
+
+@pytest.mark.parametrize(
+    ("form", "count", "edit"),
+    [
+        ("tum", 1, TrajectoryEdit()),
+        ("kitti", 2, TrajectoryEdit()),
+        ("kitti", 1, TrajectoryEdit(offset_ns=1)),
+        ("kitti", 1, TrajectoryEdit(last_ns=NS_PER_S)),
+    ],
+)
+def test_stamps_are_needed_by_a_format_by_merging_and_by_edits_in_time(unstamped, tmp_path, form, count, edit):
+    with pytest.raises(InputError, match="no stamps in"):
+        convert_trajectories([unstamped] * count, tmp_path / "out.txt", form, edit=edit)
+
+
+def test_numbers_of_frames_are_not_lost(tmp_path):
+    rows = [f"{2 * row} {line}" for row, line in enumerate(KITTI_ROWS.splitlines())]
+    (tmp_path / "00.txt").write_text("\n".join(rows))
+    with pytest.raises(InputError, match="no stamps in"):
+        convert_trajectories([TrajectorySource(tmp_path / "00.txt")], tmp_path / "out.txt", "kitti")

@@ -51,17 +51,19 @@ def export_trajectory(
     trajectory: Trajectory,
     path: Path,
     form: str,
+    *,
+    has_stamps: bool = True,
 ) -> tuple[Path, ...]:
     """Write a trajectory without loss as one file, and return its path.
 
-    The forms of KITTI and TartanAir have no stamps, so a second file has these.
+    The forms of KITTI and TartanAir have no stamps, so a second file has these, if the trajectory has any.
 
     Raises InputError for an unknown form, or if a file exists.
     """
     if form not in TRAJECTORY_TEXTS:
         raise InputError(f"no form of trajectory '{form}'. Known: {', '.join(TRAJECTORY_FORMS)}")
     texts = {path: TRAJECTORY_TEXTS[form](trajectory)}
-    if form in FORMS_WITHOUT_STAMPS:
+    if form in FORMS_WITHOUT_STAMPS and has_stamps:
         times = path.with_name(path.stem + TIMES_SUFFIX)
         texts[times] = format_times(trajectory.t_ns)
     for file in texts:

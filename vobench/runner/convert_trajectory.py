@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from vobench.dataset.export import export_trajectory
+from vobench.dataset.export import FORMS_WITHOUT_STAMPS, export_trajectory
 from vobench.errors import TrajectoryError, counted
 from vobench.runner.trajectory_pair import TrajectorySource, read_one
 from vobench.trajectory.nanoseconds import NS_PER_S
@@ -22,6 +22,11 @@ class TrajectoryEdit:
     first_ns: int | None = None
     last_ns: int | None = None
     count: int | None = None
+
+    @property
+    def needs_stamps(self) -> bool:
+        """Whether it depends on the stamps of poses."""
+        return bool(self.offset_ns) or self.first_ns is not None or self.last_ns is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,13 +48,16 @@ def convert_trajectories(
 ) -> ConvertedTrajectory:
     """Write the poses of one or more files as one file of another format.
 
-    Several files are merged in order of time. `times` are files of stamps for files without (KITTI, TartanAir).
+    Several files are merged in order of time. `times` are files of stamps for files without (KITTI, TartanAir). They
+    are not needed for a single file if neither the edit nor the new format needs stamps.
 
     Raises:
         InputError: a file cannot be read or exists, the format is unknown, or no pose is left.
     """
-    parts = [read_one(source, times=times).trajectory for source in sources]
-    whole = merged(parts)
+    needs_stamps = len(sources) > 1 or edit.needs_stamps or form not in FORMS_WITHOUT_STAMPS
+    readings = [read_one(source, times=times, needs_stamps=needs_stamps) for source in sources]
+    has_stamps = all(reading.unit is not None for reading in readings)
+    whole = merged([reading.trajectory for reading in readings])
     moved = shifted(whole.trajectory, edit.offset_ns)
     trajectory = between(moved, edit.first_ns, edit.last_ns)
     if not len(trajectory):
@@ -57,7 +65,7 @@ def convert_trajectories(
         raise TrajectoryError(f"no pose is left; the stamps are from {t_s[0]:.9f} s to {t_s[-1]:.9f} s")
     if edit.count is not None:
         trajectory = downsampled(trajectory, edit.count)
-    files = export_trajectory(trajectory, out, form)
+    files = export_trajectory(trajectory, out, form, has_stamps=has_stamps)
 
     notes = list[str]()
     if whole.repeated:

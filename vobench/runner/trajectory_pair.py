@@ -152,11 +152,23 @@ def _notes(file: _ReadFile) -> list[str]:
     return notes
 
 
-def read_one(source: TrajectorySource, *, times: Sequence[Path] = (), any_unit: bool = False) -> TrajectoryReading:
-    """Read a single file. A file without stamps needs `times`. Raises InputError."""
+def read_one(
+    source: TrajectorySource,
+    *,
+    times: Sequence[Path] = (),
+    any_unit: bool = False,
+    needs_stamps: bool = True,
+) -> TrajectoryReading:
+    """Read a single file. Raises InputError.
+
+    A file without stamps needs `times`. If the caller needs no stamps, a row is a second, and `unit` is None; this is
+    not for files with the numbers of frames, since these would be lost.
+    """
     file = _read(source, any_unit=any_unit)
     if times:
         file = _stamped(file, times)
+    elif not needs_stamps and file.parsed.frames is None:
+        file = _stamped_by_frame(file)
     if file.parsed.t_ns is None:
         raise InputError(f"no stamps in {source.path}; name the file that has them with --times")
     return _reading(file)
