@@ -21,7 +21,11 @@ def folder(scored, write_run, tmp_path):
     for case in ("room-a", "room-b"):
         trials += [scored("apt", case=case, ate_m=0.01), scored("zen", case=case, ate_m=0.02)]
         trials.append(scored("bad", "lost" if case == "room-b" else "ok", case=case, ate_m=0.05))
-    run = write_run(tmp_path / "run", trials)
+    return written(write_run(tmp_path / "run", trials), trials)
+
+
+def written(run, trials):
+    """A run with the ground truth of its cases and the estimates of its trials."""
     for trial in trials:
         (run.case(trial.case) / GROUND_TRUTH).write_text(format_tum(path()))
         (run.estimate(trial.case, trial.estimator, 0) / ESTIMATE).write_text(format_tum(path(0.01)))
@@ -56,6 +60,14 @@ def test_colours_follow_the_list_of_estimators_of_the_run(folder):
     assert labels(axes)[2:] == ["zen", "apt", "bad"]
     colours = [line.get_color() for line in axes.get_lines()[2:]]
     assert colours == [line_style(index)["color"] for index in range(3)]
+
+
+def test_segments_are_of_the_cases_that_the_estimators_are_for(scored, write_run, tmp_path):
+    trials = [scored("imu", case="with_imu", ate_m=0.01), scored("imu", "not_applicable", case="without")]
+    run = written(write_run(tmp_path / "run", trials), trials)
+    assert RunFigures(run).draw("segments").axes
+    with pytest.raises(InputError, match="none of these estimators is for one of these cases"):
+        RunFigures(run, cases=["without"]).draw("segments")
 
 
 def test_a_wide_matrix_is_as_wide_as_a_page(scored, write_run, tmp_path):

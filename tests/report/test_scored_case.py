@@ -30,6 +30,17 @@ def test_no_trial_is_an_error(run):
         scored_case(run, [], {})
 
 
+def test_an_estimator_that_a_case_is_not_for_is_left_out(scored, write_run, tmp_path):
+    trials = [scored("a", ate_m=0.01), scored("imu", status="not_applicable")]
+    folder = write_run(tmp_path / "run", trials)
+    (folder.case("down") / GROUND_TRUTH).write_text(format_tum(path()))
+    (folder.estimate("down", "a", 0) / ESTIMATE).write_text(format_tum(path(0.01)))
+    case = scored_case(folder, trials, {"a": 0, "imu": 1})
+    assert [estimate.label for estimate in case.estimates] == ["a"]
+    with pytest.raises(InputError, match="there is no trial to plot"):
+        scored_case(folder, trials[1:], {"imu": 1})
+
+
 def test_files_are_scored_against_one_ground_truth_under_their_own_names(tmp_path):
     for name, error_m in {"gt": 0.0, "mine": 0.01, "yours": 0.03}.items():
         (tmp_path / f"{name}.txt").write_text(format_tum(path(error_m)))

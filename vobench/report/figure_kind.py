@@ -21,7 +21,7 @@ from vobench.report.scored_case import ScoredCase, scored_case
 from vobench.report.segment_figure import segment_figure
 from vobench.report.strip_figure import strip_figure
 from vobench.report.trial_choice import pick
-from vobench.runner.folder import RunFolder, TrialScore, with_sequence
+from vobench.runner.folder import NOT_APPLICABLE, RunFolder, TrialScore, with_sequence
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -124,7 +124,8 @@ class RunFigures:
         if kind in BOARD_KINDS:
             return self._board_figure(kind)
         if kind == "segments":
-            return segment_figure([self._scored_case(case) for case in self._cases], self._options.width_of(kind))
+            cases = [self._scored_case(case) for case in self._applicable_cases()]
+            return segment_figure(cases, self._options.width_of(kind))
         if kind == "strip":
             trial = self._telling_trial()
             index = self._index_of[trial.estimator]
@@ -152,6 +153,13 @@ class RunFigures:
     def case(self) -> ScoredCase:
         """The case that figures of one case show."""
         return self._scored_case(self._telling_case())
+
+    def _applicable_cases(self) -> list[str]:
+        """The cases for which one of the estimators is. Raises InputError if there is none."""
+        applicable = {score.case for score in self._scores if score.status != NOT_APPLICABLE}
+        if not applicable:
+            raise InputError("none of these estimators is for one of these cases: they lack a sensor that it needs")
+        return [case for case in self._cases if case in applicable]
 
     def _scored_case(self, case: str) -> ScoredCase:
         trials = [score for score in self._scores if score.case == case]

@@ -11,7 +11,7 @@ from vobench.metric.comparison import DEFAULTS
 from vobench.metric.score import Score
 from vobench.metric.settings import ScoreSettings
 from vobench.runner.estimate import ESTIMATE
-from vobench.runner.folder import RunFolder, TrialScore, read_tum
+from vobench.runner.folder import NOT_APPLICABLE, RunFolder, TrialScore, read_tum
 from vobench.runner.frames import GROUND_TRUTH
 from vobench.runner.score import score_estimate
 from vobench.trajectory.trajectory import Trajectory
@@ -58,15 +58,17 @@ class ScoredCase:
 def scored_case(folder: RunFolder, trials: Sequence[TrialScore], index_of: Mapping[str, int]) -> ScoredCase:
     """The trials of one case of a run. Of several repeats of an estimator, the one with the median error is chosen.
 
-    `index_of` has the index of each estimator. Raises InputError if there are no trials.
+    Estimators that the case is not for, since it lacks a sensor that they need, are left out. `index_of` has the index
+    of each estimator. Raises InputError if no trial is left.
     """
-    if not trials:
+    applicable = [trial for trial in trials if trial.status != NOT_APPLICABLE]
+    if not applicable:
         raise InputError("there is no trial to plot")
-    case = trials[0].case
+    case = applicable[0].case
     truth = read_tum(folder.case(case) / GROUND_TRUTH)
     estimates = []
-    for estimator in sorted({trial.estimator for trial in trials}, key=index_of.__getitem__):
-        trial = _median_trial([trial for trial in trials if trial.estimator == estimator])
+    for estimator in sorted({trial.estimator for trial in applicable}, key=index_of.__getitem__):
+        trial = _median_trial([trial for trial in applicable if trial.estimator == estimator])
         place = folder.estimate(case, estimator, trial.repeat)
         score = score_estimate(read_tum(place / ESTIMATE), truth, trial.claims)
         estimates.append(ScoredEstimate(estimator, index_of[estimator], score, trial.status))
