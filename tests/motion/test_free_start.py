@@ -43,10 +43,14 @@ def test_starts_differ_by_seed_and_are_the_same_again():
     assert len(starts) == 3
 
 
-def test_a_start_does_not_depend_on_the_speed():
-    spec = PureRotation(angle_deg=360, start_seed=4)
-    slow, fast = (from_free_start(replace(spec, turn_radps=speed), hall()) for speed in (1.0, 5.0))
+def test_a_start_does_not_depend_on_the_speed_or_the_laps():
+    turn = PureRotation(angle_deg=360, start_seed=4)
+    slow, fast = (from_free_start(replace(turn, turn_radps=speed), hall()) for speed in (1.0, 5.0))
     assert slow.start == fast.start
+    for seed in range(20):
+        circle = Circle(radius_m=1.5, start_seed=seed)
+        starts = {from_free_start(replace(circle, laps=laps), hall()).start for laps in (0.2, 0.5, 3)}
+        assert len(starts) == 1
 
 
 def test_a_path_that_fits_nowhere_is_refused():

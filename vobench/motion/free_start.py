@@ -7,7 +7,7 @@ import numpy as np
 
 from vobench.errors import MotionError
 from vobench.geometry.se3 import Array
-from vobench.motion.course import Planar
+from vobench.motion.course import Circle, Planar
 from vobench.motion.wander import CAR, HABITS, BodyHabits, Clearance, body_clearance_m, planar_poses
 
 STARTS = 2000  # that are tried
@@ -50,8 +50,13 @@ def from_free_start(spec: Planar, clearance: Clearance) -> Planar:
 
 
 def _poses_from_origin(spec: Planar) -> Array:
-    """The poses (PATH_POSES, 3) of a robot on the path from the origin, as x and y in m and heading in rad."""
+    """The poses (PATH_POSES, 3) of a robot on the path from the origin, as x and y in m and heading in rad.
+
+    A circle is checked once around, so that the start does not depend on the number of laps.
+    """
     at_origin = replace(spec, start_m=(0.0, 0.0), start_heading_deg=0.0)
+    if isinstance(at_origin, Circle):
+        at_origin = replace(at_origin, laps=1.0)
     return planar_poses(at_origin.way(), PATH_POSES)
 
 
