@@ -102,7 +102,12 @@ class Eye:
 
 @dataclass(frozen=True, slots=True)
 class StereoPair:
-    """Two cameras whose views have the same matrix K, and their baseline. Their pictures are not rectified."""
+    """Two cameras whose views have the same matrix K, and their baseline. Their pictures are not rectified.
+
+    `left` and `right` are the cameras, each with the view to which its pixels correspond.
+    `baseline_m` is the distance between the cameras in metres.
+    `small_maps` lead from the pixels of small left and right views to those of small pictures, as `Eye.small_map`.
+    """
 
     left: Eye
     right: Eye
