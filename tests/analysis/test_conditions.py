@@ -18,8 +18,10 @@ from vobench.analysis.conditions import (
 from vobench.geometry import se3
 from vobench.geometry.camera import Pinhole, pixel_grid
 from vobench.geometry.rig import CalibrationError, CameraError, custom_stereo_pair, looking, stereo_rig
+from vobench.scene.fog import Fog
 from vobench.scene.material import Material, srgb
 from vobench.sensor.image_sensor import CameraSensor
+from vobench.sensor.timing import Timing
 from vobench.sequence.reader import StereoFrame
 from vobench.suite.axis import RigSettings
 from vobench.suite.case import Case
@@ -332,6 +334,34 @@ def test_rolling_is_the_motion_within_the_readout_and_0_for_a_global_shutter(wal
         expected_px = FOCAL_PX * 0.1 / 4 / 0.1 * readout_ms / 1e3
         assert one(rolling, "rolling", moved_m=(0, 0.1, 0)) == pytest.approx(expected_px, rel=0.01)
     assert one(wall, "rolling", moved_m=(0, 0.1, 0)) == 0
+
+
+def test_late_images_are_the_motion_within_delay_and_jitter(wall: Case) -> None:
+    for delay_ms, jitter_ms in [(20, 0), (-20, 0), (15, 5)]:
+        late = camera(wall, timing=Timing(right_delay_ms=delay_ms, jitter_ms=jitter_ms))
+        expected_px = FOCAL_PX * 0.1 / 4 / 0.1 * 20e-3
+        assert one(late, "late_images", moved_m=(0, 0.1, 0)) == pytest.approx(expected_px, rel=0.01)
+    assert one(wall, "late_images", moved_m=(0, 0.1, 0)) == 0
+
+
+def test_compression_is_what_quality_lacks_to_100(wall: Case) -> None:
+    assert one(camera(wall, jpeg_quality=30), "compression") == pytest.approx(0.7)
+    assert one(wall, "compression") == 0
+
+
+def test_dirt_drops_and_flare_are_what_the_camera_has(wall: Case) -> None:
+    dirty = camera(wall, dirt=0.2, lens_drops=0.3, flare=0.1, ghost=0.05)
+    assert one(dirty, "lens_dirt") == pytest.approx(0.2)
+    assert one(dirty, "lens_drops") == pytest.approx(0.3)
+    assert one(dirty, "flare") == pytest.approx(0.15)
+    assert [one(wall, name) for name in ("lens_dirt", "lens_drops", "flare")] == [0, 0, 0]
+
+
+def test_fog_takes_the_more_light_the_further_things_are(wall: Case) -> None:
+    depth_m = one(wall, "depth")
+    foggy = scene(wall, fog=Fog(visibility_m=10))
+    assert one(foggy, "fog") == pytest.approx(1 - 0.02 ** (depth_m / 10))  # 2 % is left at the visibility
+    assert one(wall, "fog") == 0
 
 
 def test_the_last_frame_has_the_speed_of_the_step_before(wall: Case) -> None:

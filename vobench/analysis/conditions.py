@@ -35,6 +35,12 @@ CONDITIONS: dict[str, tuple[str, str]] = {
     "turn": ("°", "rotation since the previous frame"),
     "blur": ("px", "standard deviation of motion blur, lens blur and defocus together"),
     "rolling": ("px", "image motion between the first row and the last"),
+    "late_images": ("px", "image motion within the delay of the right image and the jitter of both"),
+    "compression": ("%", "what the quality of JPEG lacks to 100"),
+    "lens_dirt": ("%", "light that dirt on the lens takes"),
+    "lens_drops": ("%", "glass before the lens that is covered by drops"),
+    "flare": ("%", "light that the lens scatters, or that is in ghosts"),
+    "fog": ("%", "light from the median distance that fog takes"),
     "noise": ("DN", "standard deviation of the noise at the mean grey value"),
     "calibration": ("px", "median reprojection error of the nominal calibration"),
     "exposure_jump": ("stops", "change of exposure since the previous frame"),
@@ -91,6 +97,7 @@ def conditions(
         camera_values = _camera_conditions(
             case,
             speed_pxps=scene_values["flow"] / (float(steps_ns[index]) / 1e9),
+            depth_m=scene_values["depth"],
             mean_dn=mean_dn,
             exposure_s=exposure_s,
             gain_db=gain_db,
@@ -330,19 +337,30 @@ def _camera_conditions(
     case: Case,
     *,
     speed_pxps: float,
+    depth_m: float,
     mean_dn: float,
     exposure_s: float,
     gain_db: float,
 ) -> dict[str, float]:
-    """The conditions that follow from the camera's settings, the image motion and the mean grey value."""
+    """The conditions that follow from the settings of camera and weather, with what the frame shows."""
     camera = case.camera
     motion_sigma_px = SIGMA_PER_SMEAR * speed_pxps * exposure_s * camera.motion_blur
     lens_sigma_px = camera.blur_sigma_px
     defocus_sigma_px = SIGMA_PER_DEFOCUS * camera.defocus_px
     blur_px = np.sqrt(motion_sigma_px**2 + lens_sigma_px**2 + defocus_sigma_px**2)
+    timing = camera.timing
+    late_s = (abs(timing.right_delay_ms) + timing.jitter_ms) / 1e3
+    fog = case.scene.fog
+    missing_quality = 0 if camera.jpeg_quality is None else 100 - camera.jpeg_quality
     return {
         "blur": float(blur_px),
         "rolling": speed_pxps * camera.readout_s,
+        "late_images": speed_pxps * late_s,
+        "compression": missing_quality / 100,
+        "lens_dirt": camera.dirt,
+        "lens_drops": camera.lens_drops,
+        "flare": camera.flare + camera.ghost,
+        "fog": 1 - float(fog.transmittance(np.array(depth_m))) if fog else 0.0,
         "noise": chip_noise_dn(camera.chip, mean_dn, gain_db=gain_db),
     }
 
