@@ -337,12 +337,13 @@ def _line(found: RecordingExplanation, *, is_right: bool) -> str:
     if found.twin is None:
         return line
     failing = found.frames.is_failing
+    typical_in_twin = np.median(found.twin.unchanged_loss)
     reductions = ", ".join(f"{'+'.join(c.removed)} {c.reduction:.0%}" for c in found.twin.explanation.singles)
     return (
-        f"{line}, {found.twin.is_failing.sum()} in the twin, overlap {found.overlap:.2f} (by chance "
-        f"{found.twin.coincidence.by_chance:.2f}, p {found.twin.coincidence.p:.2f}); error "
+        f"{line}; overlap {found.overlap:.2f} (by chance {found.twin.coincidence.by_chance:.2f}, "
+        f"p {found.twin.coincidence.p:.2f}); error "
         f"{found.frames.loss[failing].mean():.1%} and {found.twin.loss[failing].mean():.1%} (typical "
-        f"{found.frames.typical:.1%} and {found.twin.typical:.1%}); without {reductions}; "
+        f"{found.frames.typical:.1%} and {typical_in_twin:.1%}); without {reductions}; "
         f"scale {found.twin.scale:g}, misfit {found.twin.misfit:.0%}"
     )
 

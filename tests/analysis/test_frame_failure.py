@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import scipy
 
-from vobench.analysis.frame_failure import coincidence, failing_loss, frame_losses, worst_window
+from vobench.analysis.frame_failure import coincidence, failing_loss, frame_losses, twin_coincidence, worst_window
 from vobench.geometry import se3
 from vobench.trajectory.trajectory import Trajectory
 
@@ -157,3 +157,73 @@ def test_without_an_error_nothing_coincides() -> None:
     nothing = np.zeros(FRAMES)
     for found in (coincidence(nothing, block(0, 9)), coincidence(block(0, 9), nothing)):
         assert (found.overlap, found.p) == (0, 1)
+
+
+# --- A recording and its twin ---
+
+TWIN_TRIALS = 9
+TRUSTED_OVERLAP = 0.6
+TRUSTED_P = 0.1
+
+
+DAMAGED_FRAMES = 20
+
+
+def trial(rng: np.random.Generator, difficulty: np.ndarray, *, begin: int | None, factor: float) -> np.ndarray:
+    """Errors of one trial: noise that lasts for some frames, larger where the path is hard, and raised by damage.
+
+    Damage of DAMAGED_FRAMES from a frame on raises the error by random factors about `factor`, at times by much more.
+    """
+    white = rng.normal(size=(3, FRAMES))
+    lasting = 2 * scipy.ndimage.uniform_filter1d(white, 4, axis=1, mode="wrap")
+    loss = 0.01 * difficulty * np.linalg.norm(lasting, axis=0)
+    if begin is not None:
+        factors = np.repeat(rng.lognormal(np.log(factor), 1.2, DAMAGED_FRAMES // 4), 4)
+        loss[begin : begin + DAMAGED_FRAMES] *= np.maximum(factors, 1)
+    return np.minimum(loss, 1)
+
+
+def trusted_share(*, twin_begin: int, factor: float, hard_from: int = FRAMES) -> float:
+    """The share of twins that are trusted if their damage begins at a frame, and that of the recording at frame 5."""
+    rng = np.random.default_rng(3)
+    difficulty = np.where(np.arange(FRAMES) >= hard_from, 4.0, 1.0)
+    trusted = 0
+    for _ in range(200):
+        recorded = trial(rng, difficulty, begin=5, factor=factor)
+        changed = [trial(rng, difficulty, begin=twin_begin, factor=factor) for _ in range(TWIN_TRIALS)]
+        unchanged = [trial(rng, difficulty, begin=None, factor=factor) for _ in range(TWIN_TRIALS)]
+        found = twin_coincidence(recorded, np.mean(changed, axis=0), np.mean(unchanged, axis=0), typical=0.015)
+        trusted += found.overlap >= TRUSTED_OVERLAP and found.p <= TRUSTED_P
+    return trusted / 200
+
+
+@pytest.mark.parametrize("hard_from", [FRAMES, 36])
+def test_a_twin_that_is_damaged_at_the_same_time_is_trusted_also_if_the_path_is_hard_at_another(hard_from: int) -> None:
+    assert trusted_share(twin_begin=5, factor=5, hard_from=hard_from) >= 0.8
+
+
+@pytest.mark.parametrize("hard_from", [FRAMES, 36])
+@pytest.mark.parametrize("twin_begin", [18, 28])
+def test_a_twin_that_is_damaged_at_another_time_is_not_trusted(twin_begin: int, hard_from: int) -> None:
+    assert trusted_share(twin_begin=twin_begin, factor=5, hard_from=hard_from) <= 0.02
+
+
+def test_errors_that_the_path_alone_explains_do_not_coincide_with_damage() -> None:
+    difficulty = np.where(np.arange(FRAMES) >= 30, 0.08, 0.02)
+    damaged_there = difficulty * np.where(np.arange(FRAMES) >= 30, 5, 1)
+    assert twin_coincidence(difficulty, damaged_there, difficulty, typical=0.02).overlap == 0
+    assert twin_coincidence(damaged_there, damaged_there, difficulty, typical=0.02).overlap == pytest.approx(1)
+
+
+def test_a_few_frames_with_the_whole_error_do_not_outweigh_a_long_drift() -> None:
+    unchanged = np.full(FRAMES, 0.01)
+    drifting = unchanged + block(5, 35, height=0.05)
+    with_spikes = drifting + block(34, 36, height=0.9)
+    found = twin_coincidence(with_spikes, drifting, unchanged, typical=0.01)
+    assert found.overlap > 0.9
+    assert found.p <= TRUSTED_P
+
+
+def test_errors_below_half_a_percent_of_the_path_are_not_raised() -> None:
+    tiny = np.full(FRAMES, 1e-4)
+    assert twin_coincidence(40 * tiny, 40 * tiny, tiny, typical=1e-4).overlap == 0

@@ -34,8 +34,7 @@ def answer(
     in_twin = failing(*twin_frames)
     twin = TwinTrials(
         loss=np.where(in_twin, 0.3, 0.01),
-        typical=0.01,
-        is_failing=in_twin,
+        unchanged_loss=np.full(FRAMES, 0.01),
         coincidence=coincidence(is_failing.astype(float), in_twin.astype(float)),
         explanation=found or explanation(change(BLUR, reduction=0.8)),
         scale=1.4,
@@ -60,11 +59,18 @@ def test_it_is_said_how_far_the_twin_is_to_be_trusted_and_what_was_seen() -> Non
     assert found.sentences[1:3] == (
         "How far to trust this: the errors of the recording and of the twin overlap in time by 0.82. If the twin's are "
         "shifted in time, it is 0.31 on average, and as large for 10% of the shifts.",
-        "The twin fails in 18 of the 20 frames in which the recording fails, and in 2 others. The mean error of the "
-        "recording's failing frames is 40%, and 27% in the twin.",
+        "The recording fails in 20 frames, with a mean error of 40.0%. In the twin, the differences raise the error of "
+        "these frames from 1.0% to 27.1%, and that of the others from 1.0% to 2.9%.",
     )
     assert f"In the images: {BLURRED.evidence}." in found.sentences
     assert found.sentences[-1].startswith("Not found in these frames: noisy images, exposure jumps,")
+
+
+def test_where_all_frames_fail_there_is_no_sentence_about_others() -> None:
+    found = answer()
+    all_fail = replace(found, frames=replace(found.frames, is_failing=np.ones(FRAMES, bool)))
+    (sentence,) = [sentence for sentence in all_fail.sentences if "raise the error" in sentence]
+    assert sentence.endswith("raise the error of these frames from 1.0% to 12.6%.")
 
 
 def test_a_twin_that_fails_elsewhere_names_nothing() -> None:

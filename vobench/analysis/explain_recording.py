@@ -10,7 +10,13 @@ import numpy as np
 from vobench.analysis.camera_fit import look_of
 from vobench.analysis.explain import Effort, effort, explain
 from vobench.analysis.explanation import Removal
-from vobench.analysis.frame_failure import FrameRange, coincidence, failing_loss, frame_losses, worst_window
+from vobench.analysis.frame_failure import (
+    FrameRange,
+    failing_loss,
+    frame_losses,
+    twin_coincidence,
+    worst_window,
+)
 from vobench.analysis.image_statistics import evenly_spaced
 from vobench.analysis.nuisance import Nuisance
 from vobench.analysis.path_placement import ANY_SCALE, Placement, place_path, wanted_disparities
@@ -411,20 +417,18 @@ def _twin_trials(runner: "_VariantRunner", placement: Placement, frames: Failing
         seeds=seeds,
         remove=_without,
     )
-    since_first_s = frames.time_s - frames.time_s[0]
-    loss = runner.mean_loss((), since_first_s)
     everything = tuple(change.name for change in images.changes)
-    typical = float(np.median(runner.mean_loss(everything, since_first_s)))
+    since_first_s = frames.time_s - frames.time_s[0]
 
     # Errors are compared at regular times, also where frames are missing.
     regular_s = images.t_ns / NS_PER_S
-    rise = runner.mean_loss((), regular_s) - runner.mean_loss(everything, regular_s)
-    excess = np.interp(regular_s, since_first_s, frames.loss) - frames.typical
+    changed = runner.mean_loss((), regular_s)
+    unchanged = runner.mean_loss(everything, regular_s)
+    recorded = np.interp(regular_s, since_first_s, frames.loss)
     return TwinTrials(
-        loss=loss,
-        typical=typical,
-        is_failing=loss > failing_loss(typical),
-        coincidence=coincidence(excess.clip(min=0), rise.clip(min=0)),
+        loss=runner.mean_loss((), since_first_s),
+        unchanged_loss=runner.mean_loss(everything, since_first_s),
+        coincidence=twin_coincidence(recorded, changed, unchanged, typical=frames.typical),
         explanation=explanation,
         scale=placement.scale,
         misfit=placement.misfit,

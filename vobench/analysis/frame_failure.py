@@ -20,6 +20,7 @@ MAX_FAILING_LOSS = 0.5
 LOW_ERROR = 0.5  # of the mean error of a part: a smaller error is low
 MIN_LOW_SHARE = 0.2  # of the time of a part, in which the error is low
 
+NEGLIGIBLE_LOSS = 0.005  # of the path: a smaller error counts as this when errors are divided
 ROUNDING = 1e-9  # of an overlap
 
 
@@ -132,3 +133,23 @@ def coincidence(errors: Array, others: Array) -> Coincidence:
         overlaps.append(product / (2 - product))
     is_as_large = np.array(overlaps) >= overlaps[0] - ROUNDING
     return Coincidence(float(overlaps[0]), float(np.mean(overlaps)), float(is_as_large.mean()))
+
+
+def twin_coincidence(recorded: Array, changed: Array, unchanged: Array, *, typical: float) -> Coincidence:
+    """How far the errors of a recording are raised at the times at which changes raise those of its twin.
+
+    All errors are (K,). `recorded` is that of the recording, of which `typical` is usual elsewhere. `changed` and
+    `unchanged` are those of the twin with and without the changes. What is compared is the logarithm of the factor by
+    which each side exceeds its usual error, so that a few frames with the whole error do not outweigh many with three
+    times the usual one. The twin has the same path: an error that it has without any change is usual in the recording,
+    too.
+    """
+    usual = np.maximum(unchanged, typical)
+    return coincidence(_raised_by(recorded, usual), _raised_by(changed, unchanged))
+
+
+def _raised_by(loss: Array, usual: Array) -> Array:
+    """The logarithm (K,) of the factor by which errors (K,) exceed usual ones (K,); 0 where they do not."""
+    factor = np.maximum(loss, NEGLIGIBLE_LOSS) / np.maximum(usual, NEGLIGIBLE_LOSS)
+    logarithm: Array = np.log(factor).clip(min=0.0)
+    return logarithm

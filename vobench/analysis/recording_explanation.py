@@ -35,16 +35,15 @@ class FailingFrames:
 
 @dataclass(frozen=True, slots=True)
 class TwinTrials:
-    """What the estimator does in the twin: which of the same F frames fail, and what removing each change does.
+    """What the estimator does in the twin: its errors at the same F frames, and what removing each change does.
 
-    `loss` (F,) is the mean error around each frame, and `typical` the median error in the twin without any change.
-    `coincidence` compares when the recording's error is above its typical one, and when the changes raise the twin's.
+    `loss` and `unchanged_loss` (F,) are the mean errors around each frame, with all changes and without any.
+    `coincidence` compares when the recording's error is above the usual one, and when the changes raise the twin's.
     `scale` is the factor by which the place was enlarged, and `misfit` the mean error of the logarithm of disparities.
     """
 
     loss: Array
-    typical: float
-    is_failing: Frames
+    unchanged_loss: Array
     coincidence: Coincidence
     explanation: Explanation
     scale: float
@@ -169,18 +168,21 @@ def _change_of(explanation: Explanation, removed: Sequence[str]) -> Change:
 def _trust_sentences(found: RecordingExplanation, twin: TwinTrials) -> list[str]:
     """How far the twin resembles the recording."""
     is_failing = found.frames.is_failing
-    failing = int(is_failing.sum())
-    in_both = int((is_failing & twin.is_failing).sum())
-    only_in_twin = int(twin.is_failing.sum()) - in_both
-    real_loss = float(found.frames.loss[is_failing].mean())
-    twin_loss = float(twin.loss[is_failing].mean())
+    recorded_loss = float(found.frames.loss[is_failing].mean())
+    in_others = "" if is_failing.all() else f", and that of the others {_rise(twin, ~is_failing)}"
     coincidence = twin.coincidence
     return [
         f"How far to trust this: the errors of the recording and of the twin overlap in time by "
         f"{coincidence.overlap:.2f}. If the twin's are shifted in time, it is {coincidence.by_chance:.2f} on average, "
         f"and as large for {coincidence.p:.0%} of the shifts.",
-        f"The twin fails in {in_both} of the {failing} frames in which the recording fails, and in {only_in_twin} "
-        f"others. The mean error of the recording's failing frames is {real_loss:.0%}, and {twin_loss:.0%} in the "
-        f"twin.",
+        f"The recording fails in {is_failing.sum()} frames, with a mean error of {recorded_loss:.1%}. In the twin, the "
+        f"differences raise the error of these frames {_rise(twin, is_failing)}{in_others}.",
         f"The twin's place is scaled by {twin.scale:g}, and its disparities differ by {twin.misfit:.0%}.",
     ]
+
+
+def _rise(twin: TwinTrials, frames: Frames) -> str:
+    """The mean error of some frames of the twin without and with the differences."""
+    unchanged_loss = float(twin.unchanged_loss[frames].mean())
+    loss = float(twin.loss[frames].mean())
+    return f"from {unchanged_loss:.1%} to {loss:.1%}"
