@@ -50,7 +50,7 @@ def main() -> None:
             verdict = "fails in the same way" if fails_alike else "DOES NOT FAIL"
             trials = len(shrunk.found.tried)
             result = f"{share:.0%} of the frames in {trials} trials, {verdict}"
-            print(f"{failure.summary} ({score.case}): {result}", flush=True)
+            print(f"{failure.summary} ({shrunk.score.case}): {result}", flush=True)
     count = len(worst)
     print(f"{small} of {count} have at most {LARGEST_SHARE:.0%} of the frames; {alike} fail in the same way elsewhere")
 
