@@ -5,7 +5,7 @@ The rest is the reference: a property has changed in a frame if its value is far
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement, pairwise
+from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -493,22 +493,21 @@ def _turned_stretch(chunks: Sequence[_TurnedChunk], axes: Frames, frame_count: i
     measured_deg = np.array([chunk.difference_deg for chunk in chunks])  # (chunks, 3)
     weights = np.array([chunk.sigma_deg for chunk in chunks]) ** -2.0 * axes
 
-    best_gain = -np.inf
-    best = _TurnedStretch(0, frame_count, np.zeros(len(AXES)), np.full(len(AXES), np.inf))
-    for first, last in combinations_with_replacement(range(frame_count), 2):
-        end = last + 1
-        overlap_frames = np.clip(np.minimum(ends, end) - np.maximum(firsts, first), 0, None)
-        shares = (overlap_frames / (ends - firsts))[:, None]
-        information = (weights * shares**2).sum(0)
-        if not information.any():
-            continue
-        projection = (weights * shares * measured_deg).sum(0)
-        angle_deg = np.divide(projection, information, out=np.zeros(len(AXES)), where=information > 0)
+    # Each stretch of frames is a row, the shorter ones before the longer ones of the same first frame.
+    stretch_firsts, stretch_lasts = np.triu_indices(frame_count)
+    stretch_ends = stretch_lasts + 1
+    overlap_frames = np.minimum(ends, stretch_ends[:, None]) - np.maximum(firsts, stretch_firsts[:, None])
+    shares = (overlap_frames.clip(0) / (ends - firsts))[..., None]  # (stretches, chunks, 1)
+    information = (weights * shares**2).sum(1)  # (stretches, 3)
+    projection = (weights * shares * measured_deg).sum(1)
+    is_measured = information > 0
+    angle_deg = np.divide(projection, information, out=np.zeros_like(information), where=is_measured)
+    if not is_measured.any():
+        return _TurnedStretch(0, frame_count, np.zeros(len(AXES)), np.full(len(AXES), np.inf))
 
-        # The decrease of the squared residuals relative to no rotation.
-        gain = float((angle_deg * projection).sum())
-        if gain > best_gain:
-            best_gain = gain
-            variance = np.divide(CHUNKS_PER_FRAME, information, out=np.full(len(AXES), np.inf), where=information > 0)
-            best = _TurnedStretch(first, end, angle_deg, np.sqrt(variance))
-    return best
+    # The decrease of the squared residuals relative to no rotation.
+    gains = (angle_deg * projection).sum(1)
+    best = int(np.where(is_measured.any(1), gains, -np.inf).argmax())
+    unknown = np.full(len(AXES), np.inf)
+    variance = np.divide(CHUNKS_PER_FRAME, information[best], out=unknown, where=is_measured[best])
+    return _TurnedStretch(int(stretch_firsts[best]), int(stretch_ends[best]), angle_deg[best], np.sqrt(variance))
