@@ -10,7 +10,7 @@ import numpy as np
 from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.metric.settings import Side
-from vobench.trajectory.align import align
+from vobench.trajectory.align import Alignment, align
 from vobench.trajectory.quaternion_columns import QuaternionOrder
 from vobench.trajectory.trajectory import Kind as MoveKind
 from vobench.trajectory.trajectory import PoseConvention
@@ -66,7 +66,7 @@ class Misfit:
 def misfit(T_gt: Array, T_est: Array) -> Misfit:
     """The misfit of matched poses (K, 4, 4), which does not depend on their world frames and scales."""
     alignment = align(T_est, T_gt, kind="sim3")
-    aligned = _aligned(T_est, T_gt)
+    aligned = _aligned(T_est, T_gt, alignment)
     angles_rad = se3.rotation_angle(_rotations_between(aligned, T_gt))
     return Misfit(
         trans=_position_misfit(aligned, T_gt),
@@ -83,13 +83,13 @@ def _position_misfit(aligned: Array, T_gt: Array) -> float:
     return float(position_error_m / extent_m)
 
 
-def _aligned(T_est: Array, T_gt: Array) -> Array:
-    """The estimate (K, 4, 4) after the best similarity of positions; along a nearly straight path, rolled about it.
+def _aligned(T_est: Array, T_gt: Array, alignment: Alignment) -> Array:
+    """The estimate (K, 4, 4) after an alignment of its positions; along a nearly straight path, rolled about it.
 
     Such positions hardly determine a rotation about the path, so the orientations determine it: a few metres of sway
     would otherwise turn an estimate of a straight road by tens of degrees.
     """
-    aligned = align(T_est, T_gt, kind="sim3").apply(T_est)
+    aligned = alignment.apply(T_est)
     centre_m = T_gt[:, :3, 3].mean(axis=0)
     _, spreads, axes = np.linalg.svd(T_gt[:, :3, 3] - centre_m, full_matrices=False)
     sway = float(spreads[1] / (spreads[0] + TINY))
@@ -343,7 +343,7 @@ def _limit(iterates: list[Array]) -> Array:
 def _mean_rotation_left(T_gt: Array, T_est: Array, lever_m: Array) -> Array:
     """The mean rotation (3, 3) from the estimate, moved by a lever and aligned, to the truth."""
     moved = T_est @ se3.transform(IDENTITY, lever_m)
-    aligned = _aligned(moved, T_gt)
+    aligned = _aligned(moved, T_gt, align(moved, T_gt, kind="sim3"))
     return se3.nearest_rotation(np.mean(_rotations_between(aligned, T_gt), axis=0))
 
 
