@@ -2,7 +2,7 @@
 
     python benchmarks/units.py runs/worlds/latest
 
-For each pair of estimators of a run over places (as `vobench run worlds --units 12`), the standard deviation over
+For each pair of estimators of a run over places (as `vobench run worlds`), the standard deviation over
 places of the difference of their log losses, and the number of places that a board would advise for a true ratio of
 losses of 2, 1.5 and 1.3 (power 0.95, error rate 2 %):
 

@@ -1,13 +1,11 @@
 """Every command and code block of the documentation is one that vobench accepts.
 
-Commands are parsed, but not run. Blocks of YAML are read as suites or scenes, and blocks of Python are executed.
+Commands are parsed here; tests/cli/test_commands_in_docs.py runs them. Blocks of YAML are read as
+suites or scenes, and blocks of Python are executed.
 """
 
 import re
-import shlex
 import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,7 @@ import numpy as np
 import pytest
 import yaml
 
+from tests.documented import PAGES, Block, block_of, blocks_of, commands_of_page
 from vobench.cli.command_group import CommandGroup
 from vobench.dataset import layout
 from vobench.errors import VobenchError
@@ -26,88 +25,13 @@ from vobench.suite.scene_build import build
 from vobench.suite.scene_file import read_scene
 from vobench.suite.suite import read_plan
 
-ROOT = Path(__file__).parents[1]
-PAGES = [
-    *(ROOT / name for name in ("README.md", "CONTRIBUTING.md", "SECURITY.md")),
-    *sorted((ROOT / "docs").glob("*.md")),
-    ROOT / "results" / "README.md",
-    *sorted((ROOT / "examples").glob("*/README.md")),
-]
-BLOCK = re.compile(r"^```(\w*)\n(.*?)^```", re.MULTILINE | re.DOTALL)
-INLINE = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
-PROMPT = re.compile(r"^\$ ")
-ENDS_OF_COMMANDS = ("|", "&&", ";", ">")
 OPTIONS_OF_VOBENCH = ("--version", "--help", "--install-completion")
 USAGE_ERROR = 2  # click's exit code
-SHELL = ("sh", "")  # blocks without a language show sessions, with a prompt before each command
-
-
-@dataclass(frozen=True)
-class Block:
-    page: Path
-    number: int  # on the page
-    language: str
-    text: str
-
-    @property
-    def name(self) -> str:
-        return f"{self.page.relative_to(ROOT)}:{self.number}"
-
-
-def blocks_of(page: Path) -> list[Block]:
-    found = BLOCK.findall(page.read_text(encoding="utf-8"))
-    return [Block(page, number, language, text) for number, (language, text) in enumerate(found)]
-
-
 BLOCKS = [block for page in PAGES for block in blocks_of(page)]
 
 
 def blocks_in(language: str) -> list[Block]:
     return [block for block in BLOCKS if block.language == language]
-
-
-def block_of(page: str, language: str, number: int = 0) -> str:
-    """The text of a block, by its number among those of a language on a page."""
-    return [block.text for block in blocks_of(ROOT / page) if block.language == language][number]
-
-
-def lines_of_shell(text: str, language: str) -> Iterator[str]:
-    for line in text.splitlines():
-        if language == "sh" or PROMPT.match(line):
-            yield PROMPT.sub("", line)
-
-
-def commands_of(line: str) -> Iterator[list[str]]:
-    """The arguments of each call of vobench in a line of a shell."""
-    words = shlex.split(line, comments=True)
-    part: list[str] = []
-    for word in [*words, "&&"]:
-        if word not in ENDS_OF_COMMANDS:
-            part.append(word)
-            continue
-        is_call = [Path(name).name == "vobench" for name in part]
-        if any(is_call):
-            yield part[is_call.index(True) + 1 :]
-        part = []
-
-
-def commands_in_blocks() -> list[tuple[str, list[str]]]:
-    found = []
-    for block in BLOCKS:
-        if block.language in SHELL:
-            for line in lines_of_shell(block.text, block.language):
-                found += [(block.name, arguments) for arguments in commands_of(line)]
-    return found
-
-
-def commands_in_prose() -> list[tuple[str, list[str]]]:
-    found = []
-    for page in PAGES:
-        prose = BLOCK.sub("", page.read_text(encoding="utf-8"))
-        for code in INLINE.findall(prose):
-            if "vobench " in code:
-                found += [(page.name, arguments) for arguments in commands_of(code)]
-    return found
 
 
 @cache
@@ -133,8 +57,9 @@ def mistake_in(arguments: list[str]) -> str:
     return ""
 
 
-IN_BLOCKS = commands_in_blocks()
-IN_PROSE = commands_in_prose()
+COMMANDS = [command for page in PAGES for command in commands_of_page(page) if command.is_vobench]
+IN_PROSE = [(command.page, command.arguments) for command in COMMANDS if command.place == "prose"]
+IN_BLOCKS = [(command.place, command.arguments) for command in COMMANDS if command.place != "prose"]
 
 
 @pytest.mark.parametrize(("page", "arguments"), IN_BLOCKS, ids=lambda value: str(value)[:60])
@@ -151,7 +76,7 @@ def test_every_command_in_prose_is_accepted_or_shortened(page, arguments):
 def test_the_commands_of_blocks_prompts_and_prose_are_found():
     assert ("README.md:1", ["run", "quickstart"]) in IN_BLOCKS
     assert ("docs/getting-started.md:1", ["run", "lighting"]) in IN_BLOCKS
-    assert ("boards.md", ["compare", "OLD", "NEW"]) in IN_PROSE
+    assert ("docs/boards.md", ["compare", "OLD", "NEW"]) in IN_PROSE
 
 
 @pytest.mark.parametrize(
