@@ -23,7 +23,7 @@ AIR"""
 SUITE = """name: one
 seed: 3
 scenes: [SCENE]
-rigs: {down: {pitch_deg: 90, imu: IMUCALIBRATION}}
+rigs: {down: {picture_scale: 0.5, pitch_deg: 90, imu: IMUCALIBRATION}}
 lightings: {it: LIGHTING}
 trajectories: {short: {targets_m: [[0.3, 0.05]], tolerance_m: 0.1, rate_hz: 2, slip: SLIP, encoders: ENCODERSFLOOR}}
 cameras: {it: {sensor: mt9v034CAMERA}}
