@@ -284,6 +284,13 @@ def test_intervals_have_the_width_of_a_normal_distribution_and_cover_both_sides_
     assert np.mean(covered) >= 0.85
 
 
+def test_an_interval_without_1_has_a_p_value_of_at_most_5_percent() -> None:
+    for seed in range(5):
+        for cause in attributed("coin", seed).causes + attributed("moving", seed).causes:
+            excludes_1 = cause.low > 1 or cause.high < 1
+            assert excludes_1 == (cause.p < 0.049) or cause.p == pytest.approx(0.05, abs=0.003)
+
+
 @pytest.mark.parametrize(("p", "is_sure"), [(0.002, True), (0.05, True), (0.06, False)])
 def test_a_cause_is_sure_up_to_a_corrected_p_value_of_5_percent(p: float, is_sure: bool) -> None:
     assert Cause(("a",), 2.0, 1.5, 3.0, p).is_sure == is_sure

@@ -57,8 +57,9 @@ def test_it_is_said_how_far_the_twin_is_to_be_trusted_and_what_was_seen() -> Non
     found = answer()
     assert found.overlap == pytest.approx(18 / 22)
     assert found.sentences[1:3] == (
-        "How far to trust this: the errors of the recording and of the twin overlap in time by 0.82. If the twin's are "
-        "shifted in time, it is 0.31 on average, and as large for 10% of the shifts.",
+        "The simulated twin of these seconds is trusted: its errors overlap in time with the recording's by 0.82 (at "
+        "least 0.6 is asked). Shifted in time, they do by 0.31 on average, and as much for 10% of the shifts (at most "
+        "10% is asked).",
         "The recording fails in 20 frames, with a mean error of 40.0%. In the twin, the differences raise the error of "
         "these frames from 1.0% to 27.1%, and that of the others from 1.0% to 2.9%.",
     )

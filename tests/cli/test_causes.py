@@ -4,6 +4,7 @@ from types import SimpleNamespace
 
 import pytest
 
+from vobench.analysis.conditions import CONDITIONS
 from vobench.cli import causes as cli_causes
 from vobench.cli import terminal
 
@@ -71,9 +72,9 @@ def test_so_many_of_the_worst_segments_are_listed_with_their_last_frame():
 @pytest.mark.parametrize(
     ("causes", "constant", "are_joined", "is_constant"),
     [
-        ((cause("speed"),), (), False, False),
-        ((cause("speed"), cause("turn", "light")), (), True, False),
-        ((cause("turn", "light"),), ("gain",), True, True),
+        ((cause("blur"),), (), False, False),
+        ((cause("blur"), cause("turn", "flow")), (), True, False),
+        ((cause("turn", "flow"),), ("gain",), True, True),
     ],
 )
 def test_what_cannot_be_separated_or_known_is_said(capsys, causes, constant, are_joined, is_constant):
@@ -87,9 +88,9 @@ def test_what_cannot_be_separated_or_known_is_said(capsys, causes, constant, are
 @pytest.mark.parametrize(
     ("causes", "is_mostly_unexplained", "sentence"),
     [
-        ((cause("speed", factor=120.4),), False, "lk: the error depends on speed ×120 (95 % interval 1.5 to 2.5)."),
+        ((cause("blur", factor=120.4),), False, "lk: the error depends on blur ×120 (95 % interval 1.5 to 2.5)."),
         ((), False, "lk: the error depends significantly on none of the conditions."),
-        ((cause("speed"),), True, "lk: most of the error has a cause that is not among the conditions"),
+        ((cause("blur"),), True, "lk: most of the error has a cause that is not among the conditions"),
     ],
 )
 def test_causes_are_named_unless_most_of_the_error_is_unexplained(capsys, causes, is_mostly_unexplained, sentence):
@@ -97,6 +98,12 @@ def test_causes_are_named_unless_most_of_the_error_is_unexplained(capsys, causes
     found.is_mostly_unexplained = is_mostly_unexplained
     cli_causes._print_attribution("lk", found, terminal.console())
     assert capsys.readouterr().out.startswith(sentence)
+
+
+def test_named_conditions_are_described(capsys):
+    cli_causes._print_attribution("lk", attribution(cause("blur"), cause("turn", "flow")), terminal.console())
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[1:4] == [f"- {name}: {CONDITIONS[name][1]}" for name in ("blur", "turn", "flow")]
 
 
 def test_few_of_many_conditions_that_vary_together_are_named_beside_a_trial():

@@ -64,7 +64,8 @@ class Cause:
     """One or several collinear conditions, and the factor by which they multiply the error.
 
     The factor compares the 95th with the 5th percentile of the condition over all segments. `low` and `high` are its
-    95 % confidence interval. `p` is the p-value, corrected for the number of conditions by `corrected_p_values`.
+    95 % confidence interval, and `p` is the p-value. Both are corrected for the number of conditions: an interval does
+    not contain 1 if `p` is at most 5 %, except for rounding.
     `recurs` is false if all cases are on one drive, and the conditions agree with the errors in one half of it only.
     """
 
@@ -184,7 +185,7 @@ def attribute(trials: Sequence[ErrorSeries]) -> Attribution | None:
     fit = fit_ridge(predictors, log_losses[None])
     null = fit_ridge(predictors, _permuted(trials))  # of PERMUTATIONS rows
     slopes = fit.slopes[0]  # (K,)
-    half_widths = np.percentile(null.t, INTERVAL_PERCENT, axis=0) * fit.standard_errors[0]
+    half_widths = np.percentile(null.t.max(1), INTERVAL_PERCENT) * fit.standard_errors[0]
     p_values = corrected_p_values(fit.t[0], null.t)
     recurs = _recurs(windows, predictors, slopes, log_losses)
 

@@ -171,10 +171,12 @@ def _trust_sentences(found: RecordingExplanation, twin: TwinTrials) -> list[str]
     recorded_loss = float(found.frames.loss[is_failing].mean())
     in_others = "" if is_failing.all() else f", and that of the others {_rise(twin, ~is_failing)}"
     coincidence = twin.coincidence
+    trusted = "trusted" if found.is_trusted else "not trusted"
     return [
-        f"How far to trust this: the errors of the recording and of the twin overlap in time by "
-        f"{coincidence.overlap:.2f}. If the twin's are shifted in time, it is {coincidence.by_chance:.2f} on average, "
-        f"and as large for {coincidence.p:.0%} of the shifts.",
+        f"The simulated twin of these seconds is {trusted}: its errors overlap in time with the recording's by "
+        f"{coincidence.overlap:.2f} (at least {TRUSTED_OVERLAP} is asked). Shifted in time, they do by "
+        f"{coincidence.by_chance:.2f} on average, and as much for {coincidence.p:.0%} of the shifts (at most "
+        f"{TRUSTED_P:.0%} is asked).",
         f"The recording fails in {is_failing.sum()} frames, with a mean error of {recorded_loss:.1%}. In the twin, the "
         f"differences raise the error of these frames {_rise(twin, is_failing)}{in_others}.",
         f"The twin's place is scaled by {twin.scale:g}, and its disparities differ by {twin.misfit:.0%}.",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vobench.analysis.causes import MIN_EXPLAINED, Attribution, Cause
+from vobench.analysis.conditions import CONDITIONS
 from vobench.analysis.run_causes import WORST_SEGMENTS, EstimatorCauses, find_causes
 from vobench.cli import terminal
 from vobench.cli.option import Json, RunPath
@@ -63,7 +64,11 @@ def _print_causes(causes: EstimatorCauses, *, worst: int) -> None:
 
 def _print_attribution(estimator: str, attribution: Attribution, console: "Console") -> None:
     """Print what the error depends on in one sentence, then the factor of each condition."""
-    console.print(f"{estimator}: {_answer(attribution)}\n", soft_wrap=True)
+    console.print(f"{estimator}: {_answer(attribution)}", soft_wrap=True)
+    for name in dict.fromkeys(name for cause in attribution.named for name in cause.conditions):
+        _, meaning = CONDITIONS[name]
+        console.print(f"- {name}: {meaning}", soft_wrap=True)
+    console.print()
     title = "Factor of the error from a low to a high level of each condition"
     rows = [_cause_row(cause) for cause in attribution.causes]
     console.print(terminal.table(title, CAUSE_HEADINGS, rows))
