@@ -3,6 +3,8 @@
     vobench run benchmarks/severities.yaml
     python benchmarks/severities.py runs/severities/latest [--channels]
 
+Likewise for benchmarks/severities_outdoors.yaml, with the scenarios that need open air.
+
 For each scenario and estimator, the table has the loss (1 - score) at each severity, as the geometric mean over the
 units of the scenario that have all its severities, Spearman's correlation of severity and mean loss, the share of units
 whose loss grows from the lowest severity to the highest, and the factor of the loss from one severity to the next.
