@@ -65,6 +65,7 @@ OTHER = {
     "speed": 0.5,
     "start_m": [0.1, 0.2],
     "start_heading_deg": 20,
+    "start_seed": 1,
     "rate_hz": 24,
     "mover": "unicycle",
     "robot": "pioneer_3dx_laser",
