@@ -5,6 +5,7 @@ import pytest
 import scipy
 
 from vobench.analysis.frame_failure import coincidence, failing_loss, frame_losses, twin_coincidence, worst_window
+from vobench.analysis.recording_explanation import TRUSTED_OVERLAP, TRUSTED_P
 from vobench.geometry import se3
 from vobench.trajectory.trajectory import Trajectory
 
@@ -162,10 +163,6 @@ def test_without_an_error_nothing_coincides() -> None:
 # --- A recording and its twin ---
 
 TWIN_TRIALS = 9
-TRUSTED_OVERLAP = 0.6
-TRUSTED_P = 0.1
-
-
 DAMAGED_FRAMES = 20
 
 

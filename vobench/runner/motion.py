@@ -17,7 +17,7 @@ from vobench.geometry import se3
 from vobench.geometry.se3 import Array
 from vobench.motion.ackermann import ACKERMANNS, ackermann
 from vobench.motion.controller import MOST_FRAMES, ControllerSettings
-from vobench.motion.course import Planar, Planned, Unled, rolled
+from vobench.motion.course import Planar, Unled, rolled
 from vobench.motion.disturbance import DISTURBANCE_STREAMS, Generators
 from vobench.motion.drive import Drive, Waypoints, follow, led_by, options
 from vobench.motion.handheld import Handheld
@@ -102,8 +102,7 @@ def body_motion(case: Case) -> BodyMotion:
 
 def _whole_motion(case: Case) -> BodyMotion:
     spec = case.trajectory
-    if isinstance(spec, Planned) and spec.start_seed is not None:
-        assert isinstance(spec, Planar)
+    if isinstance(spec, Planar) and spec.start_seed is not None:
         spec = at_free_start(case, spec)
     if isinstance(spec, Wheeled):
         if not isinstance(spec, Waypoints) and spec.mover != "pioneer":
@@ -150,7 +149,7 @@ def recorded_drive(folder: Path) -> Drive:
         spec: Waypoints | Planar = checked(TrajectorySpec, case["trajectory"])  # type: ignore[arg-type]
     except ValidationError:
         raise InputError(f"recorded by another vobench, whose trajectories this one cannot read: {folder}") from None
-    if isinstance(spec, Planned) and spec.start_seed is not None:
+    if depends_on_place(spec):
         raise InputError(f"the drive starts where its place is free, so it cannot be repeated without that: {folder}")
     return _driven(spec, case["seed"])
 

@@ -25,6 +25,16 @@ from vobench.suite.yaml_source import Mistakes
 
 
 @dataclass(frozen=True, slots=True)
+class _Drive:
+    """A trajectory with its name as a variant, the name of its unit, and the poses that it replays, as TUM text."""
+
+    name: str
+    trajectory: TrajectorySpec
+    unit: str
+    replayed: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class ScenarioCases:
     """Reads the cases of the scenarios of a suite, and collects mistakes.
 
@@ -156,59 +166,44 @@ class ScenarioCases:
         """
         runs = sum(len(self._calibration_levels(severity)) for severity in severities)
         chosen = dealer.deal(runs, kinds)
-        kept = self._kept_by(scenario.name)
-        if "trajectory" in kept:
-            yield from self._from_free_starts(scenario, severities, dealer, chosen)
-            return
-        self._require_free_mounts(scenario, chosen)
+        keeps_trajectory = "trajectory" in self._kept_by(scenario.name)
+        if not keeps_trajectory:
+            self._require_free_mounts(scenario, chosen)
         for severity in severities:
-            rig = scenario.setups[severity].rig
+            rig = scenario.setups[severity].rig.read(self._folder_of_rig(scenario))
             for unit in chosen:
                 scene_name = self._variant(unit, "scene")
-                trajectory_name = self._variant(unit, "trajectory")
-                trajectory = self.axes["trajectory"][trajectory_name]
-                drive_name, drive = scenario.in_drive(severity, trajectory_name, trajectory)
+                if keeps_trajectory:
+                    start_seed = self.suite.base_seed + 1 + dealer.units.index(unit)
+                    drive = self._own_drive(scenario, severity, scene_name, start_seed)
+                else:
+                    drive = self._drive_of_suite(scenario, severity, unit)
                 variant = scenario.variant_names(severity, scene_name)
                 yield from self._cases(
                     scenario,
                     severity,
                     scene=_in_weather(self.axes["scene"][scene_name], scenario, severity),
                     lighting=scenario.lamps(severity),
-                    trajectory=drive,
-                    replayed=self.replayed.get(trajectory_name),
-                    variant={**variant, "scene": scene_name, "trajectory": drive_name},
-                    rig=rig.read(self._folder_of_rig(scenario)).mounted_on(trajectory),
-                    unit=unit.name,
+                    trajectory=drive.trajectory,
+                    replayed=drive.replayed,
+                    variant={**variant, "scene": scene_name, "trajectory": drive.name},
+                    rig=rig.mounted_on(drive.trajectory),
+                    unit=drive.unit,
                 )
 
-    def _from_free_starts(
-        self,
-        scenario: Scenario,
-        severities: Sequence[int],
-        dealer: Dealer,
-        chosen: Sequence[Unit],
-    ) -> Iterator[Case]:
-        """The cases of a scenario on its own trajectory in the places of units, with a start for each unit."""
-        for severity in severities:
-            setup = scenario.setups[severity]
-            trajectory = setup.trajectory
-            assert isinstance(trajectory, Planned)
-            for unit in chosen:
-                start_seed = self.suite.base_seed + 1 + dealer.units.index(unit)
-                scene_name = self._variant(unit, "scene")
-                variant = scenario.variant_names(severity, scene_name)
-                drive_name = f"{variant['trajectory']}.start.{start_seed}"
-                yield from self._cases(
-                    scenario,
-                    severity,
-                    scene=_in_weather(self.axes["scene"][scene_name], scenario, severity),
-                    lighting=scenario.lamps(severity),
-                    trajectory=replace(trajectory, start_seed=start_seed),
-                    replayed=None,
-                    variant={**variant, "scene": scene_name, "trajectory": drive_name},
-                    rig=setup.rig.read(self._folder_of_rig(scenario)),
-                    unit=f"{scene_name}-start.{start_seed}",
-                )
+    def _drive_of_suite(self, scenario: Scenario, severity: int, unit: Unit) -> _Drive:
+        """The trajectory of a unit at the rate of a severity."""
+        name = self._variant(unit, "trajectory")
+        drive_name, trajectory = scenario.in_drive(severity, name, self.axes["trajectory"][name])
+        return _Drive(drive_name, trajectory, unit.name, self.replayed.get(name))
+
+    def _own_drive(self, scenario: Scenario, severity: int, scene_name: str, start_seed: int) -> _Drive:
+        """The trajectory of a scenario at a severity from a free start in a scene."""
+        own = scenario.setups[severity].trajectory
+        assert isinstance(own, Planned)
+        name = scenario.variant_names(severity, scene_name)["trajectory"]
+        start = f"start.{start_seed}"
+        return _Drive(f"{name}.{start}", replace(own, start_seed=start_seed), f"{scene_name}-{start}")
 
     def _variant(self, unit: Unit, axis: UnitAxis) -> str:
         """The variant of a unit on an axis. An axis over which nothing is spread has only one."""
