@@ -197,6 +197,7 @@ GIVEN = {  # commands that the reader of a page ran before, on other pages
     "docs/scenarios.md": ["new estimator mine"],
     "results/README.md": ["new estimator mine"],
 }
+NEEDED_LATER = {("docs/getting-started.md", "new estimator mine")}  # in prose, before the block that runs `mine`
 
 
 @dataclass
@@ -407,7 +408,8 @@ def test_every_command_of_a_page_runs(page: str, reader: Workspace, tmp_path: Pa
         workspace.run(given.split())
     done = set[str]()
     for command in OF_VOBENCH:
-        is_left_out = command.place == "prose" and (command.text in done or not RUNS_PROSE)
+        runs_in_prose = RUNS_PROSE or (page, command.text) in NEEDED_LATER
+        is_left_out = command.place == "prose" and (command.text in done or not runs_in_prose)
         if command.page == page and not is_shortened(command) and not is_left_out:
             run(command, workspace)
             done.add(command.text)
@@ -454,7 +456,8 @@ def entries() -> Iterator[tuple[str, str]]:
 def test_every_entry_of_a_table_is_a_command_of_a_page():
     texts = {command.text for command in OF_VOBENCH}
     assert [entry for entry in entries() if entry[1] not in texts] == []
-    assert [key for key in BEFORE if key not in {(command.page, command.text) for command in OF_VOBENCH}] == []
+    places = {(command.page, command.text) for command in OF_VOBENCH}
+    assert [key for key in [*BEFORE, *NEEDED_LATER] if key not in places] == []
     words = {word for command in OF_VOBENCH for word in command.words}
     assert [word for word in STANDS_FOR if word not in words] == []
 
