@@ -14,6 +14,7 @@ from vobench.geometry.rig import looking
 from vobench.motion.wander import Wander
 from vobench.scene.fog import Fog
 from vobench.scene.material import reflectance
+from vobench.scene.paint import Paint
 from vobench.scene.rain import Rain
 from vobench.scene.wind import Wind
 from vobench.sensor.image_sensor import CameraDifference, CameraDifferences, NoiseStreams, expose
@@ -29,6 +30,7 @@ from vobench.suite.scene_spec import (
     GlassSpec,
     LevelSpec,
     LightOverride,
+    PolishedSpec,
     SceneFile,
     SkySpec,
     SunKey,
@@ -227,6 +229,19 @@ def test_a_built_in_coat_is_taken_off_and_what_is_below_is_about_as_bright(hard:
     assert coated.is_coated
     assert not below.is_coated
     assert float(reflectance(below).mean()) == pytest.approx(float(reflectance(coated).mean()), rel=0.35)
+
+
+def test_the_floor_that_a_scene_replaces_loses_its_coat_and_paint_comes_off(hard: Case) -> None:
+    marble = PolishedSpec("terrazzo", 0.4, contrast=0.5)
+    scene = replace(hard.scene, floor=marble, paint=Paint(cover=0.9))
+    case = replace(hard, scene=scene)
+    dull = without(case, ["gloss"]).scene
+    assert dull.floor == DiffuseSpec("terrazzo", 0.4, contrast=0.5)
+    assert dull.paint == scene.paint
+    textured = without(case, ["low texture"]).scene
+    assert textured.paint is None
+    assert textured.floor == marble
+    assert without(hard, ["gloss", "low texture"]).scene.floor is None
 
 
 def contrast(material: Any) -> float:

@@ -8,6 +8,7 @@ import pytest
 from vobench.errors import MotionError
 from vobench.motion.course import Circle, PureRotation, Square
 from vobench.motion.free_start import from_free_start, habits_of
+from vobench.motion.spline import Pose, PoseSpline
 from vobench.motion.wander import HABITS, Clearance, body_clearance_m, planar_poses
 
 CELL_M = 0.1
@@ -73,3 +74,38 @@ def test_a_car_takes_the_space_of_a_car():
     car = Circle(radius_m=5, mover="ackermann", car="kitti_like", start_seed=1)
     assert habits_of(car) == HABITS["car"]
     assert habits_of(replace(car, car="small_robot")) == HABITS["pioneer"]
+
+
+# --- Poses ---
+
+
+def over_waves(pitch_deg: float) -> PoseSpline:
+    """A bend through poses that pitch and roll."""
+    poses = []
+    for k in range(6):
+        tilt_deg = pitch_deg * (-1) ** k
+        position_m = (1.0 + 0.3 * k, 2.0 + 0.05 * k**2, 0.02 * (k % 2))
+        poses.append(
+            Pose(t_s=0.4 * k, position_m=position_m, yaw_deg=30 + 15 * k, pitch_deg=tilt_deg, roll_deg=-tilt_deg)
+        )
+    return PoseSpline(poses=tuple(poses), ease_s=0.5, start_seed=3)
+
+
+def test_poses_are_moved_together_to_where_the_robot_keeps_clear():
+    spec = over_waves(10.0)
+    found = from_free_start(spec, hall(side_m=3.0))
+    assert found.start_seed is None
+    poses = planar_poses(found.motion(), 500)
+    assert np.abs(poses[:, :2]).max() <= 1.5 - NEEDED_M + CELL_M
+    given = [pose.T_world_body for pose in spec.poses]
+    moved = [pose.T_world_body for pose in found.poses]
+    T_moved_given = moved[0] @ np.linalg.inv(given[0])
+    np.testing.assert_allclose(T_moved_given[2], [0, 0, 1, 0], atol=1e-12)  # about the vertical, at the same height
+    np.testing.assert_allclose(T_moved_given @ given, moved, atol=1e-12)
+    assert [pose.t_s for pose in found.poses] == [pose.t_s for pose in spec.poses]
+
+
+def test_a_start_of_poses_does_not_depend_on_how_they_pitch_and_roll():
+    flat, steep = (from_free_start(over_waves(pitch_deg), hall()) for pitch_deg in (0.0, 20.0))
+    assert [pose.position_m for pose in flat.poses] == [pose.position_m for pose in steep.poses]
+    assert [pose.yaw_deg for pose in flat.poses] == [pose.yaw_deg for pose in steep.poses]

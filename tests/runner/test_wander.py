@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from tests.generated import GENERATOR, SUITE, write_cell
-from vobench.errors import MotionError
 from vobench.geometry.rig import CalibrationError
 from vobench.motion.course import Circle
 from vobench.runner import wander
 from vobench.runner.motion import body_motion, motion_name
-from vobench.runner.wander import clearance_of, wander_motion
+from vobench.runner.wander import wander_motion
+from vobench.suite import clearance
+from vobench.suite.scene_build import build
 from vobench.suite.suite import read_plan
 
 RADIUS_M = 0.25  # of the pioneer
@@ -23,7 +24,7 @@ def cases(tmp_path, monkeypatch):
     write_cell(tmp_path / "scenes" / "cell")
     (tmp_path / "cells.yaml").write_text(SUITE, encoding="utf-8")
     monkeypatch.setattr(wander, "_drives", type(wander._drives)())
-    monkeypatch.setattr(wander, "_clearances", type(wander._clearances)())
+    monkeypatch.setattr(clearance, "_clearances", type(clearance._clearances)())
     plan = read_plan(str(tmp_path / "cells.yaml"))
     return {(case.variant["scene"], case.variant["trajectory"]): case for case in plan.simulated}
 
@@ -50,7 +51,7 @@ def test_another_place_and_another_seed_have_other_drives(cases):
 def test_a_drive_keeps_clear_of_the_walls_and_the_crate_of_its_place(cases):
     for case in cases.values():
         path_m = positions_m(case)
-        things = {thing.name: thing.mesh.bounds for thing in wander.build(case.scene, {}).things}
+        things = {thing.name: thing.mesh.bounds for thing in build(case.scene, {}).things}
         low_m, high_m = things["crate"]
         outside_m = np.maximum(np.maximum(low_m - path_m, path_m - high_m), 0)[:, :2]
         assert np.linalg.norm(outside_m, axis=1).min() > RADIUS_M
@@ -60,16 +61,10 @@ def test_a_drive_keeps_clear_of_the_walls_and_the_crate_of_its_place(cases):
 
 def test_no_more_drives_and_places_are_kept_than_stated(cases, monkeypatch):
     monkeypatch.setattr(wander, "CACHED_DRIVES", 2)
-    monkeypatch.setattr(wander, "CACHED_PLACES", 1)
+    monkeypatch.setattr(clearance, "CACHED_PLACES", 1)
     for case in cases.values():
         wander_motion(case, case.trajectory)
-    assert (len(wander._drives), len(wander._clearances)) == (2, 1)
-
-
-def test_a_place_without_a_floor_is_refused_in_one_line(cases, monkeypatch):
-    monkeypatch.setattr(wander, "floor_map", lambda *_, **__: None)
-    with pytest.raises(MotionError, match="'cell' has no level floor to wander on; is another axis up\\?"):
-        clearance_of(cases["cell.1", "tour.1"].scene, 0.6)
+    assert (len(wander._drives), len(clearance._clearances)) == (2, 1)
 
 
 SHELF_FROM_X_M = 0.3  # where a board begins that hangs 0.9 m above part of the cell
@@ -85,7 +80,7 @@ def test_a_robot_drives_under_things_only_if_its_cameras_fit_below(tmp_path, mon
     tall = SUITE.replace("pitch_deg: 90", f"pitch_deg: 90, height_m: {camera_m}")
     many = tall.replace("rate_hz: 4, seeds: 2", "rate_hz: 4, seeds: 12").replace("units: 4", "units: 24")
     (tmp_path / "cells.yaml").write_text(many, encoding="utf-8")
-    monkeypatch.setattr(wander, "_clearances", type(wander._clearances)())
+    monkeypatch.setattr(clearance, "_clearances", type(clearance._clearances)())
     monkeypatch.setattr(wander, "_drives", type(wander._drives)())
 
     plan = read_plan(str(tmp_path / "cells.yaml"))
@@ -108,7 +103,7 @@ def test_a_path_from_a_free_start_keeps_clear_of_the_crate_of_its_place(cases):
     ring = Circle(radius_m=0.4, mover="unicycle", rate_hz=8, start_seed=1)
     for case in cases.values():
         path_m = positions_m(replace(case, trajectory=ring))
-        things = {thing.name: thing.mesh.bounds for thing in wander.build(case.scene, {}).things}
+        things = {thing.name: thing.mesh.bounds for thing in build(case.scene, {}).things}
         low_m, high_m = things["crate"]
         outside_m = np.maximum(np.maximum(low_m - path_m, path_m - high_m), 0)[:, :2]
         assert np.linalg.norm(outside_m, axis=1).min() > RADIUS_M

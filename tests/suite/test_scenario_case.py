@@ -3,12 +3,13 @@
 from collections import Counter, defaultdict
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
-from tests.generated import write_cell
+from tests.generated import GENERATOR, write_cell
 from tests.suite.conftest import CLOSET
 from vobench.errors import SuiteError
-from vobench.suite import scene_file
+from vobench.suite import clearance, scene_file
 from vobench.suite.suite import read_plan
 
 DUSK = """name: dusk
@@ -233,6 +234,30 @@ def test_the_weather_changes_in_the_places_that_the_suite_names_and_nothing_else
         assert (foggy.camera, foggy.rig, foggy.trajectory) == (clear.camera, clear.rig, clear.trajectory)
 
 
+TILED = """name: tiles
+base: {scene: closet, scene_changes: {materials.grain.albedo: 0.2, floor: {pattern: plain, albedo: 0.4, eta: 1,
+  kind: polished}}, rig: {pitch_deg: 90}, trajectory: {targets_m: [[0.5, 0]]}}
+severity: [{}, {scene_changes: {floor: {eta: 1.5}}}, {}, {}, {}, {scene_changes: {floor: {eta: 2}, paint: {cover: 1}}}]
+"""
+
+
+def test_the_surfaces_of_the_places_that_the_suite_names_change_and_nothing_else(weather_plan, tmp_path):
+    cases = cases_in_yards(weather_plan, tmp_path, "tiles", TILED)
+    etas = [[case.scene.floor.eta for case in same] for same in cases.values()]
+    assert etas == [[1, 1], [1.5, 1.5], [2, 2]]
+    for bare, painted in zip(cases[0], cases[5], strict=True):
+        assert painted.scene.paint.cover == 1
+        assert replace(painted.scene, paint=None, floor=bare.scene.floor) == bare.scene
+        assert bare.scene.materials == {}  # what all severities change of the own place stays there
+        assert (painted.camera, painted.rig, painted.trajectory) == (bare.camera, bare.rig, bare.trajectory)
+
+
+def test_a_scenario_that_changes_other_surfaces_too_cannot_leave_its_place(weather_plan, tmp_path):
+    varied = TILED.replace("severity: [{}, ", "severity: [{scene_changes: {materials.grain.albedo: 0.3}}, ")
+    with pytest.raises(SuiteError, match="its severities change its own place"):
+        cases_in_yards(weather_plan, tmp_path, "tiles", varied)
+
+
 FLASHING = """name: flash
 base: {scene: closet, rig: {pitch_deg: 90}, trajectory: {targets_m: [[0.5, 0]]}}
 severity: [{}, {lighting: {lamps: {level: {steady: 0.5}}}}, {}, {}, {}, {lighting: {lamps: {level: {steady: 0.1}}}}]
@@ -308,13 +333,108 @@ def test_a_scenario_that_keeps_its_trajectory_has_a_free_start_in_each_unit(weat
     assert [case.trajectory.speed_mps for case in cases] == [0.3, 0.3, 0.8, 0.8]
     assert [unit(case)[0] for case in usual] == [unit(case)[0] for case in fast]
     assert {case.scene.name for case in cases} <= {"cell", "yard"}
-    assert len({case.trajectory.start_seed for case in usual}) == 2
+    assert len({(case.trajectory.start_m, case.trajectory.start_heading_deg) for case in usual}) == 2
+    assert len({case.variant["trajectory"] for case in cases}) == 4
     for slow_case, fast_case in zip(usual, fast, strict=True):
         assert replace(fast_case.trajectory, speed_mps=0.3) == slow_case.trajectory
-        assert slow_case.name.endswith(f"{unit(slow_case)[0]}-start.{slow_case.trajectory.start_seed}")
+        assert slow_case.name.removeprefix("ring-0") == fast_case.name.removeprefix("ring-5")
+        assert slow_case.name.startswith(f"ring-0-{unit(slow_case)[0]}-start.")
     for case in cases:
         assert (case.camera.exposure_ms, case.camera.exposure_gain) == (1, 1)
     assert any(case.trajectory.kind == "wander" for case in plan.simulated if case.scenario == "mist")
+
+
+WIDE_RING = RING.replace("radius_m: 0.3", "radius_m: 1.5")  # takes 3.6 m, and a cell is at most 4 m wide
+HALL = GENERATOR.replace("rng.uniform(3.0, 4.0)", "rng.uniform(8.0, 9.0)")
+
+
+@pytest.fixture
+def hall_plan(weather_plan, tmp_path):
+    """Reads the plan of a suite in two cells and three halls with a scenario that drives a circle of 1.5 m."""
+    write_cell(tmp_path / "scenes" / "yard", HALL, name="yard")
+    (tmp_path / "suites" / "scenarios" / "ring.yaml").write_text(WIDE_RING)
+    keep = ", keep: {ring: [trajectory, camera]}"
+    return lambda each, places="": weather_plan(f"{keep}{places}", each=each, scenarios="ring: [0, 5], mist: [1]")
+
+
+def test_a_scenario_that_keeps_its_trajectory_runs_only_where_it_fits(hall_plan):
+    cases = [case for case in hall_plan(3).simulated if case.scenario == "ring"]
+    assert {case.variant["scene"] for case in cases} == {"yard.1", "yard.2", "yard.3"}
+    assert len(cases) == 3 * 2
+
+
+def test_a_path_that_fits_into_too_few_units_is_a_mistake_of_its_scenario(hall_plan):
+    with pytest.raises(SuiteError, match=r"scenarios\.ring: spread runs .* in 4 units, but the path .* in only 3 of 5"):
+        hall_plan(4)
+    with pytest.raises(SuiteError, match=r"in 2 units, but the path that it keeps has a free start in only 0 of 2"):
+        hall_plan(2, ", places: {ring: [cell]}")
+
+
+TALL = RING.replace("{trajectory: {speed_mps: 0.8}}", "{rig: {height_m: 1.2}}")
+SHELF = GENERATOR.replace(
+    "    lamp = ",
+    '    things.append(Thing("shelf", block((1.2, 4.0, 0.02), transform=at(0.9, 0.0, 0.91)), "plaster"))\n    lamp = ',
+)
+
+
+def test_a_start_is_free_for_the_highest_rig_of_all_severities(weather_plan, tmp_path):
+    """A board hangs 0.9 m above the floor from x = 0.3 m on: below the mast of severity 5, above that of 0."""
+    write_cell(tmp_path / "scenes" / "cell", SHELF)
+    (tmp_path / "suites" / "scenarios" / "ring.yaml").write_text(
+        TALL.replace("pitch_deg: 90", "pitch_deg: 90, height_m: 0.4")
+    )
+    plan = weather_plan(
+        ", keep: {ring: [trajectory, rig]}, places: {ring: [cell]}", each=2, scenarios="ring: [0, 5], mist: [1]"
+    )
+    low, high = (
+        [case.trajectory for case in plan.simulated if case.scenario == "ring" and case.severity == severity]
+        for severity in (0, 5)
+    )
+    assert low == high
+    assert all(path.start_m[0] < 0.3 for path in high)
+
+
+GATE = """name: gate
+base: {scene: closet, rig: {pitch_deg: 0}, trajectory: {kind: stop_and_go, legs_m: [0.5], mover: unicycle,
+  start_m: [1, 2], start_heading_deg: 90}}
+severity: [{}, {}, {}, {}, {}, {scene_changes: {materials: {lead: {pattern: plain, albedo: 0.1}}, boards: [{name: gate,
+  center_m: [1, 3.5, 0.5], size_m: [0.8, 1], yaw_deg: -90, material: lead}]}}]
+"""
+KEEPS_GATE = ", keep: {gate: [trajectory, props]}"
+
+
+def test_props_that_a_scenario_keeps_stay_where_they_are_relative_to_its_path(weather_plan, tmp_path):
+    write_cell(tmp_path / "scenes" / "yard", HALL, name="yard")
+    (tmp_path / "suites" / "scenarios" / "gate.yaml").write_text(GATE)
+    cases = [
+        case
+        for case in weather_plan(KEEPS_GATE, scenarios="gate: [0, 5], mist: [1]").simulated
+        if case.scenario == "gate"
+    ]
+    assert [len(case.scene.boards) for case in cases] == [0, 0, 1, 1]
+    for open_case, gated in zip(cases[:2], cases[2:], strict=True):
+        path, (board,) = gated.trajectory, gated.scene.boards
+        ahead = np.array([np.cos(np.radians(path.start_heading_deg)), np.sin(np.radians(path.start_heading_deg))])
+        np.testing.assert_allclose(np.array(board.center_m[:2]) - path.start_m, 1.5 * ahead, atol=1e-9)
+        assert board.yaw_deg - path.start_heading_deg == pytest.approx(-180)
+        assert gated.trajectory == open_case.trajectory
+        assert replace(gated.scene, boards=(), materials={}) == open_case.scene
+
+
+def test_a_scenario_with_props_leaves_its_place_only_if_it_keeps_them(weather_plan, tmp_path):
+    (tmp_path / "suites" / "scenarios" / "gate.yaml").write_text(GATE)
+    with pytest.raises(SuiteError, match="its severities change its own place"):
+        weather_plan(", keep: {gate: [trajectory]}", scenarios="gate: [0, 5], mist: [1]")
+    with pytest.raises(SuiteError, match="should also keep the trajectory of gate"):
+        weather_plan(", keep: {gate: [props]}", scenarios="gate: [0, 5], mist: [1]")
+
+
+def test_free_starts_are_looked_for_only_for_scenarios_that_keep_their_trajectory(weather_plan, monkeypatch):
+    def refuse(*_):
+        raise AssertionError
+
+    monkeypatch.setattr(clearance, "place_clearance", refuse)
+    assert weather_plan(", places: {smog: [yard]}").simulated
 
 
 @pytest.mark.parametrize(

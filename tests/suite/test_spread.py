@@ -7,7 +7,7 @@ import pytest
 from vobench.errors import SettingError, SuiteError
 from vobench.suite.scene_entry import drawn_lighting
 from vobench.suite.scene_spec import LIGHTINGS
-from vobench.suite.spread import Dealer, Spread, changes_for_units, units
+from vobench.suite.spread import Dealer, Spread, Unit, changes_for_units, units
 
 VARIANTS = {"scene": [f"flat.{k}" for k in range(1, 7)], "trajectory": ["tour.1", "tour.2", "tour.3"]}
 
@@ -185,3 +185,50 @@ def test_who_gets_which_units_does_not_depend_on_how_many_runs_each_treatment_ha
 def test_where_all_places_are_of_one_kind_it_does_not_matter() -> None:
     of_one_kind = Dealer(units(Spread(units=12), VARIANTS), 3, seed=1).deal()
     assert len({unit.place for unit in of_one_kind}) == 3
+
+
+# --- Treatments that do not fit everywhere ---
+
+
+def in_small_flats(unit: Unit) -> bool:
+    """Whether a unit is in one of the flats 1 to 4 of six."""
+    return unit.place in {f"flat.{k}" for k in range(1, 5)}
+
+
+def test_a_treatment_gets_only_units_that_it_fits_and_the_others_stay_balanced() -> None:
+    dealer = Dealer(units(Spread(units=12), VARIANTS), 3, seed=1)
+    load = Counter[str]()
+    for number in range(20):
+        is_picky = number % 4 == 0
+        dealt = dealer.deal(fits=in_small_flats if is_picky else None)
+        assert len({unit.place for unit in dealt}) == 3
+        assert not is_picky or all(in_small_flats(unit) for unit in dealt)
+        load.update(unit.name for unit in dealt)
+    assert max(load.values()) - min(load.values()) <= 1
+
+
+def test_a_treatment_that_fits_everywhere_gets_the_units_of_one_that_does_not_ask() -> None:
+    made = units(Spread(units=12), VARIANTS)
+    asking, other = Dealer(made, 3, seed=1), Dealer(made, 3, seed=1)
+    for _ in range(8):
+        assert asking.deal(fits=lambda _: True) == other.deal()
+
+
+def test_whether_a_treatment_fits_is_asked_about_no_more_units_than_needed() -> None:
+    asked = []
+
+    def fits(unit: Unit) -> bool:
+        asked.append(unit.name)
+        return in_small_flats(unit)
+
+    dealt = Dealer(units(Spread(units=12), VARIANTS), 3, seed=2).deal(fits=fits)
+    assert len(asked) == len(set(asked))
+    assert len(asked) <= 3 + 4  # of the 12 units, 4 are in flats 5 and 6
+    assert asked[-1] in {unit.name for unit in dealt}
+
+
+def test_too_few_units_that_a_treatment_fits_are_one_line_of_error() -> None:
+    dealer = Dealer(units(Spread(units=12), VARIANTS), 3, seed=1)
+    few = "runs each scenario in 3 units, but the path that it keeps has a free start in only 2 of 12; raise the seeds"
+    with pytest.raises(SuiteError, match=few):
+        dealer.deal(fits=lambda unit: unit.place == "flat.2")

@@ -17,6 +17,7 @@ from vobench.sensor.image_sensor import CameraDifference, CameraDifferences, Cam
 from vobench.sensor.imu import FLAWLESS
 from vobench.sensor.response import FULL_SCALE_DN, linear_of_grey
 from vobench.suite.case import Case
+from vobench.suite.floor_finish import FLOOR
 from vobench.suite.scene_check import materials_used
 from vobench.suite.scene_entry import generated_scene
 from vobench.suite.scene_spec import (
@@ -296,7 +297,8 @@ def _with_materials(change: MaterialChange) -> Change:
             replacement = change(name, defined)
             if replacement is not None and replacement != defined:
                 materials[name] = replacement
-        return replace(case, scene=replace(scene, materials=materials))
+        floor = scene.floor and change(FLOOR, scene.floor)
+        return replace(case, scene=replace(scene, materials=materials, floor=floor))
 
     return changed
 
@@ -345,6 +347,12 @@ def _with_strong_texture(name: str, defined: MaterialSpec | None) -> MaterialSpe
         albedo = min(defined.albedo, STRONG_ALBEDO)
         return replace(defined, pattern="poster", contrast=STRONG_CONTRAST, tile_m=STRONG_TILE_M, albedo=albedo)
     return defined
+
+
+def _with_texture(case: Case) -> Case:
+    """Strong patterns on plain and faint surfaces, and no paint over any."""
+    bare = replace(case, scene=replace(case.scene, paint=None))
+    return _with_materials(_with_strong_texture)(bare)
 
 
 # --- Light ---
@@ -438,7 +446,7 @@ NUISANCES = (
     Nuisance("fog", "clear air", _without_fog),
     Nuisance("rain", "dry air over dry ground", _without_rain),
     Nuisance("wind", "leaves that stand still", _without_wind),
-    Nuisance("low texture", "strong patterns on faint surfaces", _with_materials(_with_strong_texture)),
+    Nuisance("low texture", "strong patterns on faint surfaces", _with_texture),
     Nuisance(
         "low light",
         "four times the light, exposed as before",

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import scipy
-from annotated_types import MaxLen, MinLen
+from annotated_types import Ge, Le, MaxLen, MinLen
 from numpy.typing import ArrayLike
 
 from vobench.errors import MotionError
@@ -153,12 +153,17 @@ Poses = Annotated[tuple[Pose, ...], MinLen(FEWEST), MaxLen(MOST_POINTS)]
 
 @settings()
 class PoseSpline:
-    """A smooth path through poses at given times; with ease_s from rest to rest."""
+    """A smooth path through poses at given times; with ease_s from rest to rest.
+
+    With `start_seed`, all poses are moved and turned about the vertical together, so that a robot on the path keeps
+    clear of everything in its place (module `free_start`).
+    """
 
     kind: Literal["pose_spline"] = "pose_spline"
     poses: Poses
     ease_s: NonNegative = 0.0
     rate_hz: Rate = 30.0
+    start_seed: Annotated[int, Ge(0), Le(2**31 - 1)] | None = None
     mount: Mount | None = None
 
     def motion(self) -> CurveMotion:

@@ -20,16 +20,18 @@ from vobench.motion.controller import MOST_FRAMES, ControllerSettings
 from vobench.motion.course import Planar, Unled, rolled
 from vobench.motion.disturbance import DISTURBANCE_STREAMS, Generators
 from vobench.motion.drive import Drive, Waypoints, follow, led_by, options
+from vobench.motion.free_start import Startable, habits_of
 from vobench.motion.handheld import Handheld
 from vobench.motion.pioneer import Theta, feed_forward
 from vobench.motion.replay import Replay
 from vobench.motion.wander import Wander
 from vobench.motion.wheeled import Wheeled
 from vobench.rendering.geometry import RayCaster
-from vobench.runner.wander import at_free_start, wander_motion
+from vobench.runner.wander import wander_motion
 from vobench.scene.scene import Scene
 from vobench.scene.triangles import Thing, Triangles, triangle_table
 from vobench.suite.case import Case
+from vobench.suite.clearance import at_free_start, column_on_wheels_m
 from vobench.suite.plan import Plan
 from vobench.suite.trajectory import TrajectorySpec, depends_on_place
 from vobench.suite.yaml_file import checked
@@ -102,8 +104,9 @@ def body_motion(case: Case) -> BodyMotion:
 
 def _whole_motion(case: Case) -> BodyMotion:
     spec = case.trajectory
-    if isinstance(spec, Planar) and spec.start_seed is not None:
-        spec = at_free_start(case, spec)
+    if isinstance(spec, Startable) and spec.start_seed is not None:
+        column_m = column_on_wheels_m(case.build_rig(), habits_of(spec))
+        spec = at_free_start(spec, case.scene, column_m)
     if isinstance(spec, Wheeled):
         if not isinstance(spec, Waypoints) and spec.mover != "pioneer":
             return _rolling(spec)

@@ -17,10 +17,14 @@ FLOOR_SHARE = 0.4  # the smallest area of the floor, relative to the largest lev
 
 @dataclass(frozen=True, slots=True)
 class LevelFloor:
-    """The floor of a scene: its height, and the corners (F, 3, 3) of its faces."""
+    """The floor of a scene: its height, and the corners (N, 3, 3) of its faces.
+
+    `is_floor` (F,) says which of the faces of the scene they are.
+    """
 
     height_m: float
     corners_m: Array
+    is_floor: Mask
 
 
 def level_floor(faces: Triangles) -> LevelFloor | None:
@@ -40,7 +44,9 @@ def level_floor(faces: Triangles) -> LevelFloor | None:
     height_m = float((large_steps[0] + lowest_step) * FLOOR_STEP_M)
 
     is_at_height = np.abs(steps * FLOOR_STEP_M - height_m) < FLOOR_STEP_M
-    return LevelFloor(height_m, corners_m[is_at_height])
+    is_floor = is_level.copy()
+    is_floor[is_level] = is_at_height
+    return LevelFloor(height_m, corners_m[is_at_height], is_floor)
 
 
 def floor_height_m(faces: Triangles) -> float | None:

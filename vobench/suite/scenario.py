@@ -9,15 +9,18 @@ from typing import Annotated, Any
 from annotated_types import MaxLen, MinLen
 
 from vobench.errors import Mistake, SuiteError
-from vobench.motion.course import Planned
+from vobench.motion.free_start import Startable
 from vobench.scene.fog import Fog
+from vobench.scene.paint import Paint
 from vobench.scene.rain import Rain
 from vobench.scene.wind import Wind
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.setting import Name, merged_over, settings
 from vobench.suite import yaml_file
 from vobench.suite.axis import AXES, Camera, RigSettings
+from vobench.suite.props import Props
 from vobench.suite.scene_lighting import LAMPS, Lighting
+from vobench.suite.scene_spec import MaterialSpec
 from vobench.suite.trajectory import TrajectorySpec
 
 MOST_SEVERE = 5
@@ -42,21 +45,24 @@ class Setup:
 
 
 @settings()
-class Weather:
-    """What the severities of a scenario change if they change the weather alone."""
+class CommonChanges:
+    """Changes of a scene that are possible in every place: of its weather, and of its surfaces."""
 
     fog: Fog | None = None
     rain: Rain | None = None
     wind: Wind | None = None
+    floor: MaterialSpec | None = None
+    paint: Paint | None = None
 
     @property
-    def changes(self) -> dict[str, Any]:
-        """The weather that there is, by its key in a scene."""
-        by_key = {key: getattr(self, key) for key in WEATHER_KEYS}
-        return {key: weather for key, weather in by_key.items() if weather is not None}
+    def by_key(self) -> dict[str, Any]:
+        """The changes that there are, by their key in a scene."""
+        changes = {key: getattr(self, key) for key in COMMON_KEYS}
+        return {key: change for key, change in changes.items() if change is not None}
 
 
-WEATHER_KEYS = tuple(each.name for each in fields(Weather))
+COMMON_KEYS = tuple(each.name for each in fields(CommonChanges))
+PROP_KEYS = tuple(each.name for each in fields(Props))
 
 
 @settings()
@@ -79,13 +85,15 @@ class ScenarioFile:
 class Scenario:
     """A scenario: its name, its file, and the setup of each severity from 0.
 
-    `weathers` has the weather of each severity, if nothing else of the scene changes; otherwise it is empty.
+    `common_changes`, `props` and `other_changes` are the three parts of what each severity changes of the scene.
     """
 
     name: str
     path: Path
     setups: tuple[Setup, ...]
-    weathers: tuple[Weather, ...] = ()
+    common_changes: tuple[CommonChanges, ...]
+    props: tuple[Props, ...]
+    other_changes: tuple[dict[str, Any], ...]
 
     @property
     def suits_any_place(self) -> bool:
@@ -99,16 +107,21 @@ class Scenario:
     def suits_named_places(self) -> bool:
         """Whether it can be combined with scenes and trajectories that somebody chose for it.
 
-        Of place, light and drive, its severities then change only what all have: the weather, the level of all lamps,
-        and the rate of the images.
+        Of place, light and drive, its severities then change only what all have: the weather, the surfaces, the level
+        of all lamps, and the rate of the images.
         """
         return all(self._changes_what_places_have(key) for key in self._changed_place_keys)
 
-    def _changes_what_places_have(self, key: str) -> bool:
-        """Whether severities change a key of place and drive only in what all places and drives have."""
+    def _changes_what_places_have(self, key: str, *, keeps_props: bool = False) -> bool:
+        """Whether severities change a key of place and drive only in what all places and drives have.
+
+        With `keeps_props`, all places have the props of the scenario.
+        """
+        has_other_changes = any(changes != self.other_changes[0] for changes in self.other_changes)
+        has_other_props = any(props != self.props[0] for props in self.props)
         is_common = {
             "scene": False,
-            "scene_changes": bool(self.weathers),
+            "scene_changes": not has_other_changes and (keeps_props or not has_other_props),
             "lighting": self._changes_only_lamps,
             "trajectory": self._changes_only_rate,
         }
@@ -126,16 +139,15 @@ class Scenario:
         base = self.setups[0].trajectory
         return all(replace(setup.trajectory, rate_hz=base.rate_hz) == base for setup in self.setups)
 
-    @property
-    def suits_places_with_its_drive(self) -> bool:
-        """Whether it can be driven on its own trajectory in other places.
+    def suits_places_with_its_drive(self, *, keeps_props: bool) -> bool:
+        """Whether it can be driven on its own trajectory in other places, with its props if it `keeps_props`.
 
-        The trajectory is then one of given shape on wheels, whose start is drawn, and of place and light its severities
+        The trajectory is then one of given shape, whose start is drawn, and of place and light its severities
         change only what all places have.
         """
-        is_planned = all(isinstance(setup.trajectory, Planned) for setup in self.setups)
+        is_startable = all(isinstance(setup.trajectory, Startable) for setup in self.setups)
         other_keys = [key for key in self._changed_place_keys if key != "trajectory"]
-        return is_planned and all(self._changes_what_places_have(key) for key in other_keys)
+        return is_startable and all(self._changes_what_places_have(key, keeps_props=keeps_props) for key in other_keys)
 
     def lamps(self, severity: int) -> Lighting:
         """What the lighting of a severity says of all lamps."""
@@ -227,20 +239,33 @@ def read_scenario(path: Path, replaced: Mapping[str, Any] = MappingProxyType({})
     # The changes are applied to the base as written, so that they can change single keys of its sections.
     written_base = {**source.plain["base"], **replaced}
     setups: list[Setup] = []
-    weathers: list[Weather] = []
+    common_changes: list[CommonChanges] = []
+    props: list[Props] = []
+    other_changes: list[dict[str, Any]] = []
     mistakes: list[Mistake] = []
     for severity, changes in enumerate(scenario_file.severity):
         place = source.place(("severity", severity))
         merged = merged_over(written_base, changes)
         try:
             setup = yaml_file.checked_section(Setup, merged, place)
-            if setup.scene_changes.keys() <= set(WEATHER_KEYS):
-                weathers.append(yaml_file.checked_section(Weather, setup.scene_changes, place))
+            changes_of_scene = setup.scene_changes
+            common = {key: value for key, value in changes_of_scene.items() if key in COMMON_KEYS}
+            around_path = {key: value for key, value in changes_of_scene.items() if key in PROP_KEYS}
+            common_changes.append(yaml_file.checked_section(CommonChanges, common, place))
+            props.append(yaml_file.checked_section(Props, around_path, place))
         except SuiteError as error:
             mistakes += error.mistakes
         else:
             setups.append(setup)
+            known_keys = common.keys() | around_path.keys()
+            other_changes.append({key: value for key, value in changes_of_scene.items() if key not in known_keys})
     if mistakes:
         raise SuiteError(*mistakes)
-    only_weather = len(weathers) == len(setups)
-    return Scenario(scenario_file.name, path, tuple(setups), tuple(weathers) if only_weather else ())
+    return Scenario(
+        scenario_file.name,
+        path,
+        tuple(setups),
+        tuple(common_changes),
+        tuple(props),
+        tuple(other_changes),
+    )

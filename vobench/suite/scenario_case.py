@@ -2,17 +2,19 @@
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
-from vobench.errors import SuiteError
+from vobench.errors import MotionError, SuiteError
 from vobench.geometry.rig import Level
-from vobench.motion.course import Planned
+from vobench.motion.free_start import Relocation, Startable, habits_of, joined_floor_use, start_of
 from vobench.motion.replay import Replay
 from vobench.suite import scene_file, scene_lighting
 from vobench.suite.axis import RigSettings
 from vobench.suite.case import Case
 from vobench.suite.lookup import Lookup
+from vobench.suite.props import Props
 from vobench.suite.scenario import DEFAULT_CAMERA, Scenario, Setup, read_scenario
 from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_lighting import Lighting
@@ -26,12 +28,16 @@ from vobench.suite.yaml_source import Mistakes
 
 @dataclass(frozen=True, slots=True)
 class _Drive:
-    """A trajectory with its name as a variant, the name of its unit, and the poses that it replays, as TUM text."""
+    """A trajectory with its name as a variant, the name of its unit, and the poses that it replays, as TUM text.
+
+    `props` are those of the scenario around it, None if it has none with it.
+    """
 
     name: str
     trajectory: TrajectorySpec
     unit: str
     replayed: str | None = None
+    props: Props | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +92,7 @@ class ScenarioCases:
         if spread is None or name in spread.own_place:
             return False
         if "trajectory" in self._kept_by(name):
-            if not scenario.suits_places_with_its_drive:
+            if not scenario.suits_places_with_its_drive(keeps_props="props" in self._kept_by(name)):
                 raise SuiteError(
                     "spread.keep says that it keeps its trajectory, which has no free start, or its severities change "
                     "its own place or single lights"
@@ -165,31 +171,38 @@ class ScenarioCases:
         All severities have the same units, so that they can be compared.
         """
         runs = sum(len(self._calibration_levels(severity)) for severity in severities)
-        chosen = dealer.deal(runs, kinds)
-        keeps_trajectory = "trajectory" in self._kept_by(scenario.name)
-        if not keeps_trajectory:
+        drives = dict[tuple[str, int], _Drive]()  # by the name of the unit and the severity
+        if "trajectory" in self._kept_by(scenario.name):
+
+            def fits(unit: Unit) -> bool:
+                """Whether the scenario can keep its trajectory in a unit; its drives there are added to `drives`."""
+                own_drives = self._own_drives(scenario, severities, dealer, unit)
+                drives.update({(unit.name, severity): drive for severity, drive in own_drives.items()})
+                return bool(own_drives)
+
+            chosen = dealer.deal(runs, kinds, fits)
+        else:
+            chosen = dealer.deal(runs, kinds)
             self._require_free_mounts(scenario, chosen)
-        for severity in severities:
+            for unit, severity in product(chosen, severities):
+                drives[unit.name, severity] = self._drive_of_suite(scenario, severity, unit)
+        for severity, unit in product(severities, chosen):
             rig = scenario.setups[severity].rig.read(self._folder_of_rig(scenario))
-            for unit in chosen:
-                scene_name = self._variant(unit, "scene")
-                if keeps_trajectory:
-                    start_seed = self.suite.base_seed + 1 + dealer.units.index(unit)
-                    drive = self._own_drive(scenario, severity, scene_name, start_seed)
-                else:
-                    drive = self._drive_of_suite(scenario, severity, unit)
-                variant = scenario.variant_names(severity, scene_name)
-                yield from self._cases(
-                    scenario,
-                    severity,
-                    scene=_in_weather(self.axes["scene"][scene_name], scenario, severity),
-                    lighting=scenario.lamps(severity),
-                    trajectory=drive.trajectory,
-                    replayed=drive.replayed,
-                    variant={**variant, "scene": scene_name, "trajectory": drive.name},
-                    rig=rig.mounted_on(drive.trajectory),
-                    unit=drive.unit,
-                )
+            scene_name = self._variant(unit, "scene")
+            drive = drives[unit.name, severity]
+            variant = scenario.variant_names(severity, scene_name)
+            scene = _with_common_changes(self.axes["scene"][scene_name], scenario, severity)
+            yield from self._cases(
+                scenario,
+                severity,
+                scene=drive.props.in_scene(scene) if drive.props else scene,
+                lighting=scenario.lamps(severity),
+                trajectory=drive.trajectory,
+                replayed=drive.replayed,
+                variant={**variant, "scene": scene_name, "trajectory": drive.name},
+                rig=rig.mounted_on(drive.trajectory),
+                unit=drive.unit,
+            )
 
     def _drive_of_suite(self, scenario: Scenario, severity: int, unit: Unit) -> _Drive:
         """The trajectory of a unit at the rate of a severity."""
@@ -197,13 +210,51 @@ class ScenarioCases:
         drive_name, trajectory = scenario.in_drive(severity, name, self.axes["trajectory"][name])
         return _Drive(drive_name, trajectory, unit.name, self.replayed.get(name))
 
-    def _own_drive(self, scenario: Scenario, severity: int, scene_name: str, start_seed: int) -> _Drive:
-        """The trajectory of a scenario at a severity from a free start in a scene."""
-        own = scenario.setups[severity].trajectory
-        assert isinstance(own, Planned)
-        name = scenario.variant_names(severity, scene_name)["trajectory"]
-        start = f"start.{start_seed}"
-        return _Drive(f"{name}.{start}", replace(own, start_seed=start_seed), f"{scene_name}-{start}")
+    def _own_drives(
+        self, scenario: Scenario, severities: Sequence[int], dealer: Dealer, unit: Unit
+    ) -> dict[int, _Drive]:
+        """The trajectories of a scenario by severity from a free start in the place of a unit.
+
+        They are empty if there is no such start. It is free for the rigs and the props of all the severities, so that
+        it does not depend on the severity.
+        """
+        from vobench.suite.clearance import at_free_start  # slow to import, and most suites need no free start
+
+        scene_name = self._variant(unit, "scene")
+        column_m = max(self._column_m(scenario, severity) for severity in severities)
+        all_props = [scenario.props[severity] for severity in severities] if self._keeps_props(scenario) else []
+        floor_use = joined_floor_use(props.floor_use for props in all_props)
+        start_seed = self.suite.base_seed + 1 + dealer.units.index(unit)
+        suffix = f"start.{start_seed}"
+
+        drives = dict[int, _Drive]()
+        for severity in severities:
+            own = scenario.setups[severity].trajectory
+            assert isinstance(own, Startable)
+            drawn = replace(own, start_seed=start_seed)
+            try:
+                trajectory = at_free_start(drawn, self.axes["scene"][scene_name], column_m, floor_use)
+            except MotionError:
+                return {}
+            props = None
+            if self._keeps_props(scenario):
+                props = scenario.props[severity].relocated(Relocation(start_of(own), start_of(trajectory)))
+            name = scenario.variant_names(severity, scene_name)["trajectory"]
+            drives[severity] = _Drive(f"{name}.{suffix}", trajectory, f"{scene_name}-{suffix}", props=props)
+        return drives
+
+    def _column_m(self, scenario: Scenario, severity: int) -> float:
+        """The height above the floor that has to be free for the robot and the rig of a severity."""
+        from vobench.suite.clearance import column_on_wheels_m
+
+        trajectory = scenario.setups[severity].trajectory
+        assert isinstance(trajectory, Startable)
+        rig = scenario.setups[severity].rig.read(self._folder_of_rig(scenario)).mounted_on(trajectory)
+        return column_on_wheels_m(rig.build(), habits_of(trajectory))
+
+    def _keeps_props(self, scenario: Scenario) -> bool:
+        """Whether a scenario takes its props to other places."""
+        return "props" in self._kept_by(scenario.name)
 
     def _variant(self, unit: Unit, axis: UnitAxis) -> str:
         """The variant of a unit on an axis. An axis over which nothing is spread has only one."""
@@ -311,11 +362,9 @@ def _exposed_for_any_place(scenario: Scenario) -> Scenario:
     return replace(scenario, setups=tuple(setups))
 
 
-def _in_weather(scene: SceneFile, scenario: Scenario, severity: int) -> SceneFile:
-    """A scene of the suite in the weather of a severity, or as it is if the scenario does not change the weather."""
-    if not scenario.weathers:
-        return scene
-    return replace(scene, **scenario.weathers[severity].changes)
+def _with_common_changes(scene: SceneFile, scenario: Scenario, severity: int) -> SceneFile:
+    """A scene of the suite with those changes of a severity that are possible in every place."""
+    return replace(scene, **scenario.common_changes[severity].by_key)
 
 
 def _replayed_poses(setup: Setup, folder: Path) -> str | None:

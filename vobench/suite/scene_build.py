@@ -26,8 +26,10 @@ from vobench.scene.generated_place import GeneratedPlace
 from vobench.scene.light import AreaLight, Light, PointLight, Sky, SpotLight, Sun
 from vobench.scene.material import LUMINANCE, WHITE, Material, emitted_cd_m2
 from vobench.scene.mesh import face_corners, moved
+from vobench.scene.paint import painted
 from vobench.scene.scene import Scene
 from vobench.scene.triangles import Thing
+from vobench.suite.floor_finish import FLOOR, with_floor
 from vobench.suite.scene_check import materials_used
 from vobench.suite.scene_entry import described_scene
 from vobench.suite.scene_file import scene_content
@@ -84,7 +86,8 @@ class Contents:
 
 def _scene(spec: SceneFile) -> Scene:
     """The scene in the light of its file. Things with an emissive material become lights."""
-    whole = _generated(spec) if spec.generated else _described(spec)
+    whole = _joined([_generated(spec), *_props(spec)]) if spec.generated else _described(spec)
+    whole = _finished(whole, spec)
 
     emissive = {name for name, material in whole.materials.items() if emitted_cd_m2(material).max() > 0}
     luminous_things = [thing for thing in whole.things if thing.material in emissive]
@@ -103,6 +106,18 @@ def _scene(spec: SceneFile) -> Scene:
     if scene.rain and not any(isinstance(light, Sky) for light in scene.lights):
         raise SuiteError(f"{scene.name}: rain falls from a sky, and the scene has none")
     return scene if spec.scale == 1 else scripted.sized(scene, spec.scale)
+
+
+def _finished(whole: Contents, spec: SceneFile) -> Contents:
+    """The contents with the floor of the spec, and under its paint. Raises SuiteError if a floor is missing."""
+    if spec.floor:
+        whole = replace(
+            whole, things=with_floor(whole.things), materials={**whole.materials, FLOOR: spec.floor.build()}
+        )
+    if spec.paint:
+        materials = {name: painted(material, spec.paint) for name, material in whole.materials.items()}
+        whole = replace(whole, materials=materials)
+    return whole
 
 
 def _described(spec: SceneFile) -> Contents:
@@ -202,6 +217,18 @@ def _generated(spec: SceneFile) -> Contents:
         Path(spec.generator), seed=spec.generated.seed, lighting=spec.generated.lighting, scene_name=spec.name
     )
     return Contents(tuple(place.things), place.materials, tuple(place.lights))
+
+
+PROP = "prop."  # before the names of materials of props, since a generator may use any other name
+
+
+def _props(spec: SceneFile) -> Iterator[Contents]:
+    """The boards and movers that a scenario puts into a place of a generator."""
+    boards = _room_and_furniture(spec)
+    things = tuple(replace(thing, material=PROP + thing.material) for thing in boards.things)
+    yield Contents(things, {PROP + name: material for name, material in boards.materials.items()})
+    for mover in spec.movers:
+        yield _mover(mover, spec)
 
 
 @contextmanager

@@ -25,6 +25,7 @@ from vobench.scene.light import (
     require_increasing,
 )
 from vobench.scene.material import LUMINANCE, WHITE, Material, Rgb
+from vobench.scene.paint import Paint
 from vobench.scene.rain import Rain
 from vobench.scene.scene import ceiling_light
 from vobench.scene.wind import Wind
@@ -458,6 +459,8 @@ class SceneFile:
     It contains a room, boxes, boards, furniture, models, and what the Python file `maker` creates. Paths are relative
     to the scene's file. `seed` determines the random details of furniture and makers. `scale` multiplies all lengths.
 
+    `floor` replaces the material of the level floor, and `paint` covers all bodies.
+
     The Python file `generator` creates places for suites that name this scene with a seed. `generated` is such a place;
     it contains nothing else that the file describes.
     """
@@ -482,6 +485,8 @@ class SceneFile:
     fog: Fog | None = None
     rain: Rain | None = None
     wind: Wind | None = None
+    floor: MaterialSpec | None = None
+    paint: Paint | None = None
     movers: tuple[MoverSpec, ...] = ()
 
     def __post_init__(self) -> None:

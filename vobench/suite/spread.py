@@ -1,7 +1,7 @@
 """Designs that spread the scenarios or settings of a suite over units: places, drives, or drives in places."""
 
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 from math import ceil
@@ -14,7 +14,7 @@ from vobench.errors import SettingError, SuiteError
 from vobench.setting import settings
 
 UnitAxis = Literal["scene", "trajectory"]
-KeptKey = Literal["rig", "camera", "trajectory"]
+KeptKey = Literal["rig", "camera", "trajectory", "props"]
 UNIT_AXES: tuple[UnitAxis, ...] = ("scene", "trajectory")
 SPREAD_STREAM = 2_917  # separates the draw of units from the other random streams of a seed
 MOST_UNITS = 10_000
@@ -35,7 +35,9 @@ class Spread:
     `places` maps a scenario to the scenes that it is spread over, such as {rain: [street, park]}. Scenarios of the
     weather, or with a lighting of their own, are spread only if they are listed here.
     `keep` maps a scenario to what it keeps of its own, such as {spin_in_place: [trajectory, camera]}, where the suite's
-    replaces that of other scenarios. A trajectory that is kept starts where the place is free.
+    replaces that of other scenarios. A trajectory that is kept starts where the place is free, and the scenario runs
+    only in places where there is such a start. `props` are boards and movers, which stay where they are relative to
+    that trajectory.
 
     In a suite without scenarios, the combinations of the other axes are spread instead. All estimators run in the same
     units.
@@ -54,6 +56,9 @@ class Spread:
             raise SettingError(f"is for designs over scenes (over is {list(self.over)})", "places")
         if self.pairs and set(self.over) != set(UNIT_AXES):
             raise SettingError(f"are for designs over scene and trajectory (over is {list(self.over)})", "pairs")
+        for scenario, kept in (self.keep or {}).items():
+            if "props" in kept and "trajectory" not in kept:
+                raise SettingError(f"should also keep the trajectory of {scenario}, which its props are around", "keep")
         if len(set(self.over)) != len(self.over):
             raise SettingError(f"should name each axis once (got {list(self.over)})", "over")
 
@@ -219,10 +224,18 @@ class Dealer:
             raise SuiteError(f"spread runs each scenario in {self.each} units, but there are {len(self.units)}")
         self._rng = np.random.default_rng([self.seed, SPREAD_STREAM])
 
-    def deal(self, runs: int = 1, kinds: Collection[str] | None = None) -> list[Unit]:
+    def deal(
+        self,
+        runs: int = 1,
+        kinds: Collection[str] | None = None,
+        fits: Callable[[Unit], bool] | None = None,
+    ) -> list[Unit]:
         """The units of the next treatment. The treatment has `runs` runs in each of its units.
 
         `kinds` are the kinds of places in which its units are; by default, all.
+        `fits` says whether the treatment can run in a unit; by default, it can run in all. It may be slow, so it is
+        asked only about units that would be chosen.
+
         Raises SuiteError if there are fewer than `each` such units.
         """
         order = self._rng.permutation(len(self.units)).tolist()
@@ -232,6 +245,7 @@ class Dealer:
         if len(candidates) < self.each:
             listed = ", ".join(kinds or ())
             raise SuiteError(f"spread runs each scenario in {self.each} units, but {listed} has {len(candidates)}")
+        available = len(candidates)
         chosen = list[Unit]()
         chosen_by_kind = Counter[str]()
         chosen_by_place = Counter[str]()
@@ -244,9 +258,13 @@ class Dealer:
             penalised_runs = self._runs_by_unit[unit.name] + penalty
             return penalised_runs, chosen_of_kind, chosen_of_place, self._runs_of_variants(unit)
 
-        for _ in range(self.each):
+        while len(chosen) < self.each:
+            if not candidates:
+                raise SuiteError(_misfit_sentence(len(chosen), available, self.each))
             unit = min(candidates, key=priority)
             candidates.remove(unit)
+            if fits is not None and not fits(unit):
+                continue
             chosen.append(unit)
             chosen_by_kind[unit.kind] += 1
             chosen_by_place[unit.place] += 1
@@ -258,6 +276,14 @@ class Dealer:
     def _runs_of_variants(self, unit: Unit) -> int:
         """The number of runs so far in the place of a unit plus the number of runs so far of its drive."""
         return sum(self._runs_by_variant[variant] for variant in unit.by_axis.items())
+
+
+def _misfit_sentence(fitting: int, available: int, each: int) -> str:
+    """The message for a scenario that fits into fewer units than it should run in."""
+    return (
+        f"spread runs each scenario in {each} units, but the path that it keeps has a free start in only {fitting} of "
+        f"{available}; raise the seeds of the scenes, name larger ones in places, or add it to own_place"
+    )
 
 
 def changes_for_units(suite: Mapping[str, Any], count: int) -> dict[str, str]:

@@ -8,8 +8,9 @@ from pydantic import ValidatorFunctionWrapHandler, WrapSerializer, WrapValidator
 
 from vobench.errors import SettingError, SuiteError, TrajectoryError
 from vobench.geometry import se3
-from vobench.motion.course import Planar, Planned
+from vobench.motion.course import Planar
 from vobench.motion.drive import Waypoints
+from vobench.motion.free_start import Startable
 from vobench.motion.handheld import Handheld
 from vobench.motion.quadrotor import Quadrotor
 from vobench.motion.rail import Rail
@@ -42,7 +43,7 @@ MOVER_SPECIFIC_KEYS = set[str]().union(*MOVER_KEYS.values())
 
 def depends_on_place(spec: AnyTrajectory) -> bool:
     """Whether the motion depends on the place, because a free path or a free start is looked for there."""
-    return isinstance(spec, Wander) or (isinstance(spec, Planned) and spec.start_seed is not None)
+    return isinstance(spec, Wander) or (isinstance(spec, Startable) and spec.start_seed is not None)
 
 
 def known_keys(spec: Wheeled) -> set[str]:
