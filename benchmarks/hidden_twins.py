@@ -199,7 +199,7 @@ class Found:
         return [low <= real <= high for _, _, low, high, real in self.estimators]
 
 
-def examine(hidden: Hidden, out: Path, placements: int) -> Found:
+def examine(hidden: Hidden, out: Path, placements: int, place: str | None) -> Found:
     """Simulate and export a recording, fit its pair, and make its twin; what was found before is read again."""
     file = out / hidden.name / "found.json"
     if file.is_file():
@@ -209,7 +209,7 @@ def examine(hidden: Hidden, out: Path, placements: int) -> Found:
 
     twin = out / hidden.name / "twin"
     command = [sys.executable, "-m", "vobench", "twin", str(recording), "--form", hidden.form, "--out", str(twin)]
-    command += ["--place", hidden.domain.twin_place, "--placements", str(placements), "--json"]
+    command += ["--place", place or hidden.domain.twin_place, "--placements", str(placements), "--json"]
     for estimator in ESTIMATORS:
         command += ["-e", estimator]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -341,6 +341,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=8)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--images", type=int, default=40)
+    parser.add_argument("--place", help="of the twins, instead of a place of the same kind")
     parser.add_argument("--placements", type=int, default=2)
     parser.add_argument("--again", action="store_true", help="print tau of two simulations of each recording instead")
     options = parser.parse_args()
@@ -352,7 +353,7 @@ def main() -> None:
     all_found = []
     for index in range(options.recordings):
         hidden = draw_recording(index, options.seed, options.images)
-        found = examine(hidden, options.out, options.placements)
+        found = examine(hidden, options.out, options.placements, options.place)
         _print(hidden, found)
         all_found.append(found)
     _print_summary(all_found)

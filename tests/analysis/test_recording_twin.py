@@ -130,6 +130,24 @@ def test_a_folder_without_a_suite_is_a_sentence(tmp_path: Path) -> None:
         recording_twin.read_twin_suite(tmp_path)
 
 
+def test_the_rebuilt_place_is_as_near_as_the_recording_everywhere(recorded_case, tmp_path, monkeypatch) -> None:
+    fit_in_few_steps(monkeypatch, tmp_path / "cache")
+    suite = write_twin_suite(
+        recorded_case, out=tmp_path / "twin", place="recorded", placements=2, estimators=list(RANKED)
+    )
+    first, second = suite.placed
+    assert first == second
+    assert first.title == "the recorded place"
+    assert first.placement.misfit < 0.1
+    assert first.placement.nearness < 1.3
+    assert PlacedPath.of_dict(json.loads(json.dumps(first.as_dict()))).scene() == first.scene()
+
+    # Both twins are in one place, with calibration errors of which the second are drawn.
+    cases = [read_plan(str(file)).simulated[0] for file in (suite.file, *suite.more)]
+    assert cases[0].scene.meshes == cases[1].scene.meshes
+    assert cases[0].rig.calibration_error != cases[1].rig.calibration_error
+
+
 def test_the_path_of_the_twin_is_that_of_the_recording_moved_as_a_whole(suite: TwinSuite, recording: Recording) -> None:
     path = parse_tum((suite.file.parent / "path.tum").read_text(), name="path")
     (case,) = read_plan(str(suite.file)).simulated

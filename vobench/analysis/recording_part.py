@@ -49,9 +49,19 @@ def reference_runs(window: FrameRange, is_failing: Frames, run_frames: int) -> l
 
 def read_parts(recording: Recording, t_ns: Stamps, windows: Sequence[FrameRange]) -> list[RecordingPart]:
     """Read the frames of windows of a recording, of which `t_ns` (N,) are the stamps with a true pose."""
+    shots = read_shots(recording, np.unique(np.concatenate([t_ns[window.frames] for window in windows])))
+    parts = []
+    for window in windows:
+        stamps = t_ns[window.frames]
+        parts.append(RecordingPart(stamps, tuple(shots[int(stamp)] for stamp in stamps)))
+    return parts
+
+
+def read_shots(recording: Recording, t_ns: Stamps) -> dict[int, PairShot]:
+    """Read the frames at some stamps with a true pose, by their stamps."""
     truth = recording.truth
     assert truth is not None
-    wanted_ns = {int(stamp) for window in windows for stamp in t_ns[window.frames]}
+    wanted_ns = set(t_ns.tolist())
     last_ns = max(wanted_ns)
     shots = dict[int, PairShot]()
     for frame in recording.frames():
@@ -59,11 +69,7 @@ def read_parts(recording: Recording, t_ns: Stamps, windows: Sequence[FrameRange]
             shots[frame.t_ns] = _shot(frame, recording, truth)
         if frame.t_ns >= last_ns:
             break
-    parts = []
-    for window in windows:
-        stamps = t_ns[window.frames]
-        parts.append(RecordingPart(stamps, tuple(shots[int(stamp)] for stamp in stamps)))
-    return parts
+    return shots
 
 
 def _shot(frame: StereoFrame, recording: Recording, truth: Trajectory) -> PairShot:

@@ -15,6 +15,7 @@ from vobench.analysis.path_placement import Placement, levelled, wanted_disparit
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
 from vobench.analysis.realism import Realism, all_errors, shots_of
 from vobench.analysis.realism_report import RealismReport, realism_of
+from vobench.analysis.recorded_place import RECORDED, own_placement, rebuild_place, recorded_scene
 from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
 from vobench.analysis.twin_estimators import twin_estimators
@@ -23,6 +24,7 @@ from vobench.analysis.twin_prediction import TwinPrediction, common_names, predi
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import stereo_pair
+from vobench.geometry.camera import pixel_grid
 from vobench.geometry.rig import custom_stereo_pair
 from vobench.geometry.se3 import Array, inverse
 from vobench.runner.data_frame import data_frame
@@ -37,6 +39,7 @@ from vobench.runner.recording import DEFAULT_OPTIONS, read_recording, sequence_p
 from vobench.runner.score import NO_SCALE
 from vobench.runner.store import SILENT, Progress
 from vobench.runner.task import bake_task, perform
+from vobench.sensor import lens
 from vobench.sensor.image_sensor import CameraSettings
 from vobench.suite import catalog
 from vobench.suite.axis import RigSettings
@@ -55,6 +58,7 @@ TWIN = "twin"
 SUITE_FILE = "twin.yaml"
 PLACE_FILE = "place.yaml"
 PATH_FILE = "path.tum"
+MODEL_FILE = "recorded.glb"
 PLACEMENT_FILE = "placement.json"
 REPORT_FILE = "twin.json"
 
@@ -182,7 +186,8 @@ def write_twin_suite(
         UnknownNameError: there is no such place.
     """
     entries = twin_estimators(estimators)
-    catalog.find("scene", place)
+    if place != RECORDED:
+        catalog.find("scene", place)
 
     recorded = read_recording(recording, form=form, options=options)
     _required_truth(recorded)  # before the folder is claimed, since a request with --truth is another one
@@ -202,7 +207,13 @@ def write_twin_suite(
     if not placed:
         pair = stereo_pair(recorded.rig, "the twin")
         wanted_px = wanted_disparities(path.fit, pair)
-        placed = tuple(find_places(place, path.T_world_left, pair, wanted_px, most=placements, progress=progress))
+        if place == RECORDED:
+            model = (out / MODEL_FILE).resolve()
+            vignetting = rebuild_place(recorded, path.t_ns, path.T_world_left, path.fit, model=model, progress=progress)
+            placement = own_placement(recorded_scene(model), path.T_world_left, pair, wanted_px)
+            placed = (PlacedPath(RECORDED, None, placement, str(model), vignetting),) * placements
+        else:
+            placed = tuple(find_places(place, path.T_world_left, pair, wanted_px, most=placements, progress=progress))
         write_json(out / PLACEMENT_FILE, [each.as_dict() for each in placed])
 
     wanted = look_of_recording(recorded)
@@ -219,7 +230,8 @@ def write_twin_suite(
             suite["source"] = [source]
         write_json(file, suite)
         # The camera is fitted to pictures of this suite's twin, so the suite is read without a camera first.
-        suite["cameras"] = {TWIN: fitted_camera(file, wanted, gain=path.fit.gain, progress=progress)}
+        camera = fitted_camera(file, wanted, gain=path.fit.gain, vignetting=each.vignetting, progress=progress)
+        suite["cameras"] = {TWIN: camera}
         write_json(file, suite)
     return TwinSuite(files[0], placed, realism, tuple(files[1:]))
 
@@ -487,12 +499,13 @@ def fitted_camera(
     wanted: CameraLook,
     *,
     gain: float,
+    vignetting: float = 0.0,
     progress: Progress,
 ) -> dict[str, Any]:
     """The camera for a suite whose images of the twin have the wanted look most nearly.
 
     `file` is the suite of the twin, still without a camera. `gain` is the ratio of grey values of the right image to
-    those of the left one.
+    those of the left one. `vignetting` is its strength.
     """
     from vobench.runner.simulate import open_renderer
     from vobench.runner.stereo_camera import World, left_lights
@@ -506,8 +519,10 @@ def fitted_camera(
     white_cd_m2 = white_of(case.scene, light)
     with closing(open_renderer(scene, case.rendering, light, white_cd_m2=white_cd_m2)) as renderer:
         lights = left_lights(case, World(scene, renderer, motion.motion, white_cd_m2), fitted_t_ns)
-    settings, _ = fit_camera(wanted, Lights(lights, seed=case.seed), progress=progress)
-    return _camera_settings(settings, gain=gain)
+    left = case.build_rig().left
+    shade = lens.vignetting(left.rays(pixel_grid(left)), strength=vignetting).astype(np.float32)
+    settings, _ = fit_camera(wanted, Lights([light * shade for light in lights], seed=case.seed), progress=progress)
+    return {**_camera_settings(settings, gain=gain), "vignetting": round(vignetting, 4)}
 
 
 def look_of_recording(recording: Recording) -> CameraLook:

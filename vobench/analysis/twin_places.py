@@ -2,9 +2,11 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 from vobench.analysis.path_placement import Placement, WantedDisparities, place_path
+from vobench.analysis.recorded_place import recorded_scene
 from vobench.errors import InputError, SuiteError
 from vobench.estimator.stereo import StereoPair
 from vobench.geometry.se3 import Array
@@ -21,31 +23,44 @@ LIGHTING = "day"
 
 @dataclass(frozen=True, slots=True)
 class PlacedPath:
-    """A placement of a path in a place: the name of its scene, and the seed if its generator creates the place."""
+    """A placement of a path in a place: the name of its scene, and the seed if its generator creates the place.
+
+    `model` is the file of a place that was rebuilt from the recording, and empty for others. `vignetting` is that of
+    the recording's camera, which is known for such a place.
+    """
 
     place: str
     seed: int | None
     placement: Placement
+    model: str = ""
+    vignetting: float = 0.0
 
     @property
     def title(self) -> str:
         """The place in words."""
+        if self.model:
+            return "the recorded place"
         return self.place if self.seed is None else f"{self.place} {self.seed}"
 
     def scene(self) -> SceneFile:
         """The place at the scale of the placement."""
+        if self.model:
+            return recorded_scene(Path(self.model))
         spec = read_twin_place(self.place, self.seed)
         return replace(spec, scale=spec.scale * self.placement.scale)
 
     def as_dict(self) -> dict[str, Any]:
         """Plain JSON values."""
-        return {"place": self.place, "seed": self.seed, **self.placement.as_dict()}
+        own = {"place": self.place, "seed": self.seed, "model": self.model, "vignetting": self.vignetting}
+        return {**own, **self.placement.as_dict()}
 
     @classmethod
     def of_dict(cls, facts: Mapping[str, Any]) -> "PlacedPath":
         """What `as_dict` described."""
-        of_placement = {key: value for key, value in facts.items() if key not in ("place", "seed")}
-        return cls(facts["place"], facts["seed"], Placement.of_dict(of_placement))
+        own_keys = ("place", "seed", "model", "vignetting")
+        of_placement = {key: value for key, value in facts.items() if key not in own_keys}
+        own = {key: facts[key] for key in own_keys}
+        return cls(**own, placement=Placement.of_dict(of_placement))
 
 
 def read_twin_place(place: str, seed: int | None) -> SceneFile:

@@ -295,7 +295,9 @@ def _bounces(
 
 def _as_columns(values: Floats) -> Floats:
     """Values (K, S, C) of lights as columns (S, K * C)."""
-    return np.ascontiguousarray(values.transpose(1, 0, 2)).reshape(values.shape[1], -1).astype(np.float32)
+    rows, columns, channels = values.shape
+    by_column = np.ascontiguousarray(values.transpose(1, 0, 2))
+    return by_column.reshape(columns, rows * channels).astype(np.float32)
 
 
 def _by_light(columns: Floats, shape: tuple[int, ...]) -> Floats:

@@ -226,7 +226,8 @@ def _totals_of(halves: Sequence[Sample], radiosity: Floats) -> _Totals:
 
 def _relative_to(light: Floats) -> Floats:
     """The light (S,) that noise is relative to: the given light, or a minimum in dark places."""
-    darkest = max(DARK * float(light.mean()), FAINTEST)
+    mean = float(light.mean()) if len(light) else 0.0
+    darkest = max(DARK * mean, FAINTEST)
     return np.asarray(np.maximum(light, darkest))
 
 

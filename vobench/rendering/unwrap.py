@@ -93,11 +93,14 @@ def _xatlas_charts(corners_px: Array, spacing_m: Array, parts: Sequence[Rows]) -
 
     Faces that are too thin, and those that xatlas leaves out, have no place. Without xatlas no face has one.
     """
+    no_chart = np.full(len(corners_px), -1, np.int32)
+    without_charts = _Charts(np.zeros((len(corners_px), 3, 2)), no_chart, width=0, height=0)
+    if not parts:
+        return without_charts
     try:
         import xatlas
     except ImportError:  # there is no xatlas for Python 3.14 yet
-        no_chart = np.full(len(corners_px), -1, np.int32)
-        return _Charts(np.zeros((len(corners_px), 3, 2)), no_chart, width=0, height=0)
+        return without_charts
 
     atlas = xatlas.Atlas()
     try:

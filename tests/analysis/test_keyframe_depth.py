@@ -1,0 +1,91 @@
+"""Depth of keyframes, on images whose depth is known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.analysis.pictures import DISPARITY_PX, HEIGHT_PX, STEP_PX, pair, part, view
+from vobench.analysis.keyframe_depth import (
+    LEAST_DISPARITY_PX,
+    Keyframe,
+    denoised,
+    dense_disparity,
+    filled,
+    keyframes_of,
+    view_geometry,
+)
+from vobench.analysis.stereo_matches import PairShot
+from vobench.geometry import se3
+
+
+def shots_along_the_wall(count: int) -> list[PairShot]:
+    """Shots whose true poses agree with the disparity of the wall."""
+    step_m = pair().baseline_m * STEP_PX / DISPARITY_PX
+    shots = []
+    for index, shot in enumerate(part(0, count).shots):
+        shots.append(replace(shot, T_world_left=se3.transform(np.eye(3), [step_m * index, 0, 0])))
+    return shots
+
+
+def disparity_of(keyframe: Keyframe) -> np.ndarray:
+    return keyframe.rho * pair().focal_baseline
+
+
+def test_a_flat_wall_has_one_disparity() -> None:
+    disparity_px = dense_disparity(view(40, 0), view(40 + DISPARITY_PX, 1), 32)
+    is_matched = np.isfinite(disparity_px)
+    assert is_matched[:, DISPARITY_PX:].mean() > 0.9
+    assert np.quantile(np.abs(disparity_px[is_matched] - DISPARITY_PX), 0.95) < 0.5
+
+
+def test_what_the_right_image_does_not_show_has_no_disparity() -> None:
+    right = view(40 + DISPARITY_PX, 1)
+    right[:, 60:120] = np.random.default_rng(0).integers(0, 255, (HEIGHT_PX, 60))
+    disparity_px = dense_disparity(view(40, 0), right, 32)
+    hidden = disparity_px[:, 60 + DISPARITY_PX + 5 : 120 + DISPARITY_PX - 5]
+    assert np.isfinite(hidden).mean() < 0.2
+
+
+def test_keyframes_have_the_depth_of_the_wall_everywhere() -> None:
+    for keyframe in keyframes_of(shots_along_the_wall(5), pair(), None, most_disparity_px=30):
+        error_px = np.abs(disparity_of(keyframe) - DISPARITY_PX)
+        assert np.quantile(error_px, 0.95) < 0.35
+
+
+def test_depth_that_no_other_keyframe_confirms_is_not_used() -> None:
+    shots = shots_along_the_wall(5)
+    wrong = shots[2].right.copy()
+    wrong[30:90] = np.roll(wrong[30:90], 6, axis=1)  # as if these rows were nearer or farther
+    shots[2] = replace(shots[2], right=wrong)
+    keyframe = keyframes_of(shots, pair(), None, most_disparity_px=30)[2]
+    error_px = np.abs(disparity_of(keyframe)[35:85, 30:150] - DISPARITY_PX)
+    assert np.quantile(error_px, 0.9) < 0.5
+
+
+def test_unknown_depth_is_that_of_the_farther_side() -> None:
+    rho = np.array([[0.5, np.nan, np.nan, 0.2, np.nan], [np.nan] * 5])
+    complete = filled(rho, 0.01)
+    assert complete[0].tolist() == [0.5, 0.2, 0.2, 0.2, 0.2]
+    assert complete[1].tolist() == [0.5, 0.2, 0.2, 0.2, 0.2]
+    assert filled(np.full((2, 2), np.nan), 0.01).tolist() == [[0.01] * 2] * 2
+
+
+def test_noise_is_removed_and_edges_stay() -> None:
+    noisy = view(40, 0)
+    smooth = denoised(noisy)
+    wall = np.mean([view(40, seed).astype(float) for seed in range(40)], axis=0)
+    before_dn = np.sqrt(np.mean((noisy - wall) ** 2))
+    after_dn = np.sqrt(np.mean((smooth - wall) ** 2))
+    assert after_dn < 0.7 * before_dn
+
+
+def test_pixels_and_points_of_a_view_correspond() -> None:
+    geometry = view_geometry(pair())
+    pixels = geometry.pixel_grid().reshape(-1, 2)
+    seen_px, depth_m = geometry.project(3.0 * geometry.rays(pixels))
+    assert seen_px == pytest.approx(pixels)
+    assert depth_m == pytest.approx(np.full(len(pixels), 3.0))
+    behind_px, _ = geometry.project(np.array([[0.0, 0, -1]]))
+    assert np.isnan(behind_px).all()
+    assert geometry.least_rho * geometry.focal_baseline == pytest.approx(LEAST_DISPARITY_PX)

@@ -1,0 +1,283 @@
+"""Dense depth of the keyframes of a recording, from stereo matching and from the other keyframes.
+
+view   the rectified left view of a stereo pair, as in `vobench.estimator.stereo`
+rho    the inverse depth in a view, in 1/m; NaN where it is unknown
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+
+from vobench.analysis.image_noise import noise_dn
+from vobench.analysis.pair_calibration import PairCalibration
+from vobench.analysis.stereo_matches import PairShot
+from vobench.estimator.stereo import OUTSIDE_PX, StereoPair
+from vobench.geometry.se3 import Array, inverse
+from vobench.sequence.picture import Image
+
+BLOCK_PX = 5
+SUBPIXELS = 16.0  # the matcher returns disparities in 1/16 px
+DISPARITY_STEP = 16  # the number of disparities is a multiple of it
+SMOOTHNESS = (8, 32)  # penalties of a step of one disparity and of more, times the area of a block
+UNIQUENESS_PERCENT = 5
+SPECKLE_PX = 60  # smaller regions are errors
+SPECKLE_RANGE = 2
+CONSISTENT_PX = 1.0  # largest difference of disparities, from left to right and back
+LEAST_DISPARITY_PX = 0.25  # points with less are as far away as with this
+
+NEIGHBOURS = 2  # keyframes before and after, from which depth is also taken
+AGREEING_PX = 1.0  # of disparity
+LARGEST_WEIGHT = 16.0
+DENOISED_SIGMAS = 1.0  # strength of the filter of non-local means, in standard deviations of the noise
+DENOISED_TEMPLATE_PX = 5
+DENOISED_SEARCH_PX = 15
+
+
+@dataclass(frozen=True, slots=True)
+class Keyframe:
+    """A keyframe: the image (H, W) of the left view, its inverse depth (H, W), and the pose of the view."""
+
+    image: Image
+    rho: Array
+    T_world_view: Array
+
+
+@dataclass(frozen=True, slots=True)
+class ViewGeometry:
+    """The pinhole of all left views, their size, and the disparity in px of a point at one metre."""
+
+    K: Array
+    width_px: int
+    height_px: int
+    focal_baseline: float
+
+    @property
+    def rho_of_px(self) -> float:
+        """The inverse depth that corresponds to a disparity of one pixel."""
+        return 1 / self.focal_baseline
+
+    @property
+    def least_rho(self) -> float:
+        """The inverse depth of the farthest points."""
+        return LEAST_DISPARITY_PX * self.rho_of_px
+
+    def rays(self, pixels: Array) -> Array:
+        """The rays (..., 3) with z = 1 through pixels (..., 2)."""
+        homogeneous = np.concatenate([pixels, np.ones((*pixels.shape[:-1], 1))], -1)
+        rays: Array = homogeneous @ np.linalg.inv(self.K).T
+        return rays
+
+    def project(self, points_m: Array) -> tuple[Array, Array]:
+        """The pixels (N, 2) and depths (N,) of points (N, 3) in the frame of a view; NaN behind the view."""
+        depth_m = np.where(points_m[:, 2] > 0, points_m[:, 2], np.nan)
+        pixels = (points_m / depth_m[:, None] @ self.K.T)[:, :2]
+        return pixels, depth_m
+
+    def pixel_grid(self) -> Array:
+        """The pixels (H, W, 2) of a view."""
+        columns, rows = np.meshgrid(np.arange(self.width_px), np.arange(self.height_px))
+        return np.stack([columns, rows], -1).astype(float)
+
+
+def view_geometry(pair: StereoPair) -> ViewGeometry:
+    """The geometry of the left views of a pair."""
+    camera = pair.left.camera
+    return ViewGeometry(pair.K, camera.width_px, camera.height_px, pair.focal_baseline)
+
+
+def keyframes_of(
+    shots: Sequence[PairShot], pair: StereoPair, calibration: PairCalibration | None, *, most_disparity_px: float
+) -> list[Keyframe]:
+    """The keyframes of shots with true poses, with depth that neighbours agree on and without holes.
+
+    The errors of `calibration` are corrected. Noise is removed from the images.
+    """
+    geometry = view_geometry(pair)
+    right_map = _right_map(geometry, pair, calibration)
+    left_map = _map_of(pair.left.from_view(geometry.pixel_grid().reshape(-1, 2)), geometry)
+    disparities = _disparity_count(most_disparity_px, geometry.width_px)
+    keyframes = []
+    for shot in shots:
+        assert shot.T_world_left is not None
+        left = _resampled(shot.left, left_map)
+        right = _resampled(shot.right, right_map)
+        disparity_px = dense_disparity(left, right, disparities)
+        rho = np.maximum(disparity_px, LEAST_DISPARITY_PX) * geometry.rho_of_px
+        T_world_view = shot.T_world_left @ inverse(pair.T_view_left)
+        keyframes.append(Keyframe(denoised(left), rho, T_world_view))
+    agreed = [_agreed(index, keyframes, geometry) for index in range(len(keyframes))]
+    return [
+        replace(keyframe, rho=filled(rho, geometry.least_rho)) for keyframe, rho in zip(keyframes, agreed, strict=True)
+    ]
+
+
+# --- Images ---
+
+
+def _map_of(source_px: Array, geometry: ViewGeometry) -> tuple[Array, Array]:
+    """The columns and rows (H, W) of source pixels (H W, 2) for OpenCV."""
+    finite = np.nan_to_num(source_px, nan=OUTSIDE_PX).astype(np.float32)
+    columns, rows = finite.T.reshape(2, geometry.height_px, geometry.width_px)
+    return np.ascontiguousarray(columns), np.ascontiguousarray(rows)
+
+
+def _right_map(geometry: ViewGeometry, pair: StereoPair, calibration: PairCalibration | None) -> tuple[Array, Array]:
+    """The pixels of the right image that an exactly calibrated right view shows."""
+    view_px = geometry.pixel_grid().reshape(-1, 2)
+    if calibration is not None:
+        nominal_px = np.nan_to_num(pair.right.from_view(view_px))
+        disparity_error_px, _ = calibration.disparity_error(nominal_px)
+        row_error_px, _ = calibration.row_error(nominal_px)
+        view_px = view_px + np.stack([-disparity_error_px, row_error_px], -1)
+    return _map_of(pair.right.from_view(view_px), geometry)
+
+
+def _resampled(image: Image, source_map: tuple[Array, Array]) -> Image:
+    return cv2.remap(image, *source_map, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE).astype(np.uint8, copy=False)
+
+
+def denoised(image: Image) -> Image:
+    """An image (H, W) without its noise, by non-local means (Buades, Coll and Morel, 2005)."""
+    sigma_dn, _ = noise_dn(image)
+    if sigma_dn == 0:
+        return image
+    strength = DENOISED_SIGMAS * sigma_dn
+    return cv2.fastNlMeansDenoising(
+        image, h=strength, templateWindowSize=DENOISED_TEMPLATE_PX, searchWindowSize=DENOISED_SEARCH_PX
+    ).astype(np.uint8, copy=False)
+
+
+# --- Stereo ---
+
+
+def _disparity_count(most_disparity_px: float, width_px: int) -> int:
+    """The number of disparities that are searched."""
+    steps = int(np.ceil(min(most_disparity_px, width_px / 2) / DISPARITY_STEP))
+    return DISPARITY_STEP * max(steps, 1)
+
+
+def dense_disparity(left: Image, right: Image, disparities: int) -> Array:
+    """The disparities (H, W) of a rectified pair of images; NaN where both directions disagree.
+
+    Source: Hirschmüller (2008), semi-global matching, as OpenCV implements it.
+    """
+    forward_px = _matched(left, right, disparities)
+    backward_px = _matched(right[:, ::-1], left[:, ::-1], disparities)[:, ::-1]
+    rows, columns = np.indices(forward_px.shape)
+    matched_columns = np.nan_to_num(columns - forward_px, nan=-1.0).round().astype(int)
+    is_inside = matched_columns >= 0
+    back_px = backward_px[rows, np.maximum(matched_columns, 0)]
+    with np.errstate(invalid="ignore"):
+        is_consistent = is_inside & (np.abs(forward_px - back_px) <= CONSISTENT_PX)
+    return np.where(is_consistent, forward_px, np.nan)
+
+
+def _matched(left: Image, right: Image, disparities: int) -> Array:
+    """The disparities (H, W) in px of the left image; NaN without a match."""
+    # OpenCV does not match the first columns, so the images are extended to the left.
+    wide_left = cv2.copyMakeBorder(left, 0, 0, disparities, 0, cv2.BORDER_REPLICATE)
+    wide_right = cv2.copyMakeBorder(right, 0, 0, disparities, 0, cv2.BORDER_REPLICATE)
+    small, large = (penalty * BLOCK_PX**2 for penalty in SMOOTHNESS)
+    matcher = cv2.StereoSGBM.create(
+        0,
+        disparities,
+        BLOCK_PX,
+        P1=small,
+        P2=large,
+        uniquenessRatio=UNIQUENESS_PERCENT,
+        speckleWindowSize=SPECKLE_PX,
+        speckleRange=SPECKLE_RANGE,
+        mode=cv2.StereoSGBM_MODE_SGBM_3WAY,
+    )
+    raw = matcher.compute(wide_left, wide_right)[:, disparities:].astype(float)
+    return np.where(raw >= 0, raw / SUBPIXELS, np.nan)
+
+
+# --- Agreement of keyframes ---
+
+
+def _agreed(index: int, keyframes: Sequence[Keyframe], geometry: ViewGeometry) -> Array:
+    """The inverse depth (H, W) of a keyframe: the weighted mean of its own and that of neighbours that agree.
+
+    A depth z' from a neighbour has the weight (z / z')⁴ relative to an own depth z, since the error of a depth grows
+    with its square. Where the own depth is unknown, or no neighbour agrees but two neighbours agree with each other,
+    theirs is taken.
+    """
+    own = keyframes[index]
+    sources = [_Source(own.rho, np.where(np.isfinite(own.rho), 1.0, 0.0))]
+    before = keyframes[max(index - NEIGHBOURS, 0) : index]
+    after = keyframes[index + 1 : index + 1 + NEIGHBOURS]
+    sources += [_seen_from(own, other, geometry) for other in (*before, *after)]
+    rho = np.stack([source.rho for source in sources])
+    weight = np.stack([source.weight for source in sources])
+
+    median = np.nanmedian(np.where(np.isfinite(rho).any(0), rho, 0.0), axis=0)
+    with np.errstate(invalid="ignore"):
+        is_agreeing = np.abs(rho - median) <= AGREEING_PX * geometry.rho_of_px
+    count = is_agreeing.sum(0)
+    total = np.where(is_agreeing, weight, 0.0).sum(0)
+    weighted = np.where(is_agreeing, weight * np.nan_to_num(rho), 0.0).sum(0)
+    known = np.isfinite(rho).sum(0)
+    is_alone = (known == 1) & np.isfinite(own.rho)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.where((count >= 2) | is_alone, weighted / total, np.nan)
+
+
+@dataclass(frozen=True, slots=True)
+class _Source:
+    """Inverse depths (H, W) of a view, with weights (H, W)."""
+
+    rho: Array
+    weight: Array
+
+
+def _seen_from(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> _Source:
+    """The points of another keyframe, as a keyframe sees them."""
+    is_known = np.isfinite(other.rho)
+    rays = geometry.rays(geometry.pixel_grid()[is_known])
+    points_m = rays / other.rho[is_known][:, None]
+    T_own_other = inverse(own.T_world_view) @ other.T_world_view
+    pixels, depth_m = geometry.project(points_m @ T_own_other[:3, :3].T + T_own_other[:3, 3])
+    with np.errstate(invalid="ignore"):
+        is_seen = np.isfinite(depth_m)
+        columns = np.where(is_seen, pixels[:, 0], -1).round()
+        rows = np.where(is_seen, pixels[:, 1], -1).round()
+    is_seen &= (columns >= 0) & (columns < geometry.width_px) & (rows >= 0) & (rows < geometry.height_px)
+    flat = rows[is_seen].astype(int) * geometry.width_px + columns[is_seen].astype(int)
+    seen_rho = 1 / depth_m[is_seen]
+
+    # The nearest point is seen, so points are written from the farthest to the nearest.
+    order = np.argsort(seen_rho)
+    rho = np.full(geometry.height_px * geometry.width_px, np.nan)
+    weight = np.zeros_like(rho)
+    rho[flat[order]] = seen_rho[order]
+    relative = (other.rho[is_known][is_seen] / seen_rho) ** 4
+    weight[flat[order]] = np.clip(relative[order], 1 / LARGEST_WEIGHT, LARGEST_WEIGHT)
+    shape = (geometry.height_px, geometry.width_px)
+    return _Source(rho.reshape(shape), weight.reshape(shape))
+
+
+def filled(rho: Array, least_rho: float) -> Array:
+    """Inverse depth (H, W) whose unknown values are those of the farther neighbour in their row or column.
+
+    Values that nothing determines are the least.
+    """
+    by_rows = _of_farther_neighbour(rho)
+    by_columns = _of_farther_neighbour(by_rows.T).T
+    return np.where(np.isfinite(by_columns), by_columns, least_rho)
+
+
+def _of_farther_neighbour(rho: Array) -> Array:
+    """The same with unknown values of each row replaced by the smaller of the next known values on both sides."""
+    height, width = rho.shape
+    is_known = np.isfinite(rho)
+    columns = np.arange(width)
+    before = np.maximum.accumulate(np.where(is_known, columns, -1), axis=1)
+    after = np.minimum.accumulate(np.where(is_known, columns, width)[:, ::-1], axis=1)[:, ::-1]
+    rows = np.arange(height)[:, None]
+    left = np.where(before >= 0, rho[rows, np.maximum(before, 0)], np.inf)
+    right = np.where(after < width, rho[rows, np.minimum(after, width - 1)], np.inf)
+    farther = np.minimum(left, right)
+    return np.where(is_known, rho, np.where(np.isfinite(farther), farther, np.nan))

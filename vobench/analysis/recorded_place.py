@@ -1,0 +1,112 @@
+"""Rebuilds the place of a recording from its own stereo images, for a twin in which the same things are seen."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from vobench.analysis.keyframe_depth import keyframes_of, view_geometry
+from vobench.analysis.pair_calibration import PairCalibration
+from vobench.analysis.path_placement import Placement, WantedDisparities, nearness_of, segment_disparities
+from vobench.analysis.reconstruction import reconstruct
+from vobench.analysis.recording_part import read_shots
+from vobench.analysis.stereo_fit import StereoFit
+from vobench.analysis.vignetting_fit import corrected, cosines, fit_photometry
+from vobench.asset.luminous_model import write_luminous_model
+from vobench.dataset.recording import Recording
+from vobench.errors import InputError
+from vobench.estimator.stereo import StereoPair, stereo_pair
+from vobench.geometry.se3 import Array, inverse, rotation_angle
+from vobench.rendering.geometry import RayCaster
+from vobench.runner.store import SILENT, Progress
+from vobench.scene.scene import triangles
+from vobench.suite.scene_build import build
+from vobench.suite.scene_spec import ModelSpec, SceneFile
+from vobench.trajectory.trajectory import Stamps
+
+RECORDED = "recorded"  # the name of the place
+WHITE_CD_M2 = 1.0  # of a white texture, as written by `write_luminous_model`
+TEXTURE_RESPONSE = 2.2  # the light of a texture is its grey value to this power, approximately
+COSINE_POWER = 4  # of the vignetting of strength 1
+STEP_SHARE = 0.03  # of the width of the image, by which it may move between keyframes
+MOST_KEYFRAMES = 80
+DISPARITY_QUANTILE = 0.99  # of the matches
+BEYOND_MATCHES = 1.3  # the largest disparity that is searched, relative to that quantile
+
+
+def recorded_scene(model: Path) -> SceneFile:
+    """The scene of a rebuilt place."""
+    return SceneFile(name=RECORDED, white_cd_m2=WHITE_CD_M2, meshes=(ModelSpec(file=str(model)),))
+
+
+def rebuild_place(
+    recording: Recording,
+    t_ns: Stamps,
+    T_world_left: Array,
+    fit: StereoFit,
+    *,
+    model: Path,
+    progress: Progress = SILENT,
+) -> float:
+    """Rebuild the place of a recording from its images at `t_ns` (N,), and write its model.
+
+    The model is in the world of the poses T_world_left (N, 4, 4) at which the images were taken. It has no vignetting;
+    returned is the strength of that of the camera, as `CameraSettings.vignetting`.
+
+    Raises InputError if the path is too long for that.
+    """
+    pair = stereo_pair(recording.rig, "the twin")
+    chosen = keyframe_indices(T_world_left, pair, typical_disparity_px=fit.disparity_px[1])
+    with progress.step(f"rebuilding the place from {len(chosen)} images"):
+        by_stamp = read_shots(recording, t_ns[chosen])
+        shots = [replace(by_stamp[int(t_ns[index])], T_world_left=T_world_left[index]) for index in chosen]
+        most_px = BEYOND_MATCHES * float(np.quantile(fit.matches.disparity_px, DISPARITY_QUANTILE))
+        keyframes = keyframes_of(shots, pair, _correction(fit), most_disparity_px=most_px)
+        geometry = view_geometry(pair)
+        cosine = cosines(pair, geometry)
+        photometry = fit_photometry(keyframes, cosine, geometry)
+        evenly_lit = corrected(keyframes, photometry, cosine)
+        write_luminous_model(reconstruct(evenly_lit, geometry), model)
+    return photometry.exponent * TEXTURE_RESPONSE / COSINE_POWER
+
+
+def _correction(fit: StereoFit) -> PairCalibration | None:
+    """The errors of the pair that are corrected; None if those of disparities are not known."""
+    calibrated = fit.calibrated
+    if calibrated is None or not calibrated.is_offset_determined:
+        return None
+    return calibrated.calibration
+
+
+def keyframe_indices(T_world_left: Array, pair: StereoPair, *, typical_disparity_px: float) -> list[int]:
+    """The indices of poses (N, 4, 4) between which the image moves by a small share of its width.
+
+    Raises InputError if there are too many.
+    """
+    focal_px = float(pair.K[0, 0])
+    typical_rho = typical_disparity_px / pair.focal_baseline
+    limit_px = STEP_SHARE * pair.left.camera.width_px
+    chosen = [0]
+    for index in range(1, len(T_world_left)):
+        T_last_this = inverse(T_world_left[chosen[-1]]) @ T_world_left[index]
+        moved_m = float(np.linalg.norm(T_last_this[:3, 3]))
+        turned_rad = float(rotation_angle(T_last_this[:3, :3]))
+        if focal_px * (moved_m * typical_rho + turned_rad) > limit_px:
+            chosen.append(index)
+    if chosen[-1] != len(T_world_left) - 1:
+        chosen.append(len(T_world_left) - 1)
+    if len(chosen) > MOST_KEYFRAMES:
+        raise InputError(
+            f"the path is too long for rebuilding its place, which would take {len(chosen)} images, more than "
+            f"{MOST_KEYFRAMES}; take fewer images, or name a place by --place"
+        )
+    return chosen
+
+
+def own_placement(scene: SceneFile, T_world_left: Array, pair: StereoPair, wanted: WantedDisparities) -> Placement:
+    """The placement of a path (N, 4, 4) in its rebuilt place, where it is."""
+    caster = RayCaster(triangles(build(scene, {})))
+    seen_px = segment_disparities(caster, T_world_left, pair, 1.0, len(wanted.cells_px))
+    misfit = float(np.nanmean(np.abs(np.log(seen_px / wanted.cells_px))))
+    nearness = nearness_of(caster, T_world_left, pair, 1.0, wanted)
+    return Placement(np.eye(4), 1.0, misfit, nearness, tried=1)

@@ -1,0 +1,125 @@
+"""Estimates the vignetting of a camera and the exposures of keyframes from surfaces that several keyframes show.
+
+cosine     of the angle to the axis of the camera
+exponent   p: a grey value is proportional to cosine ** p
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry
+from vobench.estimator.pose import cauchy_weights
+from vobench.estimator.stereo import StereoPair
+from vobench.geometry.se3 import Array, apply, inverse
+
+POINT_STEP_PX = 8
+REACH = 6  # keyframes that are compared with each
+EXPOSED_DN = (12.0, 240.0)
+SAME_PX = 0.5  # of disparity, for the same surface
+LOG_NOISE = 0.012  # usual standard deviation of the logarithm of a grey value
+ROUNDS = 5
+PRIOR_SIGMAS = (2.0, 0.3)  # of the exponent, and of the logarithms of exposures
+MOST_EXPONENT = 4.0
+
+
+@dataclass(frozen=True, slots=True)
+class Photometry:
+    """The exponent of vignetting in grey values, and the grey values (K,) of keyframes relative to their mean."""
+
+    exponent: float
+    relative_grey: Array
+
+
+def cosines(pair: StereoPair, geometry: ViewGeometry) -> Array:
+    """The cosines (H, W) of the pixels of the left view."""
+    rays = geometry.rays(geometry.pixel_grid()) @ pair.left.R_view_camera
+    return np.asarray(rays[..., 2] / np.linalg.norm(rays, axis=-1), float)
+
+
+def fit_photometry(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewGeometry) -> Photometry:
+    """Fit the exponent and the exposures to differences of logarithms of grey values.
+
+    Errors with a heavy tail, as of surfaces that shine or are not the same, count little.
+    """
+    pairs = list(_same_points(keyframes, cosine, geometry))
+    if not pairs:
+        return Photometry(0.0, np.ones(len(keyframes)))
+    differences = np.concatenate([pair.log_grey for pair in pairs])
+    design = np.concatenate([_design(pair, len(keyframes)) for pair in pairs])
+    prior_sigma = np.array([PRIOR_SIGMAS[0], *[PRIOR_SIGMAS[1]] * len(keyframes)])
+    prior = np.diag((LOG_NOISE / prior_sigma) ** 2)
+    weights = np.ones(len(differences))
+    for _ in range(ROUNDS):
+        weighted = design * weights[:, None]
+        solution = np.linalg.solve(weighted.T @ design + prior, weighted.T @ differences)
+        weights = cauchy_weights(differences - design @ solution, LOG_NOISE)
+    exponent = float(np.clip(solution[0], 0.0, MOST_EXPONENT))
+    log_exposure = solution[1:] - solution[1:].mean()
+    return Photometry(exponent, np.exp(log_exposure))
+
+
+def corrected(keyframes: Sequence[Keyframe], photometry: Photometry, cosine: Array) -> list[Keyframe]:
+    """The keyframes as a camera without vignetting and with one exposure would have taken them.
+
+    All images are darker by one factor, so that no value exceeds the range of grey values.
+    """
+    falloff = cosine**photometry.exponent
+    darkest = float(falloff.min() * photometry.relative_grey.min())
+    images = []
+    for keyframe, relative_grey in zip(keyframes, photometry.relative_grey, strict=True):
+        image = keyframe.image * (darkest / (falloff * relative_grey))
+        images.append(replace(keyframe, image=np.rint(image).astype(np.uint8)))
+    return images
+
+
+@dataclass(frozen=True, slots=True)
+class _SamePoints:
+    """Points that two keyframes show: differences (N,) of the logarithms of grey values and of cosines."""
+
+    first: int
+    second: int
+    log_grey: Array
+    log_cosine: Array
+
+
+def _design(pair: _SamePoints, count: int) -> Array:
+    """The derivatives (N, 1 + K) of the differences by the exponent and the logarithms of exposures."""
+    rows = np.zeros((len(pair.log_grey), 1 + count))
+    rows[:, 0] = pair.log_cosine
+    rows[:, 1 + pair.first] = 1
+    rows[:, 1 + pair.second] = -1
+    return rows
+
+
+def _same_points(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewGeometry) -> Iterator[_SamePoints]:
+    """The points that keyframes and the following ones show."""
+    first_px = POINT_STEP_PX // 2
+    pixels = geometry.pixel_grid()[first_px::POINT_STEP_PX, first_px::POINT_STEP_PX].reshape(-1, 2)
+    columns, rows = pixels.astype(int).T
+    last_px = np.array([geometry.width_px, geometry.height_px]) - 1
+    for first, keyframe in enumerate(keyframes):
+        points_m = geometry.rays(pixels) / keyframe.rho[rows, columns][:, None]
+        grey = keyframe.image[rows, columns].astype(float)
+        for second in range(first + 1, min(first + 1 + REACH, len(keyframes))):
+            other = keyframes[second]
+            T_other_this = inverse(other.T_world_view) @ keyframe.T_world_view
+            seen_px, depth_m = geometry.project(apply(T_other_this, points_m))
+            with np.errstate(invalid="ignore"):
+                is_seen = np.asarray(((seen_px >= 0) & (seen_px <= last_px)).all(1))
+            seen_columns, seen_rows = np.where(is_seen[:, None], seen_px, 0).round().astype(int).T
+            other_grey = other.image[seen_rows, seen_columns].astype(float)
+            with np.errstate(invalid="ignore"):
+                is_same = np.abs(1 / depth_m - other.rho[seen_rows, seen_columns]) < SAME_PX * geometry.rho_of_px
+            is_used = is_seen & is_same & _is_exposed(grey) & _is_exposed(other_grey)
+            if is_used.any():
+                log_grey = np.log(grey[is_used] / other_grey[is_used])
+                log_cosine = np.log(cosine[rows, columns] / cosine[seen_rows, seen_columns])[is_used]
+                yield _SamePoints(first, second, log_grey, log_cosine)
+
+
+def _is_exposed(grey: Array) -> NDArray[np.bool_]:
+    low_dn, high_dn = EXPOSED_DN
+    return (grey > low_dn) & (grey < high_dn)
