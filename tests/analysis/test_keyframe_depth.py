@@ -48,7 +48,7 @@ def test_what_the_right_image_does_not_show_has_no_disparity() -> None:
 
 
 def test_keyframes_have_the_depth_of_the_wall_everywhere() -> None:
-    for keyframe in keyframes_of(shots_along_the_wall(5), pair(), None, most_disparity_px=30):
+    for keyframe in keyframes_of(shots_along_the_wall(5), pair(), most_disparity_px=30):
         error_px = np.abs(disparity_of(keyframe) - DISPARITY_PX)
         assert np.quantile(error_px, 0.95) < 0.35
 
@@ -58,7 +58,7 @@ def test_depth_that_no_other_keyframe_confirms_is_not_used() -> None:
     wrong = shots[2].right.copy()
     wrong[30:90] = np.roll(wrong[30:90], 6, axis=1)  # as if these rows were nearer or farther
     shots[2] = replace(shots[2], right=wrong)
-    keyframe = keyframes_of(shots, pair(), None, most_disparity_px=30)[2]
+    keyframe = keyframes_of(shots, pair(), most_disparity_px=30)[2]
     error_px = np.abs(disparity_of(keyframe)[35:85, 30:150] - DISPARITY_PX)
     assert np.quantile(error_px, 0.9) < 0.5
 

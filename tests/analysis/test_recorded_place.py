@@ -21,7 +21,7 @@ SHOTS = 5
 
 @pytest.fixture(scope="module")
 def surfaces() -> list[Surface]:
-    keyframes = keyframes_of(shots_along_the_wall(SHOTS), pair(), None, most_disparity_px=30)
+    keyframes = keyframes_of(shots_along_the_wall(SHOTS), pair(), most_disparity_px=30)
     return reconstruct(keyframes, view_geometry(pair()))
 
 

@@ -131,21 +131,21 @@ def test_a_folder_without_a_suite_is_a_sentence(tmp_path: Path) -> None:
 
 
 def test_the_rebuilt_place_is_as_near_as_the_recording_everywhere(recorded_case, tmp_path, monkeypatch) -> None:
-    fit_in_few_steps(monkeypatch, tmp_path / "cache")
+    monkeypatch.setattr(recording_twin, "fitted_camera", lambda *_, **settings: {"vignetting": settings["vignetting"]})
     suite = write_twin_suite(
         recorded_case, out=tmp_path / "twin", place="recorded", placements=2, estimators=list(RANKED)
     )
     first, second = suite.placed
-    assert first == second
+    assert first.model != second.model
     assert first.title == "the recorded place"
-    assert first.placement.misfit < 0.1
-    assert first.placement.nearness < 1.3
+    assert max(placed.placement.misfit for placed in suite.placed) < 0.1
+    assert max(placed.placement.nearness for placed in suite.placed) < 1.3
     assert PlacedPath.of_dict(json.loads(json.dumps(first.as_dict()))).scene() == first.scene()
 
-    # Both twins are in one place, with calibration errors of which the second are drawn.
+    # The second one has calibration errors that are drawn.
     cases = [read_plan(str(file)).simulated[0] for file in (suite.file, *suite.more)]
-    assert cases[0].scene.meshes == cases[1].scene.meshes
     assert cases[0].rig.calibration_error != cases[1].rig.calibration_error
+    assert cases[0].camera.vignetting == pytest.approx(0, abs=0.1)
 
 
 def test_the_path_of_the_twin_is_that_of_the_recording_moved_as_a_whole(suite: TwinSuite, recording: Recording) -> None:

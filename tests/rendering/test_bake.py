@@ -179,6 +179,14 @@ def test_a_lamps_panel_shows_its_own_luminance() -> None:
     np.testing.assert_allclose(panel, np.pi * LAMP.luminance_cd_m2, rtol=1e-6)
 
 
+@pytest.mark.parametrize("bounces", [0, 2])
+@pytest.mark.filterwarnings("error")
+def test_a_scene_in_which_everything_shines_has_the_light_of_its_lamps(bounces: int) -> None:
+    baked = bake(scene(LAMP, things=()), replace(DIRECT, bounces=bounces))
+    panel = on_quad(baked, whole(baked), 0, *np.meshgrid(*[np.linspace(0, 1, 5)] * 2))
+    np.testing.assert_allclose(panel, np.pi * LAMP.luminance_cd_m2, rtol=1e-6)
+
+
 def test_a_bulb_obeys_the_inverse_square_and_casts_a_hard_shadow() -> None:
     bulb = PointLight("bulb", np.array([0.3, -0.2, 2.0]), 1000.0)
     blocker = rectangle(np.array([0.3, -0.2, 1.0]), np.array([0, 0.5, 0]), np.array([0.5, 0, 0]), "grey")

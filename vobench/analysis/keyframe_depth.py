@@ -11,9 +11,8 @@ import cv2
 import numpy as np
 
 from vobench.analysis.image_noise import noise_dn
-from vobench.analysis.pair_calibration import PairCalibration
 from vobench.analysis.stereo_matches import PairShot
-from vobench.estimator.stereo import OUTSIDE_PX, StereoPair
+from vobench.estimator.stereo import OUTSIDE_PX, Eye, StereoPair
 from vobench.geometry.se3 import Array, inverse
 from vobench.sequence.picture import Image
 
@@ -87,16 +86,13 @@ def view_geometry(pair: StereoPair) -> ViewGeometry:
     return ViewGeometry(pair.K, camera.width_px, camera.height_px, pair.focal_baseline)
 
 
-def keyframes_of(
-    shots: Sequence[PairShot], pair: StereoPair, calibration: PairCalibration | None, *, most_disparity_px: float
-) -> list[Keyframe]:
+def keyframes_of(shots: Sequence[PairShot], pair: StereoPair, *, most_disparity_px: float) -> list[Keyframe]:
     """The keyframes of shots with true poses, with depth that neighbours agree on and without holes.
 
-    The errors of `calibration` are corrected. Noise is removed from the images.
+    The pair is the true one, without errors of calibration. Noise is removed from the images.
     """
     geometry = view_geometry(pair)
-    right_map = _right_map(geometry, pair, calibration)
-    left_map = _map_of(pair.left.from_view(geometry.pixel_grid().reshape(-1, 2)), geometry)
+    left_map, right_map = (_map_of_view(eye, geometry) for eye in (pair.left, pair.right))
     disparities = _disparity_count(most_disparity_px, geometry.width_px)
     keyframes = []
     for shot in shots:
@@ -116,22 +112,12 @@ def keyframes_of(
 # --- Images ---
 
 
-def _map_of(source_px: Array, geometry: ViewGeometry) -> tuple[Array, Array]:
-    """The columns and rows (H, W) of source pixels (H W, 2) for OpenCV."""
+def _map_of_view(eye: Eye, geometry: ViewGeometry) -> tuple[Array, Array]:
+    """The columns and rows (H, W) in the image of a camera that its view shows, for OpenCV."""
+    source_px = eye.from_view(geometry.pixel_grid().reshape(-1, 2))
     finite = np.nan_to_num(source_px, nan=OUTSIDE_PX).astype(np.float32)
     columns, rows = finite.T.reshape(2, geometry.height_px, geometry.width_px)
     return np.ascontiguousarray(columns), np.ascontiguousarray(rows)
-
-
-def _right_map(geometry: ViewGeometry, pair: StereoPair, calibration: PairCalibration | None) -> tuple[Array, Array]:
-    """The pixels of the right image that an exactly calibrated right view shows."""
-    view_px = geometry.pixel_grid().reshape(-1, 2)
-    if calibration is not None:
-        nominal_px = np.nan_to_num(pair.right.from_view(view_px))
-        disparity_error_px, _ = calibration.disparity_error(nominal_px)
-        row_error_px, _ = calibration.row_error(nominal_px)
-        view_px = view_px + np.stack([-disparity_error_px, row_error_px], -1)
-    return _map_of(pair.right.from_view(view_px), geometry)
 
 
 def _resampled(image: Image, source_map: tuple[Array, Array]) -> Image:

@@ -7,6 +7,7 @@ the pose of a keyframe records its image again.
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from itertools import pairwise
 
 import cv2
@@ -44,15 +45,23 @@ def reconstruct(keyframes: Sequence[Keyframe], geometry: ViewGeometry) -> list[S
     wide = [_extended(keyframe, margin_px) for keyframe in keyframes]
     order = _nearest_views_first(keyframes)
     mosaic = _Mosaic(wide, wide_geometry, margin_px, order)
-    mosaic.add(of_margin=False, rejects_outvoted=True)
-    mosaic.add(of_margin=True, rejects_outvoted=True)
-    mosaic.add(of_margin=False, rejects_outvoted=False)
+    mosaic.add(Part.IMAGES, rejects_outvoted=True)
+    mosaic.add(Part.MARGINS, rejects_outvoted=True)
+    mosaic.add(Part.IMAGES)
 
-    far = [replace(keyframe, rho=np.full_like(keyframe.rho, FARTHER * geometry.least_rho)) for keyframe in wide]
+    far_rho = FARTHER * geometry.least_rho
+    far = [replace(keyframe, rho=np.full_like(keyframe.rho, far_rho)) for keyframe in wide]
     backdrop = _Mosaic(far, wide_geometry, margin_px, order)
-    backdrop.add(of_margin=False, rejects_outvoted=False)
-    backdrop.add(of_margin=True, rejects_outvoted=False)
+    backdrop.add(Part.IMAGES)
+    backdrop.add(Part.MARGINS)
     return [*mosaic.surfaces(), *backdrop.surfaces()]
+
+
+class Part(Enum):
+    """The images themselves, or the margins by which they are extended."""
+
+    IMAGES = 0
+    MARGINS = 1
 
 
 class _Mosaic:
@@ -68,18 +77,16 @@ class _Mosaic:
         self._sheets = [_sheet(keyframe, geometry) for keyframe in keyframes]
         self._smooth = [cv2.blur(keyframe.image.astype(np.float32), (SMOOTH_PX, SMOOTH_PX)) for keyframe in keyframes]
         self._shown = [np.zeros(sheet.is_edge.shape, bool) for sheet in self._sheets]
-        self._outvoted = [self._is_outvoted(index) for index in range(len(self._sheets))]
 
-    def add(self, *, of_margin: bool, rejects_outvoted: bool) -> None:
-        """Add the quads inside of the images or in their margins that are not shown yet."""
+    def add(self, part: Part, *, rejects_outvoted: bool = False) -> None:
+        """Add the quads of a part of all keyframes that are not shown yet."""
         for index in self._order:
-            sheet = self._sheets[index]
-            is_margin = _is_margin(sheet, self._geometry, self._margin_px)
-            is_new = is_margin if of_margin else ~is_margin
-            is_new = is_new & ~self._shown[index] & ~self._covered(index)
+            is_margin = _is_margin(self._sheets[index], self._geometry, self._margin_px)
+            is_candidate = (is_margin if part is Part.MARGINS else ~is_margin) & ~self._shown[index]
             if rejects_outvoted:
-                is_new &= ~self._outvoted[index]
-            self._shown[index] |= is_new
+                is_candidate &= ~self._outvoted(index, is_candidate)
+            if is_candidate.any():
+                self._shown[index] |= is_candidate & ~self._covered(index, is_candidate)
 
     def surfaces(self) -> Iterator[Surface]:
         """The surfaces of all quads that are shown."""
@@ -87,40 +94,44 @@ class _Mosaic:
             if is_shown.any():
                 yield _surface(sheet, is_shown, keyframe, self._geometry)
 
-    def _covered(self, index: int) -> Mask:
-        """Whether the quads of a sheet, and those around them, are surfaces that others show already."""
-        shape = self._sheets[index].is_edge.shape
-        is_covered = np.zeros(shape[0] * shape[1], bool)
+    def _covered(self, index: int, is_candidate: Mask) -> Mask:
+        """Whether candidates of the quads of a sheet, and those around them, are surfaces that others show already."""
+        is_covered = np.zeros(np.count_nonzero(is_candidate), bool)
         for other, shown in enumerate(self._shown):
             if other == index or not shown.any():
                 continue
-            view = self._viewed(index, other)
+            view = self._viewed(index, other, is_candidate)
             rows, columns = _quads_at(view.pixels, self._sheets[other])
             is_covered |= view.is_seen & view.is_same & shown[rows, columns]
+        covered = np.ones(is_candidate.shape, bool)
+        covered[is_candidate] = is_covered
         # Quads at the rim of what is covered are shown, so that no gap remains.
-        covered = scipy.ndimage.binary_erosion(is_covered.reshape(shape), np.ones((3, 3), bool), border_value=1)
-        return np.asarray(covered, bool)
+        return np.asarray(scipy.ndimage.binary_erosion(covered, np.ones((3, 3), bool), border_value=1), bool)
 
-    def _is_outvoted(self, index: int) -> Mask:
-        """Whether most keyframes see something behind the quads of a sheet, or something else at their place."""
-        shape = self._sheets[index].is_edge.shape
-        balance = np.ones(shape[0] * shape[1], int)  # its own keyframe sees it
+    def _outvoted(self, index: int, is_candidate: Mask) -> Mask:
+        """Whether most keyframes see something behind candidates of the quads, or something else at their place."""
+        balance = np.ones(np.count_nonzero(is_candidate), int)  # its own keyframe sees it
         size_px = np.array([self._geometry.width_px, self._geometry.height_px])
         last_px = size_px - 1 - self._margin_px
         for other in range(len(self._keyframes)):
             if other == index:
                 continue
-            view = self._viewed(index, other)
+            view = self._viewed(index, other, is_candidate)
             is_in_image = view.is_seen & ((view.pixels >= self._margin_px) & (view.pixels <= last_px)).all(1)
             balance += is_in_image & view.is_same & view.is_alike
             balance -= is_in_image & view.is_same & ~view.is_alike
             balance -= is_in_image & view.is_in_front
-        return np.asarray(balance < 0).reshape(shape)
+        outvoted = np.zeros(is_candidate.shape, bool)
+        outvoted[is_candidate] = balance < 0
+        return outvoted
 
-    def _viewed(self, index: int, other: int) -> "_View":
-        """The quads of a keyframe as another one sees them."""
+    def _viewed(self, index: int, other: int, is_candidate: Mask) -> "_View":
+        """Candidates of the quads of a keyframe as another one sees them."""
         geometry = self._geometry
-        pixels, rho = self._sheets[index].centres()
+        all_pixels, all_rho = self._sheets[index].centres()
+        chosen = is_candidate.reshape(-1)
+        pixels = all_pixels[chosen]
+        rho = all_rho[chosen]
         points_m = geometry.rays(pixels) / rho[:, None]
         T_other_own = inverse(self._keyframes[other].T_world_view) @ self._keyframes[index].T_world_view
         seen_px, depth_m = geometry.project(points_m @ T_other_own[:3, :3].T + T_other_own[:3, 3])

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from vobench.analysis.keyframe_depth import keyframes_of, view_geometry
-from vobench.analysis.pair_calibration import PairCalibration
 from vobench.analysis.path_placement import Placement, WantedDisparities, nearness_of, segment_disparities
 from vobench.analysis.reconstruction import reconstruct
 from vobench.analysis.recording_part import read_shots
@@ -16,6 +15,7 @@ from vobench.asset.luminous_model import write_luminous_model
 from vobench.dataset.recording import Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import StereoPair, stereo_pair
+from vobench.geometry.rig import Rig
 from vobench.geometry.se3 import Array, inverse, rotation_angle
 from vobench.rendering.geometry import RayCaster
 from vobench.runner.store import SILENT, Progress
@@ -43,6 +43,7 @@ def rebuild_place(
     recording: Recording,
     t_ns: Stamps,
     T_world_left: Array,
+    rig: Rig,
     fit: StereoFit,
     *,
     model: Path,
@@ -50,32 +51,25 @@ def rebuild_place(
 ) -> float:
     """Rebuild the place of a recording from its images at `t_ns` (N,), and write its model.
 
-    The model is in the world of the poses T_world_left (N, 4, 4) at which the images were taken. It has no vignetting;
-    returned is the strength of that of the camera, as `CameraSettings.vignetting`.
+    The model is in the world of the poses T_world_left (N, 4, 4) at which the images were taken, by the true `rig`,
+    whose nominal calibration has the errors of `fit`. The model has no vignetting; returned is the strength of that of
+    the camera, as `CameraSettings.vignetting`.
 
     Raises InputError if the path is too long for that.
     """
-    pair = stereo_pair(recording.rig, "the twin")
+    pair = stereo_pair(rig, "the twin")
     chosen = keyframe_indices(T_world_left, pair, typical_disparity_px=fit.disparity_px[1])
     with progress.step(f"rebuilding the place from {len(chosen)} images"):
         by_stamp = read_shots(recording, t_ns[chosen])
         shots = [replace(by_stamp[int(t_ns[index])], T_world_left=T_world_left[index]) for index in chosen]
         most_px = BEYOND_MATCHES * float(np.quantile(fit.matches.disparity_px, DISPARITY_QUANTILE))
-        keyframes = keyframes_of(shots, pair, _correction(fit), most_disparity_px=most_px)
+        keyframes = keyframes_of(shots, pair, most_disparity_px=most_px)
         geometry = view_geometry(pair)
         cosine = cosines(pair, geometry)
         photometry = fit_photometry(keyframes, cosine, geometry)
         evenly_lit = corrected(keyframes, photometry, cosine)
         write_luminous_model(reconstruct(evenly_lit, geometry), model)
     return photometry.exponent * TEXTURE_RESPONSE / COSINE_POWER
-
-
-def _correction(fit: StereoFit) -> PairCalibration | None:
-    """The errors of the pair that are corrected; None if those of disparities are not known."""
-    calibrated = fit.calibrated
-    if calibrated is None or not calibrated.is_offset_determined:
-        return None
-    return calibrated.calibration
 
 
 def keyframe_indices(T_world_left: Array, pair: StereoPair, *, typical_disparity_px: float) -> list[int]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from vobench.analysis.camera_fit import CameraLook, Lights, fit_camera, look_of
 from vobench.analysis.image_statistics import evenly_spaced
-from vobench.analysis.path_placement import Placement, levelled, wanted_disparities
+from vobench.analysis.path_placement import Placement, WantedDisparities, levelled, wanted_disparities
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
 from vobench.analysis.realism import Realism, all_errors, shots_of
 from vobench.analysis.realism_report import RealismReport, realism_of
@@ -25,7 +25,7 @@ from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import stereo_pair
 from vobench.geometry.camera import pixel_grid
-from vobench.geometry.rig import custom_stereo_pair
+from vobench.geometry.rig import CalibrationError, CameraError, custom_stereo_pair, true_rig
 from vobench.geometry.se3 import Array, inverse
 from vobench.runner.data_frame import data_frame
 from vobench.runner.estimate import ESTIMATE
@@ -208,10 +208,7 @@ def write_twin_suite(
         pair = stereo_pair(recorded.rig, "the twin")
         wanted_px = wanted_disparities(path.fit, pair)
         if place == RECORDED:
-            model = (out / MODEL_FILE).resolve()
-            vignetting = rebuild_place(recorded, path.t_ns, path.T_world_left, path.fit, model=model, progress=progress)
-            placement = own_placement(recorded_scene(model), path.T_world_left, pair, wanted_px)
-            placed = (PlacedPath(RECORDED, None, placement, str(model), vignetting),) * placements
+            placed = _rebuilt_places(recorded, path, wanted_px, count=placements, out=out, progress=progress)
         else:
             placed = tuple(find_places(place, path.T_world_left, pair, wanted_px, most=placements, progress=progress))
         write_json(out / PLACEMENT_FILE, [each.as_dict() for each in placed])
@@ -234,6 +231,29 @@ def write_twin_suite(
         suite["cameras"] = {TWIN: camera}
         write_json(file, suite)
     return TwinSuite(files[0], placed, realism, tuple(files[1:]))
+
+
+def _rebuilt_places(
+    recorded: Recording,
+    path: "RecordedPath",
+    wanted_px: WantedDisparities,
+    *,
+    count: int,
+    out: Path,
+    progress: Progress,
+) -> tuple[PlacedPath, ...]:
+    """The place of the recording, rebuilt with the calibration errors of each of some twins."""
+    pair = stereo_pair(recorded.rig, "the twin")
+    placed = []
+    for index in range(count):
+        model = _numbered(out / MODEL_FILE, index).resolve()
+        rig = true_rig(recorded.rig, path.calibration_error(index))
+        vignetting = rebuild_place(
+            recorded, path.t_ns, path.T_world_left, rig, path.fit, model=model, progress=progress
+        )
+        placement = own_placement(recorded_scene(model), path.T_world_left, pair, wanted_px)
+        placed.append(PlacedPath(RECORDED, None, placement, str(model), vignetting))
+    return tuple(placed)
 
 
 def _suite_of_place(out: Path, path: "RecordedPath", placed: PlacedPath, *, index: int) -> dict[str, Any]:
@@ -422,8 +442,17 @@ class RecordedPath:
         """
         settings: Any = plain(self.rig)
         stated = {key: settings[key] for key in ("own", "pitch_deg", "forward_m", "height_m")}
+        return {**stated, "calibration_error": self._errors(index)}
+
+    def calibration_error(self, index: int) -> CalibrationError:
+        """The calibration errors in `rig_settings`."""
+        errors = self._errors(index)
+        right = CameraError(**errors.pop("right", {}))
+        return CalibrationError(**errors, right=right)
+
+    def _errors(self, index: int) -> dict[str, Any]:
         rng = np.random.default_rng([CALIBRATION_SEED, index]) if index else None
-        return {**stated, "calibration_error": all_errors(self.fit, rng)}
+        return all_errors(self.fit, rng)
 
     def trajectory_settings(self) -> dict[str, Any]:
         """The replay of this path for a suite."""
