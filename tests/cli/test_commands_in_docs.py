@@ -111,7 +111,7 @@ CHECKED = {
         MINUTES, "explain runs/lighting/latest/dim-noisy/lk_epipolar", stop_at="trials 1 to "
     ),
     "explain RECORDING --estimate est.tum": Check(MINUTES, "explain --help"),
-    "twin RECORDING --place street --out twin": Check(MINUTES, "twin --help"),
+    "twin RECORDING --out twin": Check(MINUTES, "twin --help"),
     "twin --report twin": Check("it needs a twin, which takes many minutes", "twin --help"),
     "render SCENE --engine path --samples 256": Check("it needs the extra `path`", "render cell"),
     "run quickstart -e orbslam3_stereo -n 4 --jobs 1": Check(ORBSLAM3, "check quickstart"),

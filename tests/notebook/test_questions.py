@@ -93,7 +93,7 @@ def test_a_twin_is_made_in_its_folder_with_reports_of_its_runs(asked, monkeypatc
     assert (path, options["out"], options["place"], options["estimators"]) == (
         Path("street"),
         Path("pair"),
-        "office",
+        "recorded",
         ["a"],
     )
     assert (plans[0]["out"], plans[0]["jobs"], plans[0]["finish"]) == (Path("pair/runs"), 2, write_reports)

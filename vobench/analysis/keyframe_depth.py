@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from vobench.analysis.image_noise import noise_dn
 from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.stereo import OUTSIDE_PX, Eye, StereoPair
 from vobench.geometry.se3 import Array, inverse
@@ -29,9 +28,6 @@ LEAST_DISPARITY_PX = 0.25  # points with less are as far away as with this
 NEIGHBOURS = 2  # keyframes before and after, from which depth is also taken
 AGREEING_PX = 1.0  # of disparity
 LARGEST_WEIGHT = 16.0
-DENOISED_SIGMAS = 1.0  # strength of the filter of non-local means, in standard deviations of the noise
-DENOISED_TEMPLATE_PX = 5
-DENOISED_SEARCH_PX = 15
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +85,7 @@ def view_geometry(pair: StereoPair) -> ViewGeometry:
 def keyframes_of(shots: Sequence[PairShot], pair: StereoPair, *, most_disparity_px: float) -> list[Keyframe]:
     """The keyframes of shots with true poses, with depth that neighbours agree on and without holes.
 
-    The pair is the true one, without errors of calibration. Noise is removed from the images.
+    The pair is the true one, without errors of calibration.
     """
     geometry = view_geometry(pair)
     left_map, right_map = (_map_of_view(eye, geometry) for eye in (pair.left, pair.right))
@@ -102,7 +98,7 @@ def keyframes_of(shots: Sequence[PairShot], pair: StereoPair, *, most_disparity_
         disparity_px = dense_disparity(left, right, disparities)
         rho = np.maximum(disparity_px, LEAST_DISPARITY_PX) * geometry.rho_of_px
         T_world_view = shot.T_world_left @ inverse(pair.T_view_left)
-        keyframes.append(Keyframe(denoised(left), rho, T_world_view))
+        keyframes.append(Keyframe(left, rho, T_world_view))
     agreed = [_agreed(index, keyframes, geometry) for index in range(len(keyframes))]
     return [
         replace(keyframe, rho=filled(rho, geometry.least_rho)) for keyframe, rho in zip(keyframes, agreed, strict=True)
@@ -122,17 +118,6 @@ def _map_of_view(eye: Eye, geometry: ViewGeometry) -> tuple[Array, Array]:
 
 def _resampled(image: Image, source_map: tuple[Array, Array]) -> Image:
     return cv2.remap(image, *source_map, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE).astype(np.uint8, copy=False)
-
-
-def denoised(image: Image) -> Image:
-    """An image (H, W) without its noise, by non-local means (Buades, Coll and Morel, 2005)."""
-    sigma_dn, _ = noise_dn(image)
-    if sigma_dn == 0:
-        return image
-    strength = DENOISED_SIGMAS * sigma_dn
-    return cv2.fastNlMeansDenoising(
-        image, h=strength, templateWindowSize=DENOISED_TEMPLATE_PX, searchWindowSize=DENOISED_SEARCH_PX
-    ).astype(np.uint8, copy=False)
 
 
 # --- Stereo ---

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from vobench.analysis.keyframe_depth import keyframes_of, view_geometry
+from vobench.analysis.keyframe_texture import without_noise
 from vobench.analysis.path_placement import Placement, WantedDisparities, nearness_of, segment_disparities
 from vobench.analysis.reconstruction import reconstruct
 from vobench.analysis.recording_part import read_shots
@@ -68,7 +69,8 @@ def rebuild_place(
         cosine = cosines(pair, geometry)
         photometry = fit_photometry(keyframes, cosine, geometry)
         evenly_lit = corrected(keyframes, photometry, cosine)
-        write_luminous_model(reconstruct(evenly_lit, geometry), model)
+        smooth = without_noise(evenly_lit, geometry)
+        write_luminous_model(reconstruct(smooth, geometry), model)
     return photometry.exponent * TEXTURE_RESPONSE / COSINE_POWER
 
 

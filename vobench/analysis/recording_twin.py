@@ -20,7 +20,7 @@ from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
 from vobench.analysis.twin_estimators import twin_estimators
 from vobench.analysis.twin_places import PlacedPath, find_places
-from vobench.analysis.twin_prediction import TwinPrediction, common_names, predict
+from vobench.analysis.twin_prediction import OTHER_PLACES, RECORDED_PLACE, TwinPrediction, common_names, predict
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import stereo_pair
@@ -84,6 +84,11 @@ class TwinSuite:
     placed: tuple[PlacedPath, ...]
     realism: Realism
     more: tuple[Path, ...] = ()
+
+    @property
+    def is_rebuilt(self) -> bool:
+        """Whether the twin is in the recorded place."""
+        return bool(self.placed) and all(placed.model for placed in self.placed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,7 +161,7 @@ def write_twin_suite(
     recording: Path,
     *,
     out: Path = Path("twin"),
-    place: str = "office",
+    place: str = RECORDED,
     placements: int = PLACEMENTS,
     estimators: Sequence[str] = (),
     form: str | None = None,
@@ -165,15 +170,18 @@ def write_twin_suite(
 ) -> TwinSuite:
     """Write the suite of a recording and of its repetition in a simulated place.
 
-    The recorded path is placed at its own scale where it is free and disparities agree best, in several places. The rig
-    gets the calibration errors of the recording, and the camera gets its exposure, contrast, blur and noise.
+    The place is rebuilt from the recording's images, or the recorded path is placed at its own scale where it is free
+    and disparities agree best, in several places. The rig gets the calibration errors of the recording, and the camera
+    gets its exposure, contrast, blur and noise.
 
     Args:
         recording: a recording with ground truth, or the folder of a run's case.
         out: the folder for the suite, new or of the same request when it was interrupted. The placement and the suite
             in it are used again, also if the suite was edited.
-        place: the name of the first scene that is tried, or the path of its file or model.
-        placements: the largest number of places, as in `find_places`.
+        place: "recorded" for the place of the recording, as in `rebuild_place`, or the name of the first scene that is
+            tried, or the path of its file or model.
+        placements: the number of times that the place is rebuilt, or the largest number of places, as in
+            `find_places`.
         estimators: three estimators or more, instead of the default seven, as in `twin_estimators`.
         form: the form of the recording, if its content does not determine it.
         options: what the recording does not state itself: calibration, ground truth, rate, topics.
@@ -181,8 +189,8 @@ def write_twin_suite(
 
     Raises:
         InputError: the folder is in use for something else; fewer than three estimators; or the recording has no stereo
-            pair that can be matched, no ground truth, too few pictures, or no motion; or no free path was found in the
-            place.
+            pair that can be matched, no ground truth, too few pictures, or no motion; or it is too long for its place
+            to be rebuilt; or no free path was found in the place.
         UnknownNameError: there is no such place.
     """
     entries = twin_estimators(estimators)
@@ -370,17 +378,25 @@ def predict_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> PredictedTwin:
     for file in (suite.file, *suite.more):
         folder = run_plan(read_plan(str(file)).only([TWIN], []))
         errors.append(case_errors(folder, TWIN))
-    return PredictedTwin(predict(errors, basis=_basis(suite)), tuple(errors))
+    usual = RECORDED_PLACE if suite.is_rebuilt else OTHER_PLACES
+    return PredictedTwin(predict(errors, usual=usual, basis=_basis(suite)), tuple(errors))
 
 
 def _basis(suite: TwinSuite) -> str:
     """On what a prediction rests."""
-    titles = ", ".join(each.title for each in suite.placed)
-    places = f"the recording's path in {titles}" if titles else "the recording's path in a place"
+    if suite.is_rebuilt:
+        places = "the recorded place, rebuilt from its images"
+        covered = "errors of the rebuilt place"
+        lacking = "what moves there"
+    else:
+        titles = ", ".join(each.title for each in suite.placed)
+        places = f"the recording's path in {titles}" if titles else "the recording's path in a place"
+        covered = "other places"
+        lacking = "what a simulation lacks"
     basis = (
         f"The prediction rests on {places}, on a camera and a calibration error that were fitted to the recording, and "
-        "on that path being true. Intervals cover other places, noise and the uncertainty of the calibration, not "
-        "what a simulation lacks."
+        f"on the recorded path being true. Intervals cover {covered}, noise and the uncertainty of the calibration, "
+        f"not {lacking}."
     )
     if suite.realism.pair is None or suite.realism.pair.offset_px is None:
         basis += " The offset of disparity could not be determined and is 0 in the twin, so errors may be far larger."
@@ -392,7 +408,7 @@ def make_twin(
     *,
     run_plan: PlanRunner,
     out: Path = Path("twin"),
-    place: str = "office",
+    place: str = RECORDED,
     placements: int = PLACEMENTS,
     estimators: Sequence[str] = (),
     form: str | None = None,

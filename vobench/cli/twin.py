@@ -5,6 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
+from vobench.analysis.recorded_place import RECORDED
 from vobench.analysis.recording_twin import (
     MOST_PLACEMENTS,
     PLACEMENTS,
@@ -40,9 +41,14 @@ def twin_command(
         Path | None,
         typer.Option(help="Run the suite in the folder of a twin, such as one that was edited, and write its report."),
     ] = None,
-    place: Annotated[str, typer.Option(help="The first scene or model in which the path is tried.")] = "office",
+    place: Annotated[
+        str,
+        typer.Option(
+            help="The recorded place, rebuilt from the images, or the first scene in which the path is tried."
+        ),
+    ] = RECORDED,
     placements: Annotated[
-        int, typer.Option(min=1, max=MOST_PLACEMENTS, help="The largest number of places in which it is simulated.")
+        int, typer.Option(min=1, max=MOST_PLACEMENTS, help="The largest number of twins, in different places if named.")
     ] = PLACEMENTS,
     out: Annotated[Path, typer.Option(help="The new folder for the suite, its runs and the report.")] = Path("twin"),
     estimator: Annotated[

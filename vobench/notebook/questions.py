@@ -127,7 +127,7 @@ def twin(
     recording: Path | str | None = None,
     *,
     report: Path | str | None = None,
-    place: str = "office",
+    place: str = "recorded",
     placements: int = 3,
     estimators: Names | None = None,
     form: str | None = None,
@@ -139,7 +139,8 @@ def twin(
 
     `out` is the folder for the suite and its runs, new or of an interrupted call. With `report`, which is such a
     folder, in place of the recording, the suite in it is run and compared as it is. `estimators` are names, labels of
-    the usual ones, or entries of a suite in YAML. `placements` is the largest number of places.
+    the usual ones, or entries of a suite in YAML. `place` is the recorded one, rebuilt from the images, or the first
+    that is tried. `placements` is the largest number of twins.
     Raises InputError if the recording has no stereo pair, no ground truth or no motion, and UnknownNameError for the
     place.
     """

@@ -1,0 +1,71 @@
+"""Removes the noise of keyframes, by the mean of all keyframes that show the same surface."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from vobench.analysis.image_noise import noise_dn
+from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry
+from vobench.geometry.se3 import Array, apply, inverse
+from vobench.sequence.picture import Image
+
+REACH = 6  # keyframes before and after
+SAME_PX = 1.0  # of disparity, for the same surface
+ALIKE_SIGMAS = 4.0  # standard deviations of the difference of two images
+LEAST_ALIKE_DN = 3.0
+ENOUGH = 3  # other keyframes for a mean; elsewhere, noise is removed within the image
+TEMPLATE_PX = 5
+SEARCH_PX = 15
+
+Mask = NDArray[np.bool_]
+
+
+def without_noise(keyframes: Sequence[Keyframe], geometry: ViewGeometry) -> list[Keyframe]:
+    """The keyframes with images whose noise is removed.
+
+    A mean over keyframes preserves faint textures, which a filter within the image takes for noise.
+    """
+    return [replace(keyframe, image=_image(index, keyframes, geometry)) for index, keyframe in enumerate(keyframes)]
+
+
+def _image(index: int, keyframes: Sequence[Keyframe], geometry: ViewGeometry) -> Image:
+    own = keyframes[index]
+    sigma_dn, _ = noise_dn(own.image)
+    limit_dn = max(ALIKE_SIGMAS * 2**0.5 * sigma_dn, LEAST_ALIKE_DN)
+    total = own.image.astype(np.float64)
+    count = np.ones(total.shape)
+    before = keyframes[max(index - REACH, 0) : index]
+    after = keyframes[index + 1 : index + 1 + REACH]
+    for other in (*before, *after):
+        seen_dn, is_same = _seen_in(own, other, geometry)
+        is_alike = is_same & (np.abs(seen_dn - own.image) <= limit_dn)
+        total += np.where(is_alike, seen_dn, 0.0)
+        count += is_alike
+    mean = np.where(count > ENOUGH, total / count, denoised(own.image, sigma_dn))
+    return np.rint(mean).astype(np.uint8)
+
+
+def _seen_in(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> tuple[Array, Mask]:
+    """The grey values (H, W) that another image has where it shows the pixels of a keyframe, and whether it does."""
+    points_m = (geometry.rays(geometry.pixel_grid()) / own.rho[..., None]).reshape(-1, 3)
+    T_other_own = inverse(other.T_world_view) @ own.T_world_view
+    seen_px, depth_m = geometry.project(apply(T_other_own, points_m))
+    shape = own.rho.shape
+    columns, rows = np.nan_to_num(seen_px, nan=-1.0).astype(np.float32).T.reshape(2, *shape)
+    seen_dn = cv2.remap(other.image, columns, rows, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    other_rho = cv2.remap(other.rho, columns, rows, cv2.INTER_NEAREST, borderMode=cv2.BORDER_CONSTANT, borderValue=-1)
+    seen_rho = (1 / depth_m).reshape(shape)
+    with np.errstate(invalid="ignore"):
+        is_same = (other_rho > 0) & (np.abs(seen_rho - other_rho) <= SAME_PX * geometry.rho_of_px)
+    return seen_dn.astype(np.float64), np.asarray(is_same, bool)
+
+
+def denoised(image: Image, sigma_dn: float) -> Image:
+    """An image (H, W) with noise of a standard deviation, without it, by non-local means (Buades et al., 2005)."""
+    if sigma_dn == 0:
+        return image
+    smooth = cv2.fastNlMeansDenoising(image, h=sigma_dn, templateWindowSize=TEMPLATE_PX, searchWindowSize=SEARCH_PX)
+    return smooth.astype(np.uint8, copy=False)
