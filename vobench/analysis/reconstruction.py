@@ -45,19 +45,19 @@ def reconstruct(keyframes: Sequence[Keyframe], geometry: ViewGeometry) -> list[S
     wide = [_extended(keyframe, margin_px) for keyframe in keyframes]
     order = _nearest_views_first(keyframes)
     mosaic = _Mosaic(wide, wide_geometry, margin_px, order)
-    mosaic.add(Part.IMAGES, rejects_outvoted=True)
-    mosaic.add(Part.MARGINS, rejects_outvoted=True)
-    mosaic.add(Part.IMAGES)
+    mosaic.add(ImagePart.IMAGES, rejects_outvoted=True)
+    mosaic.add(ImagePart.MARGINS, rejects_outvoted=True)
+    mosaic.add(ImagePart.IMAGES)
 
     far_rho = FARTHER * geometry.least_rho
     far = [replace(keyframe, rho=np.full_like(keyframe.rho, far_rho)) for keyframe in wide]
     backdrop = _Mosaic(far, wide_geometry, margin_px, order)
-    backdrop.add(Part.IMAGES)
-    backdrop.add(Part.MARGINS)
+    backdrop.add(ImagePart.IMAGES)
+    backdrop.add(ImagePart.MARGINS)
     return [*mosaic.surfaces(), *backdrop.surfaces()]
 
 
-class Part(Enum):
+class ImagePart(Enum):
     """The images themselves, or the margins by which they are extended."""
 
     IMAGES = 0
@@ -78,11 +78,11 @@ class _Mosaic:
         self._smooth = [cv2.blur(keyframe.image.astype(np.float32), (SMOOTH_PX, SMOOTH_PX)) for keyframe in keyframes]
         self._shown = [np.zeros(sheet.is_edge.shape, bool) for sheet in self._sheets]
 
-    def add(self, part: Part, *, rejects_outvoted: bool = False) -> None:
+    def add(self, part: ImagePart, *, rejects_outvoted: bool = False) -> None:
         """Add the quads of a part of all keyframes that are not shown yet."""
         for index in self._order:
             is_margin = _is_margin(self._sheets[index], self._geometry, self._margin_px)
-            is_candidate = (is_margin if part is Part.MARGINS else ~is_margin) & ~self._shown[index]
+            is_candidate = (is_margin if part is ImagePart.MARGINS else ~is_margin) & ~self._shown[index]
             if rejects_outvoted:
                 is_candidate &= ~self._outvoted(index, is_candidate)
             if is_candidate.any():

@@ -26,7 +26,7 @@ MOST_EXPONENT = 4.0
 
 
 @dataclass(frozen=True, slots=True)
-class Photometry:
+class RelativePhotometry:
     """The exponent of vignetting in grey values, and the grey values (K,) of keyframes relative to their mean."""
 
     exponent: float
@@ -39,14 +39,14 @@ def cosines(pair: StereoPair, geometry: ViewGeometry) -> Array:
     return np.asarray(rays[..., 2] / np.linalg.norm(rays, axis=-1), float)
 
 
-def fit_photometry(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewGeometry) -> Photometry:
+def fit_photometry(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewGeometry) -> RelativePhotometry:
     """Fit the exponent and the exposures to differences of logarithms of grey values.
 
     Errors with a heavy tail, as of surfaces that shine or are not the same, count little.
     """
     pairs = list(_same_points(keyframes, cosine, geometry))
     if not pairs:
-        return Photometry(0.0, np.ones(len(keyframes)))
+        return RelativePhotometry(0.0, np.ones(len(keyframes)))
     differences = np.concatenate([pair.log_grey for pair in pairs])
     design = np.concatenate([_design(pair, len(keyframes)) for pair in pairs])
     prior_sigma = np.array([PRIOR_SIGMAS[0], *[PRIOR_SIGMAS[1]] * len(keyframes)])
@@ -58,10 +58,10 @@ def fit_photometry(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewG
         weights = cauchy_weights(differences - design @ solution, LOG_NOISE)
     exponent = float(np.clip(solution[0], 0.0, MOST_EXPONENT))
     log_exposure = solution[1:] - solution[1:].mean()
-    return Photometry(exponent, np.exp(log_exposure))
+    return RelativePhotometry(exponent, np.exp(log_exposure))
 
 
-def corrected(keyframes: Sequence[Keyframe], photometry: Photometry, cosine: Array) -> list[Keyframe]:
+def corrected(keyframes: Sequence[Keyframe], photometry: RelativePhotometry, cosine: Array) -> list[Keyframe]:
     """The keyframes as a camera without vignetting and with one exposure would have taken them.
 
     All images are darker by one factor, so that no value exceeds the range of grey values.
