@@ -121,6 +121,20 @@ def test_the_first_paired_units_are_in_different_places_with_different_drives() 
     assert counts == {"tour.1": 1, "tour.2": 1, "car.1": 2, "car.2": 1, "walk": 1}
 
 
+@pytest.mark.parametrize("count", range(3, 12))
+def test_fewer_units_than_scenes_have_all_kinds_in_proportion(count: int) -> None:
+    scenes = [*(f"flat.{seed}" for seed in range(6)), *(f"park.{seed}" for seed in range(3)), "hall", "street.1"]
+    pairs = {"park": ("walk",), "street": ("car",)}
+    made = units(Spread(units=count, pairs=pairs), {"scene": scenes, "trajectory": ["tour", "walk", "car"]})
+    assert len({unit.place for unit in made}) == count
+    sizes = {"flat": 6, "park": 3, "hall": 1, "street": 1}
+    for kind, size in sizes.items():
+        of_kind = sum(unit.kind == kind for unit in made)
+        assert abs(of_kind - count * size / len(scenes)) <= 1
+    drives = Counter(unit.by_axis["trajectory"] for unit in made if unit.kind in ("flat", "hall"))
+    assert max(drives.values()) - min(drives[name] for name in ("tour", "walk", "car")) <= 1
+
+
 def test_pairs_that_name_all_trajectories_change_nothing() -> None:
     everything = {"flat": ("tour", "walk", "car"), "street": ("tour", "walk", "car")}
     assert units(Spread(units=30, pairs=everything), PAIRED) == units(Spread(units=30), PAIRED)

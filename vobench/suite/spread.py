@@ -97,7 +97,8 @@ def units(spread: Spread, variants: Mapping[str, Collection[str]]) -> list[Unit]
     """The units of a design over the variants of each axis.
 
     The design is balanced: the numbers of units of any two variants of an axis differ by at most 1. With `pairs`, this
-    is guaranteed for scenes, and for trajectories among the scenes that are paired with the same trajectories.
+    is guaranteed for scenes, and for trajectories among the scenes that are paired with the same trajectories. A design
+    with fewer units than scenes has about the same share of the scenes of each kind.
 
     Raises SuiteError if the design has more units than there are combinations, or if `pairs` names an unknown scene or
     trajectory.
@@ -106,12 +107,27 @@ def units(spread: Spread, variants: Mapping[str, Collection[str]]) -> list[Unit]
     for axis in UNIT_AXES:
         if axis in spread.over:
             variants_by_axis[axis] = list(variants[axis])
-
     paired_drives = _paired_drives(spread.pairs or {}, variants_by_axis)
+    if spread.units < len(variants_by_axis.get("scene", ())):
+        variants_by_axis["scene"] = _evenly_of_kinds(variants_by_axis["scene"], spread.units)
+
     combinations = _diagonals(variants_by_axis, paired_drives)
     if spread.units > len(combinations):
         raise SuiteError(_too_few_sentence(spread, variants_by_axis, len(combinations)))
     return [Unit(combination) for combination in combinations[: spread.units]]
+
+
+def _evenly_of_kinds(scenes: Sequence[str], count: int) -> list[str]:
+    """A number of scenes, in their order, with about the same share of those of each kind."""
+    size_of_kind = Counter(kind_of(scene) for scene in scenes)
+    seen_of_kind = Counter[str]()
+    share_before = dict[str, float]()  # of the scenes of its kind, up to the middle of a scene
+    for scene in scenes:
+        kind = kind_of(scene)
+        share_before[scene] = (seen_of_kind[kind] + 0.5) / size_of_kind[kind]
+        seen_of_kind[kind] += 1
+    chosen = set(sorted(scenes, key=lambda scene: share_before[scene])[:count])
+    return [scene for scene in scenes if scene in chosen]
 
 
 def _too_few_sentence(spread: Spread, variants: Mapping[str, Collection[str]], available: int) -> str:
