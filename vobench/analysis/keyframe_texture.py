@@ -44,8 +44,9 @@ def _image(index: int, keyframes: Sequence[Keyframe], geometry: ViewGeometry) ->
         is_alike = is_same & (np.abs(seen_dn - own.image) <= limit_dn)
         total += np.where(is_alike, seen_dn, 0.0)
         count += is_alike
-    mean = np.where(count > ENOUGH, total / count, denoised(own.image, sigma_dn))
-    return np.rint(mean).astype(np.uint8)
+    mean = np.rint(total / count).astype(np.uint8)
+    remaining_dn, _ = noise_dn(mean)
+    return np.where(count > ENOUGH, denoised(mean, remaining_dn), denoised(own.image, sigma_dn))
 
 
 def _seen_in(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> tuple[Array, Mask]:

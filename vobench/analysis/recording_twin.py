@@ -20,7 +20,7 @@ from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
 from vobench.analysis.twin_estimators import twin_estimators
 from vobench.analysis.twin_places import PlacedPath, find_places
-from vobench.analysis.twin_prediction import OTHER_PLACES, RECORDED_PLACE, TwinPrediction, common_names, predict
+from vobench.analysis.twin_prediction import TwinPrediction, common_names, predict
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.errors import InputError
 from vobench.estimator.stereo import stereo_pair
@@ -378,8 +378,7 @@ def predict_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> PredictedTwin:
     for file in (suite.file, *suite.more):
         folder = run_plan(read_plan(str(file)).only([TWIN], []))
         errors.append(case_errors(folder, TWIN))
-    usual = RECORDED_PLACE if suite.is_rebuilt else OTHER_PLACES
-    return PredictedTwin(predict(errors, usual=usual, basis=_basis(suite)), tuple(errors))
+    return PredictedTwin(predict(errors, basis=_basis(suite)), tuple(errors))
 
 
 def _basis(suite: TwinSuite) -> str:

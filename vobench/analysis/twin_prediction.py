@@ -13,20 +13,12 @@ from vobench.geometry.se3 import Array
 COVERAGE = 0.95  # of the intervals
 LEAST_ERROR_PERCENT = 1e-3  # smaller errors count as this one
 
-USUAL_FREEDOM = 4  # degrees of freedom that the usual spread counts as: few twins alone say little of it
-
-
-@dataclass(frozen=True, slots=True)
-class UsualSpread:
-    """The usual standard deviations of the logarithm of an error: between twins, and what remains for one estimator."""
-
-    twin_sd: float
-    remaining_sd: float
-
-
-# Chosen by the differences between eight simulated recordings and their twins (benchmarks/hidden_twins.py, seed 1).
-OTHER_PLACES = UsualSpread(0.35, 0.3)
-RECORDED_PLACE = UsualSpread(0.25, 0.25)
+# The usual standard deviations of the logarithm of an error between twins, and of what remains for one estimator, and
+# the degrees of freedom that they count as: two twins alone say little of how twins differ. Chosen by the differences
+# between eight simulated recordings and their twins in other places (benchmarks/hidden_twins.py, seed 1).
+USUAL_TWIN_SD = 0.35
+USUAL_REMAINING_SD = 0.3
+USUAL_FREEDOM = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,9 +73,7 @@ class TwinPrediction:
         return {"estimators": rows, "taus": list(self.taus), "placements": self.placements, "says": self.sentences()}
 
 
-def predict(
-    placements: Sequence[Mapping[str, Array]], *, usual: UsualSpread = OTHER_PLACES, basis: str = ""
-) -> TwinPrediction:
+def predict(placements: Sequence[Mapping[str, Array]], *, basis: str = "") -> TwinPrediction:
     """The prediction from the errors of segments, by estimator, in each placement of a twin.
 
     Only estimators that ran in all placements are predicted. The logarithm of a mean error is taken to be the sum of
@@ -93,7 +83,7 @@ def predict(
     names = common_names(placements)
     means = np.array([_means(errors, names) for errors in placements])  # (placements, names)
     logs = np.log(np.maximum(means, LEAST_ERROR_PERCENT))
-    half_width = _half_width(logs, usual)
+    half_width = _half_width(logs)
     rows = []
     for name, log in zip(names, logs.mean(0).tolist(), strict=True):
         interval = None
@@ -118,7 +108,7 @@ def _means(errors: Mapping[str, Array], names: Sequence[str]) -> list[float]:
     return [float(np.nanmean(errors[name])) for name in names]
 
 
-def _half_width(logs: Array, usual: UsualSpread) -> float | None:
+def _half_width(logs: Array) -> float | None:
     """Half of the width of the prediction interval of a logarithm; None if there are too few (placements, names)."""
     placements, names = logs.shape
     if placements < 2 or names < 2:
@@ -129,8 +119,8 @@ def _half_width(logs: Array, usual: UsualSpread) -> float | None:
     remaining_freedom = placement_freedom * (names - 1)
     # The two parts of the variance of one logarithm around the mean of its estimator, each with its own quantile: a
     # common one would be too small where two placements are alike by chance.
-    placement_part = _squared_half_width(float((of_placements**2).sum()), placement_freedom, usual.twin_sd)
-    remaining_part = _squared_half_width(float((remaining**2).sum()), remaining_freedom, usual.remaining_sd)
+    placement_part = _squared_half_width(float((of_placements**2).sum()), placement_freedom, USUAL_TWIN_SD)
+    remaining_part = _squared_half_width(float((remaining**2).sum()), remaining_freedom, USUAL_REMAINING_SD)
     return float(np.sqrt((placement_part + remaining_part * (1 - 1 / names)) * (1 + 1 / placements)))
 
 
