@@ -36,6 +36,7 @@ from vobench.analysis.pair_parameter import (
 )
 from vobench.analysis.rank_agreement import agreement
 from vobench.analysis.realism_report import realism_of
+from vobench.analysis.recorded_place import RECORDED
 from vobench.analysis.recording_twin import case_errors
 from vobench.analysis.twin_estimators import twin_estimators
 from vobench.dataset.export import export
@@ -199,7 +200,7 @@ class Found:
         return [low <= real <= high for _, _, low, high, real in self.estimators]
 
 
-def examine(hidden: Hidden, out: Path, placements: int, place: str | None) -> Found:
+def examine(hidden: Hidden, out: Path, placements: int, *, is_elsewhere: bool) -> Found:
     """Simulate and export a recording, fit its pair, and make its twin; what was found before is read again."""
     file = out / hidden.name / "found.json"
     if file.is_file():
@@ -209,7 +210,8 @@ def examine(hidden: Hidden, out: Path, placements: int, place: str | None) -> Fo
 
     twin = out / hidden.name / "twin"
     command = [sys.executable, "-m", "vobench", "twin", str(recording), "--form", hidden.form, "--out", str(twin)]
-    command += ["--place", place or hidden.domain.twin_place, "--placements", str(placements), "--json"]
+    place = hidden.domain.twin_place if is_elsewhere else RECORDED
+    command += ["--place", place, "--placements", str(placements), "--json"]
     for estimator in ESTIMATORS:
         command += ["-e", estimator]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -341,7 +343,7 @@ def main() -> None:
     parser.add_argument("--recordings", type=int, default=8)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--images", type=int, default=40)
-    parser.add_argument("--place", help="of the twins, instead of a place of the same kind")
+    parser.add_argument("--other-place", action="store_true", help="put twins into a place of the same kind instead")
     parser.add_argument("--placements", type=int, default=2)
     parser.add_argument("--again", action="store_true", help="print tau of two simulations of each recording instead")
     options = parser.parse_args()
@@ -353,7 +355,7 @@ def main() -> None:
     all_found = []
     for index in range(options.recordings):
         hidden = draw_recording(index, options.seed, options.images)
-        found = examine(hidden, options.out, options.placements, options.place)
+        found = examine(hidden, options.out, options.placements, is_elsewhere=options.other_place)
         _print(hidden, found)
         all_found.append(found)
     _print_summary(all_found)
