@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
 from tests.generated import write_cell
 from vobench.errors import SuiteError
@@ -28,6 +29,14 @@ def test_what_lies_at_the_height_of_the_floor_gets_its_material() -> None:
     things = [square("slab", 6, 0.0), square("rug", 2, 0.005), square("table", 2, 0.7), square("ceiling", 6, 2.5)]
     materials = {thing.name: thing.material for thing in with_floor(things)}
     assert materials == {"slab": FLOOR, "rug": FLOOR, "table": "old", "ceiling": "old"}
+
+
+def test_the_lining_of_a_doorway_keeps_its_material_although_it_has_a_strip_of_floor() -> None:
+    strip = quad((0, 3, 0), (0.8, 0, 0), (0, 0.15, 0))
+    jambs = [quad((x, 3, 0), (0, 0.15, 0), (0, 0, 2)) for x in (0.0, 0.8)]
+    lining = Thing("lining", trimesh.util.concatenate([strip, *jambs]), "old")
+    materials = {thing.name: thing.material for thing in with_floor([square("slab", 6, 0.0), lining])}
+    assert materials == {"slab": FLOOR, "lining": "old"}
 
 
 def test_a_place_of_slopes_has_no_floor_to_replace() -> None:

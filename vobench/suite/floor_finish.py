@@ -11,11 +11,14 @@ from vobench.scene.triangles import Thing, triangle_table
 from vobench.suite.level_floor import level_floor
 
 FLOOR = "floor"  # the name of its material
-FLOOR_SHARE = 0.5  # of the area of a thing that faces up: from here on, a thing at the floor's height belongs to it
+DOWNWARD = -0.99  # the normal's z of faces that face down, which nobody sees of a floor
+FLOOR_SHARE = 0.5  # of the other faces' area of a thing: if more is at the floor's height, the thing belongs to it
 
 
 def with_floor(things: Sequence[Thing]) -> tuple[Thing, ...]:
-    """Things of which those that form the level floor have the material FLOOR. So do rugs that lie on it.
+    """Things of which those that form the level floor have the material FLOOR. So do rugs and markings on it.
+
+    The lining of a doorway, of which only a strip is floor, keeps its material.
 
     Raises SuiteError if there is no level floor.
     """
@@ -26,10 +29,10 @@ def with_floor(things: Sequence[Thing]) -> tuple[Thing, ...]:
         raise SuiteError("the scene has no level floor, whose material could be replaced")
 
     areas = areas_m2(faces.corners_m)
-    faces_up = faces.plane[:, 2] > 0
-    upward_m2 = np.bincount(faces.thing, areas * faces_up, minlength=len(things))
+    is_seen = faces.plane[:, 2] > DOWNWARD
+    seen_m2 = np.bincount(faces.thing, areas * is_seen, minlength=len(things))
     floor_m2 = np.bincount(faces.thing, areas * floor.is_floor, minlength=len(things))
-    belongs = floor_m2 > FLOOR_SHARE * upward_m2
+    belongs = floor_m2 > FLOOR_SHARE * seen_m2
     return tuple(
         replace(thing, material=FLOOR) if is_floor else thing for thing, is_floor in zip(things, belongs, strict=True)
     )
