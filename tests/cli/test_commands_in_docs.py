@@ -98,7 +98,6 @@ CHECKED = {
     "view RUN": Check(VIEWER, "view runs/quickstart --save look.rrd"),
     "run worlds": Check(MINUTES, "run worlds --dry-run"),
     "run SUITE --units 24": Check(MINUTES, "run daily --units 24 --dry-run"),
-    "run street": Check(MINUTES, "run street --dry-run"),
     "run street --jobs 1": Check(MINUTES, "run street --dry-run"),
     "run regression -e mine": Check("it takes two minutes", "run regression -e mine --dry-run"),
     "VOBENCH_PORTABLE=1 run quickstart -e mine --jobs 1": Check(
