@@ -5,7 +5,7 @@ import pytest
 
 from tests.analysis.pictures import DISPARITY_PX, STEP_PX, pair, view
 from tests.analysis.test_keyframe_depth import shots_along_the_wall
-from vobench.analysis import recorded_place
+from vobench.analysis import reconstruction, recorded_place
 from vobench.analysis.keyframe_depth import keyframes_of, view_geometry
 from vobench.analysis.reconstruction import reconstruct
 from vobench.analysis.recorded_place import keyframe_indices, recorded_scene
@@ -63,6 +63,15 @@ def test_what_one_keyframe_shows_no_other_shows_again(surfaces: list[Surface]) -
     )
     seen_m2 = (max(columns_m) - min(columns_m)) * np.ptp(rows_m)
     assert near_m2 < 1.5 * seen_m2
+
+
+def test_a_place_of_many_faces_has_a_coarser_grid(surfaces: list[Surface], monkeypatch: pytest.MonkeyPatch) -> None:
+    fine = sum(len(surface.faces) for surface in surfaces)
+    most = fine // 3
+    monkeypatch.setattr(reconstruction, "MOST_FACES", most)
+    keyframes = keyframes_of(shots_along_the_wall(SHOTS), pair(), most_disparity_px=30)
+    coarse = sum(len(surface.faces) for surface in reconstruct(keyframes, view_geometry(pair())))
+    assert most / 3 < coarse <= most
 
 
 def test_textures_are_those_of_the_keyframes_without_noise(surfaces: list[Surface]) -> None:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import pairwise
+from math import ceil, sqrt
 
 import cv2
 import numpy as np
@@ -19,7 +20,9 @@ from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry
 from vobench.asset.luminous_model import Surface
 from vobench.geometry.se3 import Array, inverse
 
-GRID_SHARE = 1 / 200  # of the width, between vertices
+GRID_SHARE = 1 / 200  # of the width, between vertices, unless there are more than MOST_FACES
+MOST_FACES = 600_000
+BACKDROP_SPACINGS = 8  # between vertices of the backdrop, in those of the other surfaces
 MARGIN_SHARE = 0.08  # of the width, by which images are extended on all sides
 SAME_PX = 1.0  # of disparity; surfaces that differ by less in this or in depth are the same
 SAME_RATIO = 0.05  # of depth
@@ -40,21 +43,33 @@ def reconstruct(keyframes: Sequence[Keyframe], geometry: ViewGeometry) -> list[S
     Quads that most keyframes contradict are shown only where nothing else is. Behind everything, far away, are the
     images once more, so that gaps are not black.
     """
+    spacing_px = max(round(GRID_SHARE * geometry.width_px), 1)
+    while True:
+        surfaces = list(_surfaces(keyframes, geometry, spacing_px))
+        faces = sum(len(surface.faces) for surface in surfaces)
+        if faces <= MOST_FACES:
+            return surfaces
+        spacing_px = ceil(spacing_px * sqrt(faces / MOST_FACES))
+
+
+def _surfaces(keyframes: Sequence[Keyframe], geometry: ViewGeometry, spacing_px: int) -> Iterator[Surface]:
+    """The surfaces whose vertices have a distance in the images."""
     margin_px = round(MARGIN_SHARE * geometry.width_px)
     wide_geometry = _extended_geometry(geometry, margin_px)
     wide = [_extended(keyframe, margin_px) for keyframe in keyframes]
     order = _nearest_views_first(keyframes)
-    mosaic = _Mosaic(wide, wide_geometry, margin_px, order)
+    mosaic = _Mosaic(wide, wide_geometry, margin_px, order, spacing_px=spacing_px)
     mosaic.add(ImagePart.IMAGES, rejects_outvoted=True)
     mosaic.add(ImagePart.MARGINS, rejects_outvoted=True)
     mosaic.add(ImagePart.IMAGES)
+    yield from mosaic.surfaces()
 
     far_rho = FARTHER * geometry.least_rho
     far = [replace(keyframe, rho=np.full_like(keyframe.rho, far_rho)) for keyframe in wide]
-    backdrop = _Mosaic(far, wide_geometry, margin_px, order)
+    backdrop = _Mosaic(far, wide_geometry, margin_px, order, spacing_px=BACKDROP_SPACINGS * spacing_px)
     backdrop.add(ImagePart.IMAGES)
     backdrop.add(ImagePart.MARGINS)
-    return [*mosaic.surfaces(), *backdrop.surfaces()]
+    yield from backdrop.surfaces()
 
 
 class ImagePart(Enum):
@@ -68,13 +83,19 @@ class _Mosaic:
     """Surfaces that are put together from quads of keyframes, none of which shows what is shown already."""
 
     def __init__(
-        self, keyframes: Sequence[Keyframe], geometry: ViewGeometry, margin_px: int, order: Sequence[int]
+        self,
+        keyframes: Sequence[Keyframe],
+        geometry: ViewGeometry,
+        margin_px: int,
+        order: Sequence[int],
+        *,
+        spacing_px: int,
     ) -> None:
         self._keyframes = list(keyframes)
         self._geometry = geometry
         self._margin_px = margin_px
         self._order = order
-        self._sheets = [_sheet(keyframe, geometry) for keyframe in keyframes]
+        self._sheets = [_sheet(keyframe, geometry, spacing_px) for keyframe in keyframes]
         self._smooth = [cv2.blur(keyframe.image.astype(np.float32), (SMOOTH_PX, SMOOTH_PX)) for keyframe in keyframes]
         self._shown = [np.zeros(sheet.is_edge.shape, bool) for sheet in self._sheets]
 
@@ -208,8 +229,7 @@ class _Sheet:
         return pixels, self.corner_rho.mean(-1).reshape(-1)
 
 
-def _sheet(keyframe: Keyframe, geometry: ViewGeometry) -> _Sheet:
-    spacing_px = max(round(GRID_SHARE * geometry.width_px), 1)
+def _sheet(keyframe: Keyframe, geometry: ViewGeometry, spacing_px: int) -> _Sheet:
     rows = _grid_lines(geometry.height_px, spacing_px)
     columns = _grid_lines(geometry.width_px, spacing_px)
     rho = keyframe.rho[np.ix_(rows, columns)]
