@@ -12,7 +12,8 @@ import numpy as np
 
 from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.stereo import OUTSIDE_PX, Eye, StereoPair
-from vobench.geometry.se3 import Array, inverse
+from vobench.geometry.se3 import Array, apply, inverse
+from vobench.rendering.array_types import Mask
 from vobench.sequence.picture import Image
 
 BLOCK_PX = 5
@@ -70,10 +71,26 @@ class ViewGeometry:
         pixels = (points_m / depth_m[:, None] @ self.K.T)[:, :2]
         return pixels, depth_m
 
+    def contains(self, pixels: Array, *, margin_px: float = 0) -> Mask:
+        """Whether pixels (N, 2) are in a view, at least so far from its edges."""
+        last_px = np.array([self.width_px, self.height_px]) - 1
+        with np.errstate(invalid="ignore"):
+            return np.asarray(((pixels >= margin_px) & (pixels <= last_px - margin_px)).all(-1))
+
     def pixel_grid(self) -> Array:
         """The pixels (H, W, 2) of a view."""
         columns, rows = np.meshgrid(np.arange(self.width_px), np.arange(self.height_px))
         return np.stack([columns, rows], -1).astype(float)
+
+
+def seen_from(other: Keyframe, own: Keyframe, pixels: Array, rho: Array, geometry: ViewGeometry) -> tuple[Array, Array]:
+    """The pixels (N, 2) and depths (N,) at which another keyframe sees points of a keyframe; NaN behind its view.
+
+    The points are at pixels (N, 2) of the keyframe, with inverse depths rho (N,).
+    """
+    points_m = geometry.rays(pixels) / rho[:, None]
+    T_other_own = inverse(other.T_world_view) @ own.T_world_view
+    return geometry.project(apply(T_other_own, points_m))
 
 
 def view_geometry(pair: StereoPair) -> ViewGeometry:
@@ -180,7 +197,7 @@ def _agreed(index: int, keyframes: Sequence[Keyframe], geometry: ViewGeometry) -
     sources = [_Source(own.rho, np.where(np.isfinite(own.rho), 1.0, 0.0))]
     before = keyframes[max(index - NEIGHBOURS, 0) : index]
     after = keyframes[index + 1 : index + 1 + NEIGHBOURS]
-    sources += [_seen_from(own, other, geometry) for other in (*before, *after)]
+    sources += [_source_from(own, other, geometry) for other in (*before, *after)]
     rho = np.stack([source.rho for source in sources])
     weight = np.stack([source.weight for source in sources])
 
@@ -204,19 +221,14 @@ class _Source:
     weight: Array
 
 
-def _seen_from(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> _Source:
+def _source_from(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> _Source:
     """The points of another keyframe, as a keyframe sees them."""
     is_known = np.isfinite(other.rho)
-    rays = geometry.rays(geometry.pixel_grid()[is_known])
-    points_m = rays / other.rho[is_known][:, None]
-    T_own_other = inverse(own.T_world_view) @ other.T_world_view
-    pixels, depth_m = geometry.project(points_m @ T_own_other[:3, :3].T + T_own_other[:3, 3])
-    with np.errstate(invalid="ignore"):
-        is_seen = np.isfinite(depth_m)
-        columns = np.where(is_seen, pixels[:, 0], -1).round()
-        rows = np.where(is_seen, pixels[:, 1], -1).round()
-    is_seen &= (columns >= 0) & (columns < geometry.width_px) & (rows >= 0) & (rows < geometry.height_px)
-    flat = rows[is_seen].astype(int) * geometry.width_px + columns[is_seen].astype(int)
+    pixels, depth_m = seen_from(own, other, geometry.pixel_grid()[is_known], other.rho[is_known], geometry)
+    nearest_px = pixels.round()
+    is_seen = geometry.contains(nearest_px)
+    columns, rows = nearest_px[is_seen].astype(int).T
+    flat = rows * geometry.width_px + columns
     seen_rho = 1 / depth_m[is_seen]
 
     # The nearest point is seen, so points are written from the farthest to the nearest.

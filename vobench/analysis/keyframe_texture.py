@@ -5,11 +5,11 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from vobench.analysis.image_noise import noise_dn
-from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry
-from vobench.geometry.se3 import Array, apply, inverse
+from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry, seen_from
+from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Mask
 from vobench.sequence.picture import Image
 
 REACH = 6  # keyframes before and after
@@ -19,8 +19,6 @@ LEAST_ALIKE_DN = 3.0
 ENOUGH = 3  # other keyframes for a mean; elsewhere, noise is removed within the image
 TEMPLATE_PX = 5
 SEARCH_PX = 15
-
-Mask = NDArray[np.bool_]
 
 
 def without_noise(keyframes: Sequence[Keyframe], geometry: ViewGeometry) -> list[Keyframe]:
@@ -51,9 +49,7 @@ def _image(index: int, keyframes: Sequence[Keyframe], geometry: ViewGeometry) ->
 
 def _seen_in(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> tuple[Array, Mask]:
     """The grey values (H, W) that another image has where it shows the pixels of a keyframe, and whether it does."""
-    points_m = (geometry.rays(geometry.pixel_grid()) / own.rho[..., None]).reshape(-1, 3)
-    T_other_own = inverse(other.T_world_view) @ own.T_world_view
-    seen_px, depth_m = geometry.project(apply(T_other_own, points_m))
+    seen_px, depth_m = seen_from(other, own, geometry.pixel_grid().reshape(-1, 2), own.rho.reshape(-1), geometry)
     shape = own.rho.shape
     columns, rows = np.nan_to_num(seen_px, nan=-1.0).astype(np.float32).T.reshape(2, *shape)
     seen_dn = cv2.remap(other.image, columns, rows, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)

@@ -336,9 +336,7 @@ class _Search:
             return None
         path_in_scene = T_scene_world @ _scaled_down(self.path, start.scale)
         caster = self.surroundings.caster
-        segments = len(self.wanted.cells_px)
-        seen_px = segment_disparities(caster, path_in_scene, self.pair, start.scale, segments)
-        misfit = float(np.nanmean(np.abs(np.log(seen_px / self.wanted.cells_px))))
+        misfit = misfit_of(caster, path_in_scene, self.pair, start.scale, self.wanted)
         nearness = nearness_of(caster, path_in_scene, self.pair, start.scale, self.wanted)
         excess = np.log(max(nearness / self.limits.nearness, 1.0))
         cost = misfit + SCALE_COST * abs(np.log(start.scale)) + NEARNESS_COST * excess
@@ -501,6 +499,18 @@ def segment_disparities(
     disparity_px = _ray_disparities(caster, T_scene_left[middles.astype(int)], pair, scale)
     median_px = np.median(np.nan_to_num(disparity_px, nan=0.0), axis=-1)
     return np.asarray(np.maximum(median_px, MIN_DISPARITY_PX))
+
+
+def misfit_of(
+    caster: RayCaster,
+    T_scene_left: Array,
+    pair: StereoPair,
+    scale: float,
+    wanted: WantedDisparities,
+) -> float:
+    """The mean error of log disparities of a path (N, 4, 4) in a scene, as in `Placement`."""
+    seen_px = segment_disparities(caster, T_scene_left, pair, scale, len(wanted.cells_px))
+    return float(np.nanmean(np.abs(np.log(seen_px / wanted.cells_px))))
 
 
 def nearness_of(

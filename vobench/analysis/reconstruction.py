@@ -16,9 +16,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry
+from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry, seen_from
 from vobench.asset.luminous_model import Surface
-from vobench.geometry.se3 import Array, inverse
+from vobench.geometry.se3 import Array, apply, inverse
+from vobench.rendering.array_types import Mask
 
 GRID_SHARE = 1 / 200  # of the width, between vertices, unless there are more than MOST_FACES
 MOST_FACES = 600_000
@@ -33,8 +34,6 @@ ALIKE_DN = 25.0  # largest difference of these means for the same surface
 FARTHER = 0.5  # the inverse depth of the backdrop, in that of the farthest points
 EDGE_PX = 1.0  # of disparity between the corners of a quad that is at a depth edge
 EDGE_RATIO = 0.08  # of depth, likewise
-
-Mask = NDArray[np.bool_]
 
 
 def reconstruct(keyframes: Sequence[Keyframe], geometry: ViewGeometry) -> list[Surface]:
@@ -97,7 +96,7 @@ class _Mosaic:
         self._order = order
         self._sheets = [_sheet(keyframe, geometry, spacing_px) for keyframe in keyframes]
         self._smooth = [cv2.blur(keyframe.image.astype(np.float32), (SMOOTH_PX, SMOOTH_PX)) for keyframe in keyframes]
-        self._shown = [np.zeros(sheet.is_edge.shape, bool) for sheet in self._sheets]
+        self._shown = [np.zeros(sheet.shape, bool) for sheet in self._sheets]
 
     def add(self, part: ImagePart, *, rejects_outvoted: bool = False) -> None:
         """Add the quads of a part of all keyframes that are not shown yet."""
@@ -117,11 +116,12 @@ class _Mosaic:
 
     def _covered(self, index: int, is_candidate: Mask) -> Mask:
         """Whether candidates of the quads of a sheet, and those around them, are surfaces that others show already."""
-        is_covered = np.zeros(np.count_nonzero(is_candidate), bool)
+        pixels, rho = self._sheets[index].centres(is_candidate)
+        is_covered = np.zeros(len(rho), bool)
         for other, shown in enumerate(self._shown):
             if other == index or not shown.any():
                 continue
-            view = self._viewed(index, other, is_candidate)
+            view = self._viewed(index, other, pixels, rho)
             rows, columns = _quads_at(view.pixels, self._sheets[other])
             is_covered |= view.is_seen & view.is_same & shown[rows, columns]
         covered = np.ones(is_candidate.shape, bool)
@@ -131,14 +131,13 @@ class _Mosaic:
 
     def _outvoted(self, index: int, is_candidate: Mask) -> Mask:
         """Whether most keyframes see something behind candidates of the quads, or something else at their place."""
-        balance = np.ones(np.count_nonzero(is_candidate), int)  # its own keyframe sees it
-        size_px = np.array([self._geometry.width_px, self._geometry.height_px])
-        last_px = size_px - 1 - self._margin_px
+        pixels, rho = self._sheets[index].centres(is_candidate)
+        balance = np.ones(len(rho), int)  # its own keyframe sees it
         for other in range(len(self._keyframes)):
             if other == index:
                 continue
-            view = self._viewed(index, other, is_candidate)
-            is_in_image = view.is_seen & ((view.pixels >= self._margin_px) & (view.pixels <= last_px)).all(1)
+            view = self._viewed(index, other, pixels, rho)
+            is_in_image = view.is_seen & self._geometry.contains(view.pixels, margin_px=self._margin_px)
             balance += is_in_image & view.is_same & view.is_alike
             balance -= is_in_image & view.is_same & ~view.is_alike
             balance -= is_in_image & view.is_in_front
@@ -146,19 +145,11 @@ class _Mosaic:
         outvoted[is_candidate] = balance < 0
         return outvoted
 
-    def _viewed(self, index: int, other: int, is_candidate: Mask) -> "_View":
-        """Candidates of the quads of a keyframe as another one sees them."""
+    def _viewed(self, index: int, other: int, pixels: Array, rho: Array) -> "_View":
+        """The quads of a keyframe with centres at pixels (Q, 2) and inverse depths (Q,), as another one sees them."""
         geometry = self._geometry
-        all_pixels, all_rho = self._sheets[index].centres()
-        chosen = is_candidate.reshape(-1)
-        pixels = all_pixels[chosen]
-        rho = all_rho[chosen]
-        points_m = geometry.rays(pixels) / rho[:, None]
-        T_other_own = inverse(self._keyframes[other].T_world_view) @ self._keyframes[index].T_world_view
-        seen_px, depth_m = geometry.project(points_m @ T_other_own[:3, :3].T + T_other_own[:3, 3])
-        last_px = np.array([geometry.width_px, geometry.height_px]) - 1
-        with np.errstate(invalid="ignore"):
-            is_seen = np.asarray(((seen_px >= 0) & (seen_px <= last_px)).all(1))
+        seen_px, depth_m = seen_from(self._keyframes[other], self._keyframes[index], pixels, rho, geometry)
+        is_seen = geometry.contains(seen_px)
         seen_px = np.where(is_seen[:, None], seen_px, 0.0)
         own_rho = np.where(is_seen, 1 / depth_m, np.nan)
 
@@ -212,21 +203,30 @@ class _Sheet:
     """The quads of a keyframe: `rows` (R,) and `columns` (C,) are the pixels of its grid.
 
     `corner_rho` (R - 1, C - 1, 4) are the inverse depths of the corners of quads, row by row. Quads at a depth edge
-    are at the farther depth, and `is_edge` there.
+    are at the farther depth.
     """
 
     rows: Array
     columns: Array
     corner_rho: Array
-    is_edge: Mask
 
-    def centres(self) -> tuple[Array, Array]:
-        """The pixels (Q, 2) and the inverse depths (Q,) of the centres of quads."""
+    @property
+    def shape(self) -> tuple[int, int]:
+        """The numbers of rows and columns of quads."""
+        rows, columns, _ = self.corner_rho.shape
+        return rows, columns
+
+    @property
+    def centre_px(self) -> Array:
+        """The pixels (R - 1, C - 1, 2) of the centres of quads."""
         middle_rows = (self.rows[1:] + self.rows[:-1]) / 2
         middle_columns = (self.columns[1:] + self.columns[:-1]) / 2
         columns, rows = np.meshgrid(middle_columns, middle_rows)
-        pixels = np.stack([columns, rows], -1).reshape(-1, 2)
-        return pixels, self.corner_rho.mean(-1).reshape(-1)
+        return np.stack([columns, rows], -1)
+
+    def centres(self, is_chosen: Mask) -> tuple[Array, Array]:
+        """The pixels (Q, 2) and the inverse depths (Q,) of the centres of chosen quads (R - 1, C - 1)."""
+        return self.centre_px[is_chosen], self.corner_rho[is_chosen].mean(-1)
 
 
 def _sheet(keyframe: Keyframe, geometry: ViewGeometry, spacing_px: int) -> _Sheet:
@@ -238,7 +238,7 @@ def _sheet(keyframe: Keyframe, geometry: ViewGeometry, spacing_px: int) -> _Shee
     largest = corners.max(-1)
     is_edge = (largest - least > EDGE_PX * geometry.rho_of_px) & (largest > (1 + EDGE_RATIO) * least)
     corner_rho = np.where(is_edge[..., None], least[..., None], corners)
-    return _Sheet(rows.astype(float), columns.astype(float), corner_rho, is_edge)
+    return _Sheet(rows.astype(float), columns.astype(float), corner_rho)
 
 
 def _grid_lines(size_px: int, spacing_px: int) -> NDArray[np.int64]:
@@ -247,10 +247,7 @@ def _grid_lines(size_px: int, spacing_px: int) -> NDArray[np.int64]:
 
 def _is_margin(sheet: _Sheet, geometry: ViewGeometry, margin_px: int) -> Mask:
     """Whether quads (R - 1, C - 1) are outside of the original image."""
-    pixels, _ = sheet.centres()
-    last_px = np.array([geometry.width_px, geometry.height_px]) - 1 - margin_px
-    is_inside = np.asarray(((pixels >= margin_px) & (pixels <= last_px)).all(1))
-    return ~is_inside.reshape(sheet.is_edge.shape)
+    return ~geometry.contains(sheet.centre_px, margin_px=margin_px)
 
 
 # --- What others see ---
@@ -293,8 +290,7 @@ def _surface(sheet: _Sheet, is_shown: Mask, keyframe: Keyframe, geometry: ViewGe
     )  # (Q, 4, 2)
     rho = sheet.corner_rho[quad_rows, quad_columns]  # (Q, 4)
     points_m = geometry.rays(pixels) / rho[..., None]
-    T = keyframe.T_world_view
-    vertices_m = (points_m @ T[:3, :3].T + T[:3, 3]).reshape(-1, 3)
+    vertices_m = apply(keyframe.T_world_view, points_m).reshape(-1, 3)
     uv = (pixels.reshape(-1, 2) + 0.5) / [geometry.width_px, geometry.height_px]
     first = 4 * np.arange(len(quad_rows))[:, None]
     upper = first + np.array([0, 2, 1])  # counter-clockwise as seen from the camera, with y down

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
+from vobench.analysis.conditions import RESPONSE_GAMMA
 from vobench.analysis.keyframe_depth import keyframes_of, view_geometry
 from vobench.analysis.keyframe_texture import without_noise
-from vobench.analysis.path_placement import Placement, WantedDisparities, nearness_of, segment_disparities
+from vobench.analysis.path_placement import Placement, WantedDisparities, misfit_of, nearness_of
 from vobench.analysis.reconstruction import reconstruct
 from vobench.analysis.recording_part import read_shots
 from vobench.analysis.stereo_fit import StereoFit
@@ -27,7 +28,6 @@ from vobench.trajectory.trajectory import Stamps
 
 RECORDED = "recorded"  # the name of the place
 WHITE_CD_M2 = 1.0  # of a white texture, as written by `write_luminous_model`
-TEXTURE_RESPONSE = 2.2  # the light of a texture is its grey value to this power, approximately
 COSINE_POWER = 4  # of the vignetting of strength 1
 STEP_SHARE = 0.03  # of the width of the image, by which it may move between keyframes
 MOST_KEYFRAMES = 80
@@ -71,7 +71,7 @@ def rebuild_place(
         evenly_lit = corrected(keyframes, photometry, cosine)
         smooth = without_noise(evenly_lit, geometry)
         write_luminous_model(reconstruct(smooth, geometry), model)
-    return photometry.exponent * TEXTURE_RESPONSE / COSINE_POWER
+    return photometry.exponent * RESPONSE_GAMMA / COSINE_POWER
 
 
 def keyframe_indices(T_world_left: Array, pair: StereoPair, *, typical_disparity_px: float) -> list[int]:
@@ -102,7 +102,6 @@ def keyframe_indices(T_world_left: Array, pair: StereoPair, *, typical_disparity
 def own_placement(scene: SceneFile, T_world_left: Array, pair: StereoPair, wanted: WantedDisparities) -> Placement:
     """The placement of a path (N, 4, 4) in its rebuilt place, where it is."""
     caster = RayCaster(triangles(build(scene, {})))
-    seen_px = segment_disparities(caster, T_world_left, pair, 1.0, len(wanted.cells_px))
-    misfit = float(np.nanmean(np.abs(np.log(seen_px / wanted.cells_px))))
+    misfit = misfit_of(caster, T_world_left, pair, 1.0, wanted)
     nearness = nearness_of(caster, T_world_left, pair, 1.0, wanted)
     return Placement(np.eye(4), 1.0, misfit, nearness, tried=1)

@@ -8,12 +8,12 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry
+from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry, seen_from
 from vobench.estimator.pose import cauchy_weights
 from vobench.estimator.stereo import StereoPair
-from vobench.geometry.se3 import Array, apply, inverse
+from vobench.geometry.se3 import Array
+from vobench.rendering.array_types import Mask
 
 POINT_STEP_PX = 8
 REACH = 6  # keyframes that are compared with each
@@ -99,16 +99,12 @@ def _same_points(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewGeo
     first_px = POINT_STEP_PX // 2
     pixels = geometry.pixel_grid()[first_px::POINT_STEP_PX, first_px::POINT_STEP_PX].reshape(-1, 2)
     columns, rows = pixels.astype(int).T
-    last_px = np.array([geometry.width_px, geometry.height_px]) - 1
     for first, keyframe in enumerate(keyframes):
-        points_m = geometry.rays(pixels) / keyframe.rho[rows, columns][:, None]
         grey = keyframe.image[rows, columns].astype(float)
         for second in range(first + 1, min(first + 1 + REACH, len(keyframes))):
             other = keyframes[second]
-            T_other_this = inverse(other.T_world_view) @ keyframe.T_world_view
-            seen_px, depth_m = geometry.project(apply(T_other_this, points_m))
-            with np.errstate(invalid="ignore"):
-                is_seen = np.asarray(((seen_px >= 0) & (seen_px <= last_px)).all(1))
+            seen_px, depth_m = seen_from(other, keyframe, pixels, keyframe.rho[rows, columns], geometry)
+            is_seen = geometry.contains(seen_px)
             seen_columns, seen_rows = np.where(is_seen[:, None], seen_px, 0).round().astype(int).T
             other_grey = other.image[seen_rows, seen_columns].astype(float)
             with np.errstate(invalid="ignore"):
@@ -120,6 +116,6 @@ def _same_points(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewGeo
                 yield _SamePoints(first, second, log_grey, log_cosine)
 
 
-def _is_exposed(grey: Array) -> NDArray[np.bool_]:
+def _is_exposed(grey: Array) -> Mask:
     low_dn, high_dn = EXPOSED_DN
     return (grey > low_dn) & (grey < high_dn)
