@@ -125,6 +125,7 @@ def draw_recording(index: int, seed: int, images: int) -> Hidden:
         "trajectories": {"path": domain.trajectory},
         "cameras": {"camera": _draw_camera(rng)},
         "frames": [0, images],
+        "rendering": {"samples": 16},
         "estimators": ["stand_still"],
     }
     return Hidden(f"{index}-{kind}-{form}", domain, form, suite, error)

@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from vobench.analysis.realism import STATISTICS, Realism
+from vobench.analysis.realism_band import CAR_BANDS, domain_of
 from vobench.analysis.realism_report import RealismReport, measure_realism
 from vobench.errors import InputError
 
@@ -19,10 +20,12 @@ def test_every_statistic_has_its_band_its_verdict_and_its_knob(report: RealismRe
     assert len(report.rows()) == len(report.found.values) > 5
     for row in report.rows():
         statistic = known[row["name"]]
-        assert (row["low"], row["high"]) == (statistic.low, statistic.high)
-        assert row["is"] == statistic.verdict(row["value"])
+        band = CAR_BANDS[row["name"]]
+        assert (row["low"], row["high"]) == (band.low, band.high)
+        assert row["is"] == band.verdict(row["value"])
+        assert row["knob"] == statistic.knob(row["is"])
         assert bool(row["knob"]) == (row["is"] != "in")
-    assert report.found.inside == [row["is"] for row in report.rows()].count("in")
+    assert report.inside == [row["is"] for row in report.rows()].count("in")
 
 
 def test_the_roll_of_the_right_eye_is_found_and_said(report: RealismReport) -> None:
@@ -87,3 +90,26 @@ def test_facts_of_a_report_without_a_pair() -> None:
     facts = RealismReport(Path("a"), realism(burnt=5.0)).as_dict()
     assert (facts["pair"], facts["inside"], facts["pictures"]) == (None, 1, 14)
     assert facts["says"] == RealismReport(Path("a"), realism(burnt=5.0)).sentences()
+
+
+def test_inside_counts_the_statistics_in_their_bands() -> None:
+    middle = {name: (band.low + band.high) / 2 for name, band in CAR_BANDS.items()}
+    assert RealismReport(Path("a"), realism(**middle)).inside == 9
+    assert RealismReport(Path("a"), realism(**{**middle, "burnt": 50.0})).inside == 8
+    del middle["row_error_px"]
+    assert RealismReport(Path("a"), realism(**middle)).inside == 8
+
+
+def test_a_domain_without_bands_has_values_and_no_verdicts() -> None:
+    report = RealismReport(Path("a"), realism(burnt=50.0), domain=domain_of("hand"))
+    (row,) = report.rows()
+    assert (row["value"], row["low"], row["high"], row["is"], row["knob"]) == (50.0, None, None, "", "")
+    assert report.inside == 0
+    assert report.as_dict()["domain"] == "hand"
+    assert report.sentences()[0].startswith("There are no bands for the domain hand")
+
+
+def test_what_is_compared_with_another_recording_is_not_said_to_rest_on_bands() -> None:
+    report = RealismReport(Path("a"), realism(burnt=50.0), Path("b"), realism(burnt=50.0), domain_of("hand"))
+    assert not any("bands" in sentence for sentence in report.sentences())
+    assert report.rows()[0]["is"] == "in"

@@ -52,7 +52,7 @@ class Said:
 class FlatRenderer:
     """Draws grey."""
 
-    def __init__(self, baked: object) -> None:
+    def __init__(self, baked: object, *, samples: int) -> None:
         pass
 
     def radiance(self, camera: Any, T_world_camera: object, *, weights: Any = (1, 0, 0)) -> np.ndarray:

@@ -15,6 +15,9 @@ def test_a_case_is_measured_beside_the_bands_and_beside_another(vobench, ran, he
     beside = vobench("realism", cases[0], "--against", cases[0], "--json").json
     assert {row["is"] for row in beside["statistics"]} == {"in"}
     assert "changed by" in vobench("realism", cases[0]).out
+    by_hand = vobench("realism", cases[0], "--domain", "hand").out
+    assert "statistics in their bands" not in by_hand
+    assert "no bands for the domain hand" in by_hand
 
 
 def test_a_plot_of_another_kind_is_refused_in_one_line(vobench, ran):

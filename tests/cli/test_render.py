@@ -17,10 +17,10 @@ WRONG = [
     (("--camera", "fisheyes"), "no camera named 'fisheyes'. Did you mean 'fisheye'?"),
     (("--sensor", "film"), "no camera sensor named 'film'. Known: clean"),
     (("--engine", "rater"), "--engine: no engine named 'rater'. Did you mean 'raster'?"),
-    (("--samples", "4"), "samples requires engine path, but the engine is raster; remove samples"),
+    (("--samples", "5"), "the engine raster takes 4 or 16 samples, got 5"),
     (
         ("--engine", "pyrender", "--samples", "4"),
-        "samples requires engine path, but the engine is pyrender; remove samples",
+        "samples requires engine raster or path, but the engine is pyrender; remove samples",
     ),
     (("--engine", "pyrenderer"), "--engine: no engine named 'pyrenderer'. Did you mean 'pyrender'?"),
     (("--engine", "path", "--samples", "0"), "--samples: should be 1 or more (got 0)"),

@@ -65,8 +65,8 @@ def test_realism_compares_with_another_recording_where_one_is_named(asked):
     vobench.realism("street", form="kitti")
     vobench.realism("street", against="twin")
     assert calls == [
-        ((Path("street"),), {"against": None, "form": "kitti"}),
-        ((Path("street"),), {"against": Path("twin"), "form": None}),
+        ((Path("street"),), {"against": None, "domain": "car", "form": "kitti"}),
+        ((Path("street"),), {"against": Path("twin"), "domain": "car", "form": None}),
     ]
 
 

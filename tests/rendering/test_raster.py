@@ -14,14 +14,14 @@ import pytest
 import vobench.rendering
 from tests.rendering.rectangles import box, rectangle, room
 from vobench.asset.texture import Procedural
-from vobench.geometry.camera import Camera, Pinhole, pixel_grid
+from vobench.geometry.camera import Camera, KannalaBrandt, Pinhole, pixel_grid
 from vobench.geometry.rig import LENSES, looking
 from vobench.geometry.se3 import Array
 from vobench.rendering.bake import bake
 from vobench.rendering.baked_scene import BakedScene, BakeSettings
 from vobench.rendering.geometry import RayCaster
 from vobench.rendering.raster import RasterRenderer
-from vobench.rendering.renderer import Radiance, single_instant
+from vobench.rendering.renderer import Radiance, View, single_instant
 from vobench.scene.material import Material
 from vobench.scene.scene import Scene, ceiling_light, triangles
 from vobench.suite import catalog
@@ -186,6 +186,53 @@ def test_a_triangle_seen_edge_on_leaves_no_undefined_pixel() -> None:
     with closing(RasterRenderer(bake(scene, coarse))) as renderer:
         picture = renderer.radiance(camera, single_instant(camera, T_world_camera))
     assert not np.isnan(picture).any()
+
+
+FINER = 6  # the ratio of resolutions of the picture that stands for the exact one
+
+
+def finer(camera: Pinhole) -> Pinhole:
+    """A camera with the same view, and FINER² pixels in the place of each."""
+    return Pinhole(
+        FINER * camera.width_px,
+        FINER * camera.height_px,
+        FINER * camera.fx_px,
+        FINER * camera.fy_px,
+        FINER * (camera.cx_px + 0.5) - 0.5,
+        FINER * (camera.cy_px + 0.5) - 0.5,
+    )
+
+
+def test_sixteen_samples_are_nearer_to_the_mean_over_the_pixel_than_four(furnished: BakedScene) -> None:
+    with closing(RasterRenderer(furnished)) as usual, closing(RasterRenderer(furnished, samples=16)) as fine:
+        with_four = snap(usual, CAMERA, AHEAD)
+        with_sixteen = snap(fine, CAMERA, AHEAD)
+        large = snap(fine, finer(CAMERA), AHEAD).astype(float)
+    exact = large.reshape(CAMERA.height_px, FINER, CAMERA.width_px, FINER).mean((1, 3))
+    is_edge = np.abs(with_four - exact) > 0.02 * exact.mean()
+    assert is_edge.sum() > 100
+    rms_of_four = np.sqrt(((with_four - exact)[is_edge] ** 2).mean())
+    rms_of_sixteen = np.sqrt(((with_sixteen - exact)[is_edge] ** 2).mean())
+    assert rms_of_sixteen < 0.5 * rms_of_four
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_sixteen_samples_are_the_same_in_sub_frames_of_one_pose(furnished: BakedScene, count: int) -> None:
+    now = np.zeros(count, np.int64)
+    view = View(slice(0, CAMERA.height_px), np.repeat(AHEAD[None], count, 0), now, now)
+    with closing(RasterRenderer(furnished, samples=16)) as fine:
+        picture = fine.radiance(CAMERA, [view])
+        np.testing.assert_allclose(picture, snap(fine, CAMERA, AHEAD), rtol=3e-5)
+
+
+def test_a_lens_that_resamples_pictures_has_finer_ones_with_sixteen_samples(furnished: BakedScene) -> None:
+    lens = KannalaBrandt(180, 120, 60.0, 60.0, 90.0, 60.0, 0.0, 0.0, 0.0, 0.0)
+    with closing(RasterRenderer(furnished)) as usual, closing(RasterRenderer(furnished, samples=16)) as fine:
+        with_four = snap(usual, lens, AHEAD)
+        with_sixteen = snap(fine, lens, AHEAD)
+    difference = np.abs(with_sixteen - with_four) / with_four.mean()
+    assert 0 < np.median(difference) < 0.01
+    assert difference.max() > 0.05
 
 
 # Hides X11's libraries, by name as ctypes finds them and by file as it loads them, then imports modules.

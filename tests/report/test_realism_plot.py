@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from vobench.analysis.realism import STATISTICS, Realism
+from vobench.analysis.realism_band import CAR_BANDS
 from vobench.analysis.stereo_fit import Matches, StereoFit, Uncertain
 from vobench.errors import InputError
 from vobench.report import realism_plot
@@ -22,7 +23,7 @@ def pair(row_mad_px=0.2):
 
 def realism(place=0.5, fit=None):
     """Statistics that all lie at one place of their bands: 0 is the low end, 1 the high end."""
-    values = {each.name: each.low + place * (each.high - each.low) for each in STATISTICS}
+    values = {name: band.low + place * (band.high - band.low) for name, band in CAR_BANDS.items()}
     curves = {
         "power": np.linspace(4, 1, 100),
         "gradient": np.linspace(100, 1, 128),
@@ -67,7 +68,7 @@ def test_a_value_is_a_dot_in_its_band_or_an_arrow_at_the_edge(axes, place, shown
     np.testing.assert_allclose([line.get_xdata()[0] for line in dots], shown)
     assert [line.get_ydata()[0] for line in dots] == list(range(len(STATISTICS)))
     text = axes.texts[0].get_text()
-    first = STATISTICS[0]
+    first = CAR_BANDS[STATISTICS[0].name]
     assert text == f"{first.low + place * (first.high - first.low):.2f}"
 
 

@@ -18,7 +18,7 @@ from vobench.suite.suite import read_plan
 class Plain:
     """Draws a slope of brightness that moves with the camera."""
 
-    def __init__(self, baked: object) -> None:
+    def __init__(self, baked: object, *, samples: int) -> None:
         pass
 
     def radiance(self, camera: Any, views: Any, **_: Any) -> Any:

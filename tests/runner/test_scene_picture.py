@@ -51,7 +51,8 @@ def test_a_picture_is_saved_with_a_file_per_channel_and_one_of_all_values(closet
         ({"yaw_deg": float("nan")}, "--yaw should be a finite number, got nan"),
         ({"time_s": 1e12}, r"--time should be within 1e\+09 s of the start, got 1e\+12"),
         ({"at_m": (9, 0, 1)}, r"--at should be inside the room"),
-        ({"samples": 4}, "samples requires engine path"),
+        ({"samples": 5}, "the engine raster takes 4 or 16 samples, got 5"),
+        ({"engine": "pyrender", "samples": 4}, "samples requires engine raster or path"),
     ],
 )
 def test_a_wrong_setting_is_refused_before_anything_is_computed(closet, options, sentence):

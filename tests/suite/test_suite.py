@@ -171,7 +171,7 @@ WRONG = [
     ("seed: 1", "seed: 1.5", ":2: seed: should be a whole number (got 1.5)"),
     ("seed: 1", "seed:", ":2: seed: should be a whole number (got nothing)"),
     ("seed: 1", "seed: -1", ":2: seed: should be 0 or more (got -1)"),
-    ("seed: 1", "seed: 1\nrendering: {samples: 4}", ":3: rendering: samples requires engine path, but the engine is raster; remove samples"),
+    ("seed: 1", "seed: 1\nrendering: {samples: 5}", ":3: rendering.samples: the engine raster takes 4 or 16 samples, got 5"),
     ("seed: 1", "seed: 1\nrendering: {engine: pyrendr}", ":3: rendering.engine: no engine named 'pyrendr'. Did you mean 'pyrender'? Known: path, pyrender, raster"),
     ("seed: 1", "seed: 1\nrendering: {engine: path, samples: 65537}", ":3: rendering.samples: should be 65536 or less (got 65537)"),
     ("seed: 1", "seed: 1\nrepeats: 101", ":3: repeats: should be 100 or less (got 101)"),

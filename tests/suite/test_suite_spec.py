@@ -33,11 +33,15 @@ def test_only_the_raster_engine_needs_the_light_of_the_scene(engine):
     assert Rendering(engine=engine).needs_bake is (engine == "raster")
 
 
-def test_samples_need_the_path_tracer():
-    assert Rendering(engine="path", samples=4).samples == 4
-    for engine in ("raster", "pyrender"):
-        with pytest.raises(SettingError, match=f"samples requires engine path, but the engine is {engine}"):
-            Rendering(engine=engine, samples=4)
+def test_each_engine_takes_its_own_numbers_of_samples():
+    assert Rendering(engine="path", samples=5).samples == 5
+    for samples in (4, 16):
+        assert Rendering(engine="raster", samples=samples).samples == samples
+    for samples in (1, 5, 64):
+        with pytest.raises(SettingError, match=f"the engine raster takes 4 or 16 samples, got {samples}"):
+            Rendering(engine="raster", samples=samples)
+    with pytest.raises(SettingError, match="samples requires engine raster or path, but the engine is pyrender"):
+        Rendering(engine="pyrender", samples=4)
 
 
 def test_short_forms_mean_their_long_ones():

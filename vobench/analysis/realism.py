@@ -1,7 +1,4 @@
-"""Measures how realistic images are by nine statistics, the ranges of real images, and settings that change them.
-
-The ranges are those of 14 images each of KITTI 00, 01, 06 and EuRoC V1_01. More recordings would widen them.
-"""
+"""Measures how realistic images are by nine statistics, and the settings that change them."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -30,35 +27,25 @@ from vobench.sequence import EncodedFrame
 from vobench.sequence.picture import Image, decode, grey
 from vobench.trajectory.trajectory import poses_at
 
-# --- The statistics and their ranges ---
+# --- The statistics ---
 
 
 @dataclass(frozen=True, slots=True)
 class Statistic:
-    """One statistic: its range in real images, and the settings of a suite that raise and lower it."""
+    """One statistic, and the settings of a suite that raise and lower it."""
 
     name: str
     title: str
     unit: str
-    low: float
-    high: float
     raised_by: str
     lowered_by: str
 
-    def verdict(self, value: float) -> str:
-        """Whether a value, as it is printed, is "in" the range, too "low" or too "high"."""
-        printed = round(value, PRINTED_DIGITS)
-        if printed < round(self.low, PRINTED_DIGITS):
-            return "low"
-        return "high" if printed > round(self.high, PRINTED_DIGITS) else "in"
-
-    def knob(self, value: float) -> str:
-        """The settings that would bring a value into the range; empty if it is in the range."""
+    def knob(self, verdict: str) -> str:
+        """The settings that bring a value with a verdict of `StatisticBand` into the band; empty if it is in it."""
         settings = {"in": "", "low": self.raised_by, "high": self.lowered_by}
-        return settings[self.verdict(value)]
+        return settings[verdict]
 
 
-PRINTED_DIGITS = 2
 ERRORS = "calibration_error (right_roll_deg; a pitch shifts all rows alike)"
 MORE_NOISE = "more gain_db with less exposure_gain"
 # What else the settings of the advice move, besides the statistic that they are advised for.
@@ -69,24 +56,24 @@ SIDE_EFFECTS = {
     "rate_hz": "more makes tracks longer and more of them consistent, and costs as many more images",
 }
 STATISTICS = (
-    Statistic("row_error_px", "row error of the pair", "px", 0.15, 0.5, f"more {ERRORS}", f"less {ERRORS}"),
-    Statistic("gradient_p99", "gradient, 99th percentile", "DN", 55, 75,
+    Statistic("row_error_px", "row error of the pair", "px", f"more {ERRORS}", f"less {ERRORS}"),
+    Statistic("gradient_p99", "gradient, 99th percentile", "DN",
               "contrast: sun, exposure_gain, less blur_sigma_px", "softer light, more blur_sigma_px"),
-    Statistic("gradient_kurtosis", "gradient, kurtosis", "", 15, 35,
+    Statistic("gradient_kurtosis", "gradient, kurtosis", "",
               "plain surfaces beside detailed ones", f"texture on more surfaces, {MORE_NOISE}"),
-    Statistic("spectrum_slope", "slope of the power spectrum", "", -3.2, -2.5,
+    Statistic("spectrum_slope", "slope of the power spectrum", "",
               f"fine texture, less blur_sigma_px, {MORE_NOISE}", "large shapes and shadows, more blur_sigma_px"),
-    Statistic("corner_unevenness", "unevenness of corners", "", 0.35, 0.7,
+    Statistic("corner_unevenness", "unevenness of corners", "",
               "plain walls or sky beside texture", "texture on plain surfaces"),
-    Statistic("tracks_home", "consistent tracks", "%", 50, 75,
+    Statistic("tracks_home", "consistent tracks", "%",
               "smaller steps: more rate_hz, less speed",
               "larger steps: less rate_hz, more speed"),
-    Statistic("track_life", "track length, of 13", "images", 3, 5,
+    Statistic("track_life", "track length, of 13", "images",
               "smaller steps: more rate_hz, less speed",
               "larger steps: less rate_hz, more speed, movers"),
-    Statistic("grey_sd", "standard deviation of grey", "DN", 50, 75,
+    Statistic("grey_sd", "standard deviation of grey", "DN",
               "sun and shadow, darker and brighter materials", "softer light, less exposure_gain"),
-    Statistic("burnt", "pixels at 254 or more", "%", 4, 10, "more exposure_gain, sky or windows", "less exposure_gain"),
+    Statistic("burnt", "pixels at 254 or more", "%", "more exposure_gain, sky or windows", "less exposure_gain"),
 )  # fmt: skip
 
 
@@ -97,7 +84,6 @@ def side_effects(advice: Iterable[str]) -> list[str]:
 
 
 FIGURES_WITHOUT_RANGE = ("grey_mean", "noise_dn", "edge_px", "corners", "flow_px")
-OFFSET_BAND_PX = (0.0, 0.9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,13 +100,6 @@ class Realism:
     curves: Mapping[str, Array]
     pair: StereoFit | None
     pictures: int
-
-    @property
-    def inside(self) -> int:
-        """The number of the nine statistics that are in their ranges."""
-        measured = [statistic for statistic in STATISTICS if statistic.name in self.values]
-        verdicts = [statistic.verdict(self.values[statistic.name]) for statistic in measured]
-        return verdicts.count("in")
 
 
 @dataclass(frozen=True, slots=True)

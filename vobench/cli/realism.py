@@ -5,7 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from vobench.analysis.realism import OFFSET_BAND_PX, Realism, residual, side_effects
+from vobench.analysis.realism import Realism, residual, side_effects
+from vobench.analysis.realism_band import CAR, OFFSET_BAND_PX
 from vobench.analysis.realism_report import RealismReport, measure_realism
 from vobench.cli import terminal
 from vobench.cli.option import Json, with_option_groups
@@ -24,13 +25,16 @@ def realism_command(
         Path | None,
         typer.Option(help="Compare with this recording instead of the bands of real ones; detected from content."),
     ] = None,
+    domain: Annotated[
+        str, typer.Option(help="What carries the camera: car, drone, hand or robot. Only car has bands so far.")
+    ] = CAR,
     plot: Annotated[Path | None, typer.Option(help="Plot the statistics to this .png, .svg or .pdf.")] = None,
     recording_options: RecordingOptions,
     json: Json = False,
 ) -> None:
     """Measure how realistic images are, how large the calibration error is, and which settings change what."""
     options = recording_options.read_options()
-    report = measure_realism(path, against=against, form=recording_options.form, options=options)
+    report = measure_realism(path, against=against, domain=domain, form=recording_options.form, options=options)
     if plot:
         _save_plot(plot, report)
     if json:
@@ -52,8 +56,9 @@ def _print(report: RealismReport) -> None:
     realism = report.found
     console = terminal.console()
 
-    band_count = f"{realism.inside} of {len(realism.values)} statistics in their bands"
-    title = f"{report.path}: {band_count}, measured on {realism.pictures} images"
+    has_verdicts = bool(report.against or report.domain.bands)
+    band_count = f"{report.inside} of {len(realism.values)} statistics in their bands, " if has_verdicts else ""
+    title = f"{report.path}: {band_count}measured on {realism.pictures} images"
     reference = "against" if report.against else "real ones"
     headings = ["statistic", "value", "unit", reference, "verdict", "changed by"]
     rows = [_row(row) for row in report.rows()]
@@ -78,7 +83,7 @@ def _row(row: dict[str, Any]) -> list[str]:
 def _reference(row: dict[str, Any]) -> str:
     """The band of a statistic, or its value in the other recording."""
     if "against" not in row:
-        return f"{row['low']:g} … {row['high']:g}"
+        return "" if row["low"] is None else f"{row['low']:g} … {row['high']:g}"
     return "" if row["against"] is None else f"{row['against']:.2f}"
 
 
@@ -98,5 +103,5 @@ def _other_measurements(realism: Realism) -> list[str]:
     if pair.offset_px:
         low, high = OFFSET_BAND_PX
         offset = f"{pair.offset_px.value:+.2f} ± {pair.offset_px.sigma:.2f} px"
-        lines.append(f"disparity offset: {offset} (real pairs: magnitude {low:g} … {high:g} px)")
+        lines.append(f"disparity offset: {offset} (four real pairs: magnitude {low:g} … {high:g} px)")
     return lines

@@ -48,7 +48,9 @@ class EngineOptions:
     engine: Annotated[
         str, typer.Option(help="raster; path, Mitsuba's path tracer; or pyrender, the stock renderer.")
     ] = "raster"
-    samples: Annotated[int | None, typer.Option(help="Light paths per pixel, with --engine path.")] = None
+    samples: Annotated[
+        int | None, typer.Option(help="Samples of each pixel: 4 or 16, or light paths with --engine path.")
+    ] = None
 
 
 @with_option_groups

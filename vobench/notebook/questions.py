@@ -112,15 +112,18 @@ def causes(run: Run | Path | str, *, estimator: str | None = None) -> "RunCauses
     return find_causes(run_path(run), estimator=estimator)
 
 
-def realism(recording: Path | str, *, against: Path | str | None = None, form: str | None = None) -> "RealismReport":
+def realism(
+    recording: Path | str, *, against: Path | str | None = None, domain: str = "car", form: str | None = None
+) -> "RealismReport":
     """How realistic the pictures of a recording are: nine statistics, compared with real pictures or with `against`.
 
-    `recording` is a sequence, a case of a run, a folder of a dataset or a bag. Raises InputError if it cannot be read.
+    `recording` is a sequence, a case of a run, a folder of a dataset or a bag. `domain` is what carries the camera:
+    "car", "drone", "hand" or "robot"; only "car" has bands. Raises InputError if the recording cannot be read.
     """
     from vobench.analysis.realism_report import measure_realism
 
     other = None if against is None else Path(against)
-    return measure_realism(Path(recording), against=other, form=form)
+    return measure_realism(Path(recording), against=other, domain=domain, form=form)
 
 
 def twin(

@@ -1,7 +1,7 @@
 """Pictures of a baked scene: for each sub-frame the light map is updated, movers are placed, and views are drawn."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache, partial
 
 import numpy as np
@@ -21,7 +21,7 @@ from vobench.rendering.probe import Probe, room_probe
 from vobench.rendering.rain_streaks import RainStreaks
 from vobench.rendering.render_target import RenderTarget, render_target
 from vobench.rendering.renderer import Radiance, View
-from vobench.rendering.sample_pattern import HALVES, PIXEL_CENTRE, ROTATED_GRID
+from vobench.rendering.sample_pattern import FINE_GRID, FINE_SAMPLES, HALVES, PIXEL_CENTRE, ROTATED_GRID, SamplePattern
 from vobench.rendering.view import NO_GLINTS, Box, PinholeView, pinhole_view
 from vobench.rendering.warp import Warp, warp
 from vobench.scene.fog import Fog
@@ -36,10 +36,22 @@ AWAY_M = 1e6  # the depth below the scene at which movers are while the probe is
 HALVED_FRAMES = 4  # the least number of sub-frames that have half of the samples each
 
 
-class FrameRenderer:
-    """Renders pictures in the OpenGL context that is current when it is created, and must be when it is used."""
+@dataclass(frozen=True, slots=True)
+class _Pass:
+    """One drawing of a sub-frame, by its index, with a pattern of samples."""
 
-    def __init__(self, baked: BakedScene) -> None:
+    index: int
+    pattern: SamplePattern
+
+
+class FrameRenderer:
+    """Renders pictures in the OpenGL context that is current when it is created, and must be when it is used.
+
+    Each pixel is the mean of `samples`, 4 or 16.
+    """
+
+    def __init__(self, baked: BakedScene, *, samples: int) -> None:
+        self._is_fine = samples == FINE_SAMPLES
         self._illumination = Illumination(baked)
         self._background = Background(baked.scene.lights)
         self._ambient = AmbientLight(baked)
@@ -115,15 +127,19 @@ class FrameRenderer:
         weights: Rgb | None,
     ) -> Radiance:
         boxes = [(0, camera.width_px, view.rows.start, view.rows.stop) for view in views]
-        frame_count = len(views[0].start_ns)
-        # Sub-frames alternate between the two halves of the samples, at half the cost, if their number is even.
-        can_share = frame_count >= HALVED_FRAMES and frame_count % 2 == 0
-        patterns = HALVES if can_share else (ROTATED_GRID,)
-        size_px = (camera.width_px, camera.height_px)
-        targets = [self._target(*size_px, pattern, weights) for pattern in patterns]
-        total = targets[0].total
-        self._expose(targets, camera, views, boxes, total.whole)
-        return total.read(total.whole)
+        passes = self._passes(len(views[0].start_ns))
+        target = self._target(camera.width_px, camera.height_px, passes[0].pattern, weights)
+        self._expose(target, passes, camera, views, boxes=boxes, around=target.total.whole)
+        return target.total.read(target.total.whole)
+
+    def _passes(self, frame_count: int) -> list["_Pass"]:
+        """How the sub-frames of a picture are drawn."""
+        if self._is_fine:
+            return [_Pass(index, pattern) for index in range(frame_count) for pattern in FINE_GRID]
+        if frame_count >= HALVED_FRAMES and frame_count % 2 == 0:
+            # Sub-frames alternate between the two halves of the samples, at half the cost.
+            return [_Pass(index, HALVES[index % 2]) for index in range(frame_count)]
+        return [_Pass(index, ROTATED_GRID) for index in range(frame_count)]
 
     def _room_probe(self, baked: BakedScene, faces: Triangles) -> Probe:
         """The probe of what is stationary, with lamps of variable level at level 1."""
@@ -163,38 +179,40 @@ class FrameRenderer:
     ) -> Radiance:
         """The rows of a view through a lens, resampled from pinhole pictures."""
         atlas = lens.blank(3 if weights is None else 1)
+        pattern = ROTATED_GRID if self._is_fine else PIXEL_CENTRE
+        passes = [_Pass(index, pattern) for index in range(len(view.start_ns))]
         for face in lens.faces:
             box = face.needed_for(view.rows)
             if box is None:
                 continue
-            target = self._target(face.camera.width_px, face.camera.height_px, PIXEL_CENTRE, weights)
+            target = self._target(face.camera.width_px, face.camera.height_px, pattern, weights)
             T_camera_face = se3.transform(face.R_camera_face, np.zeros(3))
             face_view = replace(view, T_world_camera=view.T_world_camera @ T_camera_face)
-            self._expose([target], face.camera, [face_view], [box], box)
+            self._expose(target, passes, face.camera, [face_view], boxes=[box], around=box)
             lens.put(atlas, face, box, target.total.read(box))
         return lens.picture(atlas, view.rows)
 
     def _expose(
         self,
-        targets: Sequence[RenderTarget],
+        target: RenderTarget,
+        passes: Sequence[_Pass],
         camera: Pinhole,
         views: Sequence[View],
+        *,
         boxes: Sequence[Box],
         around: Box,
     ) -> None:
-        """Draw the mean over the sub-frames of all views, each view in its box.
+        """Draw the mean over passes of all views, each view in its box.
 
-        Sub-frames alternate between the targets. The mean is in the total of the first target, inside the box `around`.
+        The mean is in the total of the target, inside the box `around`.
         """
-        frame_count = len(views[0].start_ns)
-        total = targets[0].total
-        total.clear(around)
-        for index in range(frame_count):
-            target = targets[index % len(targets)]
-            target.framebuffer.clear(around)
+        target.total.clear(around)
+        for each in passes:
+            of_pass = target.with_pattern(each.pattern)
+            of_pass.framebuffer.clear(around)
             for view, box in zip(views, boxes, strict=True):
-                self._draw.draw(self._lit_view(camera, view, index, box), target, box)
-            self._draw.add(target, total, around, 1 / frame_count)
+                self._draw.draw(self._lit_view(camera, view, each.index, box), of_pass, box)
+            self._draw.add(of_pass, target.total, around, 1 / len(passes))
 
     def _lit_view(
         self,

@@ -1,7 +1,7 @@
 """The raster engine: pictures of a baked scene, drawn by OpenGL without a display.
 
 Stock pyrender multisamples (its depth and colour then sit off the pixel's centre), clips to 8 bits and knows no
-mirrors. Here each pixel is the mean of four samples of linear light, read back as float.
+mirrors. Here each pixel is the mean of four or sixteen samples of linear light, read back as float.
 """
 
 from collections.abc import Sequence
@@ -12,6 +12,8 @@ from vobench.rendering.context import DriverFacts, create_context, driver_facts
 from vobench.rendering.renderer import Radiance, View
 from vobench.scene.material import LUMINANCE, Rgb
 
+USUAL_SAMPLES = 4
+
 __all__ = ["DriverFacts", "RasterRenderer", "driver_facts", "require_drawing"]
 
 
@@ -21,14 +23,14 @@ def require_drawing() -> None:
 
 
 class RasterRenderer:
-    """Pictures of a baked scene by OpenGL. One per process is enough."""
+    """Pictures of a baked scene by OpenGL, with 4 or 16 samples of each pixel. One per process is enough."""
 
-    def __init__(self, baked: BakedScene) -> None:
+    def __init__(self, baked: BakedScene, *, samples: int = USUAL_SAMPLES) -> None:
         self._context = create_context()
         # Imported here: it loads OpenGL, whose absence `create_context` reports in one line.
         from vobench.rendering.frame import FrameRenderer
 
-        self._frames = FrameRenderer(baked)
+        self._frames = FrameRenderer(baked, samples=samples)
 
     def radiance(
         self,

@@ -1,6 +1,6 @@
 """The framebuffers that a picture is drawn into: one for each depth of mirrors, and one for the sum of sub-frames."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from vobench.rendering.framebuffer import Framebuffer, LayeredFramebuffer, framebuffer, layered_framebuffer
 from vobench.rendering.sample_pattern import SamplePattern
@@ -27,6 +27,11 @@ class RenderTarget:
     def framebuffer(self) -> LayeredFramebuffer:
         """The framebuffer of the picture itself."""
         return self.framebuffers[0]
+
+    def with_pattern(self, pattern: SamplePattern) -> "RenderTarget":
+        """The same framebuffers with other positions of as many samples."""
+        framebuffers = [replace(framebuffer, pattern=pattern) for framebuffer in self.framebuffers]
+        return replace(self, framebuffers=tuple(framebuffers))
 
 
 def render_target(

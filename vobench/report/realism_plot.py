@@ -9,6 +9,7 @@ import numpy as np
 from vobench.analysis.image_noise import SATURATED_DN
 from vobench.analysis.image_statistics import CYCLES
 from vobench.analysis.realism import STATISTICS, Realism, Statistic
+from vobench.analysis.realism_band import CAR_BANDS
 from vobench.analysis.stereo_fit import StereoFit, row_error
 from vobench.geometry.se3 import Array
 from vobench.report.figure_style import DPI, SETTINGS, check_ending, undated
@@ -69,19 +70,21 @@ def _bands(axes: "Axes", recordings: Mapping[str, Realism]) -> None:
 
     axes.set_yticks(range(len(STATISTICS)), [_band_label(statistic) for statistic in STATISTICS])
     axes.set(ylim=(len(STATISTICS) - 0.4, -0.6), xlim=(SCALE_LOW - 0.3, SCALE_HIGH + 0.3))
-    axes.set_title("statistics in the bands of real images")
+    axes.set_title("statistics in the bands of recordings of cars")
     axes.set_xticks([0, 1], ["low end", "high end"])
     axes.legend(loc="lower center", bbox_to_anchor=(0.5, -0.09), ncols=len(recordings), frameon=False)
 
 
 def _band_label(statistic: Statistic) -> str:
-    band = f"{statistic.low:g} … {statistic.high:g} {statistic.unit}"
-    return f"{statistic.title}\n{band}".rstrip()
+    band = CAR_BANDS[statistic.name]
+    limits = f"{band.low:g} … {band.high:g} {statistic.unit}"
+    return f"{statistic.title}\n{limits}".rstrip()
 
 
 def _band_marker(axes: "Axes", statistic: Statistic, value: float, y: float, colour: str) -> None:
     """Draw a value as a dot. If it is outside the limits of the axis, draw an arrow at the edge."""
-    x = (value - statistic.low) / (statistic.high - statistic.low)
+    band = CAR_BANDS[statistic.name]
+    x = (value - band.low) / (band.high - band.low)
     x_shown = float(np.clip(x, SCALE_LOW, SCALE_HIGH))
     marker = "o"
     if x < SCALE_LOW:

@@ -106,13 +106,13 @@ def open_renderer(
         return PyrenderRenderer(scene, white_cd_m2=white_cd_m2)
     from vobench.rendering import freed_memory
     from vobench.rendering.baked_file import load_baked
-    from vobench.rendering.raster import RasterRenderer
+    from vobench.rendering.raster import USUAL_SAMPLES, RasterRenderer
     from vobench.rendering.wet_ground import wetted
 
     if light is None:
         raise ValueError("the engine raster needs the light of the scene")
     freed_memory.collect()  # what is left of the place before
-    return RasterRenderer(load_baked(light, wetted(scene)))
+    return RasterRenderer(load_baked(light, wetted(scene)), samples=rendering.samples or USUAL_SAMPLES)
 
 
 def _require_clear_air(scene: "Scene", engine: str) -> None:

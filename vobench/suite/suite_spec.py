@@ -22,6 +22,7 @@ from vobench.suite.trajectory import TrajectorySpec
 
 ENGINES = ("raster", "path", "pyrender")
 MOST_SAMPLES = 65536
+RASTER_SAMPLES = (4, 16)
 LARGEST_BASE_SEED = 2_000_000_000
 
 KEYS_INSTEAD_OF_SCENES = {"scenarios", "source"}  # a suite with one of these keys can omit `scenes`
@@ -32,16 +33,21 @@ KEYS_THAT_NEED_SCENES = {"rigs", "trajectories"}
 class Rendering:
     """The engine that renders the images.
 
-    `raster` rasterises with precomputed light. `path` traces `samples` light paths through each pixel; None selects
-    the default of the path tracer. `pyrender` is the unchanged renderer of that library.
+    `raster` rasterises with precomputed light, and `samples` of each pixel, 4 or 16; None selects 4. `path` traces
+    `samples` light paths through each pixel; None selects the default of the path tracer. `pyrender` is the unchanged
+    renderer of that library.
     """
 
     engine: Annotated[str, OneOf("engine", ENGINES)] = "raster"
     samples: Annotated[int, Ge(1), Le(MOST_SAMPLES)] | None = None
 
     def __post_init__(self) -> None:
-        if self.engine != "path" and self.samples is not None:
-            raise SettingError(f"samples requires engine path, but the engine is {self.engine}; remove samples")
+        if self.samples is None:
+            return
+        if self.engine == "pyrender":
+            raise SettingError("samples requires engine raster or path, but the engine is pyrender; remove samples")
+        if self.engine == "raster" and self.samples not in RASTER_SAMPLES:
+            raise SettingError(f"the engine raster takes 4 or 16 samples, got {self.samples}", "samples")
 
     @property
     def needs_bake(self) -> bool:
