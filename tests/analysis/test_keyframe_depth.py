@@ -5,17 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.analysis.pictures import DISPARITY_PX, HEIGHT_PX, STEP_PX, pair, part, view
+from tests.analysis.pictures import DISPARITY_PX, HEIGHT_PX, STEP_PX, WIDTH_PX, pair, part, view
 from vobench.analysis.keyframe_depth import (
     LEAST_DISPARITY_PX,
     Keyframe,
     dense_disparity,
-    filled,
     keyframes_of,
     view_geometry,
 )
 from vobench.analysis.stereo_matches import PairShot
+from vobench.estimator.stereo import stereo_pair
 from vobench.geometry import se3
+from vobench.geometry.camera import BrownConrady
+from vobench.geometry.rig import stereo_rig
 
 
 def shots_along_the_wall(count: int) -> list[PairShot]:
@@ -62,12 +64,26 @@ def test_depth_that_no_other_keyframe_confirms_is_not_used() -> None:
     assert np.quantile(error_px, 0.9) < 0.5
 
 
-def test_unknown_depth_is_that_of_the_farther_side() -> None:
-    rho = np.array([[0.5, np.nan, np.nan, 0.2, np.nan], [np.nan] * 5])
-    complete = filled(rho, 0.01)
-    assert complete[0].tolist() == [0.5, 0.2, 0.2, 0.2, 0.2]
-    assert complete[1].tolist() == [0.5, 0.2, 0.2, 0.2, 0.2]
-    assert filled(np.full((2, 2), np.nan), 0.01).tolist() == [[0.01] * 2] * 2
+def test_a_lens_without_distortion_has_a_view_without_margins() -> None:
+    geometry = view_geometry(pair())
+    assert (geometry.width_px, geometry.height_px) == (WIDTH_PX, HEIGHT_PX)
+    assert geometry.is_recorded.all()
+
+
+def test_a_view_of_a_lens_that_compresses_its_edges_has_margins_for_all_that_is_recorded() -> None:
+    lens = BrownConrady(WIDTH_PX, HEIGHT_PX, 120.0, 120.0, WIDTH_PX / 2 - 0.5, HEIGHT_PX / 2 - 0.5, -0.15, 0, 0, 0, 0)
+    compressed = stereo_pair(stereo_rig(lens, pitch_deg=0), "a test")
+    geometry = view_geometry(compressed)
+    corners_px = np.array([[0.0, 0], [WIDTH_PX - 1, 0], [0, HEIGHT_PX - 1], [WIDTH_PX - 1, HEIGHT_PX - 1]])
+    rays = compressed.left.rays(corners_px)
+    pixels, _ = geometry.project(rays)
+    assert geometry.width_px > WIDTH_PX + 8
+    center_px = geometry.K[:2, 2]
+    assert geometry.records(center_px + 0.99 * (pixels - center_px)).all()
+    middle_of_left_edge = np.array([[0.0, geometry.height_px / 2]])
+    assert geometry.contains(middle_of_left_edge).all()
+    assert not geometry.records(middle_of_left_edge).any()
+    assert not geometry.records(np.array([[-3.0, 5.0], [5.0, 1e4]])).any()
 
 
 def test_pixels_and_points_of_a_view_correspond() -> None:

@@ -18,9 +18,23 @@ def test_the_expected_error_is_the_geometric_mean_and_the_best_is_first() -> Non
     assert prediction.taus == (1.0,)
 
 
+def test_the_expected_error_is_that_of_the_first_placement_if_the_others_were_drawn_around_it() -> None:
+    placements = [placement(a=4.0, b=1.0), placement(a=1.0, b=0.25)]
+    first = predict(placements, expects_first=True)
+    assert [(row.estimator, row.error) for row in first.errors] == [("b", pytest.approx(1)), ("a", pytest.approx(4))]
+    mean = predict(placements)
+    for of_first, of_mean in zip(first.errors, mean.errors, strict=True):
+        width_of_first = np.log(of_first.interval[1] / of_first.interval[0])
+        width_of_mean = np.log(of_mean.interval[1] / of_mean.interval[0])
+        assert width_of_first / width_of_mean == pytest.approx(np.sqrt(2 / 1.5))
+
+
+@pytest.mark.parametrize("expects_first", [False, True])
 @pytest.mark.parametrize(("place_sd", "both_sd"), [(0.3, 0.3), (0.05, 0.4), (0.5, 0.1)])
 @pytest.mark.parametrize("placements", [2, 3, 5])
-def test_intervals_hold_for_a_further_placement_in_95_percent_or_more(placements, place_sd, both_sd) -> None:
+def test_intervals_hold_for_a_further_placement_in_95_percent_or_more(
+    placements, place_sd, both_sd, expects_first
+) -> None:
     rng = np.random.default_rng(7)
     names = ["a", "b", "c", "d", "e", "f", "g"]
     shares = []
@@ -30,7 +44,7 @@ def test_intervals_hold_for_a_further_placement_in_95_percent_or_more(placements
         logs = level + of_places + rng.normal(0, both_sd, (placements + 1, len(names)))
         *known, further = [placement(**dict(zip(names, np.exp(row), strict=True))) for row in logs]
         truth = {name: float(np.nanmean(errors)) for name, errors in further.items()}
-        covered, counted = predict(known).covered(truth)
+        covered, counted = predict(known, expects_first=expects_first).covered(truth)
         assert counted == len(names)
         shares.append(covered / counted)
     assert np.mean(shares) > 0.93

@@ -1,6 +1,6 @@
 """Dense depth of the keyframes of a recording, from stereo matching and from the other keyframes.
 
-view   the rectified left view of a stereo pair, as in `vobench.estimator.stereo`
+view   the rectified left view of a stereo pair, as in `vobench.estimator.stereo`, but with all that the camera records
 rho    the inverse depth in a view, in 1/m; NaN where it is unknown
 """
 
@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from vobench.analysis.depth_completion import completed
 from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.stereo import OUTSIDE_PX, Eye, StereoPair
 from vobench.geometry.se3 import Array, apply, inverse
@@ -24,7 +25,10 @@ UNIQUENESS_PERCENT = 5
 SPECKLE_PX = 60  # smaller regions are errors
 SPECKLE_RANGE = 2
 CONSISTENT_PX = 1.0  # largest difference of disparities, from left to right and back
+EDGE_PX = 1.5  # difference of disparities at a depth edge
 LEAST_DISPARITY_PX = 0.25  # points with less are as far away as with this
+
+MOST_MARGIN_SHARE = 0.25  # of the width and height, by which a view is extended on each side
 
 NEIGHBOURS = 2  # keyframes before and after, from which depth is also taken
 AGREEING_PX = 1.0  # of disparity
@@ -42,12 +46,16 @@ class Keyframe:
 
 @dataclass(frozen=True, slots=True)
 class ViewGeometry:
-    """The pinhole of all left views, their size, and the disparity in px of a point at one metre."""
+    """The pinhole of all left views, their size, and the disparity in px of a point at one metre.
+
+    `is_recorded` (H, W) are the pixels that the image of the camera shows.
+    """
 
     K: Array
     width_px: int
     height_px: int
     focal_baseline: float
+    is_recorded: Mask
 
     @property
     def rho_of_px(self) -> float:
@@ -71,11 +79,17 @@ class ViewGeometry:
         pixels = (points_m / depth_m[:, None] @ self.K.T)[:, :2]
         return pixels, depth_m
 
-    def contains(self, pixels: Array, *, margin_px: float = 0) -> Mask:
-        """Whether pixels (N, 2) are in a view, at least so far from its edges."""
+    def contains(self, pixels: Array) -> Mask:
+        """Whether pixels (..., 2) are in a view."""
         last_px = np.array([self.width_px, self.height_px]) - 1
         with np.errstate(invalid="ignore"):
-            return np.asarray(((pixels >= margin_px) & (pixels <= last_px - margin_px)).all(-1))
+            return np.asarray(((pixels >= 0) & (pixels <= last_px)).all(-1))
+
+    def records(self, pixels: Array) -> Mask:
+        """Whether pixels (..., 2) are in a view and recorded."""
+        is_inside = self.contains(pixels)
+        columns, rows = np.moveaxis(np.where(is_inside[..., None], pixels, 0).round().astype(int), -1, 0)
+        return np.asarray(is_inside & self.is_recorded[rows, columns])
 
     def pixel_grid(self) -> Array:
         """The pixels (H, W, 2) of a view."""
@@ -94,9 +108,49 @@ def seen_from(other: Keyframe, own: Keyframe, pixels: Array, rho: Array, geometr
 
 
 def view_geometry(pair: StereoPair) -> ViewGeometry:
-    """The geometry of the left views of a pair."""
+    """The geometry of the left views of a pair, with margins for what a distorting lens records beyond the view."""
     camera = pair.left.camera
-    return ViewGeometry(pair.K, camera.width_px, camera.height_px, pair.focal_baseline)
+    margin_x_px, margin_y_px = _margins(pair.left)
+    width_px = camera.width_px + 2 * margin_x_px
+    height_px = camera.height_px + 2 * margin_y_px
+    K = pair.K.copy()
+    K[:2, 2] += [margin_x_px, margin_y_px]
+    everything = np.ones((height_px, width_px), bool)
+    geometry = ViewGeometry(K, width_px, height_px, pair.focal_baseline, everything)
+    source_px = _in_camera(pair.left, geometry)
+    last_px = np.array([camera.width_px, camera.height_px]) - 1
+    with np.errstate(invalid="ignore"):
+        is_recorded = np.asarray(((source_px >= -0.5) & (source_px <= last_px + 0.5)).all(-1))
+    return replace(geometry, is_recorded=is_recorded)
+
+
+def _margins(eye: Eye) -> tuple[int, int]:
+    """By how many columns and rows the outline of the image of a camera exceeds its view."""
+    width_px = eye.camera.width_px
+    height_px = eye.camera.height_px
+    columns = np.arange(width_px, dtype=float)
+    rows = np.arange(height_px, dtype=float)
+    outline_px = np.concatenate(
+        [
+            np.stack(np.broadcast_arrays(columns, 0.0), -1),
+            np.stack(np.broadcast_arrays(columns, height_px - 1.0), -1),
+            np.stack(np.broadcast_arrays(0.0, rows), -1),
+            np.stack(np.broadcast_arrays(width_px - 1.0, rows), -1),
+        ]
+    )
+    in_view_px = eye.in_view(outline_px)
+    excess_px = np.maximum(-in_view_px, in_view_px - [width_px - 1, height_px - 1])
+    size_px = np.array([width_px, height_px])
+    # Lenses of more than half a turn have no largest one.
+    largest_px = np.nanmax(np.where(np.isfinite(excess_px), excess_px, np.inf), axis=0)
+    margin_x_px, margin_y_px = np.clip(np.floor(largest_px), 0, MOST_MARGIN_SHARE * size_px).astype(int).tolist()
+    return margin_x_px, margin_y_px
+
+
+def _in_camera(eye: Eye, geometry: ViewGeometry) -> Array:
+    """The pixels (H, W, 2) of a camera that its view shows; NaN for those that it does not see."""
+    rays = geometry.rays(geometry.pixel_grid())
+    return eye.project(rays.reshape(-1, 3)).reshape(rays.shape[0], rays.shape[1], 2)
 
 
 def keyframes_of(shots: Sequence[PairShot], pair: StereoPair, *, most_disparity_px: float) -> list[Keyframe]:
@@ -114,12 +168,19 @@ def keyframes_of(shots: Sequence[PairShot], pair: StereoPair, *, most_disparity_
         right = _resampled(shot.right, right_map)
         disparity_px = dense_disparity(left, right, disparities)
         rho = np.maximum(disparity_px, LEAST_DISPARITY_PX) * geometry.rho_of_px
+        rho = np.where(geometry.is_recorded, rho, np.nan)
         T_world_view = shot.T_world_left @ inverse(pair.T_view_left)
         keyframes.append(Keyframe(left, rho, T_world_view))
     agreed = [_agreed(index, keyframes, geometry) for index in range(len(keyframes))]
     return [
-        replace(keyframe, rho=filled(rho, geometry.least_rho)) for keyframe, rho in zip(keyframes, agreed, strict=True)
+        replace(keyframe, rho=_completed(rho, keyframe.image, geometry))
+        for keyframe, rho in zip(keyframes, agreed, strict=True)
     ]
+
+
+def _completed(rho: Array, image: Image, geometry: ViewGeometry) -> Array:
+    edge_rho = EDGE_PX * geometry.rho_of_px
+    return completed(rho, image, edge_rho=edge_rho, least_rho=geometry.least_rho)
 
 
 # --- Images ---
@@ -127,10 +188,8 @@ def keyframes_of(shots: Sequence[PairShot], pair: StereoPair, *, most_disparity_
 
 def _map_of_view(eye: Eye, geometry: ViewGeometry) -> tuple[Array, Array]:
     """The columns and rows (H, W) in the image of a camera that its view shows, for OpenCV."""
-    source_px = eye.from_view(geometry.pixel_grid().reshape(-1, 2))
-    finite = np.nan_to_num(source_px, nan=OUTSIDE_PX).astype(np.float32)
-    columns, rows = finite.T.reshape(2, geometry.height_px, geometry.width_px)
-    return np.ascontiguousarray(columns), np.ascontiguousarray(rows)
+    finite = np.nan_to_num(_in_camera(eye, geometry), nan=OUTSIDE_PX).astype(np.float32)
+    return np.ascontiguousarray(finite[..., 0]), np.ascontiguousarray(finite[..., 1])
 
 
 def _resampled(image: Image, source_map: tuple[Array, Array]) -> Image:
@@ -240,27 +299,3 @@ def _source_from(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> _Sou
     weight[flat[order]] = np.clip(relative[order], 1 / LARGEST_WEIGHT, LARGEST_WEIGHT)
     shape = (geometry.height_px, geometry.width_px)
     return _Source(rho.reshape(shape), weight.reshape(shape))
-
-
-def filled(rho: Array, least_rho: float) -> Array:
-    """Inverse depth (H, W) whose unknown values are those of the farther neighbour in their row or column.
-
-    Values that nothing determines are the least.
-    """
-    by_rows = _of_farther_neighbour(rho)
-    by_columns = _of_farther_neighbour(by_rows.T).T
-    return np.where(np.isfinite(by_columns), by_columns, least_rho)
-
-
-def _of_farther_neighbour(rho: Array) -> Array:
-    """The same with unknown values of each row replaced by the smaller of the next known values on both sides."""
-    height, width = rho.shape
-    is_known = np.isfinite(rho)
-    columns = np.arange(width)
-    before = np.maximum.accumulate(np.where(is_known, columns, -1), axis=1)
-    after = np.minimum.accumulate(np.where(is_known, columns, width)[:, ::-1], axis=1)[:, ::-1]
-    rows = np.arange(height)[:, None]
-    left = np.where(before >= 0, rho[rows, np.maximum(before, 0)], np.inf)
-    right = np.where(after < width, rho[rows, np.minimum(after, width - 1)], np.inf)
-    farther = np.minimum(left, right)
-    return np.where(is_known, rho, np.where(np.isfinite(farther), farther, np.nan))

@@ -57,7 +57,7 @@ def _surfaces(keyframes: Sequence[Keyframe], geometry: ViewGeometry, spacing_px:
     wide_geometry = _extended_geometry(geometry, margin_px)
     wide = [_extended(keyframe, margin_px) for keyframe in keyframes]
     order = _nearest_views_first(keyframes)
-    mosaic = _Mosaic(wide, wide_geometry, margin_px, order, spacing_px=spacing_px)
+    mosaic = _Mosaic(wide, wide_geometry, order, spacing_px=spacing_px)
     mosaic.add(ImagePart.IMAGES, rejects_outvoted=True)
     mosaic.add(ImagePart.MARGINS, rejects_outvoted=True)
     mosaic.add(ImagePart.IMAGES)
@@ -65,14 +65,14 @@ def _surfaces(keyframes: Sequence[Keyframe], geometry: ViewGeometry, spacing_px:
 
     far_rho = FARTHER * geometry.least_rho
     far = [replace(keyframe, rho=np.full_like(keyframe.rho, far_rho)) for keyframe in wide]
-    backdrop = _Mosaic(far, wide_geometry, margin_px, order, spacing_px=BACKDROP_SPACINGS * spacing_px)
+    backdrop = _Mosaic(far, wide_geometry, order, spacing_px=BACKDROP_SPACINGS * spacing_px)
     backdrop.add(ImagePart.IMAGES)
     backdrop.add(ImagePart.MARGINS)
     yield from backdrop.surfaces()
 
 
 class ImagePart(Enum):
-    """The images themselves, or the margins by which they are extended."""
+    """What cameras recorded, or the margins around it."""
 
     IMAGES = 0
     MARGINS = 1
@@ -85,14 +85,12 @@ class _Mosaic:
         self,
         keyframes: Sequence[Keyframe],
         geometry: ViewGeometry,
-        margin_px: int,
         order: Sequence[int],
         *,
         spacing_px: int,
     ) -> None:
         self._keyframes = list(keyframes)
         self._geometry = geometry
-        self._margin_px = margin_px
         self._order = order
         self._sheets = [_sheet(keyframe, geometry, spacing_px) for keyframe in keyframes]
         self._smooth = [cv2.blur(keyframe.image.astype(np.float32), (SMOOTH_PX, SMOOTH_PX)) for keyframe in keyframes]
@@ -101,8 +99,8 @@ class _Mosaic:
     def add(self, part: ImagePart, *, rejects_outvoted: bool = False) -> None:
         """Add the quads of a part of all keyframes that are not shown yet."""
         for index in self._order:
-            is_margin = _is_margin(self._sheets[index], self._geometry, self._margin_px)
-            is_candidate = (is_margin if part is ImagePart.MARGINS else ~is_margin) & ~self._shown[index]
+            is_recorded = self._geometry.records(self._sheets[index].centre_px)
+            is_candidate = (is_recorded if part is ImagePart.IMAGES else ~is_recorded) & ~self._shown[index]
             if rejects_outvoted:
                 is_candidate &= ~self._outvoted(index, is_candidate)
             if is_candidate.any():
@@ -137,7 +135,7 @@ class _Mosaic:
             if other == index:
                 continue
             view = self._viewed(index, other, pixels, rho)
-            is_in_image = view.is_seen & self._geometry.contains(view.pixels, margin_px=self._margin_px)
+            is_in_image = view.is_seen & self._geometry.records(view.pixels)
             balance += is_in_image & view.is_same & view.is_alike
             balance -= is_in_image & view.is_same & ~view.is_alike
             balance -= is_in_image & view.is_in_front
@@ -191,7 +189,11 @@ def _extended_geometry(geometry: ViewGeometry, margin_px: int) -> ViewGeometry:
     K = geometry.K.copy()
     K[:2, 2] += margin_px
     return replace(
-        geometry, K=K, width_px=geometry.width_px + 2 * margin_px, height_px=geometry.height_px + 2 * margin_px
+        geometry,
+        K=K,
+        width_px=geometry.width_px + 2 * margin_px,
+        height_px=geometry.height_px + 2 * margin_px,
+        is_recorded=np.pad(geometry.is_recorded, margin_px),
     )
 
 
@@ -243,11 +245,6 @@ def _sheet(keyframe: Keyframe, geometry: ViewGeometry, spacing_px: int) -> _Shee
 
 def _grid_lines(size_px: int, spacing_px: int) -> NDArray[np.int64]:
     return np.unique(np.append(np.arange(0, size_px, spacing_px), size_px - 1))
-
-
-def _is_margin(sheet: _Sheet, geometry: ViewGeometry, margin_px: int) -> Mask:
-    """Whether quads (R - 1, C - 1) are outside of the original image."""
-    return ~geometry.contains(sheet.centre_px, margin_px=margin_px)
 
 
 # --- What others see ---

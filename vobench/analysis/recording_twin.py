@@ -378,7 +378,7 @@ def predict_twin(suite: TwinSuite, *, run_plan: PlanRunner) -> PredictedTwin:
     for file in (suite.file, *suite.more):
         folder = run_plan(read_plan(str(file)).only([TWIN], []))
         errors.append(case_errors(folder, TWIN))
-    return PredictedTwin(predict(errors, basis=_basis(suite)), tuple(errors))
+    return PredictedTwin(predict(errors, expects_first=suite.is_rebuilt, basis=_basis(suite)), tuple(errors))
 
 
 def _basis(suite: TwinSuite) -> str:

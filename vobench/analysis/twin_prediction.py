@@ -73,19 +73,24 @@ class TwinPrediction:
         return {"estimators": rows, "taus": list(self.taus), "placements": self.placements, "says": self.sentences()}
 
 
-def predict(placements: Sequence[Mapping[str, Array]], *, basis: str = "") -> TwinPrediction:
+def predict(
+    placements: Sequence[Mapping[str, Array]], *, expects_first: bool = False, basis: str = ""
+) -> TwinPrediction:
     """The prediction from the errors of segments, by estimator, in each placement of a twin.
 
     Only estimators that ran in all placements are predicted. The logarithm of a mean error is taken to be the sum of
     the effects of the estimator, of the placement, and of both together. The interval is that of an error in a further
-    placement.
+    placement. With `expects_first`, the expected errors are those in the first placement, because the others have
+    errors of calibration that were drawn around the most likely ones; otherwise they are geometric means.
     """
     names = common_names(placements)
     means = np.array([_means(errors, names) for errors in placements])  # (placements, names)
     logs = np.log(np.maximum(means, LEAST_ERROR_PERCENT))
-    half_width = _half_width(logs)
+    expected = logs[0] if expects_first else logs.mean(0)
+    averaged = 1 if expects_first else len(placements)
+    half_width = _half_width(logs, averaged)
     rows = []
-    for name, log in zip(names, logs.mean(0).tolist(), strict=True):
+    for name, log in zip(names, expected.tolist(), strict=True):
         interval = None
         if half_width is not None:
             interval = (float(np.exp(log - half_width)), float(np.exp(log + half_width)))
@@ -108,8 +113,11 @@ def _means(errors: Mapping[str, Array], names: Sequence[str]) -> list[float]:
     return [float(np.nanmean(errors[name])) for name in names]
 
 
-def _half_width(logs: Array) -> float | None:
-    """Half of the width of the prediction interval of a logarithm; None if there are too few (placements, names)."""
+def _half_width(logs: Array, averaged: int) -> float | None:
+    """Half of the width of the prediction interval of a logarithm; None if there are too few (placements, names).
+
+    `averaged` is the number of placements whose mean is expected.
+    """
     placements, names = logs.shape
     if placements < 2 or names < 2:
         return None
@@ -121,7 +129,7 @@ def _half_width(logs: Array) -> float | None:
     # common one would be too small where two placements are alike by chance.
     placement_part = _squared_half_width(float((of_placements**2).sum()), placement_freedom, USUAL_TWIN_SD)
     remaining_part = _squared_half_width(float((remaining**2).sum()), remaining_freedom, USUAL_REMAINING_SD)
-    return float(np.sqrt((placement_part + remaining_part * (1 - 1 / names)) * (1 + 1 / placements)))
+    return float(np.sqrt((placement_part + remaining_part * (1 - 1 / names)) * (1 + 1 / averaged)))
 
 
 def _squared_half_width(sum_of_squares: float, freedom: int, usual_sd: float) -> float:

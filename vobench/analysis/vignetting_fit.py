@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vobench.analysis.image_noise import SATURATED_DN
 from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry, seen_from
 from vobench.estimator.pose import cauchy_weights
 from vobench.estimator.stereo import StereoPair
@@ -23,6 +24,7 @@ LOG_NOISE = 0.012  # usual standard deviation of the logarithm of a grey value
 ROUNDS = 5
 PRIOR_SIGMAS = (2.0, 0.3)  # of the exponent, and of the logarithms of exposures
 MOST_EXPONENT = 4.0
+WHITE_DN = 255
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,13 +66,15 @@ def fit_photometry(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewG
 def corrected(keyframes: Sequence[Keyframe], photometry: RelativePhotometry, cosine: Array) -> list[Keyframe]:
     """The keyframes as a camera without vignetting and with one exposure would have taken them.
 
-    All images are darker by one factor, so that no value exceeds the range of grey values.
+    All images are darker by one factor, so that no value exceeds the range of grey values. What is saturated in an
+    image gets the largest value.
     """
     falloff = cosine**photometry.exponent
     darkest = float(falloff.min() * photometry.relative_grey.min())
     images = []
     for keyframe, relative_grey in zip(keyframes, photometry.relative_grey, strict=True):
-        image = keyframe.image * (darkest / (falloff * relative_grey))
+        evenly_lit = keyframe.image * (darkest / (falloff * relative_grey))
+        image = np.where(keyframe.image >= SATURATED_DN, WHITE_DN, evenly_lit)
         images.append(replace(keyframe, image=np.rint(image).astype(np.uint8)))
     return images
 
@@ -99,12 +103,13 @@ def _same_points(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewGeo
     first_px = POINT_STEP_PX // 2
     pixels = geometry.pixel_grid()[first_px::POINT_STEP_PX, first_px::POINT_STEP_PX].reshape(-1, 2)
     columns, rows = pixels.astype(int).T
+    is_recorded = geometry.records(pixels)
     for first, keyframe in enumerate(keyframes):
         grey = keyframe.image[rows, columns].astype(float)
         for second in range(first + 1, min(first + 1 + REACH, len(keyframes))):
             other = keyframes[second]
             seen_px, depth_m = seen_from(other, keyframe, pixels, keyframe.rho[rows, columns], geometry)
-            is_seen = geometry.contains(seen_px)
+            is_seen = is_recorded & geometry.records(seen_px)
             seen_columns, seen_rows = np.where(is_seen[:, None], seen_px, 0).round().astype(int).T
             other_grey = other.image[seen_rows, seen_columns].astype(float)
             with np.errstate(invalid="ignore"):
