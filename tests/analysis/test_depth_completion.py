@@ -59,14 +59,14 @@ def test_nothing_known_is_far_away() -> None:
 def test_even_values_stay_even_and_smoothing_preserves_the_sum() -> None:
     image = two_surfaces()
     even = np.full((1, HEIGHT_PX, WIDTH_PX), 3.0)
-    assert smoothed(even, image) == pytest.approx(even)
+    assert smoothed(even, image, 1.0) == pytest.approx(even)
     values = np.random.default_rng(2).uniform(0, 1, (2, HEIGHT_PX, WIDTH_PX))
-    smooth = smoothed(values, image)
+    smooth = smoothed(values, image, 1.0)
     assert smooth.sum((1, 2)) == pytest.approx(values.sum((1, 2)))
     assert smooth.std() < 0.5 * values.std()
 
 
 def test_little_is_smoothed_across_an_edge_of_the_image() -> None:
-    smooth = smoothed(depth_of_two()[None], two_surfaces())[0]
+    smooth = smoothed(depth_of_two()[None], two_surfaces(), 1.0)[0]
     assert smooth[:, : EDGE_PX - 1] == pytest.approx(np.full((HEIGHT_PX, EDGE_PX - 1), FAR), abs=0.02)
     assert smooth[:, EDGE_PX + 1 :] == pytest.approx(np.full((HEIGHT_PX, WIDTH_PX - EDGE_PX - 1), NEAR), abs=0.02)

@@ -30,18 +30,18 @@ def completed(rho: Array, image: Image, *, edge_rho: float, least_rho: float) ->
     An edge is a difference of neighbours by `edge_rho`. The larger the texture of an image (H, W), the more of a known
     value is kept. Where nothing is known, the result is `least_rho`.
     """
-    confidence = _confidence(rho, image, edge_rho)
+    noise_sigma_dn, _ = noise_dn(image)
+    confidence = _confidence(rho, image, edge_rho, noise_sigma_dn)
     known = np.nan_to_num(rho, nan=0.0)
-    weighted = smoothed(np.stack([confidence * known, confidence]), image)
+    weighted = smoothed(np.stack([confidence * known, confidence]), image, noise_sigma_dn)
     is_determined = weighted[1] > LEAST_CONFIDENCE
     smooth = np.where(is_determined, weighted[0] / np.where(is_determined, weighted[1], 1.0), least_rho)
     return confidence * known + (1 - confidence) * smooth
 
 
-def _confidence(rho: Array, image: Image, edge_rho: float) -> Array:
+def _confidence(rho: Array, image: Image, edge_rho: float, noise_sigma_dn: float) -> Array:
     """The confidence (H, W) in known values, from 0 to 1."""
-    sigma_dn, _ = noise_dn(image)
-    plain_dn = NOISE_SIGMAS * sigma_dn + PLAIN_DN
+    plain_dn = NOISE_SIGMAS * noise_sigma_dn + PLAIN_DN
     contrast_dn2 = _local_variance(image)
     of_texture = contrast_dn2 / (contrast_dn2 + plain_dn**2)
     is_certain = np.isfinite(rho) & ~_near_edge(rho, edge_rho)
@@ -65,10 +65,12 @@ def _near_edge(rho: Array, edge_rho: float) -> Mask:
         return np.asarray(largest - least > edge_rho)
 
 
-def smoothed(values: Array, image: Image) -> Array:
-    """Values (C, H, W), smoothed along the rows and columns of an image (H, W) in turns, but not across its edges."""
-    sigma_dn, _ = noise_dn(image)
-    scale_dn = EDGE_DN + NOISE_SIGMAS * sigma_dn
+def smoothed(values: Array, image: Image, noise_sigma_dn: float) -> Array:
+    """Values (C, H, W), smoothed along the rows and columns of an image (H, W) in turns, but not across its edges.
+
+    Edges are differences of grey values beyond the noise of the image, whose standard deviation is given.
+    """
+    scale_dn = EDGE_DN + NOISE_SIGMAS * noise_sigma_dn
     grey = image.astype(np.float64)
     along_rows = np.exp(-np.abs(np.diff(grey, axis=1)) / scale_dn)
     along_columns = np.exp(-np.abs(np.diff(grey, axis=0)) / scale_dn)

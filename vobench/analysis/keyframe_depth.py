@@ -13,7 +13,7 @@ import numpy as np
 from vobench.analysis.depth_completion import completed
 from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.stereo import OUTSIDE_PX, Eye, StereoPair
-from vobench.geometry.se3 import Array, apply, inverse
+from vobench.geometry.se3 import Array, inverse
 from vobench.rendering.array_types import Mask
 from vobench.sequence.picture import Image
 
@@ -102,9 +102,13 @@ def seen_from(other: Keyframe, own: Keyframe, pixels: Array, rho: Array, geometr
 
     The points are at pixels (N, 2) of the keyframe, with inverse depths rho (N,).
     """
-    points_m = geometry.rays(pixels) / rho[:, None]
     T_other_own = inverse(other.T_world_view) @ own.T_world_view
-    return geometry.project(apply(T_other_own, points_m))
+    # Of a point at depth 1 / rho, the image in the other view times its depth there and times rho.
+    of_direction = geometry.K @ T_other_own[:3, :3] @ np.linalg.inv(geometry.K)
+    of_translation = geometry.K @ T_other_own[:3, 3]
+    scaled = pixels @ of_direction[:, :2].T + of_direction[:, 2] + rho[:, None] * of_translation
+    relative_depth = np.where(scaled[:, 2] > 0, scaled[:, 2], np.nan)
+    return scaled[:, :2] / relative_depth[:, None], relative_depth / rho
 
 
 def view_geometry(pair: StereoPair) -> ViewGeometry:
