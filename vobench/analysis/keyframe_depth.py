@@ -13,6 +13,7 @@ import numpy as np
 from vobench.analysis.depth_completion import completed
 from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.stereo import OUTSIDE_PX, Eye, StereoPair
+from vobench.geometry.camera import pixel_grid
 from vobench.geometry.se3 import Array, inverse
 from vobench.rendering.array_types import Mask
 from vobench.sequence.picture import Image
@@ -129,24 +130,13 @@ def view_geometry(pair: StereoPair) -> ViewGeometry:
 
 
 def _margins(eye: Eye) -> tuple[int, int]:
-    """By how many columns and rows the outline of the image of a camera exceeds its view."""
-    width_px = eye.camera.width_px
-    height_px = eye.camera.height_px
-    columns = np.arange(width_px, dtype=float)
-    rows = np.arange(height_px, dtype=float)
-    outline_px = np.concatenate(
-        [
-            np.stack(np.broadcast_arrays(columns, 0.0), -1),
-            np.stack(np.broadcast_arrays(columns, height_px - 1.0), -1),
-            np.stack(np.broadcast_arrays(0.0, rows), -1),
-            np.stack(np.broadcast_arrays(width_px - 1.0, rows), -1),
-        ]
-    )
-    in_view_px = eye.in_view(outline_px)
-    excess_px = np.maximum(-in_view_px, in_view_px - [width_px - 1, height_px - 1])
-    size_px = np.array([width_px, height_px])
-    # Lenses of more than half a turn have no largest one.
-    largest_px = np.nanmax(np.where(np.isfinite(excess_px), excess_px, np.inf), axis=0)
+    """By how many columns and rows the image of a camera exceeds its view."""
+    camera = eye.camera
+    in_view_px = eye.in_view(pixel_grid(camera).reshape(-1, 2))
+    size_px = np.array([camera.width_px, camera.height_px])
+    excess_px = np.maximum(-in_view_px, in_view_px - (size_px - 1))
+    is_beyond_any_view = np.isnan(excess_px)
+    largest_px = np.where(is_beyond_any_view, np.inf, excess_px).max(0)
     margin_x_px, margin_y_px = np.clip(np.floor(largest_px), 0, MOST_MARGIN_SHARE * size_px).astype(int).tolist()
     return margin_x_px, margin_y_px
 
