@@ -10,6 +10,7 @@ from vobench.analysis.keyframe_depth import (
     LEAST_DISPARITY_PX,
     Keyframe,
     dense_disparity,
+    filled,
     keyframes_of,
     view_geometry,
 )
@@ -62,6 +63,14 @@ def test_depth_that_no_other_keyframe_confirms_is_not_used() -> None:
     keyframe = keyframes_of(shots, pair(), most_disparity_px=30)[2]
     error_px = np.abs(disparity_of(keyframe)[35:85, 30:150] - DISPARITY_PX)
     assert np.quantile(error_px, 0.9) < 0.5
+
+
+def test_unknown_depth_is_that_of_the_farther_side() -> None:
+    rho = np.array([[0.5, np.nan, np.nan, 0.2, np.nan], [np.nan] * 5])
+    complete = filled(rho, 0.01)
+    assert complete[0].tolist() == [0.5, 0.2, 0.2, 0.2, 0.2]
+    assert complete[1].tolist() == [0.5, 0.2, 0.2, 0.2, 0.2]
+    assert filled(np.full((2, 2), np.nan), 0.01).tolist() == [[0.01] * 2] * 2
 
 
 def test_a_lens_without_distortion_has_a_view_without_margins() -> None:

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
-from vobench.analysis.depth_completion import completed
 from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.stereo import OUTSIDE_PX, Eye, StereoPair
 from vobench.geometry.camera import pixel_grid
@@ -26,7 +25,6 @@ UNIQUENESS_PERCENT = 5
 SPECKLE_PX = 60  # smaller regions are errors
 SPECKLE_RANGE = 2
 CONSISTENT_PX = 1.0  # largest difference of disparities, from left to right and back
-EDGE_PX = 1.5  # difference of disparities at a depth edge
 LEAST_DISPARITY_PX = 0.25  # points with less are as far away as with this
 
 MOST_MARGIN_SHARE = 0.25  # of the width and height, by which a view is extended on each side
@@ -167,14 +165,8 @@ def keyframes_of(shots: Sequence[PairShot], pair: StereoPair, *, most_disparity_
         keyframes.append(Keyframe(left, rho, T_world_view))
     agreed = [_agreed(index, keyframes, geometry) for index in range(len(keyframes))]
     return [
-        replace(keyframe, rho=_completed(rho, keyframe.image, geometry))
-        for keyframe, rho in zip(keyframes, agreed, strict=True)
+        replace(keyframe, rho=filled(rho, geometry.least_rho)) for keyframe, rho in zip(keyframes, agreed, strict=True)
     ]
-
-
-def _completed(rho: Array, image: Image, geometry: ViewGeometry) -> Array:
-    edge_rho = EDGE_PX * geometry.rho_of_px
-    return completed(rho, image, edge_rho=edge_rho, least_rho=geometry.least_rho)
 
 
 # --- Images ---
@@ -293,3 +285,27 @@ def _source_from(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> _Sou
     weight[flat[order]] = np.clip(relative[order], 1 / LARGEST_WEIGHT, LARGEST_WEIGHT)
     shape = (geometry.height_px, geometry.width_px)
     return _Source(rho.reshape(shape), weight.reshape(shape))
+
+
+def filled(rho: Array, least_rho: float) -> Array:
+    """Inverse depth (H, W) whose unknown values are those of the farther neighbour in their row or column.
+
+    Values that nothing determines are the least.
+    """
+    by_rows = _of_farther_neighbour(rho)
+    by_columns = _of_farther_neighbour(by_rows.T).T
+    return np.where(np.isfinite(by_columns), by_columns, least_rho)
+
+
+def _of_farther_neighbour(rho: Array) -> Array:
+    """The same with unknown values of each row replaced by the smaller of the next known values on both sides."""
+    height, width = rho.shape
+    is_known = np.isfinite(rho)
+    columns = np.arange(width)
+    before = np.maximum.accumulate(np.where(is_known, columns, -1), axis=1)
+    after = np.minimum.accumulate(np.where(is_known, columns, width)[:, ::-1], axis=1)[:, ::-1]
+    rows = np.arange(height)[:, None]
+    left = np.where(before >= 0, rho[rows, np.maximum(before, 0)], np.inf)
+    right = np.where(after < width, rho[rows, np.minimum(after, width - 1)], np.inf)
+    farther = np.minimum(left, right)
+    return np.where(is_known, rho, np.where(np.isfinite(farther), farther, np.nan))
