@@ -1,4 +1,4 @@
-"""Dead reckoning from an IMU alone: gravity and the gyroscopes' bias from a standstill, then strapdown integration."""
+"""Dead reckoning from an IMU: gravity and the gyroscopes' bias from a standstill, then strapdown integration."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,24 +7,28 @@ import numpy as np
 
 from vobench.plugin import Array, Frame, ImuReadings, Result, Rig, Status, VobenchError, se3
 
+from .picture_motion import PictureMotion
 from .standstill import Rest, Standstill
 from .strapdown import State, carried
 
 
 class ImuDeadReckoning:
-    """Integrates the readings of the IMU from half a reading before the first frame, where it is at rest.
+    """Integrates the readings of the IMU, once pictures or readings show whether the body stands still at the start.
 
     A reading is a mean over time: it holds from the middle between its stamp and the one before to the middle
-    between its stamp and the next. Until a standstill at the start is decided, the pose is that of the start.
+    between its stamp and the next. While the body seems to stand still, the pose is that of the start. Pictures are
+    used for nothing else.
     """
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:  # noqa: ARG002
         """Take the IMU's mount and its noise."""
         if rig.imu is None:
             raise VobenchError("imu_dead_reckoning needs an IMU, and this recording has none")
+        self._imu = rig.imu
         self._T_body_imu = rig.imu.T_body_imu
-        self._half_step_ns = 0.5e9 / rig.imu.rate_hz
-        self._standstill = Standstill(rig.imu, float(params["standstill_s"]))
+        self._standstill_s = float(params["standstill_s"])
+        self._pictures = PictureMotion()
+        self._standstill: Standstill | None = None
         self._rest: Rest | None = None
         self._state: State | None = None
         self._reading: tuple[int, Array, Array] | None = None
@@ -33,19 +37,31 @@ class ImuDeadReckoning:
         """Integrate all readings since the last frame, and the last of them up to this one."""
         if frame.imu is None:
             return Result(None, Status.LOST, "no_imu")
-        self._state = self._state or State(frame.t_ns - self._half_step_ns, np.eye(4), np.zeros(3))
-        if self._rest is None:
-            self._standstill.take(frame.imu)
-            self._rest = self._standstill.verdict()
-            if self._rest is None:
-                return Result(np.eye(4), Status.INIT, "standing")
-            self._integrate(self._standstill.readings)
-        else:
+        if self._standstill is None:
+            half_step_ns = 0.5e9 / self._imu.rate_hz
+            start_ns = frame.t_ns - half_step_ns
+            self._standstill = Standstill(self._imu, start_ns=start_ns, duration_s=self._standstill_s)
+
+        if self._standstill.is_over:
             self._integrate(frame.imu)
+        else:
+            moved_px = self._pictures.moved_px(frame.left)
+            self._standstill.take(frame.imu, moved_px)
+            rest = self._standstill.verdict()
+            if rest is None:
+                return Result(np.eye(4), Status.INIT, "standing")
+            self._begin(rest, self._standstill.readings)
         now = self._carried(float(frame.t_ns))
         T_odom_body = self._T_body_imu @ now.T_odom_imu @ se3.inverse(self._T_body_imu)
         speed_mps = float(np.linalg.norm(now.v_mps))
         return Result(T_odom_body, stats={"speed_mps": speed_mps})
+
+    def _begin(self, rest: Rest, readings: ImuReadings) -> None:
+        """Integrate the first readings by a verdict, which may differ from that of the last frame."""
+        self._rest = rest
+        self._state = State(rest.stood_until_ns, np.eye(4), np.zeros(3))
+        self._reading = None
+        self._integrate(readings)
 
     def _integrate(self, readings: ImuReadings) -> None:
         """Advance the state through all of these; each reading takes over midway between its stamp and the last."""

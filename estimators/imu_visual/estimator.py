@@ -26,7 +26,8 @@ from vobench.plugin import (
     unit,
 )
 
-from .filter import Reading, State, anchored, carried, corrected, started
+from .filter import LEAST_ACCEL, LEAST_GYRO, Reading, State, anchored, carried, corrected, started
+from .noise import MeasuredNoise
 
 CORRELATED = 4.0  # errors of near tracks are correlated: so many count as one
 # Standard deviations of stereo beyond the noise of its tracks.
@@ -44,7 +45,11 @@ class Settings(TrackerSettings):
 
 
 class ImuVisual:
-    """A filter advanced by IMU readings and corrected by stereo poses relative to the last view (the anchor)."""
+    """A filter advanced by IMU readings and corrected by stereo poses relative to the last view (the anchor).
+
+    Readings have the noise that the data sheet states, unless the measured noise is well above it (vibration, touches).
+    Then the measured one counts, and readings do not reject stereo.
+    """
 
     def start(self, rig: Rig, params: Mapping[str, Any], seed: int) -> None:
         """Take the IMU's mount and noise, and the cameras. Raises VobenchError if either is missing."""
@@ -52,6 +57,7 @@ class ImuVisual:
         if rig.imu is None:
             raise VobenchError("imu_visual needs an IMU, and this recording has none")
         self._imu = rig.imu
+        self._noise = MeasuredNoise(rig.imu, least_gyro=LEAST_GYRO, least_accel=LEAST_ACCEL)
         self._settings = parameters(Settings, params, "imu_visual")
         self._pair = stereo_pair(rig, "imu_visual")
         self._tracker = StereoTracker(self._pair, self._settings)
@@ -61,6 +67,7 @@ class ImuVisual:
         self._reading: Reading | None = None
         self._T_odom_anchor = np.eye(4)  # the IMU's pose when the view was taken
         self._rejected = 0
+        self._vibrates = False
 
     def process(self, frame: Frame) -> Result:
         """Integrate the readings, track from the predicted pose, correct it; take a new view if the old one is far."""
@@ -92,16 +99,18 @@ class ImuVisual:
         A reading is a mean over time: it holds from the middle between its stamp and the one before to the middle
         between its stamp and the next.
         """
+        imu = self._noise.after(readings)
+        self._vibrates = imu != self._imu
         state = self._state or self._first_state(readings, t_ns)
         rows = zip(readings.t_ns.tolist(), readings.gyro_radps, readings.accel_mps2, strict=True)
         for stamp_ns, gyro_radps, accel_mps2 in rows:
             if self._reading is not None:
                 middle_ns = (self._reading.t_ns + stamp_ns) / 2
-                state = carried(state, self._reading, middle_ns, self._imu)
+                state = carried(state, self._reading, middle_ns, imu)
             self._reading = Reading(float(stamp_ns), gyro_radps, accel_mps2)
         if self._reading is None:
             return state
-        return carried(state, self._reading, float(t_ns), self._imu)
+        return carried(state, self._reading, float(t_ns), imu)
 
     def _first_state(self, readings: ImuReadings, t_ns: int) -> State:
         """The state at the first frame: up is the mean specific force or, without readings, the body's z."""
@@ -119,7 +128,8 @@ class ImuVisual:
         noise = of_tracks + np.diag(sigmas**2)
 
         self._rejected += 1
-        gate = self._settings.gate if self._rejected <= MOST_REJECTED else np.inf
+        is_gated = self._rejected <= MOST_REJECTED and not self._vibrates
+        gate = self._settings.gate if is_gated else np.inf
         after = corrected(state, self._T_odom_anchor @ T_anchor_imu, noise, gate=gate)
         if after is not None:
             self._rejected = 0

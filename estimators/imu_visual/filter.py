@@ -19,7 +19,9 @@ GYRO_BIAS = slice(9, 12)
 ACCEL_BIAS = slice(12, 15)
 GRAVITY = slice(15, 18)
 POSE = slice(0, 6)
-START_SIGMAS = np.repeat([1e-9, 1e-9, 1.0, 0.01, 0.2, 2.0], 3)  # m, rad, m/s, rad/s, m/s², m/s²
+# A MEMS gyroscope starts with a bias of some degrees a second: 0.08 rad/s in EuRoC's V1_01, +- 3 deg/s typically in
+# Bosch's data sheet of the BMI160; ArduPilot's EKF3 starts with 2.5 deg/s.
+START_SIGMAS = np.repeat([1e-9, 1e-9, 1.0, 0.05, 0.2, 2.0], 3)  # m, rad, m/s, rad/s, m/s², m/s²
 # Least densities of noise and of random walk: no real IMU is better, and an ideal one states zero.
 LEAST_GYRO = 1e-5
 LEAST_ACCEL = 1e-3

@@ -6,6 +6,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from tests.estimator.textures import shifted, texture
+from tests.estimators.touched import BIAS_RADPS, framed, grainy, readings_at_rest, touched
+from tests.estimators.touched import BIASED as CHIP
 from vobench.errors import VobenchError
 from vobench.estimator import Frame, ImuReadings, Status
 from vobench.geometry import se3
@@ -174,3 +177,72 @@ def test_without_an_imu_it_is_lost_and_refuses_a_rig_that_has_none(bed):
     assert (result.status, result.reason) == (Status.LOST, "no_imu")
     with pytest.raises(VobenchError, match="imu_dead_reckoning needs an IMU, and this recording has none"):
         bed.started(NAME, stereo_rig(LENSES["paper_blender"], pitch_deg=15))
+
+
+STILL = texture()
+
+
+def pictures(count: int, moved_px=lambda _: 0.0, *, still=STILL) -> list:
+    """Pictures of a texture, each with its own noise and moved to the right by so much."""
+    rng = np.random.default_rng(1)
+    moved = [moved_px(k) for k in range(count)]
+    return [(grainy(shifted(still, px, 0) if px else still, rng), None) for px in moved]
+
+
+def end_m(bed, frames) -> float:
+    results = bed.estimated(NAME, rig_with(CHIP), frames)
+    return float(np.linalg.norm(results[-1].T_odom_frame[:3, 3]))
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_pictures_find_the_standstill_of_a_rig_that_is_touched(bed, seed):
+    readings = touched(readings_at_rest(3.5), seed=seed)
+    seen = framed(readings, pictures(60), rate_hz=20)
+    unseen = framed(readings, [None] * 60, rate_hz=20)
+    assert end_m(bed, seen) < 0.3
+    assert end_m(bed, unseen) > 2.0  # the bias of 0.08 rad/s is taken for turning
+
+
+def test_a_touch_that_swings_the_camera_for_a_moment_is_no_motion(bed):
+    swung = pictures(60, lambda k: 2.0 if 6 <= k < 10 else 0.0)
+    frames = framed(touched(readings_at_rest(3.5)), swung, rate_hz=20)
+    assert end_m(bed, frames) < 0.3
+
+
+def test_a_steady_turn_that_pictures_show_is_not_taken_for_bias(bed):
+    rest = readings_at_rest(2.5)
+    turning_radps = rest.gyro_radps - BIAS_RADPS + [0, 0, 0.2]
+    readings = ImuReadings(rest.t_ns, turning_radps, rest.accel_mps2)
+    turns_deg = []
+    for seen in (pictures(40, lambda k: 3.0 * k), [None] * 40):
+        last = bed.estimated(NAME, rig_with(CHIP), framed(readings, seen, rate_hz=20))[-1]
+        turns_deg.append(np.rad2deg(se3.rotation_angle(last.T_odom_frame[:3, :3])))
+    assert turns_deg == pytest.approx([np.rad2deg(0.2 * 39 / 20), 0], abs=0.2)
+
+
+@pytest.mark.parametrize("dark", [np.zeros((480, 720), np.uint8), np.full((480, 720), 40, np.uint8)])
+def test_without_texture_or_light_the_readings_decide(bed, dark):
+    hot = dark.copy()
+    hot[np.random.default_rng(2).integers(0, 480, 60), np.random.default_rng(3).integers(0, 720, 60)] = 255
+    readings = touched(readings_at_rest(2.5))
+    blind = bed.estimated(NAME, rig_with(CHIP), framed(readings, pictures(40, still=hot), rate_hz=20))
+    unseen = bed.estimated(NAME, rig_with(CHIP), framed(readings, [None] * 40, rate_hz=20))
+    np.testing.assert_array_equal([r.T_odom_frame for r in blind], [r.T_odom_frame for r in unseen])
+
+
+def test_pictures_that_move_leave_the_poses_of_a_drive_unchanged(bed):
+    unseen = frames_of(driven(), BIASED)[:60]
+    seen = [replace(f, left=pair[0]) for f, pair in zip(unseen, pictures(60, lambda k: 0.3 * k), strict=True)]
+    with_pictures, without = (bed.estimated(NAME, rig_with(BIASED), frames) for frames in (seen, unseen))
+    poses = np.array([[r.T_odom_frame for r in results] for results in (with_pictures, without)])
+    np.testing.assert_array_equal(poses[0, 2:], poses[1, 2:])
+    np.testing.assert_allclose(poses[0, :2], poses[1, :2], atol=1e-2)
+
+
+def test_a_quiet_rest_is_the_same_with_and_without_pictures(bed):
+    readings = readings_at_rest(2.5)
+    ends = [
+        bed.estimated(NAME, rig_with(CHIP), framed(readings, seen, rate_hz=20))[-1].T_odom_frame
+        for seen in (pictures(40), [None] * 40)
+    ]
+    np.testing.assert_array_equal(ends[0], ends[1])
