@@ -14,6 +14,7 @@ from vobench.scene.triangles import Thing, triangle_table
 
 MATERIALS = {"floor": Material(), "glass": Material("pane", eta=1.5, tint=0.9)}
 FLOOR = rectangle(np.zeros(3), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "floor")
+X, Y, Z = np.eye(3)
 UNIFORM = Sky("sky", 10_000.0, "uniform")
 
 
@@ -56,6 +57,20 @@ def test_a_room_with_a_skylight_has_one_pane_of_sky_and_the_open_sky() -> None:
     origin = np.array([[0.0, 0, 1.0]], np.float32)
     assert pane.transmittance(visibility, origin, up)[0] == 1
     assert rest.transmittance(visibility, origin, up)[0] == 0
+
+
+def test_a_skylight_lights_the_room_below_it_and_nothing_above_it() -> None:
+    around = [side for side in room((4, 4, 3), floor="floor", wall="floor", ceiling="floor") if side.name != "ceiling"]
+    skylight = rectangle(np.array([0, 0, 3.0]), np.array([4.0, 0, 0]), np.array([0, 4.0, 0]), "glass", "skylight")
+    pane, _ = emitters(UNIFORM, visibility_of(*around, skylight))
+    below_and_above_m = np.array([[0.0, 0, 1.0], [0.0, 0, 4.0]], np.float32)
+    assert pane.may_reach(below_and_above_m).tolist() == [True, False]
+
+
+def test_a_pane_that_stands_in_the_open_lights_both_sides() -> None:
+    pane, _ = emitters(UNIFORM, visibility_of(FLOOR, rectangle(X + Z, Y, Z, "glass")))
+    beside_m = np.array([[0.0, 0, 1.0], [2.0, 0, 1.0]], np.float32)
+    assert pane.may_reach(beside_m).all()
 
 
 def test_a_pane_far_above_gives_its_solid_angle_times_what_it_lets_through() -> None:

@@ -27,6 +27,8 @@ GENTLE = 0.2  # the visible share is smoothed if, once smoothed, it differs by l
 STEEP_SIDES = 2  # how many times as many rays along each side of the grid of rays where it differs by more
 
 PANE_BLURS = 4  # how often the light through a pane is blurred, so that the noise of its few rays leaves no stains
+# The light through a pane is interpolated on the grids of FINER_STRIDES if its relative difference is at most this.
+PANE_UNEVEN = (0.02, 1.0)
 
 # The open sky is so bright that the light of a small share of it is computed with more rays, and smoothed.
 FAINT_SHARE = 0.3  # the greatest share for which this is done
@@ -88,12 +90,17 @@ class Receivers:
     lit: Rows
 
     def pane_light(self, emitter: Emitter, side: int) -> Floats:
-        """The light (P,) of the sky through a pane, sampled at every second texel along rows and columns."""
+        """The light (P,) of the sky through a pane, sampled at every second texel along rows and columns.
+
+        Where it is even, as behind walls, every fourth texel suffices.
+        """
         light = TexelField.unknown(self.layout, len(self.points))
-        rows = self.layout.on_grid(self.lit, STRIDES[-1])
+        rows = self.layout.on_grid(self.lit, STRIDES[0])
         light.set(rows, self._sampled(emitter, rows, side))
-        not_interpolated = light.refine(self.lit, stride=1, tolerance=np.inf)
-        light.set(not_interpolated, self._sampled(emitter, not_interpolated, side))
+        for stride, tolerance in zip(FINER_STRIDES, PANE_UNEVEN, strict=True):
+            rows = self.layout.on_grid(self.lit, stride)
+            not_interpolated = light.refine(rows, stride=stride, tolerance=tolerance, is_relative=True)
+            light.set(not_interpolated, self._sampled(emitter, not_interpolated, side))
         values = light.values
         for _ in range(PANE_BLURS):
             values = self.layout.blurred(values)
@@ -147,12 +154,15 @@ class Receivers:
         share = TexelField.unknown(self.layout, len(self.points))
         coarsest = STRIDES[0]
         rows = self.layout.on_grid(self.lit, coarsest)
-        first_share, clear_share = self._shares_by_sides(emitter, rows, side, coarsest)
-        share.set(rows, clear_share)
-        low, high = share.extremes(rows, steps=coarsest)
-        share.set(rows, first_share)
-        partly_hidden = rows[(low < 1) & (high > 0)]
-        self._compute_share(share, emitter, partly_hidden, RayGrid(side, is_spread=True), coarsest)
+        spread_grid = RayGrid(side, is_spread=True)
+        if emitter.sky == "open":
+            self._set_share_of_sky(share, emitter, rows, spread_grid)
+        else:
+            first_share, clear_share = self._shares_by_sides(emitter, rows, side, coarsest)
+            share.set(rows, clear_share)
+            is_partly_hidden = _are_partly_hidden(share, rows)
+            share.set(rows, first_share)
+            self._compute_share(share, emitter, rows[is_partly_hidden], spread_grid, coarsest)
         if emitter.sky == "open" and share.values[rows].mean() < DIM_SHARE:
             self._compute_faint_share(share, emitter, rows, FAINT_SIDES * side)
 
@@ -162,6 +172,26 @@ class Receivers:
             steep = share.refine(rows, stride=stride, tolerance=tolerance)
             self._compute_share(share, emitter, steep, finer_grid, stride)
         return share.values
+
+    def _set_share_of_sky(self, share: TexelField, emitter: Emitter, rows: Rows, grid: RayGrid) -> None:
+        """Set the visible share of the open sky at the rows (N,) of the coarsest grid.
+
+        Outdoors, most points see a part of the sky. Therefore the rays of the grid are cast first, and more rays only
+        from the points around which none of these, or all, are blocked.
+        """
+        coarsest = STRIDES[0]
+        first_share, clear_share = self._shares(emitter, rows, grid, coarsest)
+        share.set(rows, clear_share)
+        even = np.flatnonzero(~_are_partly_hidden(share, rows))
+        share_by_more_rays, clear_share = self._shares_by_sides(emitter, rows[even], grid.side, coarsest)
+        share.set(rows[even], clear_share)
+        is_partly_hidden = _are_partly_hidden(share, rows)
+
+        values = first_share.copy()
+        values[even] = share_by_more_rays
+        values[is_partly_hidden] = first_share[is_partly_hidden]
+        share.set(rows, values)
+        self._smooth_share(share, emitter, rows[is_partly_hidden], grid, coarsest)
 
     def _compute_faint_share(self, share: TexelField, emitter: Emitter, rows: Rows, side: int) -> None:
         """Compute again, with side x side rays, a small share of the sky, as that seen through an opening far away.
@@ -183,13 +213,17 @@ class Receivers:
                 share.smooth(fainter, steps=coarsest)
 
     def _compute_share(self, share: TexelField, emitter: Emitter, rows: Rows, grid: RayGrid, stride: int) -> None:
-        """Set the visible share of an emitter's light at the rows (N,), without the noise of its rays.
+        """Set the visible share of an emitter's light at the rows (N,), without the noise of its rays."""
+        values, _ = self._shares(emitter, rows, grid, stride)
+        share.set(rows, values)
+        self._smooth_share(share, emitter, rows, grid, stride)
+
+    def _smooth_share(self, share: TexelField, emitter: Emitter, rows: Rows, grid: RayGrid, stride: int) -> None:
+        """Remove the noise of rays from the visible share of an emitter's light at the rows (N,).
 
         In and beside a penumbra it is smoothed where it changes slowly. Where it does not, more rays are cast on the
         finest grid, because smoothing would blur the shadow.
         """
-        values, _ = self._shares(emitter, rows, grid, stride)
-        share.set(rows, values)
         low, high = share.extremes(rows, steps=stride)
         near_penumbra = rows[(low < 1) & (high > 0)]
         smoothed = share.copy()
@@ -275,6 +309,15 @@ class Receivers:
 
         is_at_edge = (visible_nearby & hidden_nearby) | is_mixed_cell[cells]
         return rows[is_at_edge[rows]]
+
+
+def _are_partly_hidden(clear_share: TexelField, rows: Rows) -> Mask:
+    """Whether some rays, but not all, are blocked around the points at rows (N,) of the coarsest grid.
+
+    `clear_share` is the share of unobstructed rays of these points.
+    """
+    low, high = clear_share.extremes(rows, steps=STRIDES[0])
+    return np.asarray((low < 1) & (high > 0))
 
 
 def _are_bent(points: Texels, rows: Rows) -> Mask:

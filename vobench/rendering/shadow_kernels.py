@@ -56,6 +56,26 @@ def entering_light(
 
 
 @compiled
+def sum_of_directions(normals: Floats, directions: Floats, sent: Floats, eta: float, light: Floats) -> None:
+    """Write the illuminance (P,) that faces with normals (P, 3) receive from unit directions (D, 3) together.
+
+    `sent` (D,) is the illuminance at normal incidence by each direction. Under a coat, whose refractive index is `eta`
+    (0 without a coat), the result is the light that enters the coat.
+    """
+    for point in range(len(normals)):
+        total = 0.0
+        for number in range(len(directions)):
+            cosine = 0.0
+            for axis in range(3):
+                cosine += normals[point, axis] * directions[number, axis]
+            if cosine <= 0:
+                continue
+            entering = 1 - fresnel_of(min(cosine, 1.0), eta) if eta > 0 else 1.0
+            total += cosine * entering * sent[number]
+        light[point] = total
+
+
+@compiled
 def lit_rays(
     points_m: Floats,
     vectors_m: Floats,

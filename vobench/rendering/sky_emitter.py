@@ -19,11 +19,12 @@ from vobench.rendering.geometry import (
     sample_points,
 )
 from vobench.rendering.planar_patch import PlanarPatch
+from vobench.rendering.shadow_kernels import sum_of_directions
 from vobench.rendering.solid_angle import Rectangle, SeenRectangle, SolidAngle, rectangle
 from vobench.rendering.texel import Texels
+from vobench.rendering.thread_pool import in_chunks
 from vobench.rendering.visibility import Visibility
 from vobench.scene.light import Sky
-from vobench.scene.material import fresnel
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,6 +32,7 @@ class SkyPane(Emitter):
     """The sky through one pane. Light that also crosses another such pane belongs to the pane that is farther away.
 
     `face` is the rectangle of the pane, None if it has another shape.
+    `reaches_front` and `reaches_back` are whether its light reaches the side of its normal, and the other side.
     """
 
     sky: ClassVar[str] = "pane"
@@ -39,6 +41,13 @@ class SkyPane(Emitter):
     visibility: Visibility
     ball: BoundingSphere
     face: Rectangle | None
+    reaches_front: bool
+    reaches_back: bool
+
+    def may_reach(self, points_m: Floats) -> Mask:
+        """Whether the sky is visible on the side of the pane that is opposite to each point (P, 3)."""
+        is_in_front = self.pane.height_m(points_m) > 0
+        return np.where(is_in_front, self.reaches_front, self.reaches_back)
 
     def towards(self, texels: Texels) -> Aim:
         """Places that are uniform over the solid angle of the pane, or over its area if it is not a rectangle."""
@@ -181,10 +190,14 @@ def _sky_table(sky: Sky, eta: float) -> Floats:
     sent = sky.luminance_cd_m2(directions) * 4 * np.pi / SKY_DIRECTIONS
     table_normals = _table_directions()
     table = np.empty(table_normals.shape[:2])
-    for row, normals in enumerate(table_normals):
-        cosine = np.maximum(normals @ directions.T, 0)
-        entering = 1 - fresnel(cosine, eta) if eta else 1.0
-        table[row] = (cosine * entering * sent).sum(1)
+
+    def fill(part: slice) -> None:
+        normals = table_normals[part].reshape(-1, 3)
+        light = np.empty(len(normals))
+        sum_of_directions(normals, directions, sent, eta, light)
+        table[part] = light.reshape(table[part].shape)
+
+    in_chunks(fill, len(table), chunk=1)
     return table
 
 
@@ -211,7 +224,16 @@ def _read_by_normal(table: Floats, normals: Floats) -> Floats:
 
 def sky_pane(light: Sky, pane: PlanarPatch, visibility: Visibility) -> SkyPane:
     """The emitter of the sky behind a pane."""
-    return SkyPane(light, pane, visibility, bounding_sphere(pane.corners_m), rectangle(pane.corners_m))
+    is_sky_in_front, is_sky_behind = visibility.sky_sides(pane)
+    return SkyPane(
+        light,
+        pane,
+        visibility,
+        ball=bounding_sphere(pane.corners_m),
+        face=rectangle(pane.corners_m),
+        reaches_front=is_sky_behind,
+        reaches_back=is_sky_in_front,
+    )
 
 
 def open_sky(light: Sky, visibility: Visibility) -> OpenSky:

@@ -1,6 +1,6 @@
 """Rays that are reflected by mirrors, coats and panes until they end at a face that scatters light."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -91,7 +91,9 @@ class SpecularTracer:
         rays, panes = self._visibility.first_panes(batch.origins_m, batch.directions, reach_m)
         at_panes = batch.take(rays)
         segments_m = at_panes.directions * reach_m[rays, None]
-        batch.weight[rays] *= self._visibility.transmittance_of_panes(at_panes.origins_m, segments_m)
+        first_hits = replace(panes, distance=panes.distance / reach_m[rays])
+        transmittance = self._visibility.transmittance_of_crossed_panes(at_panes.origins_m, segments_m, first_hits)
+        batch.weight[rays] *= transmittance
 
         normals = self._visibility.normals[panes.face]
         along_normal = np.einsum("ij,ij->i", at_panes.directions, normals)

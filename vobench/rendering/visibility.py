@@ -94,7 +94,7 @@ class Visibility:
         panes = list[PlanarPatch]()
         for pane in planar_patches(self.faces, rows, at_least_m2=WIDE_M2):
             is_other_side = any(pane.coincides(other) for other in panes)
-            if not is_other_side and self._sees_sky(pane):
+            if not is_other_side and any(self.sky_sides(pane)):
                 panes.append(pane)
         return panes
 
@@ -173,14 +173,22 @@ class Visibility:
             return transmittance
         near = self._near_panes(origins_m, segments_m)
         rays = near[self._panes.stops(origins_m[near], segments_m[near])]
+        first_hits = self._panes.hits(origins_m[rays], segments_m[rays])
+        transmittance[rays] = self.transmittance_of_crossed_panes(origins_m[rays], segments_m[rays], first_hits)
+        return transmittance
+
+    def transmittance_of_crossed_panes(self, origins_m: Floats, segments_m: Floats, first_hits: Hits) -> Floats:
+        """As `transmittance_of_panes`, for rays whose hits of the first panes (R,) are known.
+
+        The distances of `first_hits` are in lengths of the segments.
+        """
+        transmittance = np.ones(len(origins_m), np.float32)
+        hits = first_hits
+        rays = np.arange(len(origins_m))
+        rest_m = segments_m
         travelled = np.zeros(len(rays), np.float32)  # the fraction of its segment that each ray has travelled
         for _ in range(MOST_PANES):
-            if not len(rays):
-                break
-            # Find the next pane of each ray. A ray that meets no further pane is complete.
-            rest_m = segments_m[rays] * (1 - travelled)[:, None]
-            start_m = origins_m[rays] + segments_m[rays] * travelled[:, None]
-            hits = self._panes.hits(start_m, rest_m)
+            # A ray that meets no further pane is complete.
             meets_pane = (hits.face >= 0) & (hits.distance < 1)
             crossing = np.flatnonzero(meets_pane)
             rays = rays[crossing]
@@ -197,10 +205,15 @@ class Visibility:
             # The ray continues slightly behind the pane.
             step = hits.distance[crossing] + RAY_OFFSET_M / length_m
             travelled = (travelled + (1 - travelled) * step).astype(np.float32)
+            if not len(rays):
+                break
+            rest_m = segments_m[rays] * (1 - travelled)[:, None]
+            start_m = origins_m[rays] + segments_m[rays] * travelled[:, None]
+            hits = self._panes.hits(start_m, rest_m)
         return transmittance
 
-    def _sees_sky(self, pane: PlanarPatch) -> bool:
-        """Whether the sky is visible from a pane.
+    def sky_sides(self, pane: PlanarPatch) -> tuple[bool, bool]:
+        """Whether the sky is visible from a pane, first on the side of its normal, then on the other side.
 
         SKY_PROBES cosine-weighted rays start at random points on each side. It is enough that one of them leaves the
         scene without meeting an opaque face or a pane.
@@ -219,8 +232,8 @@ class Visibility:
         segments_m = FAR_M * directions
         meets_opaque = self.opaque.stops(origins_m, segments_m)
         meets_pane = self._panes.stops(origins_m, segments_m)
-        is_blocked = meets_opaque | meets_pane
-        return not is_blocked.all()
+        is_clear = ~(meets_opaque | meets_pane)
+        return bool(is_clear[:SKY_PROBES].any()), bool(is_clear[SKY_PROBES:].any())
 
 
 def _boxes(faces: Triangles, rows: Indices) -> Floats:
