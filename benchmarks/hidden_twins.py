@@ -45,6 +45,7 @@ from vobench.runner.folder import open_run
 from vobench.runner.recording import read_recording
 from vobench.suite.yaml_file import plain
 
+REFUSED = 1  # the exit code for wrong input
 WITHIN = 1.5  # the factor by which a predicted error may differ
 NEAREST = 1.5  # times the disparities of the recording
 ESTIMATORS = ("lk_epipolar", "stereo_pnp", "stereo_pnp_wide", "feature_vo", "mono_vo")
@@ -201,8 +202,11 @@ class Found:
         return [low <= real <= high for _, _, low, high, real in self.estimators]
 
 
-def examine(hidden: Hidden, out: Path, placements: int, *, is_elsewhere: bool) -> Found:
-    """Simulate and export a recording, fit its pair, and make its twin; what was found before is read again."""
+def examine(hidden: Hidden, out: Path, placements: int, *, is_elsewhere: bool) -> Found | None:
+    """Simulate and export a recording, fit its pair, and make its twin; what was found before is read again.
+
+    None if `vobench twin` refuses the recording.
+    """
     file = out / hidden.name / "found.json"
     if file.is_file():
         return Found(**json.loads(file.read_text(encoding="utf-8")))
@@ -217,7 +221,11 @@ def examine(hidden: Hidden, out: Path, placements: int, *, is_elsewhere: bool) -
         command += ["-e", estimator]
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     began_s = time.monotonic()
-    report = json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True).stdout)
+    finished = subprocess.run(command, stdout=subprocess.PIPE, check=False)
+    if finished.returncode == REFUSED:
+        return None
+    finished.check_returncode()
+    report = json.loads(finished.stdout)
     wall_s = time.monotonic() - began_s
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
     found = Found(
@@ -329,7 +337,7 @@ def _print_summary(all_found: Sequence[Found]) -> None:
     covered = [right for found in all_found for right in found.covered()]
     taus = [found.tau for found in all_found]
     near = sum(found.nearness > NEAREST for found in all_found)
-    print(f"{len(all_found)} recordings")
+    print(f"{len(all_found)} recordings that were not refused")
     print(f"errors of the pair inside of their 95 % intervals: {np.mean(parameters):.1%} of {len(parameters)}")
     print(f"Kendall's tau of predicted orders: mean {np.mean(taus):.2f}, least {min(taus):.2f}")
     print(f"predicted errors within a factor of {WITHIN}: {np.mean(within):.1%} of {len(within)}")
@@ -357,6 +365,9 @@ def main() -> None:
     for index in range(options.recordings):
         hidden = draw_recording(index, options.seed, options.images)
         found = examine(hidden, options.out, options.placements, is_elsewhere=options.other_place)
+        if found is None:
+            print(f"{hidden.name}: refused", flush=True)
+            continue
         _print(hidden, found)
         all_found.append(found)
     _print_summary(all_found)

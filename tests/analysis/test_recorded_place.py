@@ -1,11 +1,14 @@
 """Keyframes of the path through a place that is rebuilt."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from tests.analysis.pictures import DISPARITY_PX, pair
 from vobench.analysis import recorded_place
-from vobench.analysis.recorded_place import keyframe_indices
+from vobench.analysis.path_placement import WantedDisparities
+from vobench.analysis.recorded_place import keyframe_indices, own_placement, recorded_scene
 from vobench.errors import InputError
 from vobench.geometry import se3
 
@@ -27,3 +30,18 @@ def test_a_path_that_is_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
     moving = np.stack([se3.transform(np.eye(3), [0.2 * index, 0, 0]) for index in range(10)])
     with pytest.raises(InputError, match="10 images, more than 5"):
         keyframe_indices(moving, pair(), typical_disparity_px=DISPARITY_PX)
+
+
+@pytest.mark.parametrize(("nearness", "is_refused"), [(1.4, False), (1.6, True)])
+def test_a_rebuilt_place_that_is_too_near_is_refused(monkeypatch: pytest.MonkeyPatch, nearness, is_refused) -> None:
+    for name in ("build", "triangles", "RayCaster"):
+        monkeypatch.setattr(recorded_place, name, lambda *_: None)
+    monkeypatch.setattr(recorded_place, "misfit_of", lambda *_: 0.1)
+    monkeypatch.setattr(recorded_place, "nearness_of", lambda *_: nearness)
+    scene = recorded_scene(Path("recorded.glb"))
+    wanted = WantedDisparities.of_cells(np.full((1, 3, 3), DISPARITY_PX))
+    if is_refused:
+        with pytest.raises(InputError, match=r"cannot be rebuilt: surfaces are 1\.6 times as near"):
+            own_placement(scene, np.eye(4)[None], pair(), wanted)
+    else:
+        assert own_placement(scene, np.eye(4)[None], pair(), wanted).nearness == nearness

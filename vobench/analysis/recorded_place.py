@@ -8,7 +8,7 @@ import numpy as np
 from vobench.analysis.conditions import RESPONSE_GAMMA
 from vobench.analysis.keyframe_depth import keyframes_of, view_geometry
 from vobench.analysis.keyframe_texture import without_noise
-from vobench.analysis.path_placement import Placement, WantedDisparities, misfit_of, nearness_of
+from vobench.analysis.path_placement import OWN_SCALE, Placement, WantedDisparities, misfit_of, nearness_of
 from vobench.analysis.reconstruction import reconstruct
 from vobench.analysis.recording_part import read_shots
 from vobench.analysis.stereo_fit import StereoFit
@@ -100,8 +100,17 @@ def keyframe_indices(T_world_left: Array, pair: StereoPair, *, typical_disparity
 
 
 def own_placement(scene: SceneFile, T_world_left: Array, pair: StereoPair, wanted: WantedDisparities) -> Placement:
-    """The placement of a path (N, 4, 4) in its rebuilt place, where it is."""
+    """The placement of a path (N, 4, 4) in its rebuilt place, where it is.
+
+    Raises InputError if surfaces are nearer there than in the recording, as they are if the images do not determine
+    their depth.
+    """
     caster = RayCaster(triangles(build(scene, {})))
     misfit = misfit_of(caster, T_world_left, pair, 1.0, wanted)
     nearness = nearness_of(caster, T_world_left, pair, 1.0, wanted)
+    if nearness > OWN_SCALE.nearness:
+        raise InputError(
+            f"the place of the recording cannot be rebuilt: surfaces are {nearness:.1f} times as near as in the "
+            "recording, because its images have too little light or texture; name a place by --place"
+        )
     return Placement(np.eye(4), 1.0, misfit, nearness, tried=1)
