@@ -32,6 +32,9 @@ PICTURES = {
     "weave": partial(household._weave, 1, 256),
     "spines": lambda: picture.spines(1, 20).picture,
 }
+# Vertices, coordinates and normals are float32. Processors round sines differently in the last bit of float64, so some
+# of these differ in their last bit, which moves figures by up to 2e-7.
+FLOAT32_ATOL = 1e-6
 # Releases of Pillow draw letters a little differently.
 WITH_TEXT = ("pages", "screen", "poster talk", "whiteboard", "carton", "sign", "spines")
 
@@ -61,7 +64,7 @@ def figures_of_picture(name: str) -> list[float]:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_piece_looks_as_it_did(kind: str) -> None:
     frozen = json.loads(FROZEN.read_text())["kinds"][kind]
-    np.testing.assert_allclose(figures_of_kind(kind), frozen, rtol=1e-9, atol=1e-8)
+    np.testing.assert_allclose(figures_of_kind(kind), frozen, rtol=1e-9, atol=FLOAT32_ATOL)
 
 
 @pytest.mark.parametrize("name", PICTURES)

@@ -126,7 +126,7 @@ def test_without_its_cache_a_run_still_reports_and_view_says_how_to_get_the_pict
 
 
 def test_the_pictures_may_be_missing_for_a_reason_that_doctor_knows(vobench, here, monkeypatch):
-    def broken(*_):
+    def broken(*_, **__):
         raise MissingDependencyError("cannot draw without a display (missing libEGL); run: apt-get install -y libegl1")
 
     monkeypatch.setattr(raster, "RasterRenderer", broken)
@@ -260,7 +260,7 @@ def test_a_threshold_that_is_broken_is_said_and_is_a_code_of_its_own(vobench, he
 
 
 def test_a_run_without_a_sequence_is_one_sentence_and_no_board(vobench, here, monkeypatch):
-    def broken(*_):
+    def broken(*_, **__):
         raise AttributeError("module 'OpenGL.GL' has no attribute 'glClipControl'")
 
     monkeypatch.setattr(raster, "RasterRenderer", broken)

@@ -45,7 +45,7 @@ class RealismReport:
         row |= {"unit": statistic.unit, "value": value}
         band = self.domain.bands.get(statistic.name)
         if self.against is None:
-            row |= {"low": band and band.low, "high": band and band.high}
+            row |= {"low": None, "high": None} if band is None else {"low": band.low, "high": band.high}
         else:
             other = self.against.values.get(statistic.name)
             row |= {"against": other}

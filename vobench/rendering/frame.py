@@ -132,7 +132,7 @@ class FrameRenderer:
         self._expose(target, passes, camera, views, boxes=boxes, around=target.total.whole)
         return target.total.read(target.total.whole)
 
-    def _passes(self, frame_count: int) -> list["_Pass"]:
+    def _passes(self, frame_count: int) -> list[_Pass]:
         """How the sub-frames of a picture are drawn."""
         if self._is_fine:
             return [_Pass(index, pattern) for index in range(frame_count) for pattern in FINE_GRID]

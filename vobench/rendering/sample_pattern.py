@@ -33,12 +33,17 @@ INNER_HALF = _subset(1, 2)
 HALVES = (OUTER_HALF, INNER_HALF)
 
 
+FINE_BITS = 4
+FINE_SAMPLES = 2**FINE_BITS
+FINE_PASSES = FINE_SAMPLES // len(ROTATED_GRID.positions)
+
+
 def _fine_pattern(index: int) -> SamplePattern:
-    """One of four patterns that together have 16 samples, each alone in its sixteenth of the width and height.
+    """One of the patterns that together have 16 samples, each alone in its sixteenth of the width and height.
 
     Source: Hammersley (1960); the number of a sample, with its bits reversed, is its row.
     """
-    columns = range(index, FINE_SAMPLES, FINE_SAMPLES // len(ROTATED_GRID.positions))
+    columns = range(index, FINE_SAMPLES, FINE_PASSES)
     positions = [((column + 0.5) / FINE_SAMPLES, (_reversed_bits(column) + 0.5) / FINE_SAMPLES) for column in columns]
     return SamplePattern(tuple(positions), ROTATED_GRID.lod_bias)
 
@@ -48,9 +53,7 @@ def _reversed_bits(number: int) -> int:
     return int(f"{number:0{FINE_BITS}b}"[::-1], 2)
 
 
-FINE_BITS = 4
-FINE_SAMPLES = 2**FINE_BITS
-FINE_GRID = tuple(_fine_pattern(index) for index in range(4))
+FINE_GRID = tuple(_fine_pattern(index) for index in range(FINE_PASSES))
 
 # For pictures that are drawn at twice the resolution in both directions.
 PIXEL_CENTRE = SamplePattern(positions=((0.5, 0.5),), lod_bias=(-1.5,))
