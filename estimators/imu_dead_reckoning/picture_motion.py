@@ -27,7 +27,7 @@ class PictureMotion:
         """The median displacement since the first picture; NaN if too few corners are tracked."""
         if image is None:
             return np.nan
-        smooth = cv2.medianBlur(image, MEDIAN_PX)
+        smooth: Image = cv2.medianBlur(image, MEDIAN_PX).astype(np.uint8, copy=False)
         if self._first is None:
             self._first = smooth
             self._corners_px = _corners(smooth)
@@ -48,4 +48,6 @@ def _corners(image: Image) -> Points:
     mean_square = cv2.blur(grey * grey, window)
     contrast = np.sqrt(np.maximum(mean_square - mean * mean, 0))
     columns, rows = np.rint(corners_px).astype(int).T
-    return corners_px[contrast[rows, columns] >= MIN_CONTRAST]
+    has_contrast = contrast[rows, columns] >= MIN_CONTRAST
+    standing_out: Points = corners_px[has_contrast]
+    return standing_out
