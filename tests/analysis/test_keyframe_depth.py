@@ -12,6 +12,7 @@ from vobench.analysis.keyframe_depth import (
     dense_disparity,
     filled,
     keyframes_of,
+    seen_from,
     view_geometry,
 )
 from vobench.analysis.stereo_matches import PairShot
@@ -50,7 +51,7 @@ def test_what_the_right_image_does_not_show_has_no_disparity() -> None:
 
 
 def test_keyframes_have_the_depth_of_the_wall_everywhere() -> None:
-    for keyframe in keyframes_of(shots_along_the_wall(5), pair(), most_disparity_px=30):
+    for keyframe in keyframes_of(shots_along_the_wall(5), pair(), view_geometry(pair()), most_disparity_px=30):
         error_px = np.abs(disparity_of(keyframe) - DISPARITY_PX)
         assert np.quantile(error_px, 0.95) < 0.35
 
@@ -60,7 +61,7 @@ def test_depth_that_no_other_keyframe_confirms_is_not_used() -> None:
     wrong = shots[2].right.copy()
     wrong[30:90] = np.roll(wrong[30:90], 6, axis=1)  # as if these rows were nearer or farther
     shots[2] = replace(shots[2], right=wrong)
-    keyframe = keyframes_of(shots, pair(), most_disparity_px=30)[2]
+    keyframe = keyframes_of(shots, pair(), view_geometry(pair()), most_disparity_px=30)[2]
     error_px = np.abs(disparity_of(keyframe)[35:85, 30:150] - DISPARITY_PX)
     assert np.quantile(error_px, 0.9) < 0.5
 
@@ -85,7 +86,7 @@ def test_a_view_of_a_lens_that_compresses_its_edges_has_margins_for_all_that_is_
     geometry = view_geometry(compressed)
     corners_px = np.array([[0.0, 0], [WIDTH_PX - 1, 0], [0, HEIGHT_PX - 1], [WIDTH_PX - 1, HEIGHT_PX - 1]])
     rays = compressed.left.rays(corners_px)
-    pixels, _ = geometry.project(rays)
+    pixels = (rays @ geometry.K.T)[:, :2]
     assert geometry.width_px > WIDTH_PX + 8
     center_px = geometry.K[:2, 2]
     assert geometry.records(center_px + 0.98 * (pixels - center_px)).all()
@@ -98,9 +99,11 @@ def test_a_view_of_a_lens_that_compresses_its_edges_has_margins_for_all_that_is_
 def test_pixels_and_points_of_a_view_correspond() -> None:
     geometry = view_geometry(pair())
     pixels = geometry.pixel_grid().reshape(-1, 2)
-    seen_px, depth_m = geometry.project(3.0 * geometry.rays(pixels))
+    here = Keyframe(np.zeros((0, 0), np.uint8), np.zeros((0, 0)), np.eye(4))
+    seen_px, depth_m = seen_from(here, here, pixels, np.full(len(pixels), 1 / 3.0), geometry)
     assert seen_px == pytest.approx(pixels)
     assert depth_m == pytest.approx(np.full(len(pixels), 3.0))
-    behind_px, _ = geometry.project(np.array([[0.0, 0, -1]]))
+    ahead = replace(here, T_world_view=se3.transform(np.eye(3), [0, 0, 4.0]))
+    behind_px, _ = seen_from(ahead, here, pixels, np.full(len(pixels), 1 / 3.0), geometry)
     assert np.isnan(behind_px).all()
     assert geometry.least_rho * geometry.focal_baseline == pytest.approx(LEAST_DISPARITY_PX)

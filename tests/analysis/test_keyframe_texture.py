@@ -13,7 +13,7 @@ def rms(difference: np.ndarray) -> float:
 
 
 def test_the_mean_of_keyframes_has_less_noise_than_one_and_no_less_texture() -> None:
-    keyframes = keyframes_of(shots_along_the_wall(7), pair(), most_disparity_px=30)
+    keyframes = keyframes_of(shots_along_the_wall(7), pair(), view_geometry(pair()), most_disparity_px=30)
     middle = without_noise(keyframes, view_geometry(pair()))[3]
     column_px = 20 + 3 * STEP_PX
     inner = np.s_[10:-10, 40:-40]  # where most keyframes see the wall

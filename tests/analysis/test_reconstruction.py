@@ -19,7 +19,7 @@ SHOTS = 5
 
 @pytest.fixture(scope="module")
 def surfaces() -> list[Surface]:
-    keyframes = keyframes_of(shots_along_the_wall(SHOTS), pair(), most_disparity_px=30)
+    keyframes = keyframes_of(shots_along_the_wall(SHOTS), pair(), view_geometry(pair()), most_disparity_px=30)
     return reconstruct(keyframes, view_geometry(pair()))
 
 
@@ -67,7 +67,7 @@ def test_a_place_of_many_faces_has_a_coarser_grid(surfaces: list[Surface], monke
     fine = sum(len(surface.faces) for surface in surfaces)
     most = fine // 3
     monkeypatch.setattr(reconstruction, "MOST_FACES", most)
-    keyframes = keyframes_of(shots_along_the_wall(SHOTS), pair(), most_disparity_px=30)
+    keyframes = keyframes_of(shots_along_the_wall(SHOTS), pair(), view_geometry(pair()), most_disparity_px=30)
     coarse = sum(len(surface.faces) for surface in reconstruct(keyframes, view_geometry(pair())))
     assert most / 3 < coarse <= most
 

@@ -16,7 +16,7 @@ COUNT = 8
 
 @pytest.fixture(scope="module")
 def keyframes() -> list[Keyframe]:
-    return keyframes_of(shots_along_the_wall(COUNT), pair(), most_disparity_px=30)
+    return keyframes_of(shots_along_the_wall(COUNT), pair(), view_geometry(pair()), most_disparity_px=30)
 
 
 @pytest.fixture(scope="module")

@@ -72,12 +72,6 @@ class ViewGeometry:
         rays: Array = homogeneous @ np.linalg.inv(self.K).T
         return rays
 
-    def project(self, points_m: Array) -> tuple[Array, Array]:
-        """The pixels (N, 2) and depths (N,) of points (N, 3) in the frame of a view; NaN behind the view."""
-        depth_m = np.where(points_m[:, 2] > 0, points_m[:, 2], np.nan)
-        pixels = (points_m / depth_m[:, None] @ self.K.T)[:, :2]
-        return pixels, depth_m
-
     def contains(self, pixels: Array) -> Mask:
         """Whether pixels (..., 2) are in a view."""
         last_px = np.array([self.width_px, self.height_px]) - 1
@@ -145,12 +139,13 @@ def _in_camera(eye: Eye, geometry: ViewGeometry) -> Array:
     return eye.project(rays.reshape(-1, 3)).reshape(rays.shape[0], rays.shape[1], 2)
 
 
-def keyframes_of(shots: Sequence[PairShot], pair: StereoPair, *, most_disparity_px: float) -> list[Keyframe]:
+def keyframes_of(
+    shots: Sequence[PairShot], pair: StereoPair, geometry: ViewGeometry, *, most_disparity_px: float
+) -> list[Keyframe]:
     """The keyframes of shots with true poses, with depth that neighbours agree on and without holes.
 
-    The pair is the true one, without errors of calibration.
+    The pair is the true one, without errors of calibration, and the geometry is that of its left views.
     """
-    geometry = view_geometry(pair)
     left_map, right_map = (_map_of_view(eye, geometry) for eye in (pair.left, pair.right))
     disparities = _disparity_count(most_disparity_px, geometry.width_px)
     keyframes = []

@@ -64,8 +64,8 @@ def rebuild_place(
         by_stamp = read_shots(recording, t_ns[chosen])
         shots = [replace(by_stamp[int(t_ns[index])], T_world_left=T_world_left[index]) for index in chosen]
         most_px = BEYOND_MATCHES * float(np.quantile(fit.matches.disparity_px, DISPARITY_QUANTILE))
-        keyframes = keyframes_of(shots, pair, most_disparity_px=most_px)
         geometry = view_geometry(pair)
+        keyframes = keyframes_of(shots, pair, geometry, most_disparity_px=most_px)
         cosine = cosines(pair, geometry)
         photometry = fit_photometry(keyframes, cosine, geometry)
         evenly_lit = corrected(keyframes, photometry, cosine)
