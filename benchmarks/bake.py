@@ -4,7 +4,8 @@
     python benchmarks/bake.py --stages [--scenes room office]
 
 Wall clock and CPU over all threads; compare within a run only. With --stages every built-in scene, or those named, is
-baked in a process of its own, and what each stage of the bake took is shown in place of what changes.
+baked in a process of its own, and what each stage of the bake took is shown in place of what changes. Generated places
+are named with their seed, as in office.1.
 """
 
 import argparse
@@ -35,9 +36,8 @@ from vobench.scene.material import Material
 from vobench.scene.mesh import moved
 from vobench.scene.scene import Mover, Scene, WaypointMotion
 from vobench.scene.triangles import Thing
-from vobench.suite import catalog
 from vobench.suite.scene_build import build
-from vobench.suite.scene_file import read_scene
+from vobench.suite.scene_file import read_place
 
 NS_PER_PICTURE = 100_000_000
 
@@ -54,7 +54,7 @@ def main() -> None:
         _print_stages(arguments.scenes or ALL_SCENES)
         return
     for name in arguments.scenes or ("room", "office"):
-        scene = build(read_scene(catalog.find("scene", name).path), {})
+        scene = _scene(name)
         baked = _baked(scene)
         for change, light in _changes(baked):
             print(f"{name}: {change}: {_milliseconds(light, arguments.pictures)}")
@@ -118,12 +118,18 @@ def _stages(name: str) -> str:
     bake_module.direct_light = timed(  # type: ignore[attr-defined]
         direct_light, lambda emitter, *_: f"direct {type(emitter).__name__}"
     )
-    scene = build(read_scene(catalog.find("scene", name).path), {})
+    scene = _scene(name)
     started = time.process_time()
     line = _baking(scene)[1]
     spent["rest"] = time.process_time() - started - sum(spent.values())
     parts = ", ".join(f"{stage} {cpu_s:.1f}" for stage, cpu_s in spent.items())
     return f"{line}\n  {parts}"
+
+
+def _scene(name: str) -> Scene:
+    """A built-in scene, or a generated place by its name and seed, as in office.1."""
+    place, _, seed = name.partition(".")
+    return build(read_place(place, seed=int(seed) if seed else None), {})
 
 
 def _baked(scene: Scene) -> BakedScene:

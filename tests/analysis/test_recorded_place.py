@@ -15,7 +15,7 @@ from vobench.geometry import se3
 
 def test_keyframes_follow_the_motion_of_the_image() -> None:
     width_px = pair().left.camera.width_px
-    step_px = recorded_place.STEP_SHARE * width_px / 2.2  # every third frame is a keyframe
+    step_px = recorded_place.STEP_SHARES[0] * width_px / 2.2  # every third frame is a keyframe
     step_m = step_px / pair().K[0, 0] * (pair().focal_baseline / DISPARITY_PX)
     still = np.tile(np.eye(4), (5, 1, 1))
     moving = np.stack([se3.transform(np.eye(3), [step_m * index, 0, 0]) for index in range(10)])
@@ -28,8 +28,17 @@ def test_keyframes_follow_the_motion_of_the_image() -> None:
 def test_a_path_that_is_too_long_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(recorded_place, "MOST_KEYFRAMES", 5)
     moving = np.stack([se3.transform(np.eye(3), [0.2 * index, 0, 0]) for index in range(10)])
-    with pytest.raises(InputError, match="10 images, more than 5"):
+    with pytest.raises(InputError, match="10 images, more than 5; take a part of it, as by --frames 0:5"):
         keyframe_indices(moving, pair(), typical_disparity_px=DISPARITY_PX)
+
+
+def test_keyframes_of_a_long_path_are_farther_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    step_px = recorded_place.STEP_SHARES[0] * pair().left.camera.width_px * 1.1
+    step_m = step_px / pair().K[0, 0] * (pair().focal_baseline / DISPARITY_PX)
+    moving = np.stack([se3.transform(np.eye(3), [step_m * index, 0, 0]) for index in range(11)])
+    assert keyframe_indices(moving, pair(), typical_disparity_px=DISPARITY_PX) == list(range(11))
+    monkeypatch.setattr(recorded_place, "MOST_KEYFRAMES", 6)
+    assert keyframe_indices(moving, pair(), typical_disparity_px=DISPARITY_PX) == [0, 2, 4, 6, 8, 10]
 
 
 @pytest.mark.parametrize(("nearness", "is_refused"), [(1.4, False), (1.6, True)])

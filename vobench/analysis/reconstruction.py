@@ -31,6 +31,7 @@ IN_FRONT_PX = 2.0  # of disparity, by which a surface is in front of what anothe
 IN_FRONT_RATIO = 0.1  # of depth, likewise
 SMOOTH_PX = 5  # the side of the windows whose means are compared
 ALIKE_DN = 25.0  # largest difference of these means for the same surface
+VOTERS = 40  # keyframes before and after that are asked whether they see a surface, too
 FARTHER = 0.5  # the inverse depth of the backdrop, in that of the farthest points
 EDGE_PX = 1.0  # of disparity between the corners of a quad that is at a depth edge
 EDGE_RATIO = 0.08  # of depth, likewise
@@ -64,7 +65,7 @@ def _surfaces(keyframes: Sequence[Keyframe], geometry: ViewGeometry, spacing_px:
     yield from mosaic.surfaces()
 
     far_rho = FARTHER * geometry.least_rho
-    far = [replace(keyframe, rho=np.full_like(keyframe.rho, far_rho)) for keyframe in wide]
+    far = [replace(keyframe, rho=np.broadcast_to(far_rho, keyframe.rho.shape)) for keyframe in wide]
     backdrop = _Mosaic(far, wide_geometry, order, spacing_px=BACKDROP_SPACINGS * spacing_px)
     backdrop.add(ImagePart.IMAGES)
     backdrop.add(ImagePart.MARGINS)
@@ -115,15 +116,20 @@ class _Mosaic:
     def _covered(self, index: int, is_candidate: Mask) -> Mask:
         """Whether candidates of the quads of a sheet, and those around them, are surfaces that others show already."""
         pixels, rho = self._sheets[index].centres(is_candidate)
-        is_covered = np.zeros(len(rho), bool)
-        for other, shown in enumerate(self._shown):
-            if other == index or not shown.any():
+        uncovered = np.arange(len(rho))
+        nearest_first = sorted(range(len(self._shown)), key=lambda other: abs(other - index))
+        for other in nearest_first[1:]:
+            shown = self._shown[other]
+            if not len(uncovered) or not shown.any():
                 continue
-            view = self._viewed(index, other, pixels, rho)
+            view = self._viewed(index, other, pixels[uncovered], rho[uncovered])
             rows, columns = _quads_at(view.pixels, self._sheets[other])
-            is_covered |= view.is_seen & view.is_same & shown[rows, columns]
+            is_covered = view.is_seen & view.is_same & shown[rows, columns]
+            uncovered = uncovered[~is_covered]
+        covered_candidates = np.ones(len(rho), bool)
+        covered_candidates[uncovered] = False
         covered = np.ones(is_candidate.shape, bool)
-        covered[is_candidate] = is_covered
+        covered[is_candidate] = covered_candidates
         # Quads at the rim of what is covered are shown, so that no gap remains.
         return np.asarray(scipy.ndimage.binary_erosion(covered, np.ones((3, 3), bool), border_value=1), bool)
 
@@ -131,7 +137,7 @@ class _Mosaic:
         """Whether most keyframes see something behind candidates of the quads, or something else at their place."""
         pixels, rho = self._sheets[index].centres(is_candidate)
         balance = np.ones(len(rho), int)  # its own keyframe sees it
-        for other in range(len(self._keyframes)):
+        for other in range(max(index - VOTERS, 0), min(index + VOTERS + 1, len(self._keyframes))):
             if other == index:
                 continue
             view = self._viewed(index, other, pixels, rho)

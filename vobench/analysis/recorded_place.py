@@ -29,8 +29,9 @@ from vobench.trajectory.trajectory import Stamps
 RECORDED = "recorded"  # the name of the place
 WHITE_CD_M2 = 1.0  # of a white texture, as written by `write_luminous_model`
 COSINE_POWER = 4  # of the vignetting of strength 1
-STEP_SHARE = 0.03  # of the width of the image, by which it may move between keyframes
-MOST_KEYFRAMES = 80
+# By how much of its width the image may move between keyframes: the first that does not give too many of them.
+STEP_SHARES = (0.03, 0.045, 0.06)
+MOST_KEYFRAMES = 160
 DISPARITY_QUANTILE = 0.99  # of the matches
 BEYOND_MATCHES = 1.3  # the largest disparity that is searched, relative to that quantile
 
@@ -79,9 +80,21 @@ def keyframe_indices(T_world_left: Array, pair: StereoPair, *, typical_disparity
 
     Raises InputError if there are too many.
     """
-    focal_px = float(pair.K[0, 0])
     typical_rho = typical_disparity_px / pair.focal_baseline
-    limit_px = STEP_SHARE * pair.left.camera.width_px
+    for step_share in STEP_SHARES:
+        limit_px = step_share * pair.left.camera.width_px
+        chosen = _spaced(T_world_left, float(pair.K[0, 0]), typical_rho, limit_px)
+        if len(chosen) <= MOST_KEYFRAMES:
+            return chosen
+    raise InputError(
+        f"the path is too long for rebuilding its place, which would take {len(chosen)} images, more than "
+        f"{MOST_KEYFRAMES}; take a part of it, as by --frames 0:{len(T_world_left) * MOST_KEYFRAMES // len(chosen)}, "
+        "or name a place by --place"
+    )
+
+
+def _spaced(T_world_left: Array, focal_px: float, typical_rho: float, limit_px: float) -> list[int]:
+    """The first and the last index of poses, and those between at which the image has moved by more than a limit."""
     chosen = [0]
     for index in range(1, len(T_world_left)):
         T_last_this = inverse(T_world_left[chosen[-1]]) @ T_world_left[index]
@@ -91,11 +104,6 @@ def keyframe_indices(T_world_left: Array, pair: StereoPair, *, typical_disparity
             chosen.append(index)
     if chosen[-1] != len(T_world_left) - 1:
         chosen.append(len(T_world_left) - 1)
-    if len(chosen) > MOST_KEYFRAMES:
-        raise InputError(
-            f"the path is too long for rebuilding its place, which would take {len(chosen)} images, more than "
-            f"{MOST_KEYFRAMES}; take fewer images, or name a place by --place"
-        )
     return chosen
 
 

@@ -525,6 +525,7 @@ def recording_source(
         "calibration": None if options.calibration is None else str(options.calibration.resolve()),
         "truth": None if options.truth is None else str(options.truth.resolve()),
         "topics": {name: topic for name, topic in topics.items() if topic},
+        "frames": options.frames,
     }
     return {key: value for key, value in source.items() if value}
 

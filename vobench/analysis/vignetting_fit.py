@@ -6,8 +6,10 @@ exponent   p: a grey value is proportional to cosine ** p
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
+import scipy
 
 from vobench.analysis.image_noise import SATURATED_DN
 from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry, seen_from
@@ -15,6 +17,9 @@ from vobench.estimator.pose import cauchy_weights
 from vobench.estimator.stereo import StereoPair
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Mask
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
 
 POINT_STEP_PX = 8
 REACH = 6  # keyframes that are compared with each
@@ -50,13 +55,14 @@ def fit_photometry(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewG
     if not pairs:
         return RelativePhotometry(0.0, np.ones(len(keyframes)))
     differences = np.concatenate([pair.log_grey for pair in pairs])
-    design = np.concatenate([_design(pair, len(keyframes)) for pair in pairs])
+    design = scipy.sparse.vstack([_design(pair, len(keyframes)) for pair in pairs], "csr")
     prior_sigma = np.array([PRIOR_SIGMAS[0], *[PRIOR_SIGMAS[1]] * len(keyframes)])
     prior = np.diag((LOG_NOISE / prior_sigma) ** 2)
+    transposed = design.T.tocsr()
     weights = np.ones(len(differences))
     for _ in range(ROUNDS):
-        weighted = design * weights[:, None]
-        solution = np.linalg.solve(weighted.T @ design + prior, weighted.T @ differences)
+        weighted = transposed.multiply(weights).tocsr()
+        solution = np.linalg.solve((weighted @ design).toarray() + prior, weighted @ differences)
         weights = cauchy_weights(differences - design @ solution, LOG_NOISE)
     exponent = float(np.clip(solution[0], 0.0, MOST_EXPONENT))
     log_exposure = solution[1:] - solution[1:].mean()
@@ -89,13 +95,13 @@ class _SamePoints:
     log_cosine: Array
 
 
-def _design(pair: _SamePoints, count: int) -> Array:
+def _design(pair: _SamePoints, count: int) -> "csr_matrix":
     """The derivatives (N, 1 + K) of the differences by the exponent and the logarithms of exposures."""
-    rows = np.zeros((len(pair.log_grey), 1 + count))
-    rows[:, 0] = pair.log_cosine
-    rows[:, 1 + pair.first] = 1
-    rows[:, 1 + pair.second] = -1
-    return rows
+    points = len(pair.log_grey)
+    values = np.column_stack([pair.log_cosine, np.ones(points), -np.ones(points)])
+    columns = np.tile([0, 1 + pair.first, 1 + pair.second], points)
+    starts = 3 * np.arange(points + 1)
+    return scipy.sparse.csr_matrix((values.ravel(), columns, starts), (points, 1 + count))
 
 
 def _same_points(keyframes: Sequence[Keyframe], cosine: Array, geometry: ViewGeometry) -> Iterator[_SamePoints]:

@@ -40,6 +40,10 @@ class RecordingOptions:
         ),
     ] = None
 
+    frames: Annotated[
+        str | None, typer.Option(metavar="A:B", help="Take only the frames from A to B - 1, as in 40:80.")
+    ] = None
+
     def read_options(self, imu: Path | None = None) -> ReadOptions:
         """The same options for readers of recordings. Raises UnknownNameError."""
         return ReadOptions(
@@ -48,6 +52,7 @@ class RecordingOptions:
             truth=self.truth,
             rate_hz=self.rate,
             topics=parse_topics(self.topic),
+            frames=self.frames,
         )
 
 

@@ -1,6 +1,5 @@
 """vobench view."""
 
-import re
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,13 +8,13 @@ import typer
 
 from vobench.cli import terminal
 from vobench.cli.option import Json, RunPath, option_group, with_option_groups
+from vobench.dataset.frame_range import frame_slice
 from vobench.errors import InputError, require_known
 from vobench.report.rerun import PictureForm
 from vobench.report.viewer import TrialRecording, open_viewer, save_recordings
 from vobench.runner.folder import open_run
 
 IMAGE_FORMS: dict[str, PictureForm] = {"jpeg": "jpeg", "png": "png"}
-FRAME_RANGE = re.compile(r"(?P<first>\d*):(?P<end>\d*)")  # A:B, in which both numbers are optional
 
 
 @option_group
@@ -46,12 +45,7 @@ class TrialSelection:
         """The frames that are shown. Raises InputError if --frames is not A:B."""
         if not self.frames:
             return slice(None)
-        match = FRAME_RANGE.fullmatch(self.frames)
-        if match is None:
-            raise InputError(f"--frames should be A:B, two frame numbers, as in 40:80 (got {self.frames!r})")
-        first = int(match["first"]) if match["first"] else None
-        end = int(match["end"]) if match["end"] else None
-        return slice(first, end)
+        return frame_slice(self.frames, name="--frames")
 
 
 @with_option_groups

@@ -11,6 +11,7 @@ from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from pkgutil import iter_modules
 
+from vobench.dataset.frame_range import with_frames
 from vobench.dataset.picture import listed, refuse_lfs_pointer
 from vobench.dataset.recording import ReadOptions, Recording
 from vobench.dataset.rectified_view import Views
@@ -20,6 +21,7 @@ from vobench.geometry.rig import Rig
 from vobench.trajectory.trajectory import Stamps, Trajectory
 
 GROUP = "vobench.datasets"
+OF_ALL_LAYOUTS = {"frames"}  # options that no reader needs to know
 ARCHIVES = {b"PK\x03\x04": "zip", b"\x1f\x8b": "gzip", b"BZh": "bzip2", b"7z\xbc\xaf": "7z", b"\xfd7zXZ": "xz"}
 HEAD_BYTES = 512
 MAGIC_BYTES_SHOWN = 8
@@ -227,7 +229,8 @@ def read(
             raise InputError(unknown_name_sentence("form", form, list(known)))
         layout = known[sniff(path) if form is None else form]
         _require_heeded(options, layout)
-        return layout.read(path, options)
+        recording = layout.read(path, options)
+        return with_frames(recording, options.frames) if options.frames else recording
     except OSError as error:  # for example, a folder without permission
         raise InputError(f"cannot read {error.filename or path}: {error.strerror or error}") from None
 
@@ -236,6 +239,8 @@ def _require_heeded(options: ReadOptions, layout: Layout) -> None:
     """Raise InputError for an option that the layout does not use."""
     defaults = ReadOptions()
     for field in fields(ReadOptions):
+        if field.name in OF_ALL_LAYOUTS:
+            continue
         is_set = getattr(options, field.name) != getattr(defaults, field.name)
         if is_set and field.name not in layout.heeds:
             used = ", ".join(sorted(layout.heeds)) or "none"

@@ -38,6 +38,7 @@ class ReadOptions:
     `topics` are the topics of a bag.
     `rate_hz` is the frame rate of pictures without stamps.
     `within_ns` is the largest difference between the stamps of the two pictures of a pair.
+    `frames` are the frames to take, as A:B, from A to B - 1; None for all.
     """
 
     calibration: Path | None = None
@@ -46,6 +47,7 @@ class ReadOptions:
     rate_hz: float | None = None
     within_ns: int = 1_000_000
     topics: Topics = Topics()
+    frames: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,7 +65,7 @@ def read_case(case: RecordedCase) -> Recording:
         if file:
             files[key] = Path(file)
     topics = Topics(**source.topics)
-    options = ReadOptions(**files, rate_hz=source.rate_hz, topics=topics)
+    options = ReadOptions(**files, rate_hz=source.rate_hz, topics=topics, frames=source.frames)
     return read(Path(source.path), form=source.form, options=options)
 
 

@@ -24,6 +24,7 @@ class Source:
     `truth` is a trajectory file.
     `rate_hz` is the frame rate of images without stamps.
     `topics` says which topics of a bag are used, if that is ambiguous.
+    `frames` are the frames that are used, as A:B, from A to B - 1.
     """
 
     path: str
@@ -34,6 +35,7 @@ class Source:
     truth: str | None = None
     rate_hz: Positive | None = None
     topics: dict[Annotated[str, OneOf("topic", TOPICS)], str] = field(default_factory=dict)
+    frames: str | None = None
 
     def placed(self, path: Path, name: str, folder: Path) -> "Source":
         """The source of one recording, with its name and absolute paths. Relative paths start at `folder`."""
