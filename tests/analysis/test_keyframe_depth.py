@@ -56,6 +56,22 @@ def test_keyframes_have_the_depth_of_the_wall_everywhere() -> None:
         assert np.quantile(error_px, 0.95) < 0.35
 
 
+def test_noise_is_no_texture() -> None:
+    rng = np.random.default_rng(0)
+    edge = np.where(np.arange(WIDTH_PX + 40) < 80, 60.0, 90.0)
+    plain = np.tile(edge, (HEIGHT_PX, 1))
+    shots = []
+    for shot in shots_along_the_wall(3):
+        left, right = (
+            np.rint(plain[:, start_px : start_px + WIDTH_PX] + rng.normal(0, 4, (HEIGHT_PX, WIDTH_PX))).astype(np.uint8)
+            for start_px in (20, 20 + DISPARITY_PX)
+        )
+        shots.append(replace(shot, left=left, right=right, T_world_left=np.eye(4)))
+    for keyframe in keyframes_of(shots, pair(), view_geometry(pair()), most_disparity_px=60):
+        is_right = np.abs(disparity_of(keyframe) - DISPARITY_PX) < 1.5
+        assert is_right.mean() > 0.95  # 0.79 if noise is matched
+
+
 def test_depth_that_no_other_keyframe_confirms_is_not_used() -> None:
     shots = shots_along_the_wall(5)
     wrong = shots[2].right.copy()

@@ -4,8 +4,9 @@ import numpy as np
 
 from tests.analysis.pictures import HEIGHT_PX, NOISE_DN, STEP_PX, WALL, WIDTH_PX, pair, view
 from tests.analysis.test_keyframe_depth import shots_along_the_wall
+from vobench.analysis.image_noise import denoised
 from vobench.analysis.keyframe_depth import keyframes_of, view_geometry
-from vobench.analysis.keyframe_texture import denoised, without_noise
+from vobench.analysis.keyframe_texture import without_noise
 
 
 def rms(difference: np.ndarray) -> float:

@@ -5,10 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.analysis.pictures import DISPARITY_PX, pair
+from tests.analysis.pictures import DISPARITY_PX, pair, view
+from tests.analysis.test_keyframe_depth import shots_along_the_wall
 from vobench.analysis import recorded_place
 from vobench.analysis.path_placement import WantedDisparities
-from vobench.analysis.recorded_place import keyframe_indices, own_placement, recorded_scene
+from vobench.analysis.recorded_place import RebuiltPlace, keyframe_indices, own_placement
+from vobench.analysis.stereo_matches import match_shots
+from vobench.asset.luminous_model import Surface, write_luminous_model
 from vobench.errors import InputError
 from vobench.geometry import se3
 
@@ -41,16 +44,24 @@ def test_keyframes_of_a_long_path_are_farther_apart(monkeypatch: pytest.MonkeyPa
     assert keyframe_indices(moving, pair(), typical_disparity_px=DISPARITY_PX) == [0, 2, 4, 6, 8, 10]
 
 
-@pytest.mark.parametrize(("nearness", "is_refused"), [(1.4, False), (1.6, True)])
-def test_a_rebuilt_place_that_is_too_near_is_refused(monkeypatch: pytest.MonkeyPatch, nearness, is_refused) -> None:
-    for name in ("build", "triangles", "RayCaster"):
-        monkeypatch.setattr(recorded_place, name, lambda *_: None)
-    monkeypatch.setattr(recorded_place, "misfit_of", lambda *_: 0.1)
-    monkeypatch.setattr(recorded_place, "nearness_of", lambda *_: nearness)
-    scene = recorded_scene(Path("recorded.glb"))
-    wanted = WantedDisparities.of_cells(np.full((1, 3, 3), DISPARITY_PX))
-    if is_refused:
+def place_with_a_wall_at(depth_m: float, folder: Path) -> RebuiltPlace:
+    """A place with a wall in front of the path, and images of a wall with a disparity of DISPARITY_PX."""
+    corners = np.array([[-1, -1, 1], [1, -1, 1], [-1, 1, 1], [1, 1, 1]], float)
+    uv = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], float)
+    wall = Surface(10 * depth_m * corners * [1, 1, 0.1], uv, np.array([[0, 2, 1], [1, 2, 3]]), view(40, 0))
+    model = folder / "recorded.glb"
+    write_luminous_model([wall], model)
+    return RebuiltPlace(model, 0.0, tuple(match_shots(shots_along_the_wall(3), pair())))
+
+
+@pytest.mark.parametrize("nearness", [0.8, 1.0, 1.4, 1.6])
+def test_a_rebuilt_place_that_is_too_near_is_refused(tmp_path: Path, nearness: float) -> None:
+    place = place_with_a_wall_at(pair().focal_baseline / (nearness * DISPARITY_PX), tmp_path)
+    T_world_left = np.stack([matched.shot.T_world_left for matched in place.matched])
+    wanted = WantedDisparities.of_cells(np.full((1, 3, 3), float(DISPARITY_PX)))
+    if nearness > 1.5:
         with pytest.raises(InputError, match=r"cannot be rebuilt: surfaces are 1\.6 times as near"):
-            own_placement(scene, np.eye(4)[None], pair(), wanted)
+            own_placement(place, T_world_left, pair(), pair(), wanted)
     else:
-        assert own_placement(scene, np.eye(4)[None], pair(), wanted).nearness == nearness
+        placement = own_placement(place, T_world_left, pair(), pair(), wanted)
+        assert placement.nearness == pytest.approx(nearness, rel=0.03)

@@ -1,8 +1,9 @@
-"""Estimates the noise of an image from its flat patches."""
+"""Estimates the noise of an image from its flat patches, and removes it."""
 
 from functools import cache
 from typing import Any
 
+import cv2
 import numpy as np
 import scipy
 from numpy.typing import NDArray
@@ -17,6 +18,9 @@ PATCH_STEP_PX = 3
 MIN_PATCHES = 300
 ROUNDS = 8
 FLAT_QUANTILES = np.arange(0.05, 1.0, 0.1)
+# Sides of the windows that are compared and searched for similar ones to remove noise.
+TEMPLATE_PX = 5
+SEARCH_PX = 15
 TEXTURE_QUANTILE = 0.999  # one patch of pure noise in a thousand is taken for textured
 
 Patches = NDArray[np.float32]  # (N, PATCH_PX²)
@@ -54,6 +58,14 @@ def noise_dn(picture: Image) -> tuple[float, Array]:
         flat_dn = np.quantile(flat.mean(1), FLAT_QUANTILES)
         max_energy = variance * _max_energy_of_noise()
     return sigma_dn, flat_dn
+
+
+def denoised(image: Image, sigma_dn: float) -> Image:
+    """An image (H, W) with noise of a standard deviation, without it, by non-local means (Buades et al., 2005)."""
+    if sigma_dn == 0:
+        return image
+    smooth = cv2.fastNlMeansDenoising(image, h=sigma_dn, templateWindowSize=TEMPLATE_PX, searchWindowSize=SEARCH_PX)
+    return smooth.astype(np.uint8, copy=False)
 
 
 def _patches(picture: NDArray[Any]) -> Patches:

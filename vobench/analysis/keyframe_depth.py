@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import cv2
 import numpy as np
 
+from vobench.analysis.image_noise import denoised, noise_dn
 from vobench.analysis.stereo_matches import PairShot
 from vobench.estimator.stereo import OUTSIDE_PX, Eye, StereoPair
 from vobench.geometry.camera import pixel_grid
@@ -26,6 +27,9 @@ SPECKLE_PX = 60  # smaller regions are errors
 SPECKLE_RANGE = 2
 CONSISTENT_PX = 1.0  # largest difference of disparities, from left to right and back
 LEAST_DISPARITY_PX = 0.25  # points with less are as far away as with this
+
+NOISY_DN = 1.5  # images with more noise are matched without it
+REMOVED_SIGMAS = 1.5  # of the noise
 
 MOST_MARGIN_SHARE = 0.25  # of the width and height, by which a view is extended on each side
 
@@ -153,7 +157,7 @@ def keyframes_of(
         assert shot.T_world_left is not None
         left = _resampled(shot.left, left_map)
         right = _resampled(shot.right, right_map)
-        disparity_px = dense_disparity(left, right, disparities)
+        disparity_px = dense_disparity(*_for_matching(left, right), disparities)
         rho = np.maximum(disparity_px, LEAST_DISPARITY_PX) * geometry.rho_of_px
         rho = np.where(geometry.is_recorded, rho, np.nan)
         T_world_view = shot.T_world_left @ inverse(pair.T_view_left)
@@ -200,6 +204,14 @@ def dense_disparity(left: Image, right: Image, disparities: int) -> Array:
     with np.errstate(invalid="ignore"):
         is_consistent = is_inside & (np.abs(forward_px - back_px) <= CONSISTENT_PX)
     return np.where(is_consistent, forward_px, np.nan)
+
+
+def _for_matching(left: Image, right: Image) -> tuple[Image, Image]:
+    """A pair of images without noise that would be matched where there is no texture."""
+    sigma_dn, _ = noise_dn(left)
+    if sigma_dn <= NOISY_DN:
+        return left, right
+    return denoised(left, REMOVED_SIGMAS * sigma_dn), denoised(right, REMOVED_SIGMAS * sigma_dn)
 
 
 def _matched(left: Image, right: Image, disparities: int) -> Array:

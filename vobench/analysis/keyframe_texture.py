@@ -6,7 +6,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 
-from vobench.analysis.image_noise import noise_dn
+from vobench.analysis.image_noise import denoised, noise_dn
 from vobench.analysis.keyframe_depth import Keyframe, ViewGeometry, seen_from
 from vobench.geometry.se3 import Array
 from vobench.rendering.array_types import Mask
@@ -17,8 +17,6 @@ SAME_PX = 1.0  # of disparity, for the same surface
 ALIKE_SIGMAS = 4.0  # standard deviations of the difference of two images
 LEAST_ALIKE_DN = 3.0
 ENOUGH = 3  # other keyframes for a mean; elsewhere, noise is removed within the image
-TEMPLATE_PX = 5
-SEARCH_PX = 15
 
 
 def without_noise(keyframes: Sequence[Keyframe], geometry: ViewGeometry) -> list[Keyframe]:
@@ -58,11 +56,3 @@ def _seen_in(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> tuple[Ar
     with np.errstate(invalid="ignore"):
         is_same = (other_rho > 0) & (np.abs(seen_rho - other_rho) <= SAME_PX * geometry.rho_of_px)
     return seen_dn.astype(np.float64), np.asarray(is_same, bool)
-
-
-def denoised(image: Image, sigma_dn: float) -> Image:
-    """An image (H, W) with noise of a standard deviation, without it, by non-local means (Buades et al., 2005)."""
-    if sigma_dn == 0:
-        return image
-    smooth = cv2.fastNlMeansDenoising(image, h=sigma_dn, templateWindowSize=TEMPLATE_PX, searchWindowSize=SEARCH_PX)
-    return smooth.astype(np.uint8, copy=False)

@@ -1,6 +1,6 @@
 """Rebuilds the place of a recording from its own stereo images, for a twin in which the same things are seen."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -8,10 +8,19 @@ import numpy as np
 from vobench.analysis.conditions import RESPONSE_GAMMA
 from vobench.analysis.keyframe_depth import keyframes_of, view_geometry
 from vobench.analysis.keyframe_texture import without_noise
-from vobench.analysis.path_placement import OWN_SCALE, Placement, WantedDisparities, misfit_of, nearness_of
+from vobench.analysis.path_placement import (
+    NEAREST_COMPARED_PX,
+    NEARNESS_VIEWS,
+    OWN_SCALE,
+    TENTHS,
+    Placement,
+    WantedDisparities,
+    misfit_of,
+)
 from vobench.analysis.reconstruction import reconstruct
 from vobench.analysis.recording_part import read_shots
 from vobench.analysis.stereo_fit import StereoFit
+from vobench.analysis.stereo_matches import MatchedShot, match_shots
 from vobench.analysis.vignetting_fit import corrected, cosines, fit_photometry
 from vobench.asset.luminous_model import write_luminous_model
 from vobench.dataset.recording import Recording
@@ -33,7 +42,21 @@ COSINE_POWER = 4  # of the vignetting of strength 1
 STEP_SHARES = (0.03, 0.045, 0.06)
 MOST_KEYFRAMES = 160
 DISPARITY_QUANTILE = 0.99  # of the matches
+FEWEST_MATCHES = 30  # of an image whose disparities are compared
 BEYOND_MATCHES = 1.3  # the largest disparity that is searched, relative to that quantile
+
+
+@dataclass(frozen=True, slots=True)
+class RebuiltPlace:
+    """A place that was rebuilt from a recording.
+
+    `model` is its file, without vignetting; `vignetting` is the strength of that of the camera, as
+    `CameraSettings.vignetting`. `matched` are some of the images, spread over the path, with their stereo matches.
+    """
+
+    model: Path
+    vignetting: float
+    matched: tuple[MatchedShot, ...]
 
 
 def recorded_scene(model: Path) -> SceneFile:
@@ -50,12 +73,11 @@ def rebuild_place(
     *,
     model: Path,
     progress: Progress = SILENT,
-) -> float:
+) -> RebuiltPlace:
     """Rebuild the place of a recording from its images at `t_ns` (N,), and write its model.
 
     The model is in the world of the poses T_world_left (N, 4, 4) at which the images were taken, by the true `rig`,
-    whose nominal calibration has the errors of `fit`. The model has no vignetting; returned is the strength of that of
-    the camera, as `CameraSettings.vignetting`.
+    whose nominal calibration has the errors of `fit`.
 
     Raises InputError if the path is too long for that.
     """
@@ -72,7 +94,9 @@ def rebuild_place(
         evenly_lit = corrected(keyframes, photometry, cosine)
         smooth = without_noise(evenly_lit, geometry)
         write_luminous_model(reconstruct(smooth, geometry), model)
-    return photometry.exponent * RESPONSE_GAMMA / COSINE_POWER
+        spread = np.unique(np.linspace(0, len(shots) - 1, NEARNESS_VIEWS).astype(int))
+        matched = tuple(match_shots([shots[index] for index in spread], pair))
+    return RebuiltPlace(model, photometry.exponent * RESPONSE_GAMMA / COSINE_POWER, matched)
 
 
 def keyframe_indices(T_world_left: Array, pair: StereoPair, *, typical_disparity_px: float) -> list[int]:
@@ -107,18 +131,40 @@ def _spaced(T_world_left: Array, focal_px: float, typical_rho: float, limit_px: 
     return chosen
 
 
-def own_placement(scene: SceneFile, T_world_left: Array, pair: StereoPair, wanted: WantedDisparities) -> Placement:
+def own_placement(
+    place: RebuiltPlace, T_world_left: Array, pair: StereoPair, true_pair: StereoPair, wanted: WantedDisparities
+) -> Placement:
     """The placement of a path (N, 4, 4) in its rebuilt place, where it is.
+
+    `true_pair` is the pair by which the place was rebuilt.
 
     Raises InputError if surfaces are nearer there than in the recording, as they are if the images do not determine
     their depth.
     """
-    caster = RayCaster(triangles(build(scene, {})))
+    caster = RayCaster(triangles(build(recorded_scene(place.model), {})))
     misfit = misfit_of(caster, T_world_left, pair, 1.0, wanted)
-    nearness = nearness_of(caster, T_world_left, pair, 1.0, wanted)
+    nearness = max((_nearness(caster, matched, true_pair) for matched in place.matched), default=0.0)
     if nearness > OWN_SCALE.nearness:
         raise InputError(
             f"the place of the recording cannot be rebuilt: surfaces are {nearness:.1f} times as near as in the "
             "recording, because its images have too little light or texture; name a place by --place"
         )
     return Placement(np.eye(4), 1.0, misfit, nearness, tried=1)
+
+
+def _nearness(caster: RayCaster, matched: MatchedShot, pair: StereoPair) -> float:
+    """The larger ratio of a tenth of the disparities in a rebuilt place to that of an image, both at its matches.
+
+    0 if there are too few matches.
+    """
+    T_world_left = matched.shot.T_world_left
+    assert T_world_left is not None
+    rays = pair.left.rays(matched.left_px) @ pair.left.R_view_camera  # of depth 1, in the axes of the camera
+    origins_m = np.tile(T_world_left[:3, 3], (len(rays), 1))
+    hits = caster.hits(origins_m, rays @ T_world_left[:3, :3].T)
+    is_hit = hits.face >= 0
+    if is_hit.sum() < FEWEST_MATCHES:
+        return 0.0
+    rebuilt_px = np.quantile(pair.focal_baseline / hits.distance[is_hit], TENTHS)
+    recorded_px = np.quantile(matched.disparity_px[is_hit], TENTHS)
+    return float((rebuilt_px / np.maximum(recorded_px, NEAREST_COMPARED_PX)).max())

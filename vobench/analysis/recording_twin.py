@@ -15,7 +15,7 @@ from vobench.analysis.path_placement import Placement, WantedDisparities, levell
 from vobench.analysis.rank_agreement import Agreement, agreement, segment_errors
 from vobench.analysis.realism import Realism, all_errors, shots_of
 from vobench.analysis.realism_report import RealismReport, realism_of
-from vobench.analysis.recorded_place import RECORDED, own_placement, rebuild_place, recorded_scene
+from vobench.analysis.recorded_place import RECORDED, own_placement, rebuild_place
 from vobench.analysis.request_folder import claim
 from vobench.analysis.stereo_fit import StereoFit
 from vobench.analysis.twin_estimators import twin_estimators
@@ -256,11 +256,9 @@ def _rebuilt_places(
     for index in range(count):
         model = _numbered(out / MODEL_FILE, index).resolve()
         rig = true_rig(recorded.rig, path.calibration_error(index))
-        vignetting = rebuild_place(
-            recorded, path.t_ns, path.T_world_left, rig, path.fit, model=model, progress=progress
-        )
-        placement = own_placement(recorded_scene(model), path.T_world_left, pair, wanted_px)
-        placed.append(PlacedPath(RECORDED, None, placement, str(model), vignetting))
+        rebuilt = rebuild_place(recorded, path.t_ns, path.T_world_left, rig, path.fit, model=model, progress=progress)
+        placement = own_placement(rebuilt, path.T_world_left, pair, stereo_pair(rig, "the twin"), wanted_px)
+        placed.append(PlacedPath(RECORDED, None, placement, str(model), rebuilt.vignetting))
     return tuple(placed)
 
 
