@@ -51,7 +51,7 @@ def place_with_a_wall_at(depth_m: float, folder: Path) -> RebuiltPlace:
     wall = Surface(10 * depth_m * corners * [1, 1, 0.1], uv, np.array([[0, 2, 1], [1, 2, 3]]), view(40, 0))
     model = folder / "recorded.glb"
     write_luminous_model([wall], model)
-    return RebuiltPlace(model, 0.0, tuple(match_shots(shots_along_the_wall(3), pair())))
+    return RebuiltPlace(model, 0.0, pair(), tuple(match_shots(shots_along_the_wall(3), pair())))
 
 
 @pytest.mark.parametrize("nearness", [0.8, 1.0, 1.4, 1.6])
@@ -61,7 +61,7 @@ def test_a_rebuilt_place_that_is_too_near_is_refused(tmp_path: Path, nearness: f
     wanted = WantedDisparities.of_cells(np.full((1, 3, 3), float(DISPARITY_PX)))
     if nearness > 1.5:
         with pytest.raises(InputError, match=r"cannot be rebuilt: surfaces are 1\.6 times as near"):
-            own_placement(place, T_world_left, pair(), pair(), wanted)
+            own_placement(place, T_world_left, pair(), wanted)
     else:
-        placement = own_placement(place, T_world_left, pair(), pair(), wanted)
+        placement = own_placement(place, T_world_left, pair(), wanted)
         assert placement.nearness == pytest.approx(nearness, rel=0.03)

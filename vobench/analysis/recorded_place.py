@@ -51,11 +51,13 @@ class RebuiltPlace:
     """A place that was rebuilt from a recording.
 
     `model` is its file, without vignetting; `vignetting` is the strength of that of the camera, as
-    `CameraSettings.vignetting`. `matched` are some of the images, spread over the path, with their stereo matches.
+    `CameraSettings.vignetting`. `pair` is the true pair, by which it was rebuilt. `matched` are some of the images,
+    spread over the path, with their stereo matches by this pair.
     """
 
     model: Path
     vignetting: float
+    pair: StereoPair
     matched: tuple[MatchedShot, ...]
 
 
@@ -96,7 +98,7 @@ def rebuild_place(
         write_luminous_model(reconstruct(smooth, geometry), model)
         spread = np.unique(np.linspace(0, len(shots) - 1, NEARNESS_VIEWS).astype(int))
         matched = tuple(match_shots([shots[index] for index in spread], pair))
-    return RebuiltPlace(model, photometry.exponent * RESPONSE_GAMMA / COSINE_POWER, matched)
+    return RebuiltPlace(model, photometry.exponent * RESPONSE_GAMMA / COSINE_POWER, pair, matched)
 
 
 def keyframe_indices(T_world_left: Array, pair: StereoPair, *, typical_disparity_px: float) -> list[int]:
@@ -132,18 +134,16 @@ def _spaced(T_world_left: Array, focal_px: float, typical_rho: float, limit_px: 
 
 
 def own_placement(
-    place: RebuiltPlace, T_world_left: Array, pair: StereoPair, true_pair: StereoPair, wanted: WantedDisparities
+    place: RebuiltPlace, T_world_left: Array, nominal_pair: StereoPair, wanted: WantedDisparities
 ) -> Placement:
     """The placement of a path (N, 4, 4) in its rebuilt place, where it is.
-
-    `true_pair` is the pair by which the place was rebuilt.
 
     Raises InputError if surfaces are nearer there than in the recording, as they are if the images do not determine
     their depth.
     """
     caster = RayCaster(triangles(build(recorded_scene(place.model), {})))
-    misfit = misfit_of(caster, T_world_left, pair, 1.0, wanted)
-    nearness = max((_nearness(caster, matched, true_pair) for matched in place.matched), default=0.0)
+    misfit = misfit_of(caster, T_world_left, nominal_pair, 1.0, wanted)
+    nearness = max((_nearness(caster, matched, place.pair) for matched in place.matched), default=0.0)
     if nearness > OWN_SCALE.nearness:
         raise InputError(
             f"the place of the recording cannot be rebuilt: surfaces are {nearness:.1f} times as near as in the "

@@ -257,7 +257,7 @@ def _rebuilt_places(
         model = _numbered(out / MODEL_FILE, index).resolve()
         rig = true_rig(recorded.rig, path.calibration_error(index))
         rebuilt = rebuild_place(recorded, path.t_ns, path.T_world_left, rig, path.fit, model=model, progress=progress)
-        placement = own_placement(rebuilt, path.T_world_left, pair, stereo_pair(rig, "the twin"), wanted_px)
+        placement = own_placement(rebuilt, path.T_world_left, pair, wanted_px)
         placed.append(PlacedPath(RECORDED, None, placement, str(model), rebuilt.vignetting))
     return tuple(placed)
 
