@@ -16,6 +16,9 @@ REACH = 6  # keyframes before and after
 SAME_PX = 1.0  # of disparity, for the same surface
 ALIKE_SIGMAS = 4.0  # standard deviations of the difference of two images
 LEAST_ALIKE_DN = 3.0
+# Of the measured noise. Noise that was interpolated varies slowly, so that less is measured than there is, and what is
+# left of it can be tracked like a texture.
+REMOVED_SIGMAS = 2.0
 ENOUGH = 3  # other keyframes for a mean; elsewhere, noise is removed within the image
 
 
@@ -42,7 +45,9 @@ def _image(index: int, keyframes: Sequence[Keyframe], geometry: ViewGeometry) ->
         count += is_alike
     mean = np.rint(total / count).astype(np.uint8)
     remaining_dn, _ = noise_dn(mean)
-    return np.where(count > ENOUGH, denoised(mean, remaining_dn), denoised(own.image, sigma_dn))
+    of_keyframes = denoised(mean, REMOVED_SIGMAS * remaining_dn)
+    of_own = denoised(own.image, REMOVED_SIGMAS * sigma_dn)
+    return np.where(count > ENOUGH, of_keyframes, of_own)
 
 
 def _seen_in(own: Keyframe, other: Keyframe, geometry: ViewGeometry) -> tuple[Array, Mask]:
