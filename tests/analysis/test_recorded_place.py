@@ -1,5 +1,6 @@
 """Keyframes of the path through a place that is rebuilt."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -44,14 +45,24 @@ def test_keyframes_of_a_long_path_are_farther_apart(monkeypatch: pytest.MonkeyPa
     assert keyframe_indices(moving, pair(), typical_disparity_px=DISPARITY_PX) == [0, 2, 4, 6, 8, 10]
 
 
-def place_with_a_wall_at(depth_m: float, folder: Path) -> RebuiltPlace:
+def test_one_image_that_is_too_near_is_not_enough_to_refuse(tmp_path: Path) -> None:
+    place = place_with_a_wall_at(pair().focal_baseline / (0.8 * DISPARITY_PX), tmp_path, count=8)
+    T_world_left = np.stack([matched.shot.T_world_left for matched in place.matched])
+    wanted = WantedDisparities.of_cells(np.full((1, 3, 3), float(DISPARITY_PX)))
+    first, *others = place.matched
+    halved = replace(first, disparity_px=first.disparity_px / 2)
+    placement = own_placement(replace(place, matched=(halved, *others)), T_world_left, pair(), wanted)
+    assert placement.nearness == pytest.approx(1.6, rel=0.03)
+
+
+def place_with_a_wall_at(depth_m: float, folder: Path, *, count: int = 3) -> RebuiltPlace:
     """A place with a wall in front of the path, and images of a wall with a disparity of DISPARITY_PX."""
     corners = np.array([[-1, -1, 1], [1, -1, 1], [-1, 1, 1], [1, 1, 1]], float)
     uv = np.array([[0, 0], [1, 0], [0, 1], [1, 1]], float)
     wall = Surface(10 * depth_m * corners * [1, 1, 0.1], uv, np.array([[0, 2, 1], [1, 2, 3]]), view(40, 0))
     model = folder / "recorded.glb"
     write_luminous_model([wall], model)
-    return RebuiltPlace(model, 0.0, pair(), tuple(match_shots(shots_along_the_wall(3), pair())))
+    return RebuiltPlace(model, 0.0, pair(), tuple(match_shots(shots_along_the_wall(count), pair())))
 
 
 @pytest.mark.parametrize("nearness", [0.8, 1.0, 1.4, 1.6])

@@ -42,6 +42,7 @@ COSINE_POWER = 4  # of the vignetting of strength 1
 STEP_SHARES = (0.03, 0.045, 0.06)
 MOST_KEYFRAMES = 160
 DISPARITY_QUANTILE = 0.99  # of the matches
+TOO_NEAR_SHARE = 0.25  # of the images that are compared; a place is refused if surfaces are too near in more of them
 FEWEST_MATCHES = 30  # of an image whose disparities are compared
 BEYOND_MATCHES = 1.3  # the largest disparity that is searched, relative to that quantile
 
@@ -138,18 +139,19 @@ def own_placement(
 ) -> Placement:
     """The placement of a path (N, 4, 4) in its rebuilt place, where it is.
 
-    Raises InputError if surfaces are nearer there than in the recording, as they are if the images do not determine
-    their depth.
+    Raises InputError if surfaces are nearer there than in many images of the recording, as they are if the images do
+    not determine their depth.
     """
     caster = RayCaster(triangles(build(recorded_scene(place.model), {})))
     misfit = misfit_of(caster, T_world_left, nominal_pair, 1.0, wanted)
-    nearness = max((_nearness(caster, matched, place.pair) for matched in place.matched), default=0.0)
-    if nearness > OWN_SCALE.nearness:
+    nearness = [_nearness(caster, matched, place.pair) for matched in place.matched]
+    of_most = float(np.quantile(nearness, 1 - TOO_NEAR_SHARE))
+    if of_most > OWN_SCALE.nearness:
         raise InputError(
-            f"the place of the recording cannot be rebuilt: surfaces are {nearness:.1f} times as near as in the "
+            f"the place of the recording cannot be rebuilt: surfaces are {of_most:.1f} times as near as in the "
             "recording, because its images have too little light or texture; name a place by --place"
         )
-    return Placement(np.eye(4), 1.0, misfit, nearness, tried=1)
+    return Placement(np.eye(4), 1.0, misfit, max(nearness), tried=1)
 
 
 def _nearness(caster: RayCaster, matched: MatchedShot, pair: StereoPair) -> float:
