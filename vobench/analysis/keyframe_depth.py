@@ -29,7 +29,7 @@ CONSISTENT_PX = 1.0  # largest difference of disparities, from left to right and
 LEAST_DISPARITY_PX = 0.25  # points with less are as far away as with this
 
 NOISY_DN = 1.5  # images with more noise are matched without it
-REMOVED_SIGMAS = 1.5  # of its measured noise
+REMOVED_SIGMAS = 1.5  # of their measured noise
 
 MOST_MARGIN_SHARE = 0.25  # of the width and height, by which a view is extended on each side
 

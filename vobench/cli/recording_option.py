@@ -39,7 +39,6 @@ class RecordingOptions:
             "--topic", help="left=, right=, left_info=, right_info=, truth= or imu=NAME of a bag; can be repeated."
         ),
     ] = None
-
     frames: Annotated[
         str | None, typer.Option(metavar="A:B", help="Take only the frames from A to B - 1, as in 40:80.")
     ] = None
