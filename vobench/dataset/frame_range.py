@@ -1,15 +1,22 @@
 """Selects a part of a recording by the numbers of its frames, written as A:B."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import islice
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vobench.dataset.overlap import overlap, overlapping_imu, overlapping_truth
 from vobench.dataset.recording import Recording
 from vobench.errors import InputError
 from vobench.sequence import EncodedFrame, StereoFrame
 from vobench.trajectory.trajectory import Stamps
+
+Frame = TypeVar("Frame", StereoFrame, EncodedFrame)
+Number = TypeVar("Number", bound=np.generic)
 
 FRAME_RANGE = re.compile(r"(?P<first>\d*):(?P<end>\d*)")  # A:B, in which both numbers are optional
 
@@ -37,24 +44,10 @@ def with_frames(recording: Recording, text: str) -> Recording:
         raise InputError(f"frames {text} should be some of the recording's, which has {recording.frame_count}")
     t_ns = recording.t_ns[chosen.start : chosen.stop]
 
-    def frames() -> Iterator[StereoFrame]:
-        for index, frame in enumerate(islice(recording.frames(), chosen.start, chosen.stop)):
-            yield replace(frame, index=index)
-
-    def encoded_frames() -> Iterator[EncodedFrame]:
-        for index, frame in enumerate(islice(recording.encoded_frames(), chosen.start, chosen.stop)):
-            yield replace(frame, index=index)
-
     truth = None if recording.truth is None else overlapping_truth(recording.truth, t_ns)[0]
     imu = None if recording.imu is None else overlapping_imu(recording.imu, t_ns)[0]
-    encoders = recording.encoders
-    if encoders is not None:
-        rows = _rows(encoders[0], t_ns)
-        encoders = (encoders[0][rows], encoders[1][rows])
-    exposures = recording.exposures
-    if exposures is not None:
-        rows = _rows(exposures[0], t_ns)
-        exposures = (exposures[0][rows], exposures[1][rows])
+    encoders = None if recording.encoders is None else _overlapping(*recording.encoders, t_ns)
+    exposures = None if recording.exposures is None else _overlapping(*recording.exposures, t_ns)
 
     streams_ns = [t_ns]
     streams_ns += [stream.t_ns for stream in (truth, imu) if stream is not None]
@@ -63,8 +56,8 @@ def with_frames(recording: Recording, text: str) -> Recording:
     note = f"Of {recording.frame_count} frames, {chosen.start} to {chosen.stop - 1} were taken."
     return replace(
         recording,
-        frames=frames,
-        encoded_frames=encoded_frames,
+        frames=_part(recording.frames, chosen),
+        encoded_frames=_part(recording.encoded_frames, chosen),
         t_ns=t_ns,
         start_ns=min(int(stamps[0]) for stamps in streams_ns if len(stamps)),
         truth=truth,
@@ -75,6 +68,17 @@ def with_frames(recording: Recording, text: str) -> Recording:
     )
 
 
-def _rows(t_ns: Stamps, frames_ns: Stamps) -> slice:
-    """The rows of readings in the time of the frames, with one before and one after it."""
-    return overlap(t_ns, frames_ns) or slice(0, 0)
+def _part(frames: Callable[[], Iterator[Frame]], chosen: range) -> Callable[[], Iterator[Frame]]:
+    """The iteration over the chosen ones of frames, counted from 0."""
+
+    def chosen_frames() -> Iterator[Frame]:
+        for index, frame in enumerate(islice(frames(), chosen.start, chosen.stop)):
+            yield replace(frame, index=index)
+
+    return chosen_frames
+
+
+def _overlapping(t_ns: Stamps, values: NDArray[Number], frames_ns: Stamps) -> tuple[Stamps, NDArray[Number]]:
+    """The stamps (M,) and values (M, ...) in the time of the frames, with one before and one after it."""
+    rows = overlap(t_ns, frames_ns) or slice(0, 0)
+    return t_ns[rows], values[rows]
