@@ -4,7 +4,8 @@
     python benchmarks/severities.py runs/severities/latest [--channels]
 
 Likewise for benchmarks/severities_outdoors.yaml, with the scenarios that need open air, severities_paths.yaml, with
-those that keep a path of their own, and severities_fusion.yaml, with those of IMU and wheels.
+those that keep a path of their own, severities_lamps.yaml, with those of lamps, and severities_fusion.yaml, with those
+of IMU and wheels.
 
 For each scenario and estimator, the table has the loss (1 - score) at each severity, as the geometric mean over the
 units of the scenario that have all its severities, Spearman's correlation of severity and mean loss, the share of units
