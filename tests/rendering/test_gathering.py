@@ -10,7 +10,7 @@ from tests.rendering.rectangles import rectangle, room
 from vobench.geometry.se3 import Array
 from vobench.rendering.bake import bake
 from vobench.rendering.baked_scene import BakedScene, BakeSettings
-from vobench.rendering.gathering import Smoothing
+from vobench.rendering.gathering import RayTotals, Smoothing
 from vobench.rendering.illumination import Illumination
 from vobench.scene.light import Sun
 from vobench.scene.material import Material
@@ -43,6 +43,24 @@ def test_the_density_of_flux_in_proportion_to_area_is_even() -> None:
     density = chain(50).density(np.column_stack([5 * area_m2, 0 * area_m2]), area_m2)
     np.testing.assert_allclose(density[:, 0], 5, rtol=1e-4)
     assert (density[:, 1] == 0).all()
+
+
+def test_the_luminance_of_surfels_does_not_depend_on_the_others() -> None:
+    surfels = 200_003
+    channels = 27
+    near = RNG.random((2, surfels, channels))
+    far = RNG.random((2, surfels, channels))
+    sky = RNG.random((2, 1, surfels))
+    rounds = RNG.integers(1, 8, surfels)
+    luminance = RNG.random(channels).astype(np.float32)
+    sky_weights = RNG.random(1).astype(np.float32)
+    whole = RayTotals(near, far, sky, rounds).luminance_halves(luminance, sky_weights)
+    parts = []
+    for part in (slice(0, 777), slice(777, None)):
+        totals = RayTotals(near[:, part], far[:, part], sky[..., part], rounds[part])
+        parts.append(totals.luminance_halves(luminance, sky_weights))
+    for half, by_parts in zip(whole, zip(*parts, strict=True), strict=True):
+        assert (half == np.concatenate(by_parts, 1)).all()
 
 
 def sunlit_room() -> Scene:

@@ -169,7 +169,7 @@ class Rounds:
             standard_error,
         )
 
-    def _double_rounds(self, totals: "_Totals", rows: Rows, radiosity: Floats) -> int:
+    def _double_rounds(self, totals: "RayTotals", rows: Rows, radiosity: Floats) -> int:
         """Double the number of rounds of the surfels at rows (N,). Returns the largest number of rounds after that."""
         round_count = int(totals.rounds[rows].max())
         middles = self._middles.take(rows)
@@ -185,7 +185,7 @@ class Rounds:
 
 
 @dataclass(frozen=True, slots=True)
-class _Totals:
+class RayTotals:
     """The sums, over the rounds of rays, of the light that surfels receive. The two halves of all rays are separate.
 
     `near` and `far` (2, S, C) are the light from near and far surfels in C channels.
@@ -203,10 +203,11 @@ class _Totals:
 
         Channels are weighted by `luminance` (C,), and skies by `sky_weights` (K,).
         """
+        # Not by `@`: the sums of BLAS round differently with another number of threads.
+        near = np.einsum("hsc,c->hs", self.near, luminance)
+        far = np.einsum("hsc,c->hs", self.far, luminance)
         far_sky = np.einsum("k,hks->hs", sky_weights, self.sky)
-        near_halves = self.near @ luminance / self.rounds
-        far_halves = (self.far @ luminance + far_sky) / self.rounds
-        return near_halves, far_halves
+        return near / self.rounds, (far + far_sky) / self.rounds
 
     def means(self) -> tuple[Floats, Floats, Floats]:
         """The mean light from near and far surfels (S, C), and of the skies (K, S)."""
@@ -216,12 +217,12 @@ class _Totals:
         return near_lx, far_lx, sky_lx
 
 
-def _totals_of(halves: Sequence[Sample], radiosity: Floats) -> _Totals:
+def _totals_of(halves: Sequence[Sample], radiosity: Floats) -> RayTotals:
     """The light by the first round of rays, given its two halves and the radiosity (S, C) of surfels."""
     near = np.stack([half.near @ radiosity for half in halves])
     far = np.stack([half.far @ radiosity for half in halves])
     sky = np.stack([half.sky for half in halves])
-    return _Totals(near, far, sky, rounds=np.ones(near.shape[1], np.int64))
+    return RayTotals(near, far, sky, rounds=np.ones(near.shape[1], np.int64))
 
 
 def _relative_to(light: Floats) -> Floats:
