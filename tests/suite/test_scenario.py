@@ -197,4 +197,4 @@ def test_daily_is_balanced_over_places_indoors_and_out_by_robot_hand_and_car():
             places_of[case.scenario].add(case.variant["scene"])
     assert {len(places) for places in places_of.values()} == {2}
     biases = {case.severity: case.rig.imu.gyro.bias for case in plan.simulated if case.scenario == "imu_bias"}
-    assert biases == {1: (0.002, -0.0015, 0.002), 3: (0.018, -0.0135, 0.018)}
+    assert biases == {1: (0.02, -0.015, 0.02), 3: (0.09, -0.0675, 0.09)}
