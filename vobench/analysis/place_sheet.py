@@ -29,7 +29,7 @@ from vobench.suite.scene_spec import SceneFile
 from vobench.suite.viewpoint import COARSE_LENS, Viewpoint, around
 from vobench.suite.white import fitting_white_cd_m2, look_around
 
-COARSE = BakeSettings(spacing_m=0.06, light_rays=4, indirect_spacing_m=0.25, indirect_rays=36)
+COARSE = BakeSettings(spacing_m=0.06, indirect_spacing_m=0.25, indirect_rays=36)
 PLACE_WIDTH_PX = 340  # of the view of a place, which stands beside its plan
 PLACE_HEIGHT_PX = 224
 PLACE_COLUMNS = 4
